@@ -1,0 +1,58 @@
+# make demo · make test · make check · make bench          (make help explains)
+
+PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/installed
+DISTRIBUTIONS := -e schemas -e tag_client -e service
+PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service
+PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
+
+.PHONY: help demo test check bench install chromium clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo 'make demo     start the service and simulated tags around one anchor, print the page address'
+	@echo 'make test     install what the tests need and run them all'
+	@echo 'make check    format, lint, types, import rules, schema drift'
+	@echo 'make bench    measure, print and record'
+	@echo 'make install  the set-up alone: a virtual environment in $(VENV)'
+
+install: $(STAMP)
+
+$(STAMP): $(PYPROJECTS)
+	@test -n '$(PYTHON)' || { echo 'Dropanchor needs Python 3.11 or newer; none was found. Install one, or: make PYTHON=/path/to/python3.11 $(MAKECMDGOALS)' >&2; exit 1; }
+	@echo '== making the virtual environment $(VENV) (once)'
+	@$(PYTHON) -m venv $(VENV) || { echo 'python -m venv failed. On Debian or Ubuntu: apt-get install python3-venv' >&2; exit 1; }
+	@echo '== installing Dropanchor and what it needs (once; afterwards no network is needed)'
+	@$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	@$(BIN)/python -m pip install --quiet --constraint constraints.txt $(DISTRIBUTIONS) --group dev || \
+		{ echo 'The installation failed: is the network up? Then run the same make command again.' >&2; exit 1; }
+	@touch $@
+
+demo: install
+	@exec $(BIN)/dropanchor demo $(DEMO)
+
+chromium:
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
+		echo '== installing chromium for the browser tests'; \
+		apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || { \
+		echo 'The browser tests need Chromium: install the package chromium and run make test again.' >&2; exit 1; }
+
+test: install chromium
+	@echo '== running all tests'
+	@$(BIN)/python -m pytest $(PYTEST)
+
+check: install
+	@$(BIN)/ruff format --check .
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy $(PACKAGES) tests
+	@$(BIN)/lint-imports --no-cache
+	@$(BIN)/python -m dropanchor_schemas.export --check
+
+bench: install
+	@$(BIN)/python -m pytest tests/benchmarks -s $(PYTEST)
+
+clean:
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,46 @@
+"""Writes the JSON Schemas of the contract into `json/`, or with --check says whether they are current."""
+
+import json
+import sys
+from pathlib import Path
+
+from pydantic import BaseModel
+
+from dropanchor_schemas.pose import Pose, PoseList
+from dropanchor_schemas.samples import SamplesMessage
+from dropanchor_schemas.site import Anchor, Site, TagSettings
+
+FOLDER = Path(__file__).parent / "json"
+MODELS: dict[str, type[BaseModel]] = {
+    "samples": SamplesMessage,
+    "pose": Pose,
+    "poses": PoseList,
+    "site": Site,
+    "anchor": Anchor,
+    "tag_settings": TagSettings,
+}
+
+
+def schemas() -> dict[Path, str]:
+    """The text of every exported file, by path."""
+    return {
+        FOLDER / f"{name}.schema.json": json.dumps(model.model_json_schema(), indent=2, ensure_ascii=False) + "\n"
+        for name, model in MODELS.items()
+    }
+
+
+def main(arguments: list[str]) -> int:
+    texts = schemas()
+    if arguments == ["--check"]:
+        stale = [path.name for path, text in texts.items() if not path.exists() or path.read_text() != text]
+        if stale:
+            sys.stderr.write(f"not current: {', '.join(stale)}; run python -m dropanchor_schemas.export\n")
+        return 1 if stale else 0
+    FOLDER.mkdir(exist_ok=True)
+    for path, text in texts.items():
+        path.write_text(text)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

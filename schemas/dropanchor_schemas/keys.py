@@ -1,0 +1,82 @@
+"""Zenoh key expressions, spelled once. Standard library only: tags import this."""
+
+from urllib.parse import quote, unquote
+
+PREFIX = "dropanchor/@v1"
+MAX_ID_LENGTH = 64
+
+
+class InvalidKeyError(ValueError):
+    """An identifier or key that does not follow the contract."""
+
+
+def chunk_from_id(identifier: str) -> str:
+    """The key chunk of a site, tag or anchor id: `[A-Za-z0-9._-]` as they are, all else percent-escaped UTF-8.
+
+    Raises InvalidKeyError when the id is empty, longer than 64 characters, or holds control characters.
+    """
+    if not 0 < len(identifier) <= MAX_ID_LENGTH:
+        raise InvalidKeyError(f"an id has 1 to {MAX_ID_LENGTH} characters, this one has {len(identifier)}")
+    if not identifier.isprintable():
+        raise InvalidKeyError("an id holds printable characters only")
+    return quote(identifier, safe="").replace("~", "%7E")
+
+
+def id_from_chunk(chunk: str) -> str:
+    """The id of a key chunk. Raises InvalidKeyError unless the chunk is exactly what `chunk_from_id` makes of it."""
+    try:
+        identifier = unquote(chunk, errors="strict")
+    except UnicodeDecodeError as error:
+        raise InvalidKeyError(f"{chunk!r} is not percent-escaped UTF-8") from error
+    if chunk_from_id(identifier) != chunk:
+        raise InvalidKeyError(f"{chunk!r} is not in its one escaped form, {chunk_from_id(identifier)!r}")
+    return identifier
+
+
+def samples_key(site: str, tag: str) -> str:
+    return f"{_tag_prefix(site, tag)}/samples"
+
+
+def tag_alive_key(site: str, tag: str) -> str:
+    return f"{_tag_prefix(site, tag)}/alive"
+
+
+def pose_key(site: str, tag: str) -> str:
+    return f"{_tag_prefix(site, tag)}/pose"
+
+
+def poses_key(site: str) -> str:
+    return f"{_site_prefix(site)}/poses"
+
+
+def anchor_key(site: str, anchor: str) -> str:
+    return f"{_site_prefix(site)}/anchor/{chunk_from_id(anchor)}"
+
+
+def service_alive_key(site: str, service: str) -> str:
+    return f"{_site_prefix(site)}/service/{chunk_from_id(service)}/alive"
+
+
+def all_tags(site: str, leaf: str) -> str:
+    """The key expression that selects `leaf` ("samples", "alive" or "pose") of every tag of the site."""
+    return f"{_site_prefix(site)}/tag/*/{leaf}"
+
+
+def all_anchors(site: str) -> str:
+    return f"{_site_prefix(site)}/anchor/*"
+
+
+def tag_from_key(key: str) -> str:
+    """The tag id in a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError when the key has another form."""
+    chunks = key.split("/")
+    if len(chunks) != 6 or "/".join(chunks[:2]) != PREFIX or chunks[3] != "tag":
+        raise InvalidKeyError(f"{key!r} is not {PREFIX}/<site>/tag/<tag>/<leaf>")
+    return id_from_chunk(chunks[4])
+
+
+def _site_prefix(site: str) -> str:
+    return f"{PREFIX}/{chunk_from_id(site)}"
+
+
+def _tag_prefix(site: str, tag: str) -> str:
+    return f"{_site_prefix(site)}/tag/{chunk_from_id(tag)}"

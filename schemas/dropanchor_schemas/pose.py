@@ -1,0 +1,73 @@
+"""What the service answers: poses with their uncertainty and state."""
+
+from enum import StrEnum
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class TrackingState(StrEnum):
+    """How far a pose may be believed."""
+
+    INITIALISING = "initialising"
+    AMBIGUOUS = "ambiguous"
+    TRACKING = "tracking"
+    COASTING = "coasting"
+    DEGRADED = "degraded"
+    LOST = "lost"
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+
+class Ellipse(_Answer):
+    """The 95 % ellipse of the position."""
+
+    semi_major_m: float
+    semi_minor_m: float
+    angle_rad: float = Field(description="Direction of the major axis, counter-clockwise from east.")
+
+
+class Hypothesis(_Answer):
+    """One of the places where an ambiguous tag may be."""
+
+    weight: float = Field(ge=0, le=1)
+    x: float
+    y: float
+    heading_rad: float
+    speed_mps: float
+    ellipse_95: Ellipse | None = None
+
+
+class Pose(_Answer):
+    """The pose of one tag at one time, in the site frame (ENU, metres, x east)."""
+
+    tag: str
+    t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")
+    age_s: float = Field(description="Seconds from t_ns to the moment of the answer.")
+    state: TrackingState
+    reason: str = Field(description="Machine-readable cause of the state.")
+    hint: str = Field(description="What a human can do about it; empty when nothing is needed.")
+    x: float | None = Field(description="East, m; null while unknown.")
+    y: float | None = Field(description="North, m; null while unknown.")
+    heading_rad: float | None = Field(description="Counter-clockwise from east.")
+    speed_mps: float | None
+    yaw_rate_radps: float | None
+    covariance: list[list[float]] | None = Field(description="3 × 3, of (x, y, heading_rad).")
+    ellipse_95: Ellipse | None
+    p_mode: float | None = Field(description="Probability of the published mode; 1 − p_mode is the chance of another.")
+    sigma_pos_m: float | None = Field(description="sqrt(Pxx + Pyy), m.")
+    sigma_obs_m: float | None = Field(description="Position accuracy that the last 10 s alone can deliver, m.")
+    range_m: float | None = Field(description="Last range that was fused, m.")
+    anchor: str | None = Field(description="The anchor of that range.")
+    hypotheses: list[Hypothesis] = []
+    lat: float | None = Field(default=None, description="Degrees, where the site is georeferenced.")
+    lon: float | None = None
+    online: bool = Field(description="Whether the tag's liveliness token is present.")
+
+
+class PoseList(_Answer):
+    """Poses of many tags."""
+
+    t_ns: int = Field(description="UTC, ns: the moment of the answer.")
+    poses: list[Pose]

@@ -1,0 +1,150 @@
+"""The JSON payload of samples: one object that anything can send."""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dropanchor_schemas.wire import (
+    MAX_PAYLOAD_BYTES,
+    MAX_T_NS,
+    BearingSample,
+    Frame,
+    HeadingSample,
+    ImuSample,
+    RangeSample,
+    Reason,
+    Rejection,
+    anchor_number,
+)
+
+TimeNs = Annotated[int, Field(ge=0, lt=MAX_T_NS, description="Time of measurement, ns, on the clock of the message.")]
+AnchorId = Annotated[
+    Annotated[int, Field(ge=0, lt=2**32)] | Annotated[str, Field(min_length=1, max_length=64)],
+    Field(description='Anchor id: a number or a text. "7" and 7 name the same anchor.'),
+]
+Vector = tuple[float, float, float]
+Std = Annotated[float | None, Field(description="Standard deviation; leave it out when unknown.")]
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Imu(_Message):
+    """One IMU sample; body frame x forward, y left, z up."""
+
+    t_ns: TimeNs
+    acc: Vector = Field(description="Specific force, m/s² (at rest, level: 0, 0, +9.81).")
+    gyro: Vector = Field(description="Angular rate, rad/s.")
+    mag: Vector | None = Field(default=None, description="Magnetic field, µT; leave it out without a magnetometer.")
+
+
+class Range(_Message):
+    """One two-way range."""
+
+    t_ns: TimeNs
+    anchor: AnchorId
+    range_m: float = Field(description="Slant range, m.")
+    std_m: Std = None
+
+
+class Heading(_Message):
+    """A heading that the platform itself has (a robot, a phone)."""
+
+    t_ns: TimeNs
+    heading_rad: float = Field(description="Counter-clockwise from east, rad.")
+    std_rad: Std = None
+
+
+class Bearing(_Message):
+    """The bearing of the tag as the anchor sees it."""
+
+    t_ns: TimeNs
+    anchor: AnchorId
+    bearing_rad: float = Field(description="Counter-clockwise from east, rad.")
+    std_rad: Std = None
+
+
+class SamplesMessage(_Message):
+    """A batch of raw samples of one tag."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        json_schema_extra={
+            "examples": [
+                {"range": [{"t_ns": 1760000000000000000, "anchor": "7", "range_m": 12.34}]},
+                {
+                    "version": 1,
+                    "clock": "utc",
+                    "sequence": 41,
+                    "boot_id": 3735928559,
+                    "imu": [
+                        {
+                            "t_ns": 1760000000000000000,
+                            "acc": [0.0, 0.0, 9.81],
+                            "gyro": [0.0, 0.0, 0.1],
+                            "mag": [0.0, 20.0, -44.0],
+                        }
+                    ],
+                    "range": [{"t_ns": 1760000000010000000, "anchor": 7, "range_m": 12.34, "std_m": 0.1}],
+                },
+            ]
+        },
+    )
+
+    version: int = Field(default=1, description="Version of this schema; decoders refuse what they do not know.")
+    clock: Literal["utc", "boot"] = Field(
+        default="utc", description="utc: ns since 1970; boot: ns since the tag's start."
+    )
+    sequence: int | None = Field(default=None, ge=0, lt=2**32, description="Counts the messages of one publisher.")
+    boot_id: int | None = Field(default=None, ge=0, lt=2**32, description="Random per start of the publisher.")
+    imu: list[Imu] = []
+    range: list[Range] = []
+    heading: list[Heading] = []
+    bearing: list[Bearing] = []
+
+
+def decode_json(payload: bytes) -> Frame | Rejection:
+    """The frame of a JSON payload, or why there is none. Values are not judged here, only the form."""
+    if len(payload) == 0:
+        return Rejection(Reason.PAYLOAD_EMPTY, "the payload is empty")
+    if len(payload) > MAX_PAYLOAD_BYTES:
+        return Rejection(Reason.PAYLOAD_TOO_LARGE, f"{len(payload)} bytes, at most {MAX_PAYLOAD_BYTES}")
+    try:
+        message = SamplesMessage.model_validate_json(payload)
+    except ValidationError as error:
+        return _rejection(error)
+    if message.version != 1:
+        return Rejection(Reason.VERSION_UNKNOWN, f"version {message.version}, this decoder knows 1")
+    frame = _frame(message)
+    return frame if len(frame) else Rejection(Reason.NO_SAMPLES, "the message holds no samples")
+
+
+def _rejection(error: ValidationError) -> Rejection:
+    first = error.errors(include_input=False, include_url=False)[0]
+    if first["type"] == "json_invalid":
+        return Rejection(Reason.JSON_SYNTAX, first["msg"])
+    where = ".".join(str(part) for part in first["loc"]) or "the message"
+    return Rejection(Reason.JSON_SCHEMA, f"{where}: {first['msg']}")
+
+
+def _frame(message: SamplesMessage) -> Frame:
+    named = [s.anchor for s in message.range] + [s.anchor for s in message.bearing]
+    return Frame(
+        imu=[ImuSample(s.t_ns, s.acc, s.gyro, s.mag) for s in message.imu],
+        ranges=[RangeSample(s.t_ns, anchor_number(s.anchor), s.range_m, _std(s.std_m)) for s in message.range],
+        headings=[HeadingSample(s.t_ns, s.heading_rad, _std(s.std_rad)) for s in message.heading],
+        bearings=[
+            BearingSample(s.t_ns, anchor_number(s.anchor), s.bearing_rad, _std(s.std_rad)) for s in message.bearing
+        ],
+        sequence=message.sequence,
+        boot_id=message.boot_id,
+        boot_clock=message.clock == "boot",
+        anchor_names={anchor_number(name): name for name in named if isinstance(name, str)},
+    )
+
+
+def _std(std: float | None) -> float:
+    return math.nan if std is None else std

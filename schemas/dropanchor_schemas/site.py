@@ -1,0 +1,81 @@
+"""What an operator knows: the site, its anchors, and settings per tag."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+
+from dropanchor_schemas.wire import anchor_number
+
+Id = Annotated[str, Field(min_length=1, max_length=64)]
+Positive = Annotated[FiniteFloat, Field(gt=0)]
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Anchor(_Settings):
+    """A dropped UWB anchor. Position in the site frame, m."""
+
+    id: Id = Field(description="As the tags send it: a number in decimal, or a text.")
+    x: FiniteFloat = 0.0
+    y: FiniteFloat = 0.0
+    z: FiniteFloat = Field(default=0.0, description="Height above the plane from which tag heights are counted.")
+
+    @property
+    def number(self) -> int:
+        """The u32 of this anchor in packed payloads."""
+        return anchor_number(self.id)
+
+
+class Georeference(_Settings):
+    """Where the origin of the site frame lies on the Earth (WGS 84)."""
+
+    lat: Annotated[FiniteFloat, Field(ge=-90, le=90)]
+    lon: Annotated[FiniteFloat, Field(ge=-180, le=180)]
+    rotation_rad: FiniteFloat = Field(default=0.0, description="Direction of the x axis, counter-clockwise from east.")
+
+
+class StartPose(_Settings):
+    """Where a tag is when it is first heard."""
+
+    x: FiniteFloat
+    y: FiniteFloat
+    heading_rad: FiniteFloat | None = Field(default=None, description="Leave out when the IMU has a magnetometer.")
+    std_m: Positive = Field(default=0.1, description="Standard deviation of x and of y.")
+
+
+class TagSettings(_Settings):
+    """What an operator knows about a tag: measured range = range_scale · distance + range_bias_m."""
+
+    height_m: FiniteFloat = Field(default=0.0, description="Height of the tag's antenna, on the anchors' z axis.")
+    range_std_m: Positive | None = Field(default=None, description="Of one range; null: the engine's default.")
+    range_bias_m: FiniteFloat = 0.0
+    range_scale: Positive = 1.0
+    mount_angle_rad: FiniteFloat | None = Field(
+        default=None, description="Direction of travel minus body x axis, counter-clockwise; null: not known."
+    )
+    reverse_allowed: bool = Field(default=False, description="Whether the tag may move backwards.")
+    heading_source: Literal["auto", "imu", "platform"] = Field(
+        default="auto", description="auto: the IMU where it is sent, else the platform's heading."
+    )
+    start: StartPose | None = None
+
+
+class Site(_Settings):
+    """One site: its frame and its anchors. An empty list of anchors binds the first anchor heard to the origin."""
+
+    id: Id = "default"
+    name: str = ""
+    declination_rad: FiniteFloat = Field(default=0.0, description="True minus magnetic north, positive east.")
+    georeference: Georeference | None = None
+    anchors: list[Anchor] = []
+
+    @model_validator(mode="after")
+    def _anchors_are_distinct(self) -> "Site":
+        by_number: dict[int, str] = {}
+        for anchor in self.anchors:
+            if anchor.number in by_number:
+                raise ValueError(f"anchors {by_number[anchor.number]!r} and {anchor.id!r} share one number")
+            by_number[anchor.number] = anchor.id
+        return self

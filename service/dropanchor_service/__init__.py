@@ -1,0 +1,1 @@
+"""Live positions of a fleet of tags around one dropped UWB anchor."""

@@ -1,0 +1,153 @@
+"""The columns between an engine and the rest: samples in, poses out; one row of state per tag.
+
+Units: SI and rad; times int64 ns on one clock; the site frame is ENU with x east; the body frame is x forward,
+y left, z up. An unknown float is NaN.
+"""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+IMU = np.dtype([("row", "i4"), ("t_ns", "i8"), ("acc", "f8", 3), ("gyro", "f8", 3), ("mag", "f8", 3)])
+RANGE = np.dtype([("row", "i4"), ("t_ns", "i8"), ("anchor", "i4"), ("range", "f8"), ("std", "f8")])
+HEADING = np.dtype([("row", "i4"), ("t_ns", "i8"), ("heading", "f8"), ("std", "f8")])
+BEARING = np.dtype([("row", "i4"), ("t_ns", "i8"), ("anchor", "i4"), ("bearing", "f8"), ("std", "f8")])
+
+ANCHOR = np.dtype([("x", "f8"), ("y", "f8"), ("z", "f8")])
+
+TAG_SETTINGS = np.dtype(
+    [
+        ("height", "f8"),
+        ("range_std", "f8"),  # NaN: the engine's default
+        ("range_bias", "f8"),
+        ("range_scale", "f8"),
+        ("mount_angle", "f8"),  # NaN: not known
+        ("reverse_allowed", "?"),
+        ("heading_source", "u1"),
+        ("start_known", "?"),
+        ("start_x", "f8"),
+        ("start_y", "f8"),
+        ("start_heading", "f8"),  # NaN: not given
+        ("start_std", "f8"),
+        ("declination", "f8"),  # true minus magnetic north, positive east
+    ]
+)
+
+POSE = np.dtype(
+    [
+        ("row", "i4"),
+        ("t_ns", "i8"),
+        ("state", "u1"),
+        ("reason", "u1"),
+        ("anchor", "i4"),  # of the last range fused, -1: none
+        ("range", "f8"),  # that range, as measured
+        ("x", "f8"),
+        ("y", "f8"),
+        ("heading", "f8"),
+        ("speed", "f8"),
+        ("yaw_rate", "f8"),
+        ("cov", "f8", (3, 3)),  # of (x, y, heading)
+        ("p_mode", "f8"),
+        ("sigma_pos", "f8"),
+        ("sigma_obs", "f8"),
+    ]
+)
+
+HYPOTHESIS = np.dtype(
+    [
+        ("row", "i4"),
+        ("weight", "f8"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("heading", "f8"),
+        ("speed", "f8"),
+        ("cov", "f8", (2, 2)),  # of (x, y)
+    ]
+)
+
+
+class HeadingSource(IntEnum):
+    """AUTO: the IMU where it is sent, else the platform's heading."""
+
+    AUTO = 0
+    IMU = 1
+    PLATFORM = 2
+
+
+class State(IntEnum):
+    """Tracking state of a pose, in the order of the contract."""
+
+    INITIALISING = 0
+    AMBIGUOUS = 1
+    TRACKING = 2
+    COASTING = 3
+    DEGRADED = 4
+    LOST = 5
+
+
+class StateReason(IntEnum):
+    """The machine reason of a state."""
+
+    NO_RANGE = 0  # nothing heard yet
+    NO_HEADING = 1  # neither attitude nor platform heading yet
+    START_UNKNOWN = 2  # the engine cannot find the start by itself
+    SEVERAL_MODES = 3  # more than one place explains the data
+    RESOLVED = 4
+    RANGES_MISSING = 5
+    IMU_MISSING = 6
+    RANGES_REJECTED = 7
+    HEADING_DISTURBED = 8
+    UNCERTAIN = 9  # the ellipse has grown too large
+    FAULT = 10  # the row's numbers were not finite; it starts afresh
+
+
+@dataclass(frozen=True)
+class SampleBatch:
+    """Samples of many tags. Per row and kind in order of arrival; the engine puts kinds in order of time."""
+
+    imu: Array = field(default_factory=lambda: np.empty(0, IMU))
+    ranges: Array = field(default_factory=lambda: np.empty(0, RANGE))
+    headings: Array = field(default_factory=lambda: np.empty(0, HEADING))
+    bearings: Array = field(default_factory=lambda: np.empty(0, BEARING))
+
+
+@dataclass(frozen=True)
+class PoseBatch:
+    """poses: POSE, one for every range that was fused or refused, per row in order of time.
+
+    hypotheses: HYPOTHESIS, the modes behind the last pose of each row that is ambiguous.
+    rejected: samples that were not used, counted by reason (names of the contract).
+    """
+
+    poses: Array = field(default_factory=lambda: np.empty(0, POSE))
+    hypotheses: Array = field(default_factory=lambda: np.empty(0, HYPOTHESIS))
+    rejected: dict[str, int] = field(default_factory=dict)
+
+
+class Engine(Protocol):
+    """One estimator instance per row. Not thread-safe: one thread owns an engine."""
+
+    name: str
+
+    def set_anchors(self, anchors: Array) -> None:
+        """ANCHOR, indexed by the `anchor` columns of samples. Existing indices keep their meaning."""
+
+    def configure(self, row: int, settings: Array) -> None:
+        """Make `row` (any non-negative int, dense) with these TAG_SETTINGS (0-d), or start it afresh with new ones."""
+
+    def process(self, samples: SampleBatch) -> PoseBatch:
+        """Fuse the samples. Rows must have been configured."""
+
+
+def default_settings() -> Array:
+    """TAG_SETTINGS (0-d) of a tag about which nothing is known."""
+    settings = np.zeros((), TAG_SETTINGS)
+    settings["range_scale"] = 1.0
+    for name in ("range_std", "mount_angle", "start_x", "start_y", "start_heading", "start_std"):
+        settings[name] = np.nan
+    return settings
