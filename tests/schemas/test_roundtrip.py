@@ -21,7 +21,7 @@ def frame() -> Frame:
     return Frame(
         imu=[
             ImuSample(T, (0.5, -0.25, 9.75), (0.0, 0.125, -1.0)),
-            ImuSample(T + 10_000_000, (0, 0, 9), (0, 0, 1), (1, 2, 3)),
+            ImuSample(T + 10_000_000, (0.0, 0.0, 9.0), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0)),
         ],
         ranges=[RangeSample(T + 5_000_000, anchor_number("L0"), 12.5, 0.25)],
         headings=[HeadingSample(T + 1_000, 1.5)],
