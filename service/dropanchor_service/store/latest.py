@@ -1,0 +1,61 @@
+"""The latest pose of every tag: one array, one row per tag, written by one thread and read by any."""
+
+from threading import Lock
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, Array
+
+
+class LatestPoses:
+    """Readers get copies; the lock is held for a copy only, so no reader sees a half-written pose."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._poses = np.zeros(0, POSE)
+        self._changed = np.zeros(0, np.int64)
+        self._hypotheses: dict[int, Array] = {}
+        self._version = 0
+
+    @property
+    def version(self) -> int:
+        """Grows with every write."""
+        return self._version
+
+    def write(self, poses: Array, hypotheses: Array) -> None:
+        """Take the last pose of each row in `poses` (POSE, per row in order of time) and the modes behind them."""
+        if len(poses) == 0:
+            return
+        with self._lock:
+            self._grow(int(poses["row"].max()) + 1)
+            self._version += 1
+            # With repeated indices NumPy keeps the last assignment, which is the newest pose of the row.
+            self._poses[poses["row"]] = poses
+            self._changed[poses["row"]] = self._version
+            for row in np.unique(poses["row"]):
+                self._hypotheses.pop(int(row), None)
+            for row in np.unique(hypotheses["row"]):
+                self._hypotheses[int(row)] = hypotheses[hypotheses["row"] == row]
+
+    def row(self, row: int) -> Array | None:
+        """POSE (0-d) of one row, None before its first pose."""
+        with self._lock:
+            known = row < len(self._changed) and self._changed[row] > 0
+            return self._poses[row].copy() if known else None
+
+    def since(self, version: int = 0) -> tuple[int, Array]:
+        """The version of this answer, and POSE of every row that changed after `version`."""
+        with self._lock:
+            return self._version, self._poses[self._changed > version]
+
+    def hypotheses(self, row: int) -> Array:
+        """HYPOTHESIS behind the latest pose of the row; empty when it is not ambiguous."""
+        with self._lock:
+            return self._hypotheses.get(row, np.empty(0, HYPOTHESIS))
+
+    def _grow(self, rows: int) -> None:
+        missing = rows - len(self._poses)
+        if missing > 0:
+            spare = max(missing, len(self._poses))
+            self._poses = np.concatenate([self._poses, np.zeros(spare, POSE)])
+            self._changed = np.concatenate([self._changed, np.zeros(spare, np.int64)])
