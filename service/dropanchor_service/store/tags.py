@@ -1,30 +1,75 @@
-"""The tags that have been heard or configured, and the row that each one has."""
+"""The tags that have been heard or configured: the row of each, and what was received from it."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from threading import Lock
 
+import numpy as np
 
-@dataclass
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.estimation.batch import Array
+
+KINDS = ("imu", "range", "heading", "bearing")
+REASONS = tuple(Reason)
+
+_COUNTS = np.dtype(
+    [
+        ("first_heard_ns", "i8"),  # 0: never
+        ("last_heard_ns", "i8"),
+        ("messages", "i8"),
+        ("samples", "i8", len(KINDS)),
+        ("rejected", "u4", len(REASONS)),
+    ]
+)
+
+
+@dataclass(frozen=True)
 class Tag:
-    """One tag. Counters are written by the ingest thread only."""
+    """One tag. Its counters live in the columns of the table."""
 
     name: str
     row: int
-    first_heard_ns: int | None = None
-    last_heard_ns: int | None = None
-    online: bool = False
-    samples: Counter[str] = field(default_factory=Counter)  # by kind
-    rejected: Counter[str] = field(default_factory=Counter)  # by reason
+    table: "TagTable"
+
+    @property
+    def online(self) -> bool:
+        return self.table.is_online(self.name)
+
+    @property
+    def first_heard_ns(self) -> int | None:
+        return int(self.table.counts(self.row)["first_heard_ns"]) or None
+
+    @property
+    def last_heard_ns(self) -> int | None:
+        return int(self.table.counts(self.row)["last_heard_ns"]) or None
+
+    @property
+    def messages(self) -> int:
+        return int(self.table.counts(self.row)["messages"])
+
+    @property
+    def samples(self) -> Counter[str]:
+        """Samples that reached the engine, by kind."""
+        return _named(KINDS, self.table.counts(self.row)["samples"])
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """Messages and samples that were not used, by reason."""
+        return _named(REASONS, self.table.counts(self.row)["rejected"])
 
 
 class TagTable:
-    """Names and rows. Rows are dense, given in order of registration, and never reused."""
+    """Names and rows. Rows are dense, given in order of registration, and never reused.
+
+    Counters are written by the ingest thread only; any thread may read them.
+    """
 
     def __init__(self) -> None:
         self._lock = Lock()
         self._by_name: dict[str, Tag] = {}
         self._by_row: list[Tag] = []
+        self._counts = np.zeros(16, _COUNTS)
+        self._online: set[str] = set()
 
     def __len__(self) -> int:
         return len(self._by_row)
@@ -44,7 +89,44 @@ class TagTable:
         with self._lock:
             tag = self._by_name.get(name)
             if tag is None:
-                tag = Tag(name, len(self._by_row))
+                tag = Tag(name, len(self._by_row), self)
+                self._grow(tag.row + 1)
                 self._by_row.append(tag)
                 self._by_name[name] = tag
             return tag
+
+    def set_online(self, name: str, online: bool) -> None:
+        """A token may be seen before the tag is registered; it is remembered."""
+        (self._online.add if online else self._online.discard)(name)
+
+    def is_online(self, name: str) -> bool:
+        return name in self._online
+
+    @property
+    def online_names(self) -> int:
+        """How many names have a liveliness token, registered or not."""
+        return len(self._online)
+
+    def counts(self, row: int) -> Array:
+        return self._counts[row]  # type: ignore[no-any-return]
+
+    def count_messages(self, rows: Array, now_ns: int) -> None:
+        """One message from each of `rows` (repeated for several)."""
+        first = self._counts["first_heard_ns"]
+        first[rows[first[rows] == 0]] = now_ns
+        self._counts["last_heard_ns"][rows] = now_ns
+        np.add.at(self._counts["messages"], rows, 1)
+
+    def count_samples(self, kind: str, rows: Array) -> None:
+        np.add.at(self._counts["samples"][:, KINDS.index(kind)], rows, 1)
+
+    def count_rejected(self, reason: Reason, rows: Array) -> None:
+        np.add.at(self._counts["rejected"][:, REASONS.index(reason)], rows, 1)
+
+    def _grow(self, rows: int) -> None:
+        if rows > len(self._counts):
+            self._counts = np.concatenate([self._counts, np.zeros(len(self._counts), _COUNTS)])
+
+
+def _named(names: tuple[str, ...], counts: Array) -> Counter[str]:
+    return Counter({str(name): int(count) for name, count in zip(names, counts, strict=True) if count})

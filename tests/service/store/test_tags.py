@@ -1,0 +1,53 @@
+"""The table of tags: rows, counters, liveliness."""
+
+import numpy as np
+
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.store import TagTable
+
+
+def test_a_name_keeps_its_row_and_rows_are_dense() -> None:
+    tags = TagTable()
+    rows = [tags.register(name).row for name in ("a", "b", "a", "c")]
+    assert rows == [0, 1, 0, 2]
+    assert tags.at(2).name == "c"
+
+
+def test_repeated_rows_are_counted_each_time() -> None:
+    tags = TagTable()
+    tags.register("a"), tags.register("b")
+    tags.count_messages(np.array([1, 1, 0]), now_ns=7)
+    tags.count_messages(np.array([1]), now_ns=9)
+    tags.count_samples("imu", np.array([1, 1, 1]))
+    tags.count_rejected(Reason.RANGE_NEGATIVE, np.array([0, 0]))
+    tag = tags.at(1)
+    assert (tag.messages, tag.first_heard_ns, tag.last_heard_ns) == (3, 7, 9)
+    assert tag.samples == {"imu": 3}
+    assert tags.at(0).rejected == {"range_negative": 2}
+
+
+def test_a_tag_that_was_never_heard_has_no_times_and_empty_counters() -> None:
+    tag = TagTable().register("a")
+    assert tag.first_heard_ns is None
+    assert tag.last_heard_ns is None
+    assert not tag.samples
+    assert not tag.rejected
+
+
+def test_counters_survive_the_growth_of_the_table() -> None:
+    tags = TagTable()
+    first = tags.register("first")
+    tags.count_samples("range", np.array([0]))
+    for number in range(100):
+        tags.register(str(number))
+    tags.count_samples("range", np.array([0, 100]))
+    assert first.samples == {"range": 2}
+    assert tags.at(100).samples == {"range": 1}
+
+
+def test_a_token_seen_before_its_tag_is_remembered() -> None:
+    tags = TagTable()
+    tags.set_online("a", True)
+    assert tags.register("a").online
+    tags.set_online("a", False)
+    assert not tags.at(0).online
