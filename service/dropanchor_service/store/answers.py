@@ -1,0 +1,147 @@
+"""Rows of the store as the answers of the contract; REST, the stream and Zenoh all read here.
+
+Answers are plain dictionaries and columns that `to_json` writes: at ten thousand tags a model object per tag would
+cost more than all the rest. Unknown floats are NaN in them, null in JSON.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import orjson
+
+from dropanchor_service.estimation.batch import POSE, Array, State
+from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95
+from dropanchor_service.store.latest import LatestPoses
+from dropanchor_service.store.site import SiteStore
+from dropanchor_service.store.tags import Tag, TagTable
+
+Answer = dict[str, Any]
+
+_AMBIGUOUS = State.AMBIGUOUS.name.lower()
+
+
+def to_json(answer: Any) -> bytes:
+    """Floats in their shortest form that reads back equal; NaN and infinity as null."""
+    return orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+class Answers:
+    """Reads only; any thread may ask."""
+
+    def __init__(
+        self, site: SiteStore, tags: TagTable, latest: LatestPoses, now_ns: Callable[[], int] = time.time_ns
+    ) -> None:
+        self.site = site
+        self.tags = tags
+        self.latest = latest
+        self.now_ns = now_ns
+
+    def pose_of(self, tag: Tag) -> Answer | None:
+        """`Pose`, None before the tag's first one."""
+        row = self.latest.row(tag.row)
+        return None if row is None else self.poses_of(row[None], self.now_ns())[0]
+
+    def pose_list(self, tags: Sequence[Tag] | None = None) -> Answer:
+        """`PoseList` of these tags, or of all, as far as they have a pose."""
+        now_ns = self.now_ns()
+        return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
+
+    def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
+        """`Pose` for each of the POSE rows."""
+        columns = columns_of(poses, self.site, self.tags, now_ns)
+        answers = [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
+        for answer, row in zip(answers, poses["row"].tolist(), strict=True):
+            answer["hypotheses"] = self._hypotheses_of(row, answer["state"]) or []
+        return answers
+
+    def frame_of(self, poses: Array, now_ns: int) -> Answer:
+        """`PoseFrame` of the POSE rows: columns, for many tags many times a second."""
+        columns = columns_of(poses, self.site, self.tags, now_ns)
+        frame: Answer = {
+            "t_ns": now_ns,
+            "tags": columns.tags,
+            "online": columns.online,
+            "state": columns.states,
+            "reason": columns.reasons,
+            "hint": columns.hints,
+            "anchor": columns.anchors,
+            "age_s": np.round(columns.age_s, 3),
+        }
+        for name, field in _FRAME_FIELDS.items():
+            frame[name] = np.round(columns.poses[field], 4)
+        frame["semi_major_m"] = np.round(columns.semi_major_m, 4)
+        frame["semi_minor_m"] = np.round(columns.semi_minor_m, 4)
+        frame["angle_rad"] = np.round(columns.angle_rad, 4)
+        frame["hypotheses"] = list(map(self._hypotheses_of, poses["row"].tolist(), columns.states))
+        if columns.lat is not None and columns.lon is not None:
+            frame["lat"], frame["lon"] = np.round(columns.lat, 9), np.round(columns.lon, 9)
+        return frame
+
+    def rows(self, tags: Sequence[Tag] | None = None) -> Array:
+        """POSE of these tags, or of all, as far as they have one."""
+        if tags is None:
+            return self.latest.since()[1]
+        found = [row for row in (self.latest.row(tag.row) for tag in tags) if row is not None]
+        return np.stack(found) if found else np.empty(0, POSE)
+
+    def _hypotheses_of(self, row: int, state: str) -> list[Answer] | None:
+        """The modes of a tag that is ambiguous, None of another."""
+        return _hypotheses(self.latest.hypotheses(row)) if state == _AMBIGUOUS else None
+
+
+_FRAME_FIELDS = {
+    "x": "x",
+    "y": "y",
+    "heading_rad": "heading",
+    "speed_mps": "speed",
+    "yaw_rate_radps": "yaw_rate",
+    "range_m": "range",
+    "p_mode": "p_mode",
+    "sigma_pos_m": "sigma_pos",
+    "sigma_obs_m": "sigma_obs",
+}
+
+_POSE_NAMES = (
+    *("tag", "t_ns", "age_s", "state", "reason", "hint"),
+    *("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps"),
+    *("covariance", "ellipse_95", "p_mode", "sigma_pos_m", "sigma_obs_m", "range_m", "anchor"),
+    *("hypotheses", "lat", "lon", "online"),
+)
+
+
+def _pose_values(columns: PoseColumns) -> tuple[Sequence[Any], ...]:
+    """One sequence per name in _POSE_NAMES."""
+    poses = columns.poses
+    known = np.isfinite(poses["cov"]).all(axis=(1, 2))
+    nowhere = [None] * len(poses)
+    return (
+        *(columns.tags, poses["t_ns"].tolist(), columns.age_s.tolist(), columns.states, columns.reasons, columns.hints),
+        *(poses[field].tolist() for field in ("x", "y", "heading", "speed", "yaw_rate")),
+        [cov if finite else None for cov, finite in zip(poses["cov"].tolist(), known.tolist(), strict=True)],
+        _ellipses(columns.semi_major_m, columns.semi_minor_m, columns.angle_rad),
+        *(poses[field].tolist() for field in ("p_mode", "sigma_pos", "sigma_obs", "range")),
+        columns.anchors,
+        nowhere,
+        nowhere if columns.lat is None else columns.lat.tolist(),
+        nowhere if columns.lon is None else columns.lon.tolist(),
+        columns.online,
+    )
+
+
+def _ellipses(major: Array, minor: Array, angle: Array) -> list[Answer | None]:
+    """`Ellipse` for each, None where it is NaN."""
+    return [
+        {"semi_major_m": a, "semi_minor_m": b, "angle_rad": c} if a == a else None
+        for a, b, c in zip(major.tolist(), minor.tolist(), angle.tolist(), strict=True)
+    ]
+
+
+def _hypotheses(modes: Array) -> list[Answer]:
+    """`Hypothesis` for each HYPOTHESIS."""
+    fields = zip(*(modes[name].tolist() for name in ("weight", "x", "y", "heading", "speed")), strict=True)
+    return [
+        {"weight": weight, "x": x, "y": y, "heading_rad": heading, "speed_mps": speed, "ellipse_95": ellipse}
+        for (weight, x, y, heading, speed), ellipse in zip(fields, _ellipses(*ellipse_95(modes["cov"])), strict=True)
+    ]
