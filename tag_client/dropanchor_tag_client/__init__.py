@@ -1,1 +1,6 @@
 """A light client that publishes the raw range and IMU samples of a tag."""
+
+from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.session import ConnectError, SessionSettings
+
+__all__ = ["ConnectError", "SessionSettings", "TagClient"]

@@ -1,0 +1,69 @@
+"""Samples that wait to be sent in one message."""
+
+import math
+
+from dropanchor_schemas.wire import MAX_T_NS, BearingSample, Frame, HeadingSample, ImuSample, RangeSample, Reason
+
+Sample = ImuSample | RangeSample | HeadingSample | BearingSample
+
+# Packed payloads count microseconds in 32 bits; a message spans far less in any case.
+_MAX_SPAN_NS = 60_000_000_000
+_MAX_FLOAT32 = 3.4028234663852886e38
+
+
+class SampleBuffer:
+    """A frame in the making. Not thread-safe: its owner holds a lock."""
+
+    def __init__(self, max_samples: int) -> None:
+        self._max_samples = max_samples
+        self._frame = Frame()
+        self._first_ns = 0
+
+    def __len__(self) -> int:
+        return len(self._frame)
+
+    @property
+    def is_full(self) -> bool:
+        return len(self._frame) >= self._max_samples
+
+    def spans(self, t_ns: int) -> bool:
+        """Whether a sample of this time may join the samples that wait."""
+        return not len(self._frame) or abs(t_ns - self._first_ns) <= _MAX_SPAN_NS
+
+    def add(self, sample: Sample, anchor: int | str | None = None) -> None:
+        if not len(self._frame):
+            self._first_ns = sample.t_ns
+        match sample:
+            case ImuSample():
+                self._frame.imu.append(sample)
+            case RangeSample():
+                self._frame.ranges.append(sample)
+            case HeadingSample():
+                self._frame.headings.append(sample)
+            case BearingSample():
+                self._frame.bearings.append(sample)
+        if isinstance(anchor, str) and isinstance(sample, RangeSample | BearingSample):
+            self._frame.anchor_names[sample.anchor] = anchor
+
+    def take(self) -> Frame:
+        """The samples that waited; afterwards none wait."""
+        frame, self._frame = self._frame, Frame()
+        return frame
+
+
+def unsendable(sample: Sample) -> Reason | None:
+    """Why a payload cannot hold this sample; None when it can. A standard deviation of NaN means unknown."""
+    if not 0 <= sample.t_ns < MAX_T_NS:
+        return Reason.TIME_OUT_OF_RANGE
+    match sample:
+        case ImuSample():
+            values, std = (*sample.acc, *sample.gyro, *(sample.mag or ())), math.nan
+        case RangeSample():
+            values, std = (sample.range_m,), sample.std_m
+        case HeadingSample():
+            values, std = (sample.heading_rad,), sample.std_rad
+        case BearingSample():
+            values, std = (sample.bearing_rad,), sample.std_rad
+    if not all(abs(value) <= _MAX_FLOAT32 for value in values):
+        return Reason.NOT_FINITE
+    return Reason.STD_INVALID if abs(std) > _MAX_FLOAT32 else None

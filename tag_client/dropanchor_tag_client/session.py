@@ -1,0 +1,124 @@
+"""The Zenoh session of a tag: who to connect to, how to prove who we are, and what not to leave at its default."""
+
+import json
+import logging
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+DEFAULT_CONNECT = "tcp/127.0.0.1:7447"
+_PROTOCOLS = ("tcp", "tls", "quic", "udp", "ws", "unixsock-stream")
+_ATTEMPT_S = 5.0
+
+_log = logging.getLogger(__name__)
+
+
+class ConnectError(Exception):
+    """The router could not be reached in the time given, or it refused us; Zenoh does not say which."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionSettings:
+    """How to reach the router.
+
+    connect: Zenoh endpoint, `tcp/host:port`, or `tls/host:port` with `ca` (and `cert`, `key` where the router asks
+    for certificates of its clients). Files are PEM. user, password: where the router asks for them.
+    thin_link: small send buffers, so that a link too thin for the data delivers fewer but younger samples.
+    Raises ValueError for settings that cannot work.
+    """
+
+    connect: str = DEFAULT_CONNECT
+    ca: str | Path | None = None
+    cert: str | Path | None = None
+    key: str | Path | None = None
+    user: str | None = None
+    password: str | None = field(default=None, repr=False)
+    thin_link: bool = False
+
+    def __post_init__(self) -> None:
+        protocol, slash, address = self.connect.partition("/")
+        if protocol not in _PROTOCOLS or not slash or not address:
+            raise ValueError(f"connect is {self.connect!r}; an endpoint such as {DEFAULT_CONNECT} was expected")
+        if (self.cert is None) != (self.key is None):
+            raise ValueError("cert and key go together: give both or neither")
+        if (self.user is None) != (self.password is None):
+            raise ValueError("user and password go together: give both or neither")
+        for name, path in (("ca", self.ca), ("cert", self.cert), ("key", self.key)):
+            if path is not None and protocol not in ("tls", "quic"):
+                raise ValueError(f"{name} is given, but {self.connect} is not a tls/ or quic/ endpoint")
+            if path is not None and not Path(path).is_file():
+                raise ValueError(f"{name}: there is no file {path}")
+
+
+def open_session(settings: SessionSettings, timeout_s: float | None = None) -> zenoh.Session:
+    """A session that is connected, and that reconnects by itself for ever.
+
+    Tries for `timeout_s`, or for ever with a line in the log every few seconds; raises ConnectError.
+    """
+    deadline = None if timeout_s is None else time.monotonic() + timeout_s
+    while True:
+        left_s = _ATTEMPT_S if deadline is None else min(_ATTEMPT_S, deadline - time.monotonic())
+        try:
+            return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration(settings, left_s))))
+        except zenoh.ZError as error:
+            if deadline is not None and time.monotonic() + 0.01 >= deadline:
+                raise ConnectError(_what_to_check(settings)) from error
+            _log.warning("%s Still trying.", _what_to_check(settings))
+            time.sleep(0.1)
+
+
+def configuration(settings: SessionSettings, attempt_s: float = _ATTEMPT_S) -> dict[str, Any]:
+    """The Zenoh configuration (client mode)."""
+    return {
+        "mode": "client",
+        "connect": {
+            "endpoints": [settings.connect],
+            # An endless attempt inside Zenoh could not be interrupted; a finite one still reconnects for ever.
+            "timeout_ms": max(1, round(attempt_s * 1000)),
+            "exit_on_failure": True,
+            "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
+        },
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {
+            "shared_memory": {"enabled": False},
+            "link": _link(settings),
+            "auth": {"usrpwd": {"user": settings.user, "password": settings.password}} if settings.user else {},
+        },
+    }
+
+
+def _link(settings: SessionSettings) -> dict[str, Any]:
+    link: dict[str, Any] = {"tx": {"lease": 4000, "keep_alive": 4}, "rx": {"max_message_size": 2**20}}
+    if settings.thin_link:
+        link["tx"]["batch_size"] = 4096
+        link["tcp"] = {"so_sndbuf": 8192}
+    if settings.ca is not None or settings.cert is not None:
+        link["tls"] = _tls(settings)
+    return link
+
+
+def _tls(settings: SessionSettings) -> dict[str, Any]:
+    tls: dict[str, Any] = {"verify_name_on_connect": True, "close_link_on_expiration": True}
+    if settings.ca is not None:
+        tls["root_ca_certificate"] = str(settings.ca)
+    if settings.cert is not None:
+        tls |= {
+            "enable_mtls": True,
+            "connect_certificate": str(settings.cert),
+            "connect_private_key": str(settings.key),
+        }
+    return tls
+
+
+def _what_to_check(settings: SessionSettings) -> str:
+    checks = ["the address", "that the router runs"]
+    if settings.connect.startswith(("tls/", "quic/")):
+        checks.append("the certificates")
+    if settings.user is not None:
+        checks.append("user and password")
+    else:
+        checks.append("whether the router wants a certificate or a password")
+    return f"Cannot connect to {settings.connect}: check {', '.join(checks[:-1])} and {checks[-1]}."

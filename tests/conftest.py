@@ -1,0 +1,15 @@
+"""Fixtures that every part of the suite may use."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from support.zenoh_router import free_endpoint, running_router
+
+
+@pytest.fixture
+def router_endpoint() -> Iterator[str]:
+    """The endpoint of a Zenoh router that runs as long as the test."""
+    endpoint = free_endpoint()
+    with running_router(endpoint):
+        yield endpoint

@@ -1,0 +1,69 @@
+"""Real Zenoh routers on loopback, for tests."""
+
+import json
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import zenoh
+
+_ROUTER_PROGRAM = """
+import sys, zenoh
+with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
+    print("up", flush=True)
+    sys.stdin.read()
+"""
+
+
+def free_port() -> int:
+    """A port on loopback that nobody uses at this moment."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def free_endpoint() -> str:
+    return f"tcp/127.0.0.1:{free_port()}"
+
+
+def configuration(mode: str, endpoint: str, extra: dict[str, Any] | None = None) -> str:
+    """JSON5 of a router that listens at the endpoint, or of a client that connects to it."""
+    role = {"listen": {"endpoints": [endpoint]}} if mode == "router" else {"connect": {"endpoints": [endpoint]}}
+    quiet = {"scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}}}
+    transport = {"shared_memory": {"enabled": False}, **(extra or {})}
+    return json.dumps({"mode": mode, **role, **quiet, "transport": transport})
+
+
+@contextmanager
+def running_router(endpoint: str, extra: dict[str, Any] | None = None) -> Iterator[zenoh.Session]:
+    """A router inside this process, closed at the end. `extra` goes into its transport section."""
+    with zenoh.open(zenoh.Config.from_json5(configuration("router", endpoint, extra))) as session:
+        yield session
+
+
+@contextmanager
+def connected_session(endpoint: str) -> Iterator[zenoh.Session]:
+    """A client session, closed at the end."""
+    with zenoh.open(zenoh.Config.from_json5(configuration("client", endpoint))) as session:
+        yield session
+
+
+def start_router_process(endpoint: str) -> subprocess.Popen[str]:
+    """A router in a process of its own, so that it can be killed. The caller ends it."""
+    command = [sys.executable, "-c", _ROUTER_PROGRAM, configuration("router", endpoint)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "up\n", "the router did not start"
+    return process
+
+
+def wait_until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
+    """Returns when the condition holds; fails the test when it does not come true in time."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, f"not within {timeout_s} s"
+        time.sleep(0.005)

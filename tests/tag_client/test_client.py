@@ -1,0 +1,243 @@
+"""A tag client beside a real router: what it publishes arrives, whole and in order."""
+
+import logging
+import math
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+import pytest
+import zenoh
+
+from dropanchor_schemas import decode_json, keys
+from dropanchor_schemas.wire import ENCODING_PACKED, Frame, Reason, anchor_number, decode_packed
+from dropanchor_tag_client import ConnectError, SessionSettings, TagClient
+from support.zenoh_router import connected_session, free_endpoint, running_router, wait_until
+
+T = 1_760_000_000_000_000_000
+
+
+class Heard:
+    """The frames that a subscriber receives."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.keys: list[str] = []
+
+    def take(self, message: zenoh.Sample) -> None:
+        packed = str(message.encoding) == ENCODING_PACKED
+        frame = (decode_packed if packed else decode_json)(bytes(message.payload))
+        assert isinstance(frame, Frame), frame
+        self.frames.append(frame)
+        self.keys.append(str(message.key_expr))
+
+    def ranges(self) -> list[float]:
+        return [sample.range_m for frame in self.frames for sample in frame.ranges]
+
+
+@contextmanager
+def listening(endpoint: str, site: str = "default") -> Iterator[Heard]:
+    heard = Heard()
+    everything = keys.all_tags(site, "samples")
+    with connected_session(endpoint) as session, session.declare_subscriber(everything, heard.take):
+        list(session.get("nobody/answers", timeout=1.0))  # a round trip: the router knows of the subscription
+        yield heard
+
+
+@pytest.mark.parametrize("encoding", ["packed", "json"])
+def test_every_kind_of_sample_arrives_in_either_encoding(
+    router_endpoint: str, encoding: Literal["packed", "json"]
+) -> None:
+    with listening(router_endpoint) as heard:
+        with TagClient("tag 1", connect=router_endpoint, encoding=encoding) as tag:
+            tag.publish_range("L0", 2.5, t_ns=T, std_m=0.25)
+            tag.publish_imu((0.5, 0.25, 9.75), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), t_ns=T + 1000)
+            tag.publish_heading(1.5, t_ns=T + 2000)
+            tag.publish_bearing(7, -0.5, t_ns=T + 3000, std_rad=0.125)
+        wait_until(lambda: heard.frames)
+    (frame,) = heard.frames
+    assert heard.keys == ["dropanchor/@v1/default/tag/tag%201/samples"]
+    assert frame.ranges == [(T, anchor_number("L0"), 2.5, 0.25)]
+    assert frame.imu == [(T + 1000, (0.5, 0.25, 9.75), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0))]
+    assert frame.headings[0][:2] == (T + 2000, 1.5)
+    assert math.isnan(frame.headings[0].std_rad)
+    assert frame.bearings == [(T + 3000, 7, -0.5, 0.125)]
+    assert (frame.sequence, frame.boot_id, frame.boot_clock) == (0, tag.boot_id, False)
+    assert frame.anchor_names == ({} if encoding == "packed" else {anchor_number("L0"): "L0"})
+
+
+def test_a_full_batch_leaves_at_once_and_messages_are_numbered(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard:
+        with TagClient("a", connect=router_endpoint, batch_samples=5, batch_s=None) as tag:
+            for i in range(12):
+                tag.publish_range(1, float(i), t_ns=T + i)
+            wait_until(lambda: len(heard.frames) == 2)
+        wait_until(lambda: len(heard.frames) == 3)
+    assert [len(frame) for frame in heard.frames] == [5, 5, 2]
+    assert [frame.sequence for frame in heard.frames] == [0, 1, 2]
+    assert heard.ranges() == [float(i) for i in range(12)]
+    assert tag.sent[:2] == (12, 3)
+
+
+def test_a_lonely_sample_leaves_when_its_time_is_up(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard, TagClient("a", connect=router_endpoint, batch_s=0.05) as tag:
+        tag.publish_range(1, 1.0)
+        wait_until(lambda: heard.ranges() == [1.0], timeout_s=3.0)
+        tag.publish_range(1, 2.0)
+        wait_until(lambda: heard.ranges() == [1.0, 2.0], timeout_s=3.0)
+
+
+def test_flush_sends_what_waits(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard, TagClient("a", connect=router_endpoint, batch_s=None) as tag:
+        tag.publish_range(1, 1.0)
+        tag.flush()
+        wait_until(lambda: heard.ranges() == [1.0])
+
+
+def test_samples_too_far_apart_for_one_message_go_in_two(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard:
+        with TagClient("a", connect=router_endpoint, batch_s=None) as tag:
+            for hour in range(3):
+                tag.publish_range(1, float(hour), t_ns=T + hour * 3_600_000_000_000)
+        wait_until(lambda: len(heard.frames) == 3)
+    assert [frame.ranges[0].t_ns - T for frame in heard.frames] == [hour * 3_600_000_000_000 for hour in range(3)]
+
+
+def test_many_threads_may_publish_through_one_client(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard:
+        with TagClient("a", connect=router_endpoint, batch_samples=7, batch_s=0.001) as tag:
+
+            def publish(worker: int) -> None:
+                for i in range(100):
+                    tag.publish_range(worker, float(i))
+
+            workers = [threading.Thread(target=publish, args=(n,)) for n in range(8)]
+            for worker in workers:
+                worker.start()
+            for worker in workers:
+                worker.join()
+        wait_until(lambda: len(heard.ranges()) == 800)
+    assert [frame.sequence for frame in heard.frames] == list(range(len(heard.frames)))
+    for n in range(8):
+        own = [s.range_m for frame in heard.frames for s in frame.ranges if s.anchor == n]
+        assert own == [float(i) for i in range(100)]
+
+
+def test_several_tags_share_a_session_that_stays_open(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard, connected_session(router_endpoint) as session:
+        with TagClient("a", connect=session) as a, TagClient("b", connect=session, cache_messages=0) as b:
+            a.publish_range(1, 1.0)
+            b.publish_range(1, 2.0)
+        wait_until(lambda: sorted(heard.ranges()) == [1.0, 2.0])
+        assert not session.is_closed()
+    assert a.boot_id != b.boot_id
+    assert sorted(heard.keys) == [keys.samples_key("default", "a"), keys.samples_key("default", "b")]
+
+
+def test_the_liveliness_token_lives_as_long_as_the_client(router_endpoint: str) -> None:
+    def alive() -> list[str]:
+        replies = session.liveliness().get(keys.all_tags("yard", "alive"), timeout=2.0)
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
+    with connected_session(router_endpoint) as session:
+        with TagClient("a", site="yard", connect=router_endpoint):
+            wait_until(lambda: alive() == ["dropanchor/@v1/yard/tag/a/alive"])
+        wait_until(lambda: alive() == [])
+
+
+def test_a_boot_clock_counts_from_the_start_of_the_machine(router_endpoint: str) -> None:
+    with listening(router_endpoint) as heard:
+        before_ns = time.monotonic_ns()
+        with TagClient("a", connect=router_endpoint, clock="boot") as tag:
+            tag.publish_range(1, 1.0)
+        wait_until(lambda: heard.frames)
+    assert heard.frames[0].boot_clock
+    assert before_ns <= heard.frames[0].ranges[0].t_ns <= time.monotonic_ns()
+
+
+@pytest.mark.parametrize("encoding", ["packed", "json"])
+def test_what_a_payload_cannot_hold_is_counted_and_the_rest_is_sent(
+    router_endpoint: str, encoding: Literal["packed", "json"], caplog: pytest.LogCaptureFixture
+) -> None:
+    with listening(router_endpoint) as heard:
+        with TagClient("a", connect=router_endpoint, encoding=encoding) as tag:
+            for bad in (math.nan, math.inf, -math.inf, 1e39):
+                tag.publish_range(1, bad)
+                tag.publish_imu((0.0, bad, 0.0), (0.0, 0.0, 0.0))
+            tag.publish_range(1, 2.0, t_ns=-1)
+            tag.publish_range(1, 2.0, t_ns=2**62)
+            tag.publish_heading(0.0, std_rad=math.inf)
+            tag.publish_range(1, 3.0)
+        wait_until(lambda: heard.ranges() == [3.0])
+    assert tag.refused == {Reason.NOT_FINITE: 8, Reason.TIME_OUT_OF_RANGE: 2, Reason.STD_INVALID: 1}
+    assert len(caplog.records) == 3
+
+
+def test_mistakes_of_the_caller_are_errors(router_endpoint: str) -> None:
+    with TagClient("a", connect=router_endpoint) as tag:
+        with pytest.raises(ValueError, match="acc has three components, not 2"):
+            tag.publish_imu((0.0, 0.0), (0.0, 0.0, 0.0))
+        with pytest.raises(ValueError, match="not empty"):
+            tag.publish_range("", 1.0)
+        with pytest.raises(ValueError, match="at most 64 characters"):
+            tag.publish_range("x" * 65, 1.0)
+        with pytest.raises(ValueError, match="between 0"):
+            tag.publish_range(-1, 1.0)
+        with pytest.raises(RuntimeError, match="is open already"):
+            tag.open()
+    with pytest.raises(RuntimeError, match="is not open"):
+        tag.publish_range(1, 1.0)
+    tag.close()
+    with pytest.raises(ValueError, match="batch_samples is 0"):
+        TagClient("a", batch_samples=0)
+    with pytest.raises(keys.InvalidKeyError):
+        TagClient("")
+
+
+def test_a_router_that_is_not_there_is_a_clear_error_in_the_time_given() -> None:
+    endpoint = free_endpoint()
+    began = time.monotonic()
+    with pytest.raises(ConnectError, match=f"Cannot connect to {endpoint}: check the address"):
+        TagClient("a", connect=endpoint, connect_timeout_s=0.3).open()
+    assert time.monotonic() - began < 3.0
+
+
+def test_a_client_waits_for_a_router_that_comes_later(caplog: pytest.LogCaptureFixture) -> None:
+    endpoint = free_endpoint()
+    opened = threading.Event()
+    leave = threading.Event()
+
+    def run() -> None:
+        with TagClient("a", connect=endpoint):
+            opened.set()
+            leave.wait(10.0)
+
+    caplog.set_level(logging.WARNING)
+    thread = threading.Thread(target=run)
+    thread.start()
+    time.sleep(0.3)
+    assert not opened.is_set()
+    with running_router(endpoint):
+        assert opened.wait(10.0)
+        leave.set()
+        thread.join()
+
+
+def test_a_name_and_password_open_the_door_and_a_wrong_one_does_not(tmp_path: Path) -> None:
+    users = tmp_path / "users.txt"
+    users.write_text("tag-a:secret\n")
+    endpoint = free_endpoint()
+    auth = {"auth": {"usrpwd": {"user": "router", "password": "r", "dictionary_file": str(users)}}}
+    with running_router(endpoint, auth):
+        good = SessionSettings(connect=endpoint, user="tag-a", password="secret")
+        with TagClient("a", connect=good, connect_timeout_s=5.0) as tag:
+            tag.publish_range(1, 1.0)
+        wrong = SessionSettings(connect=endpoint, user="tag-a", password="guess")
+        with pytest.raises(ConnectError, match="user and password"):
+            TagClient("a", connect=wrong, connect_timeout_s=0.5).open()
+        with pytest.raises(ConnectError, match="wants a certificate or a password"):
+            TagClient("a", connect=endpoint, connect_timeout_s=0.5).open()
+    assert "guess" not in repr(wrong)
