@@ -69,18 +69,18 @@ def _kept(samples: Array, messages: Array, checks: Iterable[Check], rejected: li
 
 def _imu_checks(imu: Array) -> Sequence[Check]:
     no_mag: Array = np.isnan(imu["mag"]).all(axis=1)
-    small = _inside(imu["acc"], ACC_LIMIT) & _inside(imu["gyro"], GYRO_LIMIT)
-    small &= no_mag | _inside(imu["mag"], MAG_LIMIT)
+    in_field: Array = no_mag | _inside(imu["mag"], MAG_LIMIT)
+    small = _inside(imu["acc"], ACC_LIMIT) & _inside(imu["gyro"], GYRO_LIMIT) & in_field
     if small.all():
         return ()
-    finite = np.isfinite(imu["acc"]).all(axis=1) & np.isfinite(imu["gyro"]).all(axis=1)
-    finite &= no_mag | np.isfinite(imu["mag"]).all(axis=1)
+    finite: Array = no_mag | np.isfinite(imu["mag"]).all(axis=1)
+    finite &= np.isfinite(imu["acc"]).all(axis=1) & np.isfinite(imu["gyro"]).all(axis=1)
     return (Reason.NOT_FINITE, ~finite), (Reason.IMU_ABSURD, ~small)
 
 
 def _inside(vectors: Array, limit: float) -> Array:
     """False for NaN too."""
-    inside: Array = (np.abs(vectors) <= limit).all(axis=1)
+    inside: Array = np.logical_and.reduce(np.abs(vectors) <= limit, axis=1)
     return inside
 
 

@@ -1,0 +1,47 @@
+"""Builds the chosen engine, and turns what an operator knows into its columns."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from dropanchor_schemas.site import Anchor, TagSettings
+from dropanchor_service.estimation.batch import ANCHOR, Array, Engine, HeadingSource, default_settings
+from dropanchor_service.settings import Settings
+
+
+def create_engine(settings: Settings) -> Engine:
+    """Each engine is imported when it is chosen: filterpy alone costs seconds."""
+    match settings.engine:
+        case "paper":
+            from dropanchor_service.estimation.paper import PaperEngine
+
+            return PaperEngine(settings.paper.values())
+
+
+def anchor_columns(anchors: Sequence[Anchor]) -> Array:
+    """ANCHOR, one per anchor."""
+    return np.array([(anchor.x, anchor.y, anchor.z) for anchor in anchors], ANCHOR)
+
+
+def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
+    """TAG_SETTINGS (0-d)."""
+    columns = default_settings()
+    columns["height"] = tag.height_m
+    columns["range_std"] = _or_nan(tag.range_std_m)
+    columns["range_bias"] = tag.range_bias_m
+    columns["range_scale"] = tag.range_scale
+    columns["mount_angle"] = _or_nan(tag.mount_angle_rad)
+    columns["reverse_allowed"] = tag.reverse_allowed
+    columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
+    columns["declination"] = declination_rad
+    if tag.start is not None:
+        columns["start_known"] = True
+        columns["start_x"], columns["start_y"] = tag.start.x, tag.start.y
+        columns["start_heading"] = _or_nan(tag.start.heading_rad)
+        columns["start_std"] = tag.start.std_m
+    return columns
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value

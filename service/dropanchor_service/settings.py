@@ -1,0 +1,129 @@
+"""The settings of the service. `settings_sources` reads them; they are built once and passed down."""
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.site import Site, TagSettings
+from dropanchor_service.estimation.attitude import AttitudeParameters
+from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
+
+
+def _is_endpoint(text: str) -> str:
+    protocol, _, address = text.partition("/")
+    if not protocol.isalnum() or ":" not in address or " " in text:
+        raise ValueError("an endpoint such as tcp/127.0.0.1:7447 was expected")
+    return text
+
+
+def _is_tag_id(name: str) -> str:
+    try:
+        chunk_from_id(name)
+    except InvalidKeyError as error:
+        raise ValueError(str(error)) from error
+    return name
+
+
+def _as_list(value: Any) -> Any:
+    """One endpoint, or several with commas between: what fits into an environment variable."""
+    return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
+
+
+Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_is_endpoint)], ...], BeforeValidator(_as_list)]
+TagId = Annotated[str, AfterValidator(_is_tag_id)]
+Parameters = TypeVar("Parameters", PaperParameters, AttitudeParameters)
+Port = Annotated[int, Field(ge=0, le=65535)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class HttpSettings(_Section):
+    """Where the page and the REST interface are served."""
+
+    host: str = Field(default="127.0.0.1", min_length=1)
+    port: Port = Field(default=8080, description="0: any free port.")
+
+
+class ZenohSettings(_Section):
+    """Either a router of our own that listens, or a session that connects to one."""
+
+    listen: Endpoints = ("tcp/127.0.0.1:7447",)
+    connect: Endpoints = Field(default=(), description="Endpoints of a router; then `listen` is not used.")
+    config_file: Path | None = Field(default=None, description="A Zenoh configuration (JSON5): TLS, access control.")
+
+
+class IngestSettings(_Section):
+    """How samples come in."""
+
+    period_ms: Annotated[float, Field(gt=0, le=1000)] = Field(
+        default=5.0, description="Samples are gathered for so long before they are fused together."
+    )
+    buffer_mib: Annotated[float, Field(gt=0, le=4096)] = Field(
+        default=32.0, description="Messages that may wait; beyond it the oldest of the busiest tags are shed."
+    )
+
+
+class PaperSettings(_Section):
+    """Parameters of the engine `paper`; names, units and sources stand in `estimation/paper_parameters.py`."""
+
+    preset: Literal["published", "tuned"] = Field(
+        default="published", description="The paper's and its authors' values, or ours for realistic noise."
+    )
+    parameters: dict[str, float] = Field(default={}, description="Single parameters that differ from the preset.")
+    attitude: dict[str, float] = Field(default={}, description="The same for the attitude filter.")
+
+    @model_validator(mode="after")
+    def _parameters_exist(self) -> "PaperSettings":
+        self.values()
+        return self
+
+    def values(self) -> PaperParameters:
+        """Raises ValueError for a name that is no parameter."""
+        preset = {"published": PaperParameters(), "tuned": TUNED}[self.preset]
+        attitude = _replaced(preset.attitude, self.attitude)
+        return replace(_replaced(preset, self.parameters), attitude=attitude)
+
+
+def _replaced(preset: Parameters, changes: Mapping[str, float]) -> Parameters:
+    numbers = {
+        f.name: type(getattr(preset, f.name))
+        for f in fields(preset)
+        if isinstance(getattr(preset, f.name), int | float)
+    }
+    for name in changes:
+        if name not in numbers:
+            close = difflib.get_close_matches(name, numbers, 1)
+            raise ValueError(f"{name} is not a parameter" + (f"; did you mean {close[0]}?" if close else ""))
+    return replace(preset, **{name: numbers[name](value) for name, value in changes.items()})
+
+
+class Settings(_Section):
+    """Everything that can be set. Built once, at the start, and passed down."""
+
+    engine: Literal["paper"] = Field(default="paper", description="The estimator.")
+    data_dir: Path | None = Field(
+        default=None, description="Where changes made over REST are kept; without it a restart forgets them."
+    )
+    unknown_tags: Literal["accept", "refuse"] = Field(
+        default="accept", description="Whether a tag that is not listed here is registered when it is heard."
+    )
+    max_tags: Annotated[int, Field(ge=1, le=1_000_000)] = 20_000
+    http: HttpSettings = HttpSettings()
+    zenoh: ZenohSettings = ZenohSettings()
+    ingest: IngestSettings = IngestSettings()
+    site: Site = Site()
+    tags: dict[TagId, TagSettings] = {}
+    paper: PaperSettings = PaperSettings()
+
+    @model_validator(mode="after")
+    def _listed_tags_fit(self) -> "Settings":
+        if len(self.tags) > self.max_tags:
+            raise ValueError(f"max_tags is {self.max_tags}, but {len(self.tags)} tags are listed")
+        return self

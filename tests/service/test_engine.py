@@ -1,0 +1,33 @@
+"""What an operator knows, as columns of an engine."""
+
+import math
+
+from dropanchor_schemas import Anchor, StartPose, TagSettings
+from dropanchor_service.engine import anchor_columns, create_engine, tag_columns
+from dropanchor_service.estimation.batch import HeadingSource
+from dropanchor_service.settings_sources import load_settings
+
+
+def test_settings_of_a_tag_become_columns_and_what_is_not_known_nan() -> None:
+    start = StartPose(x=1.0, y=2.0)
+    columns = tag_columns(TagSettings(height_m=1.5, heading_source="platform", start=start), declination_rad=0.1)
+    assert columns["height"] == 1.5
+    assert columns["heading_source"] == HeadingSource.PLATFORM
+    assert columns["declination"] == 0.1
+    assert [columns[name].item() for name in ("start_known", "start_x", "start_y")] == [True, 1.0, 2.0]
+    assert all(math.isnan(columns[name]) for name in ("range_std", "mount_angle", "start_heading"))
+
+
+def test_no_start_is_not_a_start_at_the_origin() -> None:
+    columns = tag_columns(TagSettings(), 0.0)
+    assert not columns["start_known"]
+    assert math.isnan(columns["start_x"])
+
+
+def test_anchors_keep_their_order() -> None:
+    assert anchor_columns([Anchor(id="1", x=1.0), Anchor(id="2", z=3.0)]).tolist() == [(1.0, 0.0, 0.0), (0.0, 0.0, 3.0)]
+    assert len(anchor_columns([])) == 0
+
+
+def test_the_chosen_engine_is_built() -> None:
+    assert create_engine(load_settings(environment={"DROPANCHOR_ENGINE": "paper"})).name == "paper"
