@@ -1,0 +1,196 @@
+"""`dropanchor replay`: an engine on a recording, with a report where the recording knows the truth."""
+
+import argparse
+import csv
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from pydantic import ValidationError
+from tqdm import tqdm
+
+from dropanchor_schemas.site import StartPose, TagSettings
+from dropanchor_service.engine import create_engine, tag_columns
+from dropanchor_service.estimation.batch import State
+from dropanchor_service.evaluation.accuracy import Accuracy, accuracy, share_of_time
+from dropanchor_service.evaluation.replay import Samples, Track, anchors_of, replay, samples_of, track_of, truth_of
+from dropanchor_service.evaluation.track_plot import plot_track
+from dropanchor_service.settings_sources import SettingsError, load_settings
+from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
+
+HELP = "run an engine on a recording, offline"
+DESCRIPTION = """\
+Runs the same engine as the service on a recording, as fast as it can, and reports the error where the recording
+brings the truth. A recording is a folder with range.csv and anchors.csv, and imu.csv, heading.csv and truth.csv where
+there are any (plain or gzipped). x and y are in the coordinates of anchors.csv.
+"""
+EPILOG = """\
+examples:
+  dropanchor replay recordings/yard --anchor 7 --start=10,0,1.57
+  dropanchor replay recordings/yard --anchor 7 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
+  dropanchor-tag simulate --out recordings/yard      makes a recording with truth to try it on
+"""
+COLUMNS = ("t_s", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("recording", type=Path, metavar="RECORDING", help="folder of the recording")
+    add(
+        "--anchor",
+        action="append",
+        metavar="ID",
+        help="anchor whose ranges are used; the recording's only one if left out",
+    )
+    add("--engine", metavar="NAME", help="estimator (default: that of the service)")
+    add(
+        "--start",
+        type=_start,
+        metavar="X,Y[,HEADING]",
+        help="where the tag is at first: m, m, rad; unknown if left out",
+    )
+    add(
+        "--heading",
+        choices=("auto", "imu", "platform"),
+        default="auto",
+        help="heading from our attitude filter on the IMU, or from heading.csv (default: the IMU where there is one)",
+    )
+    known = parser.add_argument_group("what an operator knows (measured range = scale · distance + bias)")
+    known.add_argument("--tag-height", type=float, default=0.0, metavar="M", help="on the z axis of anchors.csv (0)")
+    known.add_argument("--range-std", type=float, metavar="M", help="standard deviation of one range")
+    known.add_argument("--range-bias", type=float, default=0.0, metavar="M")
+    known.add_argument("--range-scale", type=float, default=1.0, metavar="K")
+    known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
+    known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
+    add("--out", type=Path, metavar="CSV", help=f"write the poses: {','.join(COLUMNS)}")
+    add(
+        "--plot",
+        type=Path,
+        metavar="PNG",
+        help="write the picture here (default: replay-RECORDING-ANCHOR.png, with truth)",
+    )
+    add("--no-plot", action="store_true", help="write no picture")
+    add("--config", type=Path, metavar="FILE", help="settings file of the service, for parameters of the engine")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when it ran to the end, 2 when recording or options cannot be used, 130 on Ctrl-C."""
+    try:
+        recording = read_recording(arguments.recording)
+        anchors = arguments.anchor or _only_anchor(recording)
+        samples = samples_of(recording, anchors)
+        track = _track(arguments, recording, samples)
+        return _conclude(arguments, recording, anchors, samples, track)
+    except (RecordingError, SettingsError, OSError) as error:
+        print(f"dropanchor replay: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        return 130
+
+
+def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples) -> Track:
+    if len(samples.batch.ranges) == 0:
+        raise RecordingError(f"recording {recording.name} has no usable range to this anchor")
+    engine = create_engine(load_settings(arguments.config, {"engine": arguments.engine} if arguments.engine else None))
+    settings = tag_columns(_tag_settings(arguments), declination_rad=0.0)
+    steps = []
+    with tqdm(total=samples.end_s, unit="s", unit_scale=True, desc=f"{engine.name} on {recording.name}") as bar:
+        for reached_s, poses in replay(engine, anchors_of(recording), settings, samples):
+            steps.append(poses)
+            bar.update(reached_s - bar.n)
+    return track_of(steps)
+
+
+def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
+    try:
+        return TagSettings(
+            height_m=arguments.tag_height,
+            range_std_m=arguments.range_std,
+            range_bias_m=arguments.range_bias,
+            range_scale=arguments.range_scale,
+            mount_angle_rad=arguments.mount_angle,
+            reverse_allowed=arguments.reverse,
+            heading_source=arguments.heading,
+            start=arguments.start,
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise SettingsError(f"{first['loc'][0]}: {first['msg']}") from error
+
+
+def _conclude(
+    arguments: argparse.Namespace, recording: Recording, anchors: Sequence[str], samples: Samples, track: Track
+) -> int:
+    if arguments.out:
+        write_poses(arguments.out, track)
+        print(f"{len(track.poses)} poses: {arguments.out}")
+    truth = truth_of(recording)
+    first = recording.anchor(anchors[0])
+    result: Accuracy | None = None
+    if truth is not None:
+        try:
+            result = accuracy(track.t, track.poses, truth, (first.x, first.y))
+        except ValueError as error:
+            print(f"no accuracy: {error}{_advice(arguments)}")
+    for line in _report(track, result, samples):
+        print(line)
+    picture = arguments.plot or (truth is not None and Path(f"replay-{recording.name}-{'+'.join(anchors)}.png"))
+    if picture and not arguments.no_plot:
+        title = f"{recording.name}, anchor {', '.join(anchors)}" + (f": RMSE {result.rmse:.2f} m" if result else "")
+        used = anchors_of(recording)[[recording.anchors.index(recording.anchor(anchor)) for anchor in anchors]]
+        plot_track(picture, title, track.t, track.poses, truth, used)
+        print(f"picture: {picture}")
+    return 0
+
+
+def _advice(arguments: argparse.Namespace) -> str:
+    return "" if arguments.start else "; the engine did not find the start by itself: give --start X,Y,HEADING"
+
+
+def _report(track: Track, result: Accuracy | None, samples: Samples) -> list[str]:
+    lines = []
+    if result is not None:
+        lines += [
+            f"RMSE {result.rmse:.3f} m (mean {result.mean:.3f}, median {result.median:.3f}, 95 % {result.p95:.3f}, "
+            f"worst {result.worst:.3f}) over {result.compared} poses",
+            f"RMSE while tracking {result.rmse_tracking:.3f} m; after the best rotation about the anchor "
+            f"{result.rmse_rotated:.3f} m; ATE (best rigid motion) {result.ate:.3f} m",
+            f"truth inside the 95 % ellipse: {result.coverage:.1%}",
+        ]
+    shares = share_of_time(track.t, track.poses["state"])
+    lines.append("time: " + ", ".join(f"{name} {share:.1%}" for name, share in shares.items()))
+    if samples.rejected:
+        lines.append("not used: " + ", ".join(f"{count} {why}" for why, count in sorted(samples.rejected.items())))
+    return lines
+
+
+def write_poses(path: Path, track: Track) -> None:
+    """One row per range; numbers that are not known are `nan`. Raises OSError."""
+    poses = track.poses
+    cov = poses["cov"]
+    columns = [track.t, *(poses[name] for name in ("x", "y", "heading", "speed"))]
+    columns += [cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1], poses["p_mode"]]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for *numbers, state in zip(*(column.tolist() for column in columns), poses["state"].tolist(), strict=True):
+            writer.writerow([*(f"{number:.6f}" for number in numbers), State(state).name.lower()])
+
+
+def _start(text: str) -> StartPose:
+    parts = text.split(",")
+    if len(parts) not in (2, 3):
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y or X,Y,HEADING (m, m, rad)")
+    try:
+        x, y, *heading = (float(part) for part in parts)
+        return StartPose(x=x, y=y, heading_rad=heading[0] if heading else None)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y or X,Y,HEADING (m, m, rad)") from error
+
+
+def _only_anchor(recording: Recording) -> list[str]:
+    if len(recording.anchors) > 1:
+        known = ", ".join(anchor.id for anchor in recording.anchors)
+        raise RecordingError(f"recording {recording.name} has several anchors, choose one with --anchor: {known}")
+    return [recording.anchors[0].id]

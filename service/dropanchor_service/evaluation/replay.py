@@ -1,0 +1,131 @@
+"""The engines offline: a recording goes through the same screening and the same `process` as live samples."""
+
+from array import array
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dropanchor_schemas.wire import anchor_number
+from dropanchor_service.decode import FORM, SCALAR, Decoded
+from dropanchor_service.estimation.batch import ANCHOR, HEADING, IMU, POSE, RANGE, Array, Engine, SampleBatch
+from dropanchor_service.evaluation.accuracy import Truth
+from dropanchor_service.screening import screen
+from dropanchor_tag_client.recording import Recording
+
+STEP_S = 1.0
+NS_PER_S = 1e9
+
+
+@dataclass(frozen=True)
+class Track:
+    """What an engine made of a recording. t: (n,) s on its clock; poses: POSE (n,), one per range."""
+
+    t: Array
+    poses: Array
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The screened samples of a recording, for row 0 of an engine; rejected: those left out, by reason."""
+
+    batch: SampleBatch
+    rejected: Counter[str]
+
+    @property
+    def end_s(self) -> float:
+        return max(float(times[-1]) for times in _times(self.batch) if len(times))
+
+
+def anchors_of(recording: Recording) -> Array:
+    """ANCHOR, in the order of the recording's anchors."""
+    return np.array([(anchor.x, anchor.y, anchor.z) for anchor in recording.anchors], ANCHOR)
+
+
+def truth_of(recording: Recording) -> Truth | None:
+    """The truth that a recording brings, None without any."""
+    columns = recording.truth
+    t, x, y = (np.asarray(columns[name]) for name in ("t_s", "x", "y"))
+    return Truth(t, x, y) if len(t) > 1 else None
+
+
+def samples_of(recording: Recording, anchors: Sequence[str]) -> Samples:
+    """IMU, headings, and the ranges to these anchors. Raises RecordingError when the recording lacks one of them."""
+    numbers = {anchor_number(recording.anchor(anchor).id) for anchor in anchors}
+    index = {anchor_number(anchor.id): i for i, anchor in enumerate(recording.anchors)}
+    ranges = _scalars(recording.ranges, "range_m", "std_m")
+    ranges["anchor"] = [anchor_number(anchor) for anchor in recording.range_anchors]
+    decoded, refused = screen(
+        Decoded(
+            np.ones(1, FORM),
+            imu=_imu(recording.imu),
+            ranges=ranges[np.isin(ranges["anchor"], list(numbers))],
+            headings=_scalars(recording.headings, "yaw_rad", "std_rad"),
+        )
+    )
+    rejected: Counter[str] = Counter()
+    for group in refused:
+        rejected[group.reason] += len(group.messages)
+    fused = np.zeros(len(decoded.ranges), RANGE)
+    fused["t_ns"], fused["range"], fused["std"] = (decoded.ranges[name] for name in ("t_ns", "value", "std"))
+    fused["anchor"] = [index[number] for number in decoded.ranges["anchor"].tolist()]
+    headings = np.zeros(len(decoded.headings), HEADING)
+    headings["t_ns"], headings["heading"], headings["std"] = (
+        decoded.headings[name] for name in ("t_ns", "value", "std")
+    )
+    return Samples(SampleBatch(imu=decoded.imu, ranges=fused, headings=headings), rejected)
+
+
+def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) -> Iterator[tuple[float, Array]]:
+    """Feed row 0 of a fresh engine, one second of the recording at a time.
+
+    anchors: ANCHOR; settings: TAG_SETTINGS (0-d). Yields the time reached, s, and the POSE rows of that second;
+    what the engine itself rejects is added to `samples.rejected`.
+    """
+    engine.set_anchors(anchors)
+    engine.configure(0, settings)
+    end_s = 0.0
+    while end_s <= samples.end_s:
+        end_s += STEP_S
+        batch = engine.process(_between(samples.batch, end_s - STEP_S, end_s))
+        samples.rejected.update(batch.rejected)
+        yield min(end_s, samples.end_s), batch.poses
+
+
+def track_of(steps: Sequence[Array]) -> Track:
+    """The track of the POSE rows of consecutive steps."""
+    poses = np.concatenate([np.empty(0, POSE), *steps])
+    return Track(poses["t_ns"] / NS_PER_S, poses)
+
+
+def _between(batch: SampleBatch, start_s: float, end_s: float) -> SampleBatch:
+    parts = []
+    for samples in (batch.imu, batch.ranges, batch.headings):
+        first, last = np.searchsorted(samples["t_ns"], [start_s * NS_PER_S, end_s * NS_PER_S])
+        parts.append(samples[0 if start_s == 0.0 else first : last])
+    return SampleBatch(imu=parts[0], ranges=parts[1], headings=parts[2])
+
+
+def _times(batch: SampleBatch) -> list[Array]:
+    return [samples["t_ns"] / NS_PER_S for samples in (batch.imu, batch.ranges, batch.headings)]
+
+
+def _imu(columns: dict[str, "array[float]"]) -> Array:
+    imu = np.zeros(len(columns["t_s"]), IMU)
+    imu["t_ns"] = _t_ns(columns["t_s"])
+    for name, parts in (("acc", ("ax", "ay", "az")), ("gyro", ("gx", "gy", "gz")), ("mag", ("mx", "my", "mz"))):
+        imu[name] = np.column_stack([np.asarray(columns[part]) for part in parts])
+    return imu
+
+
+def _scalars(columns: dict[str, "array[float]"], value: str, std: str) -> Array:
+    scalars = np.zeros(len(columns["t_s"]), SCALAR)
+    scalars["t_ns"] = _t_ns(columns["t_s"])
+    scalars["value"], scalars["std"] = np.asarray(columns[value]), np.asarray(columns[std])
+    return scalars
+
+
+def _t_ns(t_s: "array[float]") -> Array:
+    ns: Array = np.rint(np.asarray(t_s) * NS_PER_S).astype(np.int64)
+    return ns

@@ -1,0 +1,81 @@
+"""`dropanchor replay` as a user calls it."""
+
+import argparse
+import csv
+from pathlib import Path
+
+import pytest
+
+from dropanchor_service.commands import replay
+from support.recordings import recording_or_skip, write_square
+
+
+def call(*arguments: str | Path) -> int:
+    parser = argparse.ArgumentParser()
+    replay.add_arguments(parser)
+    return replay.run(parser.parse_args([str(argument) for argument in arguments]))
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_recording_with_a_known_start_is_tracked_and_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_square(tmp_path, range_std_m=0.05)
+    out, picture = tmp_path / "poses.csv", tmp_path / "track.png"
+    status = call(folder, "--anchor", "A", "--engine", "paper", "--start=10,0,1.5708", "--out", out, "--plot", picture)
+    printed = capsys.readouterr().out
+    assert status == 0
+    assert float(printed.split("RMSE ")[1].split()[0]) < 2.0
+    assert "truth inside the 95 % ellipse" in printed
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    poses = rows(out)
+    assert list(poses[0]) == list(replay.COLUMNS)
+    assert len(poses) == 600
+    assert poses[300]["state"] in {"tracking", "degraded", "coasting"}
+
+
+def test_without_a_start_the_paper_says_that_it_cannot_know(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(write_square(tmp_path), "--anchor", "A", "--engine", "paper", "--no-plot") == 0
+    printed = capsys.readouterr().out
+    assert "give --start X,Y,HEADING" in printed
+    assert "ambiguous" in printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--anchor", "Z"], "has no anchor 'Z'; it has: A, B"),
+        ([], "has several anchors, choose one with --anchor: A, B"),
+        (["--anchor", "B"], "has no usable range to this anchor"),
+        (["--anchor", "A", "--range-scale", "0"], "range_scale: Input should be greater than 0"),
+        (["--anchor", "A", "--engine", "nonsense"], "engine"),
+        (["--anchor", "A", "--config", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_what_cannot_be_used_is_named_and_ends_with_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert call(write_square(tmp_path), *arguments) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("start", ["1", "1,2,3,4", "a,b", "nan,0,0"])
+def test_a_start_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], start: str) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        call(write_square(tmp_path), "--start", start)
+    assert "X,Y,HEADING" in capsys.readouterr().err
+
+
+@pytest.mark.recordings
+@pytest.mark.parametrize(
+    ("name", "anchor", "start"),
+    [("tiers_B", "L0", "1.3836,1.3673,-2.2287"), ("iasl_s1", "1", "4.4008,4.0954,1.5418")],
+)
+def test_real_recordings_run_to_the_end(tmp_path: Path, name: str, anchor: str, start: str) -> None:
+    folder, out = recording_or_skip(name), tmp_path / "poses.csv"
+    assert call(folder, "--anchor", anchor, "--engine", "paper", f"--start={start}", "--out", out, "--no-plot") == 0
+    assert len(rows(out)) > 500
