@@ -1,0 +1,48 @@
+"""Drive the compiled IMU front-end over arrays."""
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from dropanchor_service.estimation.fleet.frontend import FRONTEND, close_node, feed, start_frontend
+from dropanchor_service.estimation.fleet.node import NODE
+from support.imu import Motion
+
+Array = NDArray[Any]
+START_NS = 1_700_000_000_000_000_000
+
+
+def nanoseconds(t: Array) -> Array:
+    """s since START_NS to ns."""
+    return START_NS + np.round(t * 1e9).astype(np.int64)
+
+
+@njit
+def drive(f: Any, t: Array, acc: Array, gyro: Array, mag: Array, ends: Array, nodes: Array) -> None:
+    """Samples up to each end, then a node; the samples after the last end are fed too."""
+    k = 0
+    for e in range(len(ends)):
+        while k < len(t) and t[k] <= ends[e]:
+            feed(f, t[k], acc[k], gyro[k], mag[k])
+            k += 1
+        close_node(f, ends[e], nodes[e])
+    while k < len(t):
+        feed(f, t[k], acc[k], gyro[k], mag[k])
+        k += 1
+
+
+def new_frontend(hard_iron: float = 1.0, declination: float = 0.0) -> Array:
+    """One row."""
+    rows = np.zeros(1, FRONTEND)
+    start_frontend(rows[0], hard_iron, declination)
+    return rows
+
+
+def run(rows: Array, m: Motion, ends: Array) -> Array:
+    """NODE at ends (s)."""
+    nodes = np.zeros(len(ends), NODE)
+    columns = [np.ascontiguousarray(c) for c in (m.acc, m.gyro, m.mag)]
+    drive(rows[0], nanoseconds(m.t), *columns, nanoseconds(ends), nodes)
+    return nodes
