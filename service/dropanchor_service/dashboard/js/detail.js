@@ -1,0 +1,130 @@
+/** Everything about the selected tag. */
+
+import { api, getJson } from "./connection.js";
+import { UNKNOWN, age, compassPoint, degrees, fixed, metres, percent, sigma, words } from "./format.js";
+import { AMBIGUOUS, STATES } from "./states.js";
+import { symbol } from "./symbols.js";
+
+/** @typedef {import("./fleet.js").Fleet} Fleet */
+
+const ASK_MS = 1000;
+
+export class Detail {
+  /** What the stream does not carry; of the selected tag only. @type {any} */
+  #pose = null;
+  #asked = -Infinity;
+
+  /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("./choice.js").Choice} choice */
+  constructor(panel, fleet, choice) {
+    this.panel = panel;
+    this.fleet = fleet;
+    this.choice = choice;
+    this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
+    this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
+    this.#part("close").addEventListener("click", () => choice.select(null));
+    choice.addEventListener("change", () => this.update());
+    this.update();
+  }
+
+  update() {
+    const row = this.fleet.row(this.choice.selected);
+    this.panel.hidden = row < 0;
+    if (row < 0) return;
+    this.#ask(this.fleet.names[row]);
+    this.#head(row);
+    this.#numbers(row);
+    this.#hypotheses(row);
+  }
+
+  /** @param {string} name */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
+  }
+
+  /** @param {string} tag */
+  async #ask(tag) {
+    if (this.#pose?.tag !== tag) this.#pose = { tag };
+    else if (performance.now() - this.#asked < ASK_MS) return;
+    this.#asked = performance.now();
+    try {
+      const pose = await getJson(api(`tags/${encodeURIComponent(tag)}/pose`));
+      if (this.choice.selected === tag) this.#pose = pose;
+    } catch {
+      this.#pose = { tag };
+    }
+  }
+
+  /** @param {number} row */
+  #head(row) {
+    const state = STATES[this.fleet.state[row]];
+    const name = this.fleet.names[row];
+    this.panel.dataset.state = state.name;
+    put(this.#part("name"), name);
+    put(this.#part("state"), state.label);
+    this.#part("symbol").replaceChildren(symbol(state.name).svg);
+    const reason = this.fleet.value.reason[row];
+    put(this.#part("meaning"), state.meaning);
+    put(this.#part("reason"), reason ? words(reason) : "");
+    const hint = this.#pose?.reason === reason ? (this.#pose?.hint ?? "") : "";
+    put(this.#part("hint"), hint);
+    this.#part("hint").hidden = hint === "";
+    this.follow.setAttribute("aria-pressed", String(this.choice.follow));
+    this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
+  }
+
+  /** @param {number} row */
+  #numbers(row) {
+    const number = (/** @type {keyof Fleet["number"]} */ name) => this.fleet.number[name][row];
+    const heading = number("heading_rad");
+    const anchor = this.fleet.value.anchor[row];
+    /** @type {Record<string, string>} */
+    const texts = {
+      x: metres(number("x")),
+      y: metres(number("y")),
+      sigma: `± ${sigma(number("sigma_pos_m"))} m`,
+      ellipse: `${fixed(number("semi_major_m"), 2)} × ${fixed(number("semi_minor_m"), 2)} m`,
+      heading: Number.isNaN(heading) ? UNKNOWN : `${degrees(heading)} ${compassPoint(heading)}`,
+      speed: `${fixed(number("speed_mps"), 2)} m/s`,
+      turn: turnRate(this.#pose?.yaw_rate_radps),
+      range: metres(number("range_m")),
+      anchor: anchor ?? UNKNOWN,
+      mode: percent(number("p_mode")),
+      sight: this.#pose?.sigma_obs_m == null ? UNKNOWN : `± ${sigma(this.#pose.sigma_obs_m)} m`,
+      age: age(this.fleet.age(row, performance.now())),
+      online: this.fleet.online[row] ? "Online" : "Offline",
+    };
+    for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
+  }
+
+  /** @param {number} row */
+  #hypotheses(row) {
+    const list = this.#part("hypotheses");
+    const ghosts = this.fleet.state[row] === AMBIGUOUS ? (this.fleet.value.hypotheses[row] ?? []) : [];
+    list.hidden = ghosts.length === 0;
+    const likely = [...ghosts].sort((a, b) => b.weight - a.weight).slice(0, 6);
+    list.replaceChildren(...likely.map(hypothesisLine));
+  }
+}
+
+/** @param {import("./fleet.js").Hypothesis} ghost */
+function hypothesisLine(ghost) {
+  const line = document.createElement("li");
+  const bar = document.createElement("meter");
+  bar.max = 1;
+  bar.value = ghost.weight;
+  bar.setAttribute("aria-label", "probability");
+  const place = document.createElement("span");
+  place.textContent = `${fixed(ghost.x, 1)}, ${fixed(ghost.y, 1)} m`;
+  const weight = document.createElement("span");
+  weight.textContent = percent(ghost.weight);
+  line.append(place, bar, weight);
+  return line;
+}
+
+/** @param {number | null | undefined} radps */
+const turnRate = (radps) => (radps == null ? UNKNOWN : `${fixed((radps * 180) / Math.PI, 0)} °/s`);
+
+/** @param {HTMLElement} element @param {string} text */
+function put(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,129 @@
+/** The latest pose of every tag, in columns: one row per tag, rows given in order of appearance. */
+
+import { stateNumber } from "./states.js";
+
+/** Columns of numbers; unknown is NaN. Names as in the stream. */
+const NUMBERS = /** @type {const} */ ([
+  "x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "sigma_pos_m", "sigma_obs_m", "p_mode", "range_m",
+  "semi_major_m", "semi_minor_m", "angle_rad",
+]);
+
+/** Columns of values that are kept as they come; unknown is null. */
+const VALUES = /** @type {const} */ (["reason", "hint", "anchor", "hypotheses"]);
+
+/**
+ * @typedef {object} Hypothesis
+ * @property {number} weight
+ * @property {number} x
+ * @property {number} y
+ * @property {number} heading_rad
+ * @property {number} speed_mps
+ * @property {{semi_major_m: number, semi_minor_m: number, angle_rad: number} | null} [ellipse_95]
+ */
+
+/**
+ * A frame of the stream: `tags` and columns beside it. A column that is left out leaves what was known.
+ * @typedef {{t_ns: number, tags: string[]} & Record<string, any>} Frame
+ */
+
+export class Fleet {
+  size = 0;
+  /** Grows whenever tags come or go. */
+  membership = 0;
+  /** @type {string[]} */
+  names = [];
+  /** @type {Map<string, number>} */
+  #rows = new Map();
+  state = new Uint8Array(0);
+  online = new Uint8Array(0);
+  /** On the clock of the caller: ms at which the pose was valid; NaN before the first pose. */
+  poseTime = new Float64Array(0);
+  /** Where the dot is drawn: follows x, y smoothly (see motion.js). */
+  drawnX = new Float32Array(0);
+  drawnY = new Float32Array(0);
+  /** @type {Record<typeof NUMBERS[number], Float32Array>} */
+  number = /** @type {any} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(0)])));
+  /** @type {{reason: (string|null)[], hint: (string|null)[], anchor: (string|null)[], hypotheses: (Hypothesis[]|null)[]}} */
+  value = { reason: [], hint: [], anchor: [], hypotheses: [] };
+
+  /** @param {string | null} name @returns {number} −1: no such tag */
+  row(name) {
+    return name === null ? -1 : (this.#rows.get(name) ?? -1);
+  }
+
+  /** Seconds since the pose was valid; NaN before the first pose. @param {number} row @param {number} now_ms */
+  age(row, now_ms) {
+    return (now_ms - this.poseTime[row]) / 1000;
+  }
+
+  /** Take a frame that changes some tags. @param {Frame} frame @param {number} now_ms */
+  apply(frame, now_ms) {
+    const rows = this.#rowsOf(frame.tags);
+    for (const name of NUMBERS) if (frame[name]) writeNumbers(this.number[name], rows, frame[name]);
+    for (const name of VALUES) if (frame[name]) writeValues(this.value[name], rows, frame[name]);
+    if (frame.state) rows.forEach((row, i) => (this.state[row] = stateNumber(frame.state[i])));
+    if (frame.online) rows.forEach((row, i) => (this.online[row] = frame.online[i] ? 1 : 0));
+    if (frame.age_s) rows.forEach((row, i) => (this.poseTime[row] = now_ms - (frame.age_s[i] ?? NaN) * 1000));
+  }
+
+  /** Take a frame that names every tag: those it does not name are gone. @param {Frame} frame @param {number} now_ms */
+  replace(frame, now_ms) {
+    const named = new Set(frame.tags);
+    if (this.names.some((name) => !named.has(name))) this.#clear();
+    this.apply(frame, now_ms);
+  }
+
+  #clear() {
+    this.size = 0;
+    this.names = [];
+    this.#rows.clear();
+    this.membership++;
+  }
+
+  /** @param {string[]} tags */
+  #rowsOf(tags) {
+    const rows = new Int32Array(tags.length);
+    for (let i = 0; i < tags.length; i++) rows[i] = this.#rows.get(tags[i]) ?? this.#register(tags[i]);
+    return rows;
+  }
+
+  /** @param {string} name */
+  #register(name) {
+    const row = this.size++;
+    if (row >= this.state.length) this.#grow();
+    this.names.push(name);
+    this.#rows.set(name, row);
+    this.membership++;
+    for (const column of Object.values(this.number)) column[row] = NaN;
+    for (const column of Object.values(this.value)) column[row] = null;
+    this.state[row] = this.online[row] = 0;
+    this.poseTime[row] = this.drawnX[row] = this.drawnY[row] = NaN;
+    return row;
+  }
+
+  #grow() {
+    const capacity = Math.max(64, 2 * this.state.length);
+    this.state = grown(this.state, new Uint8Array(capacity));
+    this.online = grown(this.online, new Uint8Array(capacity));
+    this.poseTime = grown(this.poseTime, new Float64Array(capacity));
+    this.drawnX = grown(this.drawnX, new Float32Array(capacity));
+    this.drawnY = grown(this.drawnY, new Float32Array(capacity));
+    for (const name of NUMBERS) this.number[name] = grown(this.number[name], new Float32Array(capacity));
+  }
+}
+
+/** @template {Uint8Array | Float32Array | Float64Array} T @param {T} from @param {T} to @returns {T} */
+function grown(from, to) {
+  to.set(from);
+  return to;
+}
+
+/** @param {Float32Array} column @param {Int32Array} rows @param {(number | null)[]} values */
+function writeNumbers(column, rows, values) {
+  for (let i = 0; i < rows.length; i++) column[rows[i]] = values[i] ?? NaN;
+}
+
+/** @param {any[]} column @param {Int32Array} rows @param {any[]} values */
+function writeValues(column, rows, values) {
+  for (let i = 0; i < rows.length; i++) column[rows[i]] = values[i] ?? null;
+}

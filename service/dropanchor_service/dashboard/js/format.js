@@ -1,0 +1,77 @@
+/** Numbers as people read them. Unknown (NaN, null) is an en dash. */
+
+export const UNKNOWN = "–";
+const MINUS = "−";
+
+/** @param {number | null | undefined} value @returns {value is number} */
+const known = (value) => typeof value === "number" && Number.isFinite(value);
+
+/**
+ * A fixed number of decimals with a true minus sign and no negative zero.
+ * @param {number | null | undefined} value
+ * @param {number} decimals
+ */
+export function fixed(value, decimals) {
+  if (!known(value)) return UNKNOWN;
+  const text = Math.abs(value).toFixed(decimals);
+  return value < 0 && Number(text) !== 0 ? MINUS + text : text;
+}
+
+/** A coordinate in a narrow column: fewer decimals the farther away. @param {number | null | undefined} value */
+export function coordinate(value) {
+  return known(value) ? fixed(value, Math.abs(value) < 100 ? 2 : Math.abs(value) < 1000 ? 1 : 0) : UNKNOWN;
+}
+
+/** @param {number | null | undefined} value */
+export const metres = (value) => (known(value) ? `${fixed(value, 2)} m` : UNKNOWN);
+
+/** Centimetres matter below a metre, not above a hundred. @param {number | null | undefined} value */
+export function sigma(value) {
+  if (!known(value)) return UNKNOWN;
+  return fixed(value, value < 10 ? 2 : value < 100 ? 1 : 0);
+}
+
+/** @param {number | null | undefined} rad counter-clockwise from east, shown as 0° to 360° */
+export function degrees(rad) {
+  if (!known(rad)) return UNKNOWN;
+  const turned = Math.round((((rad * 180) / Math.PI) % 360) + 360) % 360;
+  return `${turned}°`;
+}
+
+const POINTS = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
+
+/** @param {number | null | undefined} rad counter-clockwise from east */
+export function compassPoint(rad) {
+  if (!known(rad)) return UNKNOWN;
+  return POINTS[((Math.round(rad / (Math.PI / 4)) % 8) + 8) % 8];
+}
+
+/** @param {number | null | undefined} share 0 to 1 */
+export function percent(share) {
+  if (!known(share)) return UNKNOWN;
+  if (share > 0.99 && share < 1) return `${(Math.floor(share * 1000) / 10).toFixed(1)} %`;
+  return `${Math.round(share * 100)} %`;
+}
+
+/** @param {number | null | undefined} seconds */
+export function age(seconds) {
+  if (!known(seconds)) return UNKNOWN;
+  if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
+  if (seconds < 99.5) return `${Math.round(seconds)} s`;
+  if (seconds < 5970) return `${Math.round(seconds / 60)} min`;
+  if (seconds < 48 * 3600) return `${Math.round(seconds / 3600)} h`;
+  return `${Math.round(seconds / 86400)} d`;
+}
+
+/** A round distance of rings and scale bars: 0.5 m, 20 m, 2 km. @param {number} value_m */
+export function distance(value_m) {
+  if (value_m >= 1000) return `${Number((value_m / 1000).toPrecision(6))} km`;
+  if (value_m < 0.1) return `${Number((value_m * 100).toPrecision(6))} cm`;
+  return `${Number(value_m.toPrecision(6))} m`;
+}
+
+/** @param {number} count @param {string} noun */
+export const counted = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+
+/** A machine word for people: `several_modes` → "several modes". @param {string} word */
+export const words = (word) => word.replaceAll("_", " ");

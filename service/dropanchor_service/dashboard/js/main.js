@@ -1,0 +1,125 @@
+/** Wiring: the stream fills the fleet; map, table and panel show it. */
+
+import { Choice } from "./choice.js";
+import { StateChips } from "./chips.js";
+import { Connection } from "./connection.js";
+import { Detail } from "./detail.js";
+import { Fleet } from "./fleet.js";
+import { fixed } from "./format.js";
+import { listen } from "./gestures.js";
+import { LiveMap } from "./map.js";
+import { Notices } from "./notices.js";
+import { STATES } from "./states.js";
+import { TagTable } from "./table.js";
+import { installTheme } from "./theme.js";
+import { Trails } from "./trails.js";
+
+const PANELS_MS = 250;
+
+/** @template {HTMLElement} T @param {string} id @returns {T} */
+const byId = (id) => /** @type {T} */ (document.getElementById(id));
+
+const fleet = new Fleet();
+const trails = new Trails();
+const choice = new Choice();
+const connection = new Connection();
+const map = new LiveMap(byId("map"), fleet, trails, choice);
+const chips = new StateChips(byId("chips"), fleet, choice);
+const detail = new Detail(byId("detail"), fleet, choice);
+const notices = new Notices(connection, fleet);
+const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
+
+/** @param {string | null} tag */
+function select(tag) {
+  choice.select(tag);
+  if (tag === null) return;
+  map.reveal(fleet.row(tag));
+  table.reveal(tag);
+  byId("detail").scrollIntoView({ block: "nearest" });
+  announce(tag);
+}
+
+/** For those who hear the page. @param {string} tag */
+function announce(tag) {
+  const row = fleet.row(tag);
+  const { x, y } = fleet.number;
+  const place = `x ${fixed(x[row], 1)} m, y ${fixed(y[row], 1)} m`;
+  byId("spoken").textContent = `${tag} selected: ${STATES[fleet.state[row]].label}, ${place}`;
+}
+
+/** @param {(frame: import("./fleet.js").Frame, now_ms: number) => void} take @returns {(event: Event) => void} */
+function receiver(take) {
+  return (event) => {
+    const now_ms = performance.now();
+    const frame = /** @type {CustomEvent} */ (event).detail;
+    take(frame, now_ms);
+    trails.note(fleet, frame.tags, now_ms);
+    map.redraw();
+  };
+}
+
+connection.addEventListener("snapshot", receiver((frame, now_ms) => {
+  fleet.replace(frame, now_ms);
+  trails.prune(fleet);
+}));
+connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
+connection.addEventListener("site", (event) => {
+  const site = /** @type {CustomEvent} */ (event).detail;
+  map.anchors = site.anchors;
+  byId("site").textContent = site.name || site.id;
+  map.redraw();
+});
+
+/** The panels need no more than a few updates a second; ages go on while nothing comes in. */
+function updatePanels() {
+  if (document.hidden) return;
+  table.update();
+  chips.update();
+  detail.update();
+  notices.update();
+  byId("crowd").hidden = !map.stats.density;
+  map.redraw();
+}
+
+const filter = byId("filter");
+filter.addEventListener("input", () => (choice.text = /** @type {HTMLInputElement} */ (filter).value));
+byId("show-all").addEventListener("click", () => {
+  /** @type {HTMLInputElement} */ (filter).value = "";
+  choice.showAll();
+});
+choice.addEventListener("change", () => (byId("show-all").hidden = !choice.narrows));
+byId("zoom-in").addEventListener("click", () => map.zoom(1.6));
+byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.6));
+byId("fit").addEventListener("click", () => map.fitAll());
+map.addEventListener("view", () => byId("fit").setAttribute("aria-pressed", String(map.autoFit)));
+map.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
+  byId("cursor").textContent = `${fixed(map.view.worldX(offsetX), 2)}, ${fixed(map.view.worldY(offsetY), 2)} m`;
+});
+document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape") select(null);
+  if (event.key !== "/" || event.target === filter) return;
+  event.preventDefault();
+  filter.focus();
+});
+
+listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
+installTheme(byId("theme"), () => map.recolour());
+setInterval(updatePanels, PANELS_MS);
+connection.start();
+
+/** Read-only, for tests and the curious. */
+Object.defineProperty(window, "dropanchor", {
+  value: Object.freeze({
+    status: () => connection.status,
+    received: () => ({ ...connection.stats }),
+    drawing: () => ({ ...map.stats }),
+    tags: () => fleet.names.map((tag, row) => ({
+      tag,
+      state: STATES[fleet.state[row]].name,
+      x: fleet.number.x[row],
+      y: fleet.number.y[row],
+      pixel: [map.view.screenX(fleet.drawnX[row]), map.view.screenY(fleet.drawnY[row])],
+      semiMajor: fleet.number.semi_major_m[row],
+    })),
+  }),
+});

@@ -1,0 +1,48 @@
+/** What the page says about itself: connecting, connection lost, no tags yet. */
+
+import { age } from "./format.js";
+
+/** @param {string} id */
+const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+export class Notices {
+  /** @param {import("./connection.js").Connection} connection @param {import("./fleet.js").Fleet} fleet */
+  constructor(connection, fleet) {
+    this.connection = connection;
+    this.fleet = fleet;
+    byId("retry").addEventListener("click", () => connection.retry());
+    for (const button of document.querySelectorAll("button[data-copies]")) installCopy(button);
+    connection.addEventListener("status", () => this.update());
+    this.update();
+  }
+
+  update() {
+    const { status, lostAt } = this.connection;
+    const label = { connecting: "Connecting", live: "Live", lost: "Disconnected" }[status];
+    byId("status").dataset.status = status;
+    write(byId("status-text"), label);
+    byId("lost").hidden = status !== "lost";
+    write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
+    byId("empty").hidden = status !== "live" || this.fleet.size > 0;
+  }
+}
+
+/** @param {HTMLElement} element @param {string} text */
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** @param {Element} button */
+function installCopy(button) {
+  button.addEventListener("click", async () => {
+    const source = byId(/** @type {HTMLElement} */ (button).dataset.copies ?? "");
+    try {
+      await navigator.clipboard.writeText(source.textContent ?? "");
+      button.textContent = "Copied";
+    } catch {
+      getSelection()?.selectAllChildren(source);
+      button.textContent = "Press Ctrl-C";
+    }
+    setTimeout(() => (button.textContent = "Copy"), 1600);
+  });
+}

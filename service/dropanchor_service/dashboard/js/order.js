@@ -1,0 +1,66 @@
+/** Which tags the table lists, and in which order. */
+
+import { BEST_FIRST, STATES } from "./states.js";
+
+/** @typedef {import("./fleet.js").Fleet} Fleet */
+/** @typedef {{column: string, descending: boolean}} Sort */
+
+const RANK_OF = STATES.map((_, state) => BEST_FIRST.indexOf(state));
+
+/** `tag-9` before `tag-10`: digits padded. @param {string} name */
+export const nameKey = (name) => name.toLowerCase().replace(/\d+/g, (digits) => digits.padStart(12, "0"));
+
+export class Order {
+  #membership = -1;
+  /** @type {string[]} */
+  #keys = [];
+
+  /**
+   * The rows that are shown, sorted; unknown values last whatever the direction, equal ones by name.
+   * @param {Fleet} fleet @param {(row: number) => boolean} wanted @param {Sort} sort @param {number} now_ms
+   */
+  rows(fleet, wanted, sort, now_ms) {
+    this.#learnNames(fleet);
+    const rows = Array.from({ length: fleet.size }, (_, row) => row).filter(wanted);
+    const sign = sort.descending ? -1 : 1;
+    const value = valueOf(fleet, sort.column, now_ms);
+    if (!value) return rows.sort((a, b) => sign * this.#byName(a, b));
+    const values = Float64Array.from({ length: fleet.size }, (_, row) => value(row));
+    return rows.sort((a, b) => compare(values[a], values[b], sign) || this.#byName(a, b));
+  }
+
+  /** @param {Fleet} fleet */
+  #learnNames(fleet) {
+    if (fleet.membership === this.#membership) return;
+    this.#membership = fleet.membership;
+    this.#keys = fleet.names.map(nameKey);
+  }
+
+  /** @param {number} a @param {number} b */
+  #byName(a, b) {
+    const [left, right] = [this.#keys[a], this.#keys[b]];
+    return left < right ? -1 : left > right ? 1 : a - b;
+  }
+}
+
+/** @param {number} a @param {number} b @param {number} sign */
+function compare(a, b, sign) {
+  if (Number.isNaN(a) || Number.isNaN(b)) return Number(Number.isNaN(a)) - Number(Number.isNaN(b));
+  return sign * (a - b);
+}
+
+/** @param {Fleet} fleet @param {string} column @param {number} now_ms @returns {((row: number) => number) | null} */
+function valueOf(fleet, column, now_ms) {
+  const { x, y, sigma_pos_m: sigma, speed_mps: speed } = fleet.number;
+  /** @type {Record<string, (row: number) => number>} */
+  const values = {
+    state: (row) => RANK_OF[fleet.state[row]],
+    x: (row) => x[row],
+    y: (row) => y[row],
+    sigma: (row) => sigma[row],
+    speed: (row) => speed[row],
+    age: (row) => fleet.age(row, now_ms),
+    online: (row) => 1 - fleet.online[row],
+  };
+  return values[column] ?? null;
+}

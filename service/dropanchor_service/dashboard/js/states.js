@@ -1,0 +1,50 @@
+/** The tracking states, in the order of the contract, and how far each may be believed. */
+
+/**
+ * @typedef {object} StateStyle
+ * @property {string} name as in the contract
+ * @property {string} label
+ * @property {string} meaning one sentence for people
+ * @property {"disc"|"diamond"|"square"|"ring"|"dotted"|"cross"} shape differs per state, so colour is never needed
+ * @property {boolean} placed whether x and y may be shown as the place of the tag
+ * @property {boolean} trusted whether the pose is as good as the service can make it
+ */
+
+/** @type {readonly StateStyle[]} */
+export const STATES = Object.freeze([
+  { name: "initialising", label: "Initialising", meaning: "Waiting for the first ranges and a heading.", shape: "dotted", placed: false, trusted: false },
+  { name: "ambiguous", label: "Ambiguous", meaning: "More than one place explains the data.", shape: "ring", placed: false, trusted: false },
+  { name: "tracking", label: "Tracking", meaning: "The pose and its ellipse can be believed.", shape: "disc", placed: true, trusted: true },
+  { name: "coasting", label: "Coasting", meaning: "No ranges at the moment: carried on by motion alone.", shape: "diamond", placed: true, trusted: false },
+  { name: "degraded", label: "Degraded", meaning: "Tracked, but with poor data: the place is rough.", shape: "square", placed: true, trusted: false },
+  { name: "lost", label: "Lost", meaning: "The place is not known any more.", shape: "cross", placed: false, trusted: false },
+]);
+
+const NUMBERS = new Map(STATES.map((state, number) => [state.name, number]));
+
+/**
+ * The number of a state; a state this page does not know is treated as the most doubtful one.
+ * @param {string | null | undefined} name
+ */
+export function stateNumber(name) {
+  return NUMBERS.get(name ?? "initialising") ?? STATES.length - 1;
+}
+
+/** The states by how much they can be believed. */
+export const BEST_FIRST = ["tracking", "coasting", "degraded", "ambiguous", "initialising", "lost"].map(stateNumber);
+
+export const AMBIGUOUS = stateNumber("ambiguous");
+
+/** Seconds after which a pose is drawn hollow and fainter, and after which it is fainter still. */
+export const STALE_S = 2;
+export const OLD_S = 10;
+
+/**
+ * 0 fresh, 1 stale, 2 old.
+ * @param {number} age_s
+ * @returns {0 | 1 | 2}
+ */
+export function staleness(age_s) {
+  if (!(age_s >= STALE_S)) return Number.isNaN(age_s) ? 2 : 0;
+  return age_s >= OLD_S ? 2 : 1;
+}

@@ -1,0 +1,85 @@
+/** Where each tag has been in the last seconds: a ring of points per tag, only of poses that could be placed. */
+
+import { STATES } from "./states.js";
+
+export const TRAIL_S = 30;
+const INTERVAL_MS = 200;
+const CAPACITY = (TRAIL_S * 1000) / INTERVAL_MS + 1;
+
+class Trail {
+  x = new Float32Array(CAPACITY);
+  y = new Float32Array(CAPACITY);
+  time = new Float64Array(CAPACITY);
+  /** 1: trusted; 0: placed, but doubtful; NaN in x: a gap. */
+  trusted = new Uint8Array(CAPACITY);
+  length = 0;
+  #next = 0;
+
+  /** @param {number} x @param {number} y @param {boolean} trusted @param {number} time_ms */
+  add(x, y, trusted, time_ms) {
+    const at = this.#next;
+    this.x[at] = x;
+    this.y[at] = y;
+    this.time[at] = time_ms;
+    this.trusted[at] = trusted ? 1 : 0;
+    this.#next = (at + 1) % CAPACITY;
+    this.length = Math.min(CAPACITY, this.length + 1);
+  }
+
+  /** Position in the arrays of the i-th oldest point. @param {number} i */
+  at(i) {
+    return (this.#next - this.length + i + CAPACITY) % CAPACITY;
+  }
+
+  get lastTime() {
+    return this.length ? this.time[this.at(this.length - 1)] : -Infinity;
+  }
+
+  get ended() {
+    return this.length > 0 && Number.isNaN(this.x[this.at(this.length - 1)]);
+  }
+}
+
+export class Trails {
+  /** @type {Map<string, Trail>} */
+  #trails = new Map();
+
+  /** @param {string} name */
+  of(name) {
+    return this.#trails.get(name) ?? null;
+  }
+
+  /**
+   * Note where the named tags are now.
+   * @param {import("./fleet.js").Fleet} fleet
+   * @param {string[]} names
+   * @param {number} now_ms
+   */
+  note(fleet, names, now_ms) {
+    for (const name of names) {
+      const row = fleet.row(name);
+      const state = STATES[fleet.state[row]];
+      const x = fleet.number.x[row];
+      if (state.placed && Number.isFinite(x)) this.#extend(name, x, fleet.number.y[row], state.trusted, now_ms);
+      else this.#interrupt(name, now_ms);
+    }
+  }
+
+  /** Forget tags that are gone. @param {import("./fleet.js").Fleet} fleet */
+  prune(fleet) {
+    for (const name of this.#trails.keys()) if (fleet.row(name) < 0) this.#trails.delete(name);
+  }
+
+  /** @param {string} name @param {number} x @param {number} y @param {boolean} trusted @param {number} now_ms */
+  #extend(name, x, y, trusted, now_ms) {
+    let trail = this.#trails.get(name);
+    if (!trail) this.#trails.set(name, (trail = new Trail()));
+    if (now_ms - trail.lastTime >= INTERVAL_MS * 0.9) trail.add(x, y, trusted, now_ms);
+  }
+
+  /** @param {string} name @param {number} now_ms */
+  #interrupt(name, now_ms) {
+    const trail = this.#trails.get(name);
+    if (trail && !trail.ended) trail.add(NaN, NaN, false, now_ms);
+  }
+}

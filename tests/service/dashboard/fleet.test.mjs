@@ -1,0 +1,150 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Choice, countStates } from "../../../service/dropanchor_service/dashboard/js/choice.js";
+import { Fleet } from "../../../service/dropanchor_service/dashboard/js/fleet.js";
+import { follow } from "../../../service/dropanchor_service/dashboard/js/motion.js";
+import { Order } from "../../../service/dropanchor_service/dashboard/js/order.js";
+import { isFilled } from "../../../service/dropanchor_service/dashboard/js/shapes.js";
+import { STATES, staleness, stateNumber } from "../../../service/dropanchor_service/dashboard/js/states.js";
+import { Trails } from "../../../service/dropanchor_service/dashboard/js/trails.js";
+
+/** @param {string[]} tags @param {Record<string, any[]>} columns @returns {any} */
+const frame = (tags, columns) => ({ t_ns: 0, tags, ...columns });
+
+/** @param {Fleet} fleet @param {string} column @param {boolean} [descending] */
+function sorted(fleet, column, descending = false) {
+  return new Order().rows(fleet, () => true, { column, descending }, 0).map((row) => fleet.names[row]);
+}
+
+test("a tag that is new has a row, and nothing about it is known", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a"], {}), 0);
+  const row = fleet.row("a");
+  assert.ok(Number.isNaN(fleet.number.x[row]) && Number.isNaN(fleet.age(row, 0)));
+  assert.equal(STATES[fleet.state[row]].name, "initialising");
+  assert.equal(fleet.row("b"), -1);
+});
+
+test("a frame changes only the tags that it names", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a", "b"], { x: [1, 2], state: ["tracking", "lost"], online: [true, false] }), 0);
+  fleet.apply(frame(["b"], { x: [5], state: ["tracking"] }), 10);
+  assert.deepEqual([...fleet.number.x.slice(0, 2)], [1, 5]);
+  assert.deepEqual(countStates(fleet)[stateNumber("tracking")], 2);
+  assert.equal(fleet.online[fleet.row("b")], 0);
+});
+
+test("null in a column means not known any more", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a"], { x: [1] }), 0);
+  fleet.apply(frame(["a"], { x: [null] }), 1);
+  assert.ok(Number.isNaN(fleet.number.x[0]));
+});
+
+test("a thousand tags keep their own values while the store grows", () => {
+  const fleet = new Fleet();
+  const names = Array.from({ length: 1000 }, (_, i) => `t${i}`);
+  for (const name of names) fleet.apply(frame([name], { x: [Number(name.slice(1))], reason: [name] }), 0);
+  for (const name of names) {
+    assert.equal(fleet.number.x[fleet.row(name)], Number(name.slice(1)));
+    assert.equal(fleet.value.reason[fleet.row(name)], name);
+  }
+});
+
+test("a snapshot forgets the tags that it does not name", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a", "b", "c"], { x: [1, 2, 3] }), 0);
+  fleet.replace(frame(["c", "d"], { x: [3, 4] }), 0);
+  assert.deepEqual(fleet.names, ["c", "d"]);
+  assert.equal(fleet.row("a"), -1);
+  assert.equal(fleet.number.x[fleet.row("d")], 4);
+});
+
+test("the age goes on while nothing comes in", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a"], { age_s: [0.5] }), 1000);
+  assert.equal(fleet.age(0, 3000), 2.5);
+});
+
+test("a state that the page does not know is not believed", () => {
+  assert.equal(STATES[stateNumber("splendid")].trusted, false);
+});
+
+test("only a fresh pose in tracking is a full dot", () => {
+  const full = STATES.filter((_, state) => isFilled(state, staleness(0.1))).map(({ name }) => name);
+  assert.deepEqual(full, ["tracking"]);
+  for (const age_s of [2.5, 60, NaN]) assert.equal(isFilled(stateNumber("tracking"), staleness(age_s)), false);
+});
+
+test("every state has a shape of its own", () => {
+  assert.equal(new Set(STATES.map(({ shape }) => shape)).size, STATES.length);
+});
+
+test("tags are sorted as people count, and unknown values come last in both directions", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["tag-10", "tag-9", "Tag-1"], { x: [3, null, -4] }), 0);
+  assert.deepEqual(sorted(fleet, "tag"), ["Tag-1", "tag-9", "tag-10"]);
+  assert.deepEqual(sorted(fleet, "x"), ["Tag-1", "tag-10", "tag-9"]);
+  assert.deepEqual(sorted(fleet, "x", true), ["tag-10", "Tag-1", "tag-9"]);
+});
+
+test("the filter takes names and states", () => {
+  const fleet = new Fleet();
+  const choice = new Choice();
+  fleet.apply(frame(["Forklift-1", "cart-1"], { state: ["tracking", "lost"] }), 0);
+  choice.text = " fork ";
+  assert.deepEqual([choice.shows(fleet, 0), choice.shows(fleet, 1)], [true, false]);
+  choice.text = "";
+  choice.toggleState(stateNumber("tracking"));
+  assert.deepEqual([choice.shows(fleet, 0), choice.shows(fleet, 1)], [false, true]);
+  choice.showAll();
+  assert.ok(choice.shows(fleet, 0) && !choice.narrows);
+});
+
+test("nothing can be followed while nothing is selected", () => {
+  const choice = new Choice();
+  choice.follow = true;
+  assert.equal(choice.follow, false);
+  choice.select("a");
+  choice.follow = true;
+  choice.select(null);
+  assert.equal(choice.follow, false);
+});
+
+test("dots glide to a near pose and jump to a far one", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a"], { x: [0], y: [0] }), 0);
+  follow(fleet, 16, true);
+  fleet.apply(frame(["a"], { x: [0.5], y: [0] }), 0);
+  assert.equal(follow(fleet, 16, true), true);
+  assert.ok(fleet.drawnX[0] > 0 && fleet.drawnX[0] < 0.5);
+  fleet.apply(frame(["a"], { x: [9], y: [0] }), 0);
+  assert.equal(follow(fleet, 16, true), false);
+  assert.equal(fleet.drawnX[0], 9);
+});
+
+test("with reduced motion the dots are where the poses are", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a"], { x: [0], y: [0] }), 0);
+  follow(fleet, 16, false);
+  fleet.apply(frame(["a"], { x: [0.5], y: [0] }), 0);
+  assert.equal(follow(fleet, 16, false), false);
+  assert.equal(fleet.drawnX[0], 0.5);
+});
+
+test("a trail holds placed poses, breaks where the place was not known, and does not grow for ever", () => {
+  const [fleet, trails] = [new Fleet(), new Trails()];
+  for (let i = 0; i < 1000; i++) {
+    const state = i === 990 ? "ambiguous" : i > 995 ? "degraded" : "tracking";
+    fleet.apply(frame(["a"], { x: [i], y: [0], state: [state] }), i * 200);
+    trails.note(fleet, ["a"], i * 200);
+  }
+  const trail = trails.of("a");
+  assert.ok(trail && trail.length < 200);
+  const points = Array.from({ length: 12 }, (_, i) => trail.at(trail.length - 12 + i));
+  assert.deepEqual(points.map((at) => trail.x[at]), [988, 989, NaN, 991, 992, 993, 994, 995, 996, 997, 998, 999]);
+  assert.deepEqual(points.map((at) => trail.trusted[at]), [1, 1, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0]);
+  trails.prune(new Fleet());
+  assert.equal(trails.of("a"), null);
+});

@@ -1,0 +1,49 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import {
+  age, compassPoint, coordinate, counted, degrees, distance, fixed, metres, percent, sigma, words,
+} from "../../../service/dropanchor_service/dashboard/js/format.js";
+
+/** @param {(value: any) => string} format @param {[any, string][]} cases */
+function gives(format, cases) {
+  for (const [value, text] of cases) assert.equal(format(value), text);
+}
+
+test("what is not known is a dash, whatever it is", () => {
+  for (const format of [age, compassPoint, coordinate, degrees, metres, percent, sigma]) {
+    gives(format, [[NaN, "–"], [null, "–"], [undefined, "–"], [Infinity, "–"]]);
+  }
+});
+
+test("numbers have a true minus sign and no negative zero", () => {
+  assert.equal(fixed(-1.255, 1), "−1.3");
+  assert.equal(fixed(-0.001, 2), "0.00");
+});
+
+test("coordinates lose decimals with distance", () => {
+  gives(coordinate, [[-3.14159, "−3.14"], [123.456, "123.5"], [-9876.5, "−9877"]]);
+});
+
+test("headings are turned into one turn", () => {
+  gives(degrees, [[0, "0°"], [-Math.PI / 2, "270°"], [7 * Math.PI, "180°"], [-0.001, "0°"]]);
+  gives(compassPoint, [[0, "E"], [Math.PI / 2, "N"], [-Math.PI / 2, "S"], [Math.PI, "W"], [-Math.PI / 4, "SE"]]);
+});
+
+test("a share is never rounded up to certainty", () => {
+  gives(percent, [[0.624, "62 %"], [0.9996, "99.9 %"], [1, "100 %"], [0, "0 %"]]);
+});
+
+test("ages are told in the unit that a person would choose", () => {
+  gives(age, [[-0.2, "0.0 s"], [0.34, "0.3 s"], [12.4, "12 s"], [120, "2 min"], [7200, "2 h"], [3 * 86400, "3 d"]]);
+});
+
+test("ring distances have no needless digits", () => {
+  gives(distance, [[0.05, "5 cm"], [0.30000000000000004, "0.3 m"], [20, "20 m"], [2000, "2 km"], [1500, "1.5 km"]]);
+});
+
+test("one tag is not tags", () => {
+  assert.equal(counted(1, "tag"), "1 tag");
+  assert.equal(counted(12000, "tag"), "12,000 tags");
+  assert.equal(words("several_modes"), "several modes");
+});

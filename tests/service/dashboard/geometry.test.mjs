@@ -1,0 +1,24 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { distancesTo, horizontal } from "../../../service/dropanchor_service/dashboard/js/geometry.js";
+
+const square = { left: 0, right: 4, bottom: 0, top: 3 };
+
+test("the distances from inside a rectangle begin at zero", () => {
+  assert.deepEqual(distancesTo(0, 0, square), [0, 5]);
+});
+
+test("the distances from outside a rectangle are to its edge and to its far corner", () => {
+  assert.deepEqual(distancesTo(-3, 7, square), [5, Math.hypot(7, 7)]);
+  assert.deepEqual(distancesTo(2, -5, square), [5, Math.hypot(2, 8)]);
+});
+
+test("a slant range is longer than the distance on the map", () => {
+  assert.equal(horizontal(5, 3), 4);
+  assert.equal(horizontal(5, -3), 4);
+});
+
+test("a range shorter than the height is straight below", () => {
+  assert.equal(horizontal(2, 3), 0);
+});
