@@ -30,7 +30,7 @@ class Motion:
     def yaw(self) -> Array:
         """(n,) rad, azimuth of the body x axis."""
         x = self.attitude.apply([1.0, 0.0, 0.0])
-        return np.arctan2(x[:, 1], x[:, 0])
+        return np.asarray(np.arctan2(x[:, 1], x[:, 0]))
 
 
 def synthesise(
@@ -48,7 +48,9 @@ def synthesise(
     body = attitude(t)
     gyro = (attitude(t - h).inv() * attitude(t + h)).as_rotvec() / (2 * h)
     a = np.zeros((len(t), 3)) if acceleration is None else acceleration(t)
-    return Motion(t, body.inv().apply(a + [0.0, 0.0, G0]), gyro, body.inv().apply(np.tile(field, (len(t), 1))), body)
+    return Motion(
+        t, body.inv().apply(a + np.array([0.0, 0.0, G0])), gyro, body.inv().apply(np.tile(field, (len(t), 1))), body
+    )
 
 
 def turning(t: Array, rate: float = 0.6, tilt: float = 0.15) -> Array:

@@ -4,8 +4,8 @@ Model, linear in field f (level frame) and hard iron h (body frame), with R from
   m = R^T f + h + v
 State x = (f, h, b, s): the level frame itself turns slowly about the vertical, by phi = b dt + s dyaw, because the
 gyroscope has a residual bias b (rad/s) and scale error s; then f <- R_z(phi) f, which makes b and s observable. A
-Kalman filter with f ~ N(0, l^2), h ~ N(0, (hard_iron l)^2), l = |m| of the first sample, so a magnetometer without units
-will do. Soft iron cannot be told from the field's own distortion on a level track; it stays in v.
+Kalman filter with f ~ N(0, l^2), h ~ N(0, (hard_iron l)^2), l = |m| of the first sample, so a magnetometer without
+units will do. Soft iron cannot be told from the field's own distortion on a level track; it stays in v.
 
 v is the distortion of the field by the place. It is correlated along the path (a few seconds at walking speed) and
 constant at rest: hence its variance is inflated by 2 tau / dt, and nothing is learned from a resting tag after its

@@ -36,7 +36,7 @@ def watched(acc: Array, gyro: Array, dt: float = 0.01) -> tuple[Array, Array, Ar
 
 def noise(seed: int, n: int, acc_sd: float, gyro_sd: float, rate: float = 0.0) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
-    return rng.normal(0, acc_sd, (n, 3)) + [0, 0, 9.8], rng.normal(0, gyro_sd, (n, 3)) + [0, 0, rate]
+    return rng.normal([0, 0, 9.8], acc_sd, (n, 3)), rng.normal([0, 0, rate], gyro_sd, (n, 3))
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_rest_begins_within_a_second_and_ends_within_a_tenth() -> None:
 @pytest.mark.parametrize("dt", [0.005, 0.01, 0.052])
 def test_the_bias_is_learned_at_rest_at_any_rate_of_samples(dt: float) -> None:
     acc, gyro = noise(6, int(6 / dt), 0.014, 0.003)
-    _, bias, row = watched(acc, gyro + [0.01, -0.015, 0.008], dt)
+    _, bias, row = watched(acc, gyro + np.array([0.01, -0.015, 0.008]), dt)
     assert bias == pytest.approx([0.01, -0.015, 0.008], abs=1.5e-3)
     assert np.sqrt(row["bias_var"]) < 2e-3
 
