@@ -50,6 +50,7 @@ check: install
 	@$(BIN)/mypy $(PACKAGES) tests
 	@$(BIN)/lint-imports --no-cache
 	@$(BIN)/python -m dropanchor_schemas.export --check
+	@$(BIN)/python -m dropanchor_service.api.export --check
 
 bench: install
 	@$(BIN)/python -m pytest tests/benchmarks -s $(PYTEST)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from dropanchor_schemas.answers import PoseFrame
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, Site, TagSettings
@@ -15,6 +16,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "samples": SamplesMessage,
     "pose": Pose,
     "poses": PoseList,
+    "pose_frame": PoseFrame,
     "site": Site,
     "anchor": Anchor,
     "tag_settings": TagSettings,

@@ -2,11 +2,18 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
+from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_schemas.wire import anchor_number
 
-Id = Annotated[str, Field(min_length=1, max_length=64)]
+
+def _has_a_key(identifier: str) -> str:
+    chunk_from_id(identifier)
+    return identifier
+
+
+Id = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_has_a_key)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
 
 

@@ -1,0 +1,90 @@
+"""Puts the interface together. Everything it uses is passed in."""
+
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from prometheus_client import CollectorRegistry
+
+from dropanchor_schemas.answers import PoseFrame, Problem
+from dropanchor_service.api.dashboard import DashboardMount
+from dropanchor_service.api.errors import Kind, add_error_handlers
+from dropanchor_service.api.health import Ready, health_router, metrics_router
+from dropanchor_service.api.limits import BodyLimit, EscapedPath
+from dropanchor_service.api.poses import poses_router
+from dropanchor_service.api.site import site_router
+from dropanchor_service.api.stream import stream_router
+from dropanchor_service.api.tags import tags_router
+from dropanchor_service.store.answers import Answers
+
+PREFIX = "/api/v1"
+MAX_BODY_BYTES = 1_048_576
+DASHBOARD = Path(__file__).parent.parent / "dashboard"
+
+
+def create_app(
+    answers: Answers,
+    *,
+    ready: Ready,
+    registry: CollectorRegistry,
+    stopping: Event,
+    max_tags: int = 20_000,
+    dashboard: Path | None = DASHBOARD,
+) -> FastAPI:
+    """ready: whether the service can do its work, and why not. stopping: when set, streams end.
+    dashboard: the folder of the page, None for no page."""
+    app = FastAPI(
+        title="Dropanchor",
+        version="1",
+        openapi_url=f"{PREFIX}/openapi.json",
+        docs_url=None,  # its scripts come from elsewhere; the page works without any other network
+        redoc_url=None,
+        redirect_slashes=False,
+    )
+    app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
+    app.add_middleware(EscapedPath)
+    add_error_handlers(app)
+    for router in (
+        tags_router(answers, max_tags),
+        poses_router(answers),
+        stream_router(answers, stopping),
+        site_router(answers.site),
+        health_router(ready),
+    ):
+        app.include_router(router, prefix=PREFIX)
+    app.include_router(metrics_router(registry))
+    if dashboard is not None:
+        app.router.routes.append(DashboardMount(dashboard))
+    app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
+    return app
+
+
+def openapi_of(app: FastAPI) -> dict[str, Any]:
+    if app.openapi_schema is None:
+        document = get_openapi(
+            title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
+        )
+        for model in (PoseFrame, Problem):  # neither is the one model of a route
+            schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
+            document["components"]["schemas"] |= schema.pop("$defs") | {model.__name__: schema}
+        app.openapi_schema = document
+    return app.openapi_schema
+
+
+_TAGS = [
+    {"name": "poses", "description": "Where the tags are."},
+    {"name": "tags", "description": "What was heard from the tags, and what an operator knows about them."},
+    {"name": "site", "description": "The frame, its place on the Earth, and the anchors."},
+    {"name": "health", "description": "For supervisors and Prometheus."},
+]
+
+
+def _description() -> str:
+    rows = "\n".join(f"| `{kind.type}` | {kind.status} | {kind.title} |" for kind in Kind)
+    return (
+        "Live positions of a fleet of tags around one dropped UWB anchor. SI units; the site frame is ENU with x east; "
+        "times are UTC in ns.\n\nErrors are problems (RFC 9457) of these types:\n\n"
+        f"| type | status | title |\n|---|---|---|\n{rows}\n"
+    )

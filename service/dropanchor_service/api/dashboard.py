@@ -1,0 +1,38 @@
+"""The page: static files beside the interface, always revalidated, and allowed to load nothing from elsewhere."""
+
+from pathlib import Path
+
+from starlette.responses import Response
+from starlette.routing import Match, Mount
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+_HEADERS = {
+    "cache-control": "no-cache",
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+}
+
+
+class _Files(StaticFiles):
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        response = await super().get_response(path, scope)
+        response.headers.update(_HEADERS)
+        return response
+
+
+class DashboardMount(Mount):
+    """At the root, for every path but those of the interface, whose own 404 and 405 it must not hide."""
+
+    def __init__(self, folder: Path) -> None:
+        """Raises RuntimeError when there is no such folder."""
+        super().__init__("/", app=_Files(directory=folder, html=True), name="dashboard")
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        reading = scope["method"] in ("GET", "HEAD")
+        if scope["path"].startswith("/api/"):
+            return Match.NONE, {}
+        match, child_scope = super().matches(scope)
+        return (match if reading or match is Match.NONE else Match.PARTIAL), child_scope

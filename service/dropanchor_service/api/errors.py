@@ -1,0 +1,149 @@
+"""Every error is a problem (RFC 9457, application/problem+json) with a type that stays the same."""
+
+import json
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+from starlette.routing import Match
+
+MEDIA_TYPE = "application/problem+json"
+TYPE_PREFIX = "urn:dropanchor:problem:"
+
+_METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
+_MAX_PARTS = 20
+_MAX_LOCATION = 200
+
+
+class Kind(Enum):
+    """The kinds of problem: status and title."""
+
+    NOT_FOUND = (404, "There is nothing here")
+    UNKNOWN_TAG = (404, "The tag is not known")
+    NO_POSE_YET = (404, "The tag has no pose yet")
+    UNKNOWN_ANCHOR = (404, "The site has no such anchor")
+    METHOD_NOT_ALLOWED = (405, "The method is not allowed here")
+    NOT_ACCEPTABLE = (406, "None of the accepted media types is offered")
+    NOT_GEOREFERENCED = (409, "The site has no georeference")
+    SITE_ID_FIXED = (409, "The site's id cannot change while the service runs")
+    TAGS_FULL = (409, "The service holds as many tags as it may")
+    BODY_TOO_LARGE = (413, "The request body is too large")
+    INVALID_REQUEST = (422, "The request is not valid")
+    INTERNAL = (500, "The service made a mistake")
+    NOT_SAVED = (503, "The change could not be saved")
+    NOT_READY = (503, "The service is not ready")
+    OTHER = (400, "The request cannot be answered")
+
+    def __init__(self, status: int, title: str) -> None:
+        self.status = status
+        self.title = title
+
+    @property
+    def type(self) -> str:
+        return TYPE_PREFIX + self.name.lower().replace("_", "-")
+
+
+class ProblemError(HTTPException):
+    """Raised anywhere behind a route. members: more members of the problem."""
+
+    def __init__(self, kind: Kind, detail: str, **members: Any) -> None:
+        super().__init__(kind.status, detail)
+        self.kind = kind
+        self.members = members
+
+
+def problem_response(
+    request: Request,
+    kind: Kind,
+    detail: str,
+    *,
+    members: Mapping[str, Any] | None = None,
+    status: int | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    status = kind.status if status is None else status
+    problem = {"type": kind.type, "title": kind.title, "status": status, "detail": detail, "instance": _path(request)}
+    # ASCII: a request may hold lone surrogates, which no UTF-8 can carry.
+    body = json.dumps(problem | dict(members or {}), ensure_ascii=True).encode()
+    return Response(body, status, {"cache-control": "no-store", **(headers or {})}, MEDIA_TYPE)
+
+
+def add_error_handlers(app: FastAPI) -> None:
+    app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(RequestValidationError, _on_invalid_request)
+    app.add_exception_handler(Exception, _on_exception)
+
+
+def problems(*kinds: Kind) -> dict[int | str, dict[str, Any]]:
+    """How a route declares them in OpenAPI."""
+    content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    by_status: dict[int | str, dict[str, Any]] = {}
+    for kind in kinds:
+        said = by_status.get(kind.status, {}).get("description")
+        line = f"`{kind.type}`: {kind.title}."
+        by_status[kind.status] = {"description": f"{said} {line}" if said else line, "content": content}
+    return by_status
+
+
+async def _on_http_exception(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    if isinstance(error, ProblemError):
+        return problem_response(request, error.kind, error.detail, members=error.members)
+    match error.status_code:
+        case 404:
+            return problem_response(request, Kind.NOT_FOUND, f"There is no resource at {_path(request)}.")
+        case 405:
+            allow = ", ".join(_allowed_methods(request))
+            detail = f"{request.method} is not allowed; {allow} is."
+            return problem_response(request, Kind.METHOD_NOT_ALLOWED, detail, headers={"allow": allow})
+        case 400:
+            return problem_response(request, Kind.INVALID_REQUEST, "The body cannot be read as JSON.")
+    headers = dict(error.headers or {})
+    return problem_response(request, Kind.OTHER, str(error.detail), status=error.status_code, headers=headers)
+
+
+async def _on_invalid_request(request: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    parts = [
+        # Never the input itself: it may be a secret, or a number that JSON cannot carry.
+        {"location": _location(part["loc"]), "detail": _sentence(part)}
+        for part in error.errors()[:_MAX_PARTS]
+    ]
+    detail = "; ".join(f"{part['location']}: {part['detail']}" for part in parts[:3])
+    return problem_response(request, Kind.INVALID_REQUEST, detail, members={"errors": parts})
+
+
+async def _on_exception(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs it
+    return problem_response(request, Kind.INTERNAL, "An unexpected error; the service's log says more.")
+
+
+def _path(request: Request) -> str:
+    """As it was sent."""
+    return str(request.scope.get("raw_path", b"").decode("latin-1"))
+
+
+def _location(parts: Iterable[Any]) -> str:
+    return ".".join(str(part) for part in parts)[:_MAX_LOCATION]
+
+
+def _sentence(part: Mapping[str, Any]) -> str:
+    if part["type"] == "json_invalid":
+        return f"is not JSON: {part['ctx']['error']}"
+    if part["type"] == "extra_forbidden":
+        return "is not known"
+    return str(part["msg"]).removeprefix("Value error, ")
+
+
+def _allowed_methods(request: Request) -> list[str]:
+    """Of all routes that have this path."""
+    scope = {"type": "http", "path": request.scope["path"], "root_path": "", "headers": []}
+    routes = request.app.router.routes
+    return [
+        method
+        for method in _METHODS
+        if any(route.matches(scope | {"method": method})[0] is Match.FULL for route in routes)
+    ]

@@ -1,0 +1,83 @@
+"""One example of each answer, for the OpenAPI document."""
+
+from typing import Any
+
+_ELLIPSE = {"semi_major_m": 0.24, "semi_minor_m": 0.15, "angle_rad": 1.2}
+
+POSE: dict[str, Any] = {
+    "tag": "tag-1",
+    "t_ns": 1_800_000_000_000_000_000,
+    "age_s": 0.042,
+    "state": "tracking",
+    "reason": "resolved",
+    "hint": "",
+    "x": 3.2,
+    "y": -1.7,
+    "heading_rad": 0.61,
+    "speed_mps": 1.1,
+    "yaw_rate_radps": 0.02,
+    "covariance": [[0.0045, 0.0016, 0.0], [0.0016, 0.0087, 0.0], [0.0, 0.0, 0.001]],
+    "ellipse_95": _ELLIPSE,
+    "p_mode": 0.998,
+    "sigma_pos_m": 0.115,
+    "sigma_obs_m": 0.31,
+    "range_m": 3.64,
+    "anchor": "17",
+    "hypotheses": [],
+    "lat": 52.512345678,
+    "lon": 13.412345678,
+    "online": True,
+}
+POSE_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "poses": [POSE]}
+POSE_FRAME: dict[str, Any] = {
+    "t_ns": 1_800_000_000_042_000_000,
+    "tags": ["tag-1", "tag-2"],
+    "online": [True, True],
+    "state": ["tracking", "initialising"],
+    "reason": ["resolved", "no_heading"],
+    "hint": ["", "No heading yet: the tag has to send IMU samples or a platform heading."],
+    "anchor": ["17", "17"],
+    "age_s": [0.042, 0.05],
+    "x": [3.2, None],
+    "y": [-1.7, None],
+    "heading_rad": [0.61, None],
+    "speed_mps": [1.1, None],
+    "yaw_rate_radps": [0.02, None],
+    "range_m": [3.64, 7.1],
+    "p_mode": [0.998, None],
+    "sigma_pos_m": [0.115, None],
+    "sigma_obs_m": [0.31, None],
+    "semi_major_m": [0.24, None],
+    "semi_minor_m": [0.15, None],
+    "angle_rad": [1.2, None],
+    "hypotheses": [None, None],
+}
+TAG_SETTINGS: dict[str, Any] = {
+    "height_m": 1.1,
+    "range_std_m": 0.1,
+    "range_bias_m": 0.0,
+    "range_scale": 1.0,
+    "mount_angle_rad": 0.0,
+    "reverse_allowed": False,
+    "heading_source": "auto",
+    "start": {"x": 2.0, "y": 0.5, "heading_rad": None, "std_m": 0.1},
+}
+TAG: dict[str, Any] = {
+    "tag": "tag-1",
+    "online": True,
+    "first_heard_ns": 1_799_999_400_000_000_000,
+    "last_heard_ns": 1_800_000_000_000_000_000,
+    "messages": 3000,
+    "samples": {"imu": 60000, "range": 6000},
+    "rejected": {"range_negative": 2},
+    "settings": TAG_SETTINGS,
+}
+TAG_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "tags": [TAG]}
+ANCHOR: dict[str, Any] = {"id": "17", "x": 0.0, "y": 0.0, "z": 2.5}
+SITE: dict[str, Any] = {
+    "id": "default",
+    "name": "Yard",
+    "declination_rad": 0.07,
+    "georeference": {"lat": 52.5123, "lon": 13.4123, "rotation_rad": 0.0},
+    "anchors": [ANCHOR],
+}

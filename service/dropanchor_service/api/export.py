@@ -1,0 +1,36 @@
+"""Writes the OpenAPI document into the schemas' folder, or with --check says whether it is current."""
+
+import json
+import sys
+from pathlib import Path
+from threading import Event
+
+from prometheus_client import CollectorRegistry
+
+import dropanchor_schemas
+from dropanchor_schemas.site import Site
+from dropanchor_service.api.app import create_app
+from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.answers import Answers
+
+FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
+
+
+def text() -> str:
+    answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
+    app = create_app(answers, ready=lambda: (True, []), registry=CollectorRegistry(), stopping=Event(), dashboard=None)
+    return json.dumps(app.openapi(), indent=2, ensure_ascii=False) + "\n"
+
+
+def main(arguments: list[str]) -> int:
+    if arguments != ["--check"]:
+        FILE.write_text(text(), encoding="utf-8")
+        return 0
+    if FILE.exists() and FILE.read_text(encoding="utf-8") == text():
+        return 0
+    sys.stderr.write(f"not current: {FILE.name}; run python -m dropanchor_service.api.export\n")
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

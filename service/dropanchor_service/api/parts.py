@@ -1,0 +1,86 @@
+"""What the routes share: ids in paths, filters in queries, JSON answers."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+from urllib.parse import unquote
+
+from fastapi import Depends, Path, Request
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from starlette.responses import Response
+
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_service.api.errors import Kind, ProblemError
+from dropanchor_service.store.answers import to_json
+
+
+def json_response(answer: Any, media_type: str = "application/json") -> Response:
+    return Response(to_json(answer), media_type=media_type, headers={"cache-control": "no-store"})
+
+
+def refuse_query(request: Request) -> None:
+    """For routes without query parameters: a misspelt one must not look as if it had worked."""
+    if request.query_params:
+        name = next(iter(request.query_params))
+        raise ProblemError(Kind.INVALID_REQUEST, f"query.{name[:64]}: is not known; no query parameter is taken here")
+
+
+def shown(example: Any) -> dict[int | str, dict[str, Any]]:
+    """How a route declares what it answers."""
+    return {200: {"content": {"application/json": {"example": example}}}}
+
+
+NO_QUERY = Depends(refuse_query)
+
+
+def id_of(escaped: str) -> str:
+    """The id of a path segment, which arrives escaped so that an id may hold a slash. Raises ProblemError."""
+    try:
+        identifier = unquote(escaped, errors="strict")
+        chunk_from_id(identifier)
+    except UnicodeDecodeError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, "the id in the path is not percent-escaped UTF-8") from error
+    except InvalidKeyError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"the id in the path cannot be used: {error}") from error
+    return identifier
+
+
+def _tag_id(tag: Annotated[str, Path(description="The tag's id, percent-escaped.", examples=["tag-1"])]) -> str:
+    return id_of(tag)
+
+
+def _anchor_id(anchor: Annotated[str, Path(description="The anchor's id, percent-escaped.", examples=["17"])]) -> str:
+    return id_of(anchor)
+
+
+TagId = Annotated[str, Depends(_tag_id)]
+AnchorId = Annotated[str, Depends(_anchor_id)]
+
+
+def _split(values: list[str]) -> list[str]:
+    names = [name for value in values for name in value.split(",")]
+    for name in names:
+        chunk_from_id(name)
+    return names
+
+
+class TagFilter(BaseModel):
+    """The query of a route that can be asked for some tags only."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    tags: Annotated[list[str], AfterValidator(_split)] = Field(
+        default=[],
+        description="Only these tags: separated by commas, or the parameter repeated. A tag that is not known is left "
+        "out. Without it: all tags.",
+        examples=[["tag-1,tag-2"]],
+    )
+
+
+@contextmanager
+def saving() -> Iterator[None]:
+    """Around a change of the site: what could not be written was not changed either."""
+    try:
+        yield
+    except OSError as error:
+        raise ProblemError(Kind.NOT_SAVED, f"The change was not made: {error.strerror or error}.") from error

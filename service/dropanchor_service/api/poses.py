@@ -1,0 +1,70 @@
+"""Poses: one, or many."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import Response
+
+from dropanchor_schemas.pose import Pose, PoseList
+from dropanchor_service.api import examples, geojson
+from dropanchor_service.api.errors import Kind, ProblemError, problems
+from dropanchor_service.api.parts import NO_QUERY, TagFilter, TagId, json_response
+from dropanchor_service.store.answers import Answer, Answers
+
+_NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
+
+
+def poses_router(answers: Answers) -> APIRouter:
+    router = APIRouter(tags=["poses"])
+
+    @router.get(
+        "/tags/{tag}/pose",
+        operation_id="get_pose",
+        summary="The latest pose of a tag",
+        response_model=Pose,
+        dependencies=[NO_QUERY],
+        responses=_offers(examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the place is unknown.")
+        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, *_NEGOTIATION),
+    )
+    async def get_pose(tag: TagId, request: Request) -> Response:
+        as_geojson = geojson.wanted(request, answers)
+        pose = _pose_of(answers, tag)
+        return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
+
+    @router.get(
+        "/poses",
+        operation_id="list_poses",
+        summary="The latest poses of all tags, or of some",
+        response_model=PoseList,
+        responses=_offers(examples.POSE_LIST, "A GeoJSON FeatureCollection (RFC 7946).") | problems(*_NEGOTIATION),
+    )
+    async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
+        as_geojson = geojson.wanted(request, answers)
+        found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
+        poses = answers.pose_list(found if query.tags else None)
+        if as_geojson:
+            return _response(geojson.collection_of(poses), geojson.MEDIA_TYPE)
+        return _response(poses, geojson.JSON)
+
+    return router
+
+
+def _pose_of(answers: Answers, name: str) -> Answer:
+    tag = answers.tags.find(name)
+    if tag is None:
+        raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {name!r} has been heard or configured.")
+    pose = answers.pose_of(tag)
+    if pose is None:
+        raise ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet.")
+    return pose
+
+
+def _response(answer: Answer, media_type: str) -> Response:
+    response = json_response(answer, media_type)
+    response.headers["vary"] = "accept"
+    return response
+
+
+def _offers(example: Answer, as_geojson: str) -> dict[int | str, dict[str, Any]]:
+    schema = {"schema": {"type": "object", "description": as_geojson}}
+    return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: schema}}}

@@ -1,0 +1,76 @@
+"""An interface over a store that each test fills, asked without a network."""
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import httpx
+import numpy as np
+from fastapi import FastAPI
+from prometheus_client import CollectorRegistry
+
+from dropanchor_schemas.answers import Problem
+from dropanchor_schemas.site import Anchor, Site
+from dropanchor_service.api import create_app
+from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
+from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.answers import Answers
+
+T_NS = 1_800_000_000_000_000_000
+
+
+@dataclass
+class House:
+    """What the interface reads, and what a test changes in it."""
+
+    answers: Answers
+    registry: CollectorRegistry = field(default_factory=CollectorRegistry)
+    stopping: Event = field(default_factory=Event)
+    not_ready: Sequence[str] = ()
+    now_ns: int = T_NS
+
+    def move(self, *names: str, **fields: Any) -> None:
+        poses = np.zeros(len(names), POSE)
+        poses["row"] = [self.answers.tags.register(name).row for name in names]
+        poses["t_ns"], poses["state"], poses["reason"] = self.now_ns, State.TRACKING, StateReason.RESOLVED
+        poses["cov"], poses["p_mode"] = np.diag([0.04, 0.01, 0.001]), 1.0
+        for name, value in fields.items():
+            poses[name] = value
+        self.answers.latest.write(poses, np.empty(0, HYPOTHESIS))
+
+    def app(self, dashboard: Path | None = None, max_tags: int = 1000) -> FastAPI:
+        return create_app(
+            self.answers,
+            ready=lambda: (not self.not_ready, self.not_ready),
+            registry=self.registry,
+            stopping=self.stopping,
+            max_tags=max_tags,
+            dashboard=dashboard,
+        )
+
+
+def make_house(site: Site | None = None, folder: Path | None = None) -> House:
+    store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
+    house = House(Answers(store, TagTable(), LatestPoses()))
+    house.answers.now_ns = lambda: house.now_ns
+    return house
+
+
+def ask(app: FastAPI, method: str, path: str, **options: Any) -> httpx.Response:
+    async def asked() -> httpx.Response:
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
+            return await client.request(method, path, **options)
+
+    return asyncio.run(asked())
+
+
+def kind_of(response: httpx.Response) -> str:
+    """The last part of a problem's type, once it is sure that it is a problem."""
+    assert response.headers["content-type"] == "application/problem+json"
+    problem = Problem.model_validate(response.json())
+    assert problem.status == response.status_code
+    return problem.type.removeprefix("urn:dropanchor:problem:")
