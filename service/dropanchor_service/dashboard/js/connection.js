@@ -1,5 +1,9 @@
 /** The service: the stream of poses, and the site. Comes back by itself when the service does. */
 
+/** Frames a second; fewer where each is large. */
+const HZ = 10;
+const HZ_OF_MANY = 4;
+const MANY = 2000;
 const RETRY_MS = [500, 1000, 2000, 3000];
 const PROBE_MS = 3000;
 const PROBE_TIMEOUT_MS = 4000;
@@ -28,6 +32,7 @@ export class Connection extends EventTarget {
   /** @type {EventSource | null} */
   #stream = null;
   #attempt = 0;
+  #max_hz = HZ;
   #timer = 0;
 
   start() {
@@ -41,10 +46,18 @@ export class Connection extends EventTarget {
     this.#open();
   }
 
+  /** @param {number} tags */
+  slowDownFor(tags) {
+    const max_hz = tags > MANY ? HZ_OF_MANY : HZ;
+    if (max_hz === this.#max_hz) return;
+    this.#max_hz = max_hz;
+    this.#open();
+  }
+
   #open() {
     clearTimeout(this.#timer);
     this.#stream?.close();
-    const stream = new EventSource(api("stream?max_hz=10"));
+    const stream = new EventSource(api(`stream?max_hz=${this.#max_hz}`));
     stream.addEventListener("open", () => this.#opened());
     stream.addEventListener("snapshot", (event) => this.#received("snapshot", event));
     stream.addEventListener("poses", (event) => this.#received("change", event));

@@ -14,10 +14,12 @@ export class Detail {
   #pose = null;
   #asked = -Infinity;
 
-  /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("./choice.js").Choice} choice */
-  constructor(panel, fleet, choice) {
+  /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("./roster.js").Roster} roster
+   * @param {import("./choice.js").Choice} choice */
+  constructor(panel, fleet, roster, choice) {
     this.panel = panel;
     this.fleet = fleet;
+    this.roster = roster;
     this.choice = choice;
     this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
     this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
@@ -30,7 +32,7 @@ export class Detail {
     const row = this.fleet.row(this.choice.selected);
     this.panel.hidden = row < 0;
     if (row < 0) return;
-    this.#ask(this.fleet.names[row]);
+    if (this.fleet.hasPose(row)) this.#ask(this.fleet.names[row]);
     this.#head(row);
     this.#numbers(row);
     this.#hypotheses(row);
@@ -70,6 +72,7 @@ export class Detail {
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
+    this.#part("json").hidden = !this.fleet.hasPose(row);
   }
 
   /** @param {number} row */
@@ -94,6 +97,9 @@ export class Detail {
       online: this.fleet.online[row] ? "Online" : "Offline",
     };
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
+    const status = this.roster.of(this.fleet.names[row]);
+    put(this.#part("samples"), counts("Samples", status?.samples));
+    put(this.#part("rejected"), counts("Rejected", status?.rejected));
   }
 
   /** @param {number} row */
@@ -119,6 +125,12 @@ function hypothesisLine(ghost) {
   weight.textContent = percent(ghost.weight);
   line.append(place, bar, weight);
   return line;
+}
+
+/** @param {string} title @param {Record<string, number> | undefined} byName */
+function counts(title, byName) {
+  const parts = Object.entries(byName ?? {}).map(([name, count]) => `${count.toLocaleString("en")} ${words(name)}`);
+  return parts.length ? `${title}: ${parts.join(", ")}` : "";
 }
 
 /** @param {number | null | undefined} radps */

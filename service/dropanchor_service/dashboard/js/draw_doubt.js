@@ -113,14 +113,14 @@ export function drawRangeRings(scene, wanted) {
 }
 
 /** @param {Scene} scene @param {number} row @param {number} alpha */
-function strokeRangeRing({ ctx, view, palette, fleet, anchors, selected, now_ms }, row, alpha) {
+function strokeRangeRing({ ctx, view, palette, fleet, roster, anchors, selected, now_ms }, row, alpha) {
   const anchor = anchors.find((other) => other.id === fleet.value.anchor[row]);
   const range = fleet.number.range_m[row];
   const stale = staleness(fleet.age(row, now_ms));
   if (!anchor || Number.isNaN(range) || (stale === 2 && row !== selected)) return false;
   const state = fleet.state[row];
   ctx.beginPath();
-  traceRing(ctx, view, anchor.x, anchor.y, horizontal(range, anchor.z));
+  traceRing(ctx, view, anchor.x, anchor.y, horizontal(range, anchor.z - roster.height(fleet.names[row])));
   ctx.globalAlpha = alpha * FADE[stale];
   ctx.strokeStyle = palette.state[state];
   ctx.lineWidth = 1.25;

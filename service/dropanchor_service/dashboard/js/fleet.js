@@ -56,6 +56,11 @@ export class Fleet {
     return (now_ms - this.poseTime[row]) / 1000;
   }
 
+  /** @param {number} row */
+  hasPose(row) {
+    return row >= 0 && !Number.isNaN(this.poseTime[row]);
+  }
+
   /** Take a frame that changes some tags. @param {Frame} frame @param {number} now_ms */
   apply(frame, now_ms) {
     const rows = this.#rowsOf(frame.tags);

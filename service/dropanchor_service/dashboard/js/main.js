@@ -9,6 +9,7 @@ import { fixed } from "./format.js";
 import { listen } from "./gestures.js";
 import { LiveMap } from "./map.js";
 import { Notices } from "./notices.js";
+import { Roster } from "./roster.js";
 import { STATES } from "./states.js";
 import { TagTable } from "./table.js";
 import { installTheme } from "./theme.js";
@@ -21,11 +22,12 @@ const byId = (id) => /** @type {T} */ (document.getElementById(id));
 
 const fleet = new Fleet();
 const trails = new Trails();
+const roster = new Roster(fleet);
 const choice = new Choice();
 const connection = new Connection();
-const map = new LiveMap(byId("map"), fleet, trails, choice);
+const map = new LiveMap(byId("map"), fleet, trails, roster, choice);
 const chips = new StateChips(byId("chips"), fleet, choice);
-const detail = new Detail(byId("detail"), fleet, choice);
+const detail = new Detail(byId("detail"), fleet, roster, choice);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -61,6 +63,7 @@ function receiver(take) {
 connection.addEventListener("snapshot", receiver((frame, now_ms) => {
   fleet.replace(frame, now_ms);
   trails.prune(fleet);
+  connection.slowDownFor(fleet.size);
 }));
 connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
 connection.addEventListener("site", (event) => {
@@ -106,6 +109,7 @@ listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 setInterval(updatePanels, PANELS_MS);
 connection.start();
+roster.start();
 
 /** Read-only, for tests and the curious. */
 Object.defineProperty(window, "dropanchor", {

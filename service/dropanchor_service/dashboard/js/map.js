@@ -34,12 +34,14 @@ export class LiveMap extends EventTarget {
   #calm = matchMedia("(prefers-reduced-motion: reduce)");
 
   /** @param {HTMLCanvasElement} canvas @param {import("./fleet.js").Fleet} fleet
-   * @param {import("./trails.js").Trails} trails @param {import("./choice.js").Choice} choice */
-  constructor(canvas, fleet, trails, choice) {
+   * @param {import("./trails.js").Trails} trails @param {import("./roster.js").Roster} roster
+   * @param {import("./choice.js").Choice} choice */
+  constructor(canvas, fleet, trails, roster, choice) {
     super();
     this.canvas = canvas;
     this.fleet = fleet;
     this.trails = trails;
+    this.roster = roster;
     this.choice = choice;
     this.#ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     new ResizeObserver(() => this.#resize()).observe(canvas);
@@ -169,8 +171,8 @@ export class LiveMap extends EventTarget {
     const shown = (/** @type {number} */ row) => choice.shows(fleet, row);
     this.#rows = rowsInView(fleet, view, shown);
     const scene = {
-      ctx: this.#ctx, view, palette, fleet, trails: this.trails, anchors: this.anchors, rows: this.#rows,
-      selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
+      ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
+      rows: this.#rows, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
     };
     this.#ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);

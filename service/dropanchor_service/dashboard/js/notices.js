@@ -13,6 +13,9 @@ export class Notices {
     byId("retry").addEventListener("click", () => connection.retry());
     for (const button of document.querySelectorAll("button[data-copies]")) installCopy(button);
     connection.addEventListener("status", () => this.update());
+    if (!["localhost", "127.0.0.1", "[::1]"].includes(location.hostname)) {
+      byId("command").textContent += ` --connect tcp/${location.hostname}:7447`;
+    }
     this.update();
   }
 

@@ -10,6 +10,7 @@ import { staleness } from "./states.js";
  * @property {import("./fleet.js").Fleet} fleet
  * @property {import("./trails.js").Trails} trails
  * @property {readonly import("./draw_site.js").Anchor[]} anchors
+ * @property {import("./roster.js").Roster} roster
  * @property {Int32Array} rows tags that are to be seen
  * @property {number} selected row, or −1
  * @property {number} hovered row, or −1
