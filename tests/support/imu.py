@@ -26,6 +26,11 @@ class Motion:
     mag: Array
     attitude: Rotation
 
+    def at(self, index: Array) -> "Motion":
+        """Some of the samples: a mask or indices."""
+        columns = self.t[index], self.acc[index], self.gyro[index], self.mag[index]
+        return Motion(*columns, attitude=self.attitude[index])
+
     @property
     def yaw(self) -> Array:
         """(n,) rad, azimuth of the body x axis."""

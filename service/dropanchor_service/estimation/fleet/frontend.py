@@ -17,7 +17,7 @@ from numba import njit
 from .attitude import ATTITUDE, correct_tilt, level, spin, turn, yaw_of
 from .magnetometer import MAGNETOMETER, feel, north_of, spread_yaw
 from .node import ABSOLUTE_HEADING, NO_HEADING, RELATIVE_HEADING
-from .preintegration import GYRO_NOISE, GYRO_SCALE, HORIZON, PREINTEGRATION, TURN_UNKNOWN, accelerate, end_node, wrap
+from .preintegration import GYRO_NOISE, GYRO_SCALE, HORIZON, PREINTEGRATION, accelerate, end_node, unwatched_turn, wrap
 from .standstill import CONFIRM, STANDSTILL, at_rest, learn_bias, observe, start_standstill
 
 FRONTEND = np.dtype(
@@ -54,6 +54,7 @@ def start_frontend(f: Any, hard_iron: float, declination: float) -> None:
     declination: rad, true minus magnetic north, positive east.
     """
     f.running = 0
+    f.t_node = 0
     f.absolute = 0
     f.hard_iron = hard_iron
     f.declination = declination
@@ -88,7 +89,8 @@ def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
     if math.isfinite(acc[0] + acc[1] + acc[2]):
         level(a.q, acc[0], acc[1], acc[2])
     f.t_imu = t_ns
-    f.t_node = t_ns
+    if f.t_node == 0:
+        f.t_node = t_ns
     f.running = 1
 
 
@@ -98,19 +100,20 @@ def lose_turn(f: Any, gap: float) -> None:
     f.preintegration.silent += gap
     f.standstill.quiet = 0.0
     if f.magnetometer.unit > 0.0:
-        spread_yaw(f.magnetometer, (TURN_UNKNOWN * gap) ** 2)
-    f.drift_var += (TURN_UNKNOWN * gap) ** 2
+        spread_yaw(f.magnetometer, unwatched_turn(gap))
+    f.drift_var += unwatched_turn(gap)
 
 
 @njit(cache=True, nogil=True)
 def feed(f: Any, t_ns: int, acc: Any, gyro: Any, mag: Any) -> None:
-    """One IMU sample (m/s^2, rad/s, any unit; acc and mag may be NaN). Samples must come in order of time."""
+    """One IMU sample (m/s^2, rad/s, any unit; acc and mag may be NaN). One not after the last is left out."""
     if not math.isfinite(gyro[0] + gyro[1] + gyro[2]):
         return
     if f.running == 0:
         first_sample(f, t_ns, acc, gyro)
+        return
     dt = (t_ns - f.t_imu) * 1e-9
-    if dt < 0.0:
+    if dt <= 0.0:
         return
     f.t_imu = t_ns
     a, s, p = f.attitude, f.standstill, f.preintegration
@@ -147,7 +150,7 @@ def gather_drift(f: Any, dt: float, turned: float) -> None:
 @njit(cache=True, nogil=True)
 def refer_heading(f: Any, psi: float, ahead: float, node: Any) -> None:
     """Heading of the node from psi, the yaw at its end."""
-    blind = (TURN_UNKNOWN * max(0.0, ahead - HORIZON)) ** 2
+    blind = unwatched_turn(max(0.0, ahead - HORIZON))
     north, variance = north_of(f.magnetometer)
     f.absolute = variance < (RELATIVE_ABOVE if f.absolute else ABSOLUTE_BELOW)
     if f.absolute:
@@ -161,19 +164,26 @@ def refer_heading(f: Any, psi: float, ahead: float, node: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
+def know_nothing(dt: float, node: Any) -> None:
+    """A node before the first IMU sample."""
+    node.dt_s = dt
+    node.dyaw, node.dyaw_var = 0.0, unwatched_turn(dt)
+    node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
+    node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
+    node.rest = 0
+
+
+@njit(cache=True, nogil=True)
 def close_node(f: Any, t_ns: int, node: Any) -> None:
     """End a node at t_ns, not before the last IMU sample or node, and begin the next.
 
     Fills dt_s, dyaw, dv, heading and rest of `node` with their variances.
     """
+    dt = (t_ns - f.t_node) * 1e-9 if f.t_node > 0 else 0.0
     if f.running == 0:
-        node.dt_s = 0.0
-        node.dyaw, node.dyaw_var = 0.0, 0.0
-        node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
-        node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
-        node.rest = 0
+        f.t_node = t_ns
+        know_nothing(dt, node)
         return
-    dt = (t_ns - f.t_node) * 1e-9
     ahead = (t_ns - f.t_imu) * 1e-9
     f.t_node = t_ns
     psi = end_node(f.preintegration, yaw_of(f.attitude.q), ahead, dt, node)

@@ -45,11 +45,11 @@ MAGNETOMETER = np.dtype(
 
 PERIOD = 0.0999  # s between updates; samples between are averaged
 CORRELATION = 4.0  # s
-NOISE, NOISE_FLOOR = 0.15, 0.03  # of the unit
-NOISE_TAU = 40.0  # s
+NOISE, NOISE_FLOOR = 0.15, 0.02  # of the unit
+NOISE_TAU = 20.0  # s
 NOISE_PRIOR = 5.0  # s: what the first value of r counts for
-FIELD_WALK = 3e-3  # of the unit, per sqrt(s)
-IRON_WALK = 1e-2  # of the unit, per sqrt(s): motors near by
+FIELD_WALK = 2e-3  # of the unit, per sqrt(s)
+IRON_WALK = 3e-3  # of the unit, per sqrt(s): motors near by
 YAW_WALK = 1e-6  # rad^2/s, the gyroscope's white noise
 BIAS_SD = 1.5e-3  # rad/s, of what rest has left
 SCALE_SD = 7e-3

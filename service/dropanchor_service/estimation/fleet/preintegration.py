@@ -44,6 +44,12 @@ def wrap(angle: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def unwatched_turn(s: float) -> float:
+    """Variance, rad^2, of the turn in s seconds that no gyroscope watched; the rate lasts about a second."""
+    return TURN_UNKNOWN * TURN_UNKNOWN * s * max(s, 1.0)
+
+
+@njit(cache=True, nogil=True)
 def accelerate(p: Any, dt: float, q: Any, acc: Any, gravity: float, variance: float) -> None:
     """Add dt of acceleration (trapezoid); q is the attitude at the end of dt, variance that of standstill."""
     p.rough += dt / (ROUGH_TAU + dt) * (variance - p.rough)
@@ -69,7 +75,7 @@ def end_node(p: Any, yaw: float, ahead: float, dt: float, node: Any) -> float:
     node.dv_forward = c * dx + s * dy
     node.dv_left = c * dy - s * dx
     unheard = p.silent + max(0.0, ahead - HORIZON)
-    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + (TURN_UNKNOWN * unheard) ** 2
+    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unwatched_turn(unheard)
     node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + (ACC_UNKNOWN * unheard) ** 2
     p.yaw_end = wrap(end)
     p.V_end[0], p.V_end[1] = vx, vy

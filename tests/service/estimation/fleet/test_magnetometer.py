@@ -120,3 +120,13 @@ def test_a_resting_tag_does_not_talk_itself_into_certainty() -> None:
     assert nodes["rest"][ends > 2].all()
     assert abs(np.diff(nodes["heading"][ends > 10])).max() < 1e-3
     assert nodes["heading_var"][-1] > 0.9 * nodes["heading_var"][ends > 10][0]
+
+
+def test_soft_iron_of_ten_percent_stays_inside_the_published_variance() -> None:
+    m = noisy(120)
+    m.mag = m.mag @ np.array([[1.1, 0.05, 0.0], [0.05, 0.92, 0.03], [0.0, 0.03, 1.0]])
+    nodes = run(new_frontend(), m, ends := ends_of(m))
+    e = heading_error(m, nodes, ends)
+    absolute = nodes["heading_kind"] == ABSOLUTE_HEADING
+    assert np.mean(abs(e / np.sqrt(nodes["heading_var"]))[absolute] < 2) > 0.95
+    assert abs(e[ends > 20]).max() < math.radians(6)
