@@ -64,6 +64,7 @@ class GuardedProtocol(H11Protocol):
 
     request_s = 10.0
     stalled_s = 10.0
+    stalled_at_shutdown_s = 0.5
 
     _deadline: asyncio.TimerHandle | None = None
     _stall: asyncio.TimerHandle | None = None
@@ -89,6 +90,13 @@ class GuardedProtocol(H11Protocol):
     def resume_writing(self) -> None:
         super().resume_writing()
         self._stall = _cancelled(self._stall)
+
+    def shutdown(self) -> None:
+        super().shutdown()
+        if self.flow.write_paused:
+            self.stalled_s = self.stalled_at_shutdown_s
+            _cancelled(self._stall)
+            self._watch_stall()
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._deadline = _cancelled(self._deadline)

@@ -1,5 +1,6 @@
 """The HTTP server: uvicorn with limits that uvicorn does not set by itself."""
 
+import asyncio
 import errno
 import socket
 from threading import Event
@@ -19,7 +20,7 @@ class ListenError(OSError):
 
 
 class Server(uvicorn.Server):
-    """Sets `stopping` before it waits for open requests: streams end by themselves then."""
+    """Sets `stopping` before it waits for open requests, so that streams end by themselves, and cuts what is left."""
 
     def __init__(self, config: uvicorn.Config, stopping: Event) -> None:
         super().__init__(config)
@@ -28,6 +29,9 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         self._stopping.set()
         await super().shutdown(sockets)
+        for connection in list(self.server_state.connections):
+            connection.transport.abort()
+        await asyncio.sleep(0)  # the sockets are closed in the loop's next round
 
 
 def build_server(app: ASGIApp, stopping: Event, protocol: type[GuardedProtocol] = GuardedProtocol) -> Server:

@@ -11,14 +11,16 @@ from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query
+from numpy.typing import NDArray
 from pydantic import Field
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_service.api import examples
 from dropanchor_service.api.errors import Kind, problems
 from dropanchor_service.api.parts import TagFilter
-from dropanchor_service.estimation.batch import Array
 from dropanchor_service.store.answers import Answer, Answers, to_json
+
+Array = NDArray[Any]  # POSE rows of the store
 
 MEDIA_TYPE = "text/event-stream"
 HEARTBEAT_S = 5.0
