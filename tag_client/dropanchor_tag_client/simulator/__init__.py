@@ -1,0 +1,1 @@
+"""Simulated tags: scenarios, sensors, perturbations. Needs numpy (the extra `simulator`); the rest does not."""

@@ -1,0 +1,113 @@
+"""Slant ranges to anchors: white noise, a positive tail without line of sight, dropouts, delay."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
+
+
+class AnchorPlace(NamedTuple):
+    """Where an anchor stands, m."""
+
+    id: str = "0"
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+
+
+class Ranges(NamedTuple):
+    """Columns (n,), in order of time. anchor: index into the anchors; std_m: what the sensor says of its own noise."""
+
+    t_s: Array
+    anchor: NDArray[np.int64]
+    range_m: Array
+    std_m: Array
+
+    def where(self, rows: NDArray[Any]) -> "Ranges":
+        """The rows of a mask or of indices."""
+        return Ranges(self.t_s[rows], self.anchor[rows], self.range_m[rows], self.std_m[rows])
+
+
+@dataclass(frozen=True)
+class RangeModel:
+    """measured = scale · slant distance + bias + white noise (+ excess without line of sight).
+
+    hz: per anchor, None: at every instant of the motion. A share of single ranges, and `burst_count` bursts with one
+    excess each, have an excess of U(nlos_m). `outage_s` is one stretch without ranges. A range stamped t was
+    measured at t - delay_s. Deviations m, durations s.
+    """
+
+    hz: float | None = None
+    std: float = 0.2
+    bias: float = 0.0
+    scale: float = 1.0
+    nlos_share: float = 0.0
+    nlos_m: tuple[float, float] = (0.3, 2.0)
+    burst_count: int = 0
+    burst_s: tuple[float, float] = (1.0, 3.0)
+    dropout_share: float = 0.0
+    outage_s: float = 0.0
+    delay_s: float = 0.0
+
+    def measure(
+        self, motion: Trajectory, height: float, anchors: Sequence[AnchorPlace], rng: np.random.Generator
+    ) -> Ranges:
+        """The ranges to all anchors over a motion at one height; anchors take turns."""
+        hz = self.hz or 1.0 / motion.dt
+        count = len(anchors)
+        parts = [
+            self._to_anchor(motion, height, index, anchor, (hz, index / (hz * count)), rng)
+            for index, anchor in enumerate(anchors)
+        ]
+        t_s, which, range_m = (np.concatenate(column) for column in zip(*parts, strict=True))
+        range_m = range_m + self._bursts(t_s, rng)
+        heard = Ranges(t_s, which, np.maximum(range_m, 0.0), np.full(len(t_s), self.std)).where(
+            self._received(t_s, rng)
+        )
+        return heard.where(np.argsort(heard.t_s, kind="stable"))
+
+    def _to_anchor(
+        self,
+        motion: Trajectory,
+        height: float,
+        index: int,
+        anchor: AnchorPlace,
+        timing: tuple[float, float],
+        rng: np.random.Generator,
+    ) -> tuple[Array, NDArray[np.int64], Array]:
+        t_s = sample_times(motion, *timing)
+        there = motion.at(t_s - self.delay_s)
+        distance = np.sqrt((there.x - anchor.x) ** 2 + (there.y - anchor.y) ** 2 + (height - anchor.z) ** 2)
+        noise = self.std * rng.standard_normal(len(t_s))
+        blocked = rng.random(len(t_s)) < self.nlos_share
+        excess = np.where(blocked, rng.uniform(*self.nlos_m, len(t_s)), 0.0)
+        return t_s, np.full(len(t_s), index), self.scale * distance + self.bias + noise + excess
+
+    def _bursts(self, t_s: Array, rng: np.random.Generator) -> Array:
+        excess = np.zeros(len(t_s))
+        for _ in range(self.burst_count):
+            first = rng.uniform(t_s.min(), t_s.max() - self.burst_s[1])
+            inside = (t_s >= first) & (t_s < first + rng.uniform(*self.burst_s))
+            excess[inside] = rng.uniform(*self.nlos_m)
+        return excess
+
+    def _received(self, t_s: Array, rng: np.random.Generator) -> NDArray[np.bool_]:
+        received = rng.random(len(t_s)) >= self.dropout_share
+        if self.outage_s:
+            # Not within the first 5 s: a tag is heard before it is lost.
+            first = rng.uniform(t_s.min() + 5.0, t_s.max() - self.outage_s)
+            received &= (t_s < first) | (t_s >= first + self.outage_s)
+        return received
+
+
+def sample_times(motion: Trajectory, hz: float, offset: float = 0.0) -> Array:
+    """Instants k / hz + offset, k = 0, 1, …, that lie within a motion (both ends included)."""
+    slack = 1e-6
+    first = int(np.ceil((motion.t[0] - offset) * hz - slack))
+    last = int(np.floor((motion.t[-1] - offset) * hz + slack))
+    times: Array = offset + np.arange(first, last + 1) / hz
+    return times

@@ -1,0 +1,76 @@
+"""All sensors of a simulated tag, and named settings of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from dropanchor_tag_client.simulator.heading_error import HeadingErrorModel
+from dropanchor_tag_client.simulator.imu import ImuModel
+from dropanchor_tag_client.simulator.ranging import AnchorPlace, RangeModel
+from dropanchor_tag_client.simulator.scalar import ScalarModel
+
+
+@dataclass(frozen=True)
+class SensorModels:
+    """mount_rad: course minus body yaw; height_m: of the tag, on the anchors' z axis.
+
+    first_seen_s: the tag is heard only from this long after its first motion on; None: from the beginning.
+    """
+
+    ranges: RangeModel = field(default_factory=RangeModel)
+    scalar: ScalarModel = field(default_factory=ScalarModel)
+    imu: ImuModel = field(default_factory=ImuModel)
+    heading_error: HeadingErrorModel = field(default_factory=HeadingErrorModel)
+    anchors: tuple[AnchorPlace, ...] = (AnchorPlace(),)
+    mount_rad: float = 0.0
+    height_m: float = 0.0
+    first_seen_s: float | None = None
+
+
+def noiseless() -> SensorModels:
+    """Perfect sensors on a body that neither leans nor shakes."""
+    return SensorModels(
+        ranges=RangeModel(std=0.0),
+        scalar=ScalarModel(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        imu=ImuModel(
+            acc_std=0.0,
+            acc_bias_std=0.0,
+            acc_scale_std=0.0,
+            gyro_std=0.0,
+            gyro_bias_std=0.0,
+            gyro_wander_std=0.0,
+            mag_std=0.0,
+            hard_iron_std=0.0,
+            soft_iron_std=0.0,
+            rocking_std=0.0,
+            lean_std=0.0,
+            vibration_acc=0.0,
+            vibration_gyro=0.0,
+        ),
+    )
+
+
+def with_noise(range_std: float, heading_std: float, range_hz: float | None = None) -> SensorModels:
+    """The default sensors, but for white range noise, m, white heading noise, rad, and the rate of ranges."""
+    return SensorModels(ranges=RangeModel(hz=range_hz, std=range_std), scalar=ScalarModel(heading_std=heading_std))
+
+
+# paper: as its text says; released: what the data that its authors released really has; real: a DW1000-class tag.
+PRESETS: Mapping[str, SensorModels] = MappingProxyType(
+    {
+        "paper": with_noise(0.2, 0.1),
+        "released": with_noise(0.005, 0.01),
+        "real": with_noise(0.1, 0.05, range_hz=10.0),
+        "none": noiseless(),
+    }
+)
+
+
+def preset(name: str, range_hz: float | None = None, imu_hz: float | None = None) -> SensorModels:
+    """The sensors of this name, at other rates where given. Raises ValueError when there are none of the name."""
+    if name not in PRESETS:
+        raise ValueError(f"there is no noise {name!r}; there are {', '.join(PRESETS)}")
+    models = PRESETS[name]
+    ranges = models.ranges if range_hz is None else replace(models.ranges, hz=range_hz)
+    imu = models.imu if imu_hz is None else replace(models.imu, hz=imu_hz)
+    return replace(models, ranges=ranges, imu=imu)

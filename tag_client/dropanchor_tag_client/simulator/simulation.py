@@ -1,0 +1,119 @@
+"""One run of one tag: its true motion, and what its sensors say about it."""
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions
+from dropanchor_tag_client.simulator.noise import Stream, stream
+from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges, sample_times
+from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, Scalars
+from dropanchor_tag_client.simulator.scenarios import trajectory
+from dropanchor_tag_client.simulator.sensors import SensorModels
+from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
+
+
+class Truth(NamedTuple):
+    """Columns (n,): position m, heading (body yaw) and course (of the forward axis) rad, not wrapped, speed along
+    the course m/s, yaw rate rad/s; attitude (n, 4): quaternion (w, x, y, z) body → ENU."""
+
+    t_s: Array
+    x: Array
+    y: Array
+    z: Array
+    heading: Array
+    course: Array
+    v: Array
+    w: Array
+    attitude: Array
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Columns at the IMU's instants, but for the ranges, which have their own. Times s from the motion's start.
+
+    imu: raw 9-axis samples; scalars: heading, yaw rate and forward acceleration with noise of their own.
+    """
+
+    scenario: str
+    seed: int
+    anchors: tuple[AnchorPlace, ...]
+    truth: Truth
+    imu: Imu
+    ranges: Ranges
+    scalars: Scalars
+
+    def level_imu(self) -> Imu:
+        """The scalar sensors as the samples of an IMU that is always level and has no magnetometer (NaN).
+
+        Leftward acceleration is the true v·w: the scalar sensors have none.
+        """
+        n = len(self.scalars.t_s)
+        zero = np.zeros(n)
+        acc = np.column_stack([self.scalars.acceleration_mps2, self.truth.v * self.truth.w, zero + GRAVITY])
+        return Imu(
+            self.scalars.t_s, acc, np.column_stack([zero, zero, self.scalars.gyro_radps]), np.full((n, 3), np.nan)
+        )
+
+
+def simulate(scenario: str, seed: int, models: SensorModels | None = None) -> Simulation:
+    """The run of a scenario with these sensors (default: SensorModels()). The same arguments, the same numbers.
+
+    Raises UnknownScenarioError.
+    """
+    models = models or SensorModels()
+    motion = trajectory(scenario, seed)
+    if models.imu.hz is not None:
+        motion = motion.at(sample_times(motion, models.imu.hz))
+    return observe(scenario, seed, motion, models)
+
+
+def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) -> Simulation:
+    """What the sensors say about a motion; `scenario` only names it."""
+    error = models.heading_error.draw(motion, stream(seed, Stream.HEADING_ERROR))
+    unit = draw_unit(models.imu, models.mount_rad, stream(seed, Stream.IMU_UNIT))
+    seen = _first_seen(motion, models.first_seen_s)
+    kept = motion.t >= seen
+    ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
+    scalars = models.scalar.measure(motion, models.mount_rad, error, stream(seed, Stream.SCALAR))
+    before = _with_row_before(motion)
+    imu = unit.measure(before, stream(seed, Stream.IMU), np.concatenate([error[:1], error]))
+    return Simulation(
+        scenario=scenario,
+        seed=seed,
+        anchors=models.anchors,
+        truth=Truth(*(column[kept] for column in truth_of(motion, unit, models.height_m))),
+        imu=Imu(*(column[kept] for column in imu)),
+        ranges=ranges.where(ranges.t_s >= seen),
+        scalars=Scalars(*(column[kept] for column in scalars)),
+    )
+
+
+def truth_of(motion: Trajectory, unit: ImuUnit, height: float) -> Truth:
+    attitude: Attitude = unit.attitude(motion)
+    return Truth(
+        t_s=motion.t,
+        x=motion.x,
+        y=motion.y,
+        z=np.full(len(motion), height),
+        heading=attitude.yaw,
+        course=motion.course,
+        v=motion.v,
+        w=motion.w,
+        attitude=quaternions(attitude),
+    )
+
+
+def _with_row_before(motion: Trajectory) -> Trajectory:
+    """The motion with its first row repeated one step earlier: it begins without acceleration."""
+    columns = [np.concatenate([getattr(motion, f.name)[:1], getattr(motion, f.name)]) for f in fields(motion)]
+    columns[0][0] -= motion.dt
+    return Trajectory(*columns)
+
+
+def _first_seen(motion: Trajectory, after_motion_s: float | None) -> float:
+    if after_motion_s is None:
+        return float(motion.t[0])
+    moving = np.flatnonzero(np.abs(motion.v) > AT_REST_MPS)
+    return float(motion.t[moving[0]] + after_motion_s) if len(moving) else float(motion.t[0])
