@@ -60,6 +60,7 @@ class Reason(StrEnum):
     TAG_UNKNOWN = "tag_unknown"
     TAGS_FULL = "tags_full"
     SHED = "shed"
+    ESTIMATOR_FAULT = "estimator_fault"
 
 
 class Rejection(NamedTuple):

@@ -1,5 +1,6 @@
 """What is known of each publisher of a tag: its clock, and which of its messages have come already."""
 
+import time
 from collections import OrderedDict
 
 PUBLISHERS_PER_TAG = 4
@@ -73,3 +74,13 @@ class Publishers:
         elif len(known) > 1:
             known.move_to_end(boot_id)
         return publisher
+
+
+class UtcClock:
+    """UTC as the host had it at the start, carried on by its monotonic clock: steps of the host's clock do nothing."""
+
+    def __init__(self) -> None:
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+
+    def now_ns(self) -> int:
+        return time.monotonic_ns() + self._offset_ns

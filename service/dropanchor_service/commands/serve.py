@@ -1,0 +1,52 @@
+"""`dropanchor serve`: the service until it is stopped."""
+
+import argparse
+import sys
+
+from dropanchor_service import logs
+from dropanchor_service.api.server import ListenError
+from dropanchor_service.commands.options import add_service_options, settings_of
+from dropanchor_service.service import Service
+from dropanchor_service.settings_sources import SettingsError
+from dropanchor_service.signals import interrupts
+from dropanchor_service.zenoh_session import ZenohError
+
+HELP = "run the service"
+DESCRIPTION = """\
+Runs the service until Ctrl-C or SIGTERM. Without settings: site `default`, a Zenoh router of its own on the loopback,
+the first anchor that is heard becomes the origin, and every tag that is heard gets a track.
+"""
+EPILOG = """\
+examples:
+  dropanchor serve
+  dropanchor serve --port 8081 --zenoh-listen tcp/127.0.0.1:7448
+  dropanchor serve --zenoh-connect tcp/10.0.0.5:7447 --config yard.toml
+  DROPANCHOR_UNKNOWN_TAGS=refuse dropanchor serve --config yard.toml
+
+a settings file:
+  unknown_tags = "refuse"
+  [[site.anchors]]
+  id = "7"
+  z = 2.5
+  [tags.forklift-1]
+  height_m = 1.2
+  start = { x = 10.0, y = 0.0, heading_rad = 1.57 }
+"""
+UNUSABLE = 2
+DIED = 1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_service_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when it was stopped, 1 when it died, 2 when it could not start."""
+    logs.configure(arguments.log_level)
+    try:
+        with interrupts() as interrupt, Service(settings_of(arguments)) as service:
+            stopped = interrupt.wait(lambda: not service.has_died)
+    except (SettingsError, ListenError, ZenohError) as error:
+        sys.stderr.write(f"dropanchor serve: {error}\n")
+        return UNUSABLE
+    return 0 if stopped else DIED

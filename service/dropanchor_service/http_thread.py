@@ -1,0 +1,37 @@
+"""The HTTP server in a thread of its own, so that the main thread is free to watch and to stop it."""
+
+import asyncio
+import socket
+import threading
+import time
+
+import uvicorn
+
+
+class HttpThread:
+    """Serves on a socket that is bound already."""
+
+    def __init__(self, server: uvicorn.Server, bound: socket.socket) -> None:
+        self._server = server
+        self._bound = bound
+        self._thread = threading.Thread(target=self._run, name="http", daemon=True)
+
+    def start(self) -> None:
+        """Returns when requests are answered, or when the server has failed to start."""
+        self._thread.start()
+        while self.is_alive and not self._server.started:
+            time.sleep(0.005)
+
+    def ask_to_stop(self) -> None:
+        self._server.should_exit = True
+
+    def join(self, timeout_s: float) -> None:
+        self._thread.join(timeout_s)
+        self._bound.close()
+
+    @property
+    def is_alive(self) -> bool:
+        return self._thread.is_alive()
+
+    def _run(self) -> None:
+        asyncio.run(self._server.serve(sockets=[self._bound]))

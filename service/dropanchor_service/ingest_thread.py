@@ -1,0 +1,62 @@
+"""The only thread that runs estimators. It survives errors, and says so when it does not."""
+
+import logging
+import threading
+import time
+
+from dropanchor_service.buffer import MessageBuffer
+from dropanchor_service.ingest import Ingest
+from dropanchor_service.logs import RareLog
+from dropanchor_service.metrics import Metrics
+
+IDLE_S = 0.25
+BACKLOG = 1000  # messages beyond which there is no waiting for more
+SILENT_S = 5.0  # without a turn the thread counts as stuck
+
+
+class IngestThread:
+    """Takes a turn every `period_s` while messages come in."""
+
+    def __init__(self, ingest: Ingest, buffer: MessageBuffer, metrics: Metrics, period_s: float) -> None:
+        self._log = RareLog(logging.getLogger(__name__))
+        self._ingest = ingest
+        self._buffer = buffer
+        self._metrics = metrics
+        self._period_s = period_s
+        self._stop = threading.Event()
+        self._turned_s = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name="ingest", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self, timeout_s: float = 1.0) -> None:
+        self._stop.set()
+        self._thread.join(timeout_s)
+
+    @property
+    def is_alive(self) -> bool:
+        return self._thread.is_alive()
+
+    @property
+    def problem(self) -> str | None:
+        """Why samples are not fused at this moment; None when they are."""
+        if not self.is_alive:
+            return "the ingest thread does not run"
+        silent_s = time.monotonic() - self._turned_s
+        return f"the ingest thread has been stuck for {silent_s:.0f} s" if silent_s > SILENT_S else None
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            if self._buffer.wait(IDLE_S) and self._buffer.depth < BACKLOG:
+                self._stop.wait(self._period_s)  # so that one call fuses many messages
+            self._turn()
+
+    def _turn(self) -> None:
+        self._turned_s = time.monotonic()
+        try:
+            self._ingest.turn()
+        except Exception as error:
+            self._metrics.faults.labels("ingest").inc()
+            self._log.exception("ingest", error)
+            self._stop.wait(self._period_s)

@@ -1,0 +1,137 @@
+"""The service put together: what it consists of, in the order in which it starts and, backwards, stops."""
+
+import logging
+import os
+import socket
+from collections.abc import Sequence
+from contextlib import ExitStack
+from threading import Event
+from types import TracebackType
+from typing import Self
+
+import zenoh
+from pydantic import ValidationError
+
+from dropanchor_service.admission import Admission
+from dropanchor_service.api import create_app
+from dropanchor_service.api.server import build_server, listen
+from dropanchor_service.buffer import MessageBuffer
+from dropanchor_service.clock import UtcClock
+from dropanchor_service.engine import create_engine
+from dropanchor_service.estimators import Estimators
+from dropanchor_service.http_thread import HttpThread
+from dropanchor_service.ingest import Ingest
+from dropanchor_service.ingest_thread import IngestThread
+from dropanchor_service.metrics import FleetGauges, Metrics
+from dropanchor_service.settings import Settings
+from dropanchor_service.settings_sources import SettingsError
+from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.answers import Answers
+from dropanchor_service.zenoh_answers import ZenohAnswers
+from dropanchor_service.zenoh_intake import ZenohIntake
+from dropanchor_service.zenoh_poses import ZenohPoses
+from dropanchor_service.zenoh_session import open_session
+
+HTTP_STOP_S = 2.5
+
+_log = logging.getLogger(__name__)
+
+
+class Service:
+    """Runs while it is open: `with Service(settings) as service`.
+
+    Raises, when it is made or opened, SettingsError, ListenError or ZenohError, each with a sentence for its user.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._stopping = Event()
+        self._opened = ExitStack()
+        self._session: zenoh.Session | None = None
+        self.metrics = Metrics()
+        self.clock = UtcClock()
+        self.tags = TagTable()
+        self.latest = LatestPoses()
+        self.site = _site_store(settings)
+        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns)
+        self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20))
+        self._ingest = Ingest(
+            self._buffer,
+            Admission(settings, self.site, self.tags),
+            Estimators(create_engine(settings), self.site, self.tags, self.metrics),
+            self.site,
+            self.tags,
+            self.latest,
+            self.metrics,
+            self.clock,
+        )
+        self._thread = IngestThread(self._ingest, self._buffer, self.metrics, settings.ingest.period_ms * 1e-3)
+        self.metrics.watch(FleetGauges(self.tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth))
+
+    def __enter__(self) -> Self:
+        with self._opened:
+            bound = listen(self._settings.http.host, self._settings.http.port)
+            self._opened.callback(bound.close)
+            self._open_zenoh()
+            self._open_http(bound)
+            self._opened = self._opened.pop_all()
+        _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._stopping.set()
+        self._opened.close()
+        _log.info("stopped")
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{self._address[0]}:{self._address[1]}"
+
+    def problems(self) -> Sequence[str]:
+        """Why the service cannot do its work at this moment; empty when it can."""
+        found = [] if self._thread.problem is None else [self._thread.problem]
+        if self._settings.zenoh.connect and self._session is not None and not self._session.info.routers_zid():
+            found.append("there is no connection to the Zenoh router")
+        return found
+
+    @property
+    def has_died(self) -> bool:
+        """Whether a thread that must run does not."""
+        return not self._http.is_alive or not self._thread.is_alive
+
+    def _open_zenoh(self) -> None:
+        self._session = self._opened.enter_context(open_session(self._settings.zenoh))
+        self._thread.start()
+        self._opened.callback(self._thread.stop)
+        session, site = self._session, self.site.site.id
+        intake = ZenohIntake(
+            session, site, self._buffer, self._ingest, self.tags, self.metrics, self.clock, self._settings.max_tags
+        )
+        self._opened.enter_context(intake)
+        service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
+        self._opened.enter_context(ZenohAnswers(session, self.answers, service_id, self.metrics))
+        self._opened.enter_context(ZenohPoses(session, self.answers, self.metrics))
+
+    def _open_http(self, bound: socket.socket) -> None:
+        app = create_app(
+            self.answers,
+            ready=lambda: (not (found := self.problems()), found),
+            registry=self.metrics.registry,
+            stopping=self._stopping,
+            max_tags=self._settings.max_tags,
+        )
+        self._address = bound.getsockname()
+        self._http = HttpThread(build_server(app, self._stopping), bound)
+        self._http.start()
+        self._opened.callback(self._http.join, HTTP_STOP_S)
+        self._opened.callback(self._http.ask_to_stop)
+
+
+def _site_store(settings: Settings) -> SiteStore:
+    try:
+        return SiteStore(settings.site, dict(settings.tags), settings.data_dir)
+    except (OSError, ValidationError) as error:
+        raise SettingsError(f"data_dir: the site kept in {settings.data_dir} cannot be read: {error}") from error

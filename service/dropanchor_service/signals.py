@@ -1,0 +1,41 @@
+"""Ctrl-C and SIGTERM as an event that the main thread waits for."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+CHECK_S = 0.5
+
+
+class Interrupt:
+    """Set by the first signal; the second ends the process at once."""
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+
+    def wait(self, goes_on: Callable[[], bool]) -> bool:
+        """Until a signal comes; False when `goes_on` has become false before."""
+        while goes_on():
+            if self._event.wait(CHECK_S):
+                return True
+        return False
+
+    def on_signal(self, number: int, _frame: FrameType | None) -> None:
+        if self._event.is_set():
+            os._exit(128 + number)
+        self._event.set()
+
+
+@contextmanager
+def interrupts() -> Iterator[Interrupt]:
+    """Signals are ours while it is open."""
+    interrupt = Interrupt()
+    before = {number: signal.signal(number, interrupt.on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield interrupt
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,113 @@
+"""Answers to Zenoh queries: `…/tag/*/pose` and `…/anchor/*`, also with wildcards over many.
+
+A queryable that raises leaves the asker without reply or error, so everything unforeseen is answered as an error.
+"""
+
+import logging
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Any, Self
+
+import zenoh
+
+from dropanchor_schemas import keys
+from dropanchor_service.logs import RareLog
+from dropanchor_service.metrics import Metrics
+from dropanchor_service.store.answers import Answers, to_json
+
+Reply = tuple[str, bytes]
+"""Key and JSON."""
+
+
+class QueryError(Exception):
+    """A query that has no answer; the message says why."""
+
+
+class ZenohAnswers:
+    """Answers while it is open. Queries are answered one after another in a thread of Zenoh's own."""
+
+    def __init__(self, session: zenoh.Session, answers: Answers, service_id: str, metrics: Metrics) -> None:
+        self._log = RareLog(logging.getLogger(__name__))
+        self._session = session
+        self._answers = answers
+        self._site = answers.site.site.id
+        self._service_id = service_id
+        self._metrics = metrics
+        self._declared: list[Any] = []
+
+    def __enter__(self) -> Self:
+        for key, find in (
+            (keys.all_tags(self._site, "pose"), self.poses),
+            (keys.all_anchors(self._site), self.anchors),
+        ):
+            self._declared.append(self._session.declare_queryable(key, self._answering(find)))
+        alive = keys.service_alive_key(self._site, self._service_id)
+        self._declared.append(self._session.liveliness().declare_token(alive))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        for declared in self._declared:
+            declared.undeclare()
+
+    def poses(self, asked: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
+        """Raises QueryError when one tag is asked for and has no pose."""
+        _refuse(parameters)
+        name = _one_tag(str(asked))
+        tags = self._answers.tags
+        if name is not None:
+            tag = tags.find(name)
+            pose = None if tag is None else self._answers.pose_of(tag)
+            if pose is None:
+                raise QueryError(f"no tag {name!r} is known" if tag is None else f"tag {name!r} has no pose yet")
+            yield keys.pose_key(self._site, name), to_json(pose)
+            return
+        wanted = [tag for tag in tags.all() if asked.includes(keys.pose_key(self._site, tag.name))]
+        for pose in self._answers.pose_list(wanted)["poses"]:
+            yield keys.pose_key(self._site, pose["tag"]), to_json(pose)
+
+    def anchors(self, asked: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
+        """Raises QueryError when one anchor is asked for and is not there."""
+        _refuse(parameters)
+        site = self._answers.site.site
+        found = [
+            (key, to_json(anchor.model_dump() | {"site": site.model_dump(exclude={"anchors"})}))
+            for key, anchor in ((keys.anchor_key(site.id, anchor.id), anchor) for anchor in site.anchors)
+            if asked.includes(key)
+        ]
+        if not found and "*" not in str(asked):
+            raise QueryError(f"no anchor {str(asked).rpartition('/')[2]!r} is known")
+        yield from found
+
+    def _answering(self, find: Callable[[zenoh.KeyExpr, str], Iterator[Reply]]) -> Callable[[zenoh.Query], None]:
+        def answer(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    for key, payload in find(query.key_expr, str(query.parameters)):
+                        query.reply(key, payload, encoding=zenoh.Encoding.APPLICATION_JSON)
+                except QueryError as error:
+                    query.reply_err(to_json({"error": str(error)}), encoding=zenoh.Encoding.APPLICATION_JSON)
+                except Exception as error:
+                    self._metrics.faults.labels("query").inc()
+                    self._log.exception("query", error)
+                    query.reply_err(to_json({"error": "internal error"}), encoding=zenoh.Encoding.APPLICATION_JSON)
+
+        return answer
+
+
+def _one_tag(key: str) -> str | None:
+    """The tag that a key without wildcards names. Raises QueryError when it does not follow the contract."""
+    if "*" in key or "$" in key:
+        return None
+    try:
+        return keys.tag_from_key(key)
+    except keys.InvalidKeyError as error:
+        raise QueryError(str(error)) from error
+
+
+def _refuse(parameters: str) -> None:
+    """Parameters that are not understood must not be ignored: the answer would be to another question."""
+    unknown = [part.partition("=")[0] for part in parameters.split(";") if part and not part.startswith("_")]
+    if unknown:
+        raise QueryError(f"parameter {unknown[0]!r} is not known")

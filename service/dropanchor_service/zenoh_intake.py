@@ -1,0 +1,82 @@
+"""What comes in over Zenoh: samples and liveliness. Callbacks put things down and return; they never call Zenoh."""
+
+import logging
+from types import TracebackType
+from typing import Any, Self
+
+import zenoh
+import zenoh.ext
+
+from dropanchor_schemas import keys
+from dropanchor_service.buffer import MessageBuffer
+from dropanchor_service.clock import UtcClock
+from dropanchor_service.ingest import Ingest
+from dropanchor_service.logs import RareLog
+from dropanchor_service.metrics import Metrics
+from dropanchor_service.store import TagTable
+
+
+class ZenohIntake:
+    """Subscribed while it is open. Messages that a tag's publisher still has are asked for when they were missed."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        site: str,
+        buffer: MessageBuffer,
+        ingest: Ingest,
+        tags: TagTable,
+        metrics: Metrics,
+        clock: UtcClock,
+        max_tags: int,
+    ) -> None:
+        self._log = RareLog(logging.getLogger(__name__))
+        self._session = session
+        self._site = site
+        self._buffer = buffer
+        self._ingest = ingest
+        self._tags = tags
+        self._metrics = metrics
+        self._clock = clock
+        self._max_tokens = 2 * max_tags
+        self._declared: list[Any] = []
+
+    def __enter__(self) -> Self:
+        samples = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            keys.all_tags(self._site, "samples"),
+            zenoh.handlers.Callback(self._on_samples, indirect=False),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+        )
+        misses = samples.sample_miss_listener(zenoh.handlers.Callback(self._on_miss, indirect=False))
+        tokens = self._session.liveliness().declare_subscriber(
+            keys.all_tags(self._site, "alive"),
+            zenoh.handlers.Callback(self._on_token, indirect=False),
+            history=True,
+        )
+        self._declared = [misses, samples, tokens]
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        for declared in self._declared:
+            declared.undeclare()
+
+    def _on_samples(self, message: zenoh.Sample) -> None:
+        self._buffer.append(str(message.key_expr), bytes(message.payload), str(message.encoding), self._clock.now_ns())
+
+    def _on_miss(self, miss: zenoh.ext.Miss) -> None:
+        self._metrics.misses.inc(miss.nb)
+        self._log.warning("messages are lost for good", f"{miss.nb} of one publisher, which no longer has them")
+
+    def _on_token(self, message: zenoh.Sample) -> None:
+        try:
+            name = keys.tag_from_key(str(message.key_expr))
+        except keys.InvalidKeyError:
+            return
+        if message.kind == zenoh.SampleKind.DELETE:
+            self._tags.set_online(name, False)
+        elif self._tags.online_names < self._max_tokens:
+            self._tags.set_online(name, True)
+            self._ingest.announce(name)

@@ -1,0 +1,97 @@
+"""The buffer between receiving and fusing: bounded, fair, and deaf to floods of strangers."""
+
+import threading
+from collections import Counter
+
+from dropanchor_service.buffer import MESSAGE_OVERHEAD, STRANGERS, MessageBuffer, Received
+
+PAYLOAD = b"x" * (1000 - MESSAGE_OVERHEAD)  # a message counts 1,000 bytes
+
+
+def full_of(buffer: MessageBuffer) -> Counter[str]:
+    return Counter(message[0] for message in buffer.drain(10**9))
+
+
+def put(buffer: MessageBuffer, key: str, number: int) -> None:
+    buffer.append(key, PAYLOAD, "e", number)
+
+
+def test_messages_come_out_in_the_order_in_which_they_came() -> None:
+    buffer = MessageBuffer(10**6)
+    buffer.admit("ab")
+    for number in range(10):
+        put(buffer, "ab"[number % 2], number)
+    assert [message[3] for message in buffer.drain(4)] == [0, 1, 2, 3]
+    assert [message[3] for message in buffer.drain(100)] == [4, 5, 6, 7, 8, 9]
+    assert not buffer.drain(1)
+
+
+def test_when_it_is_full_the_busiest_tag_loses_its_oldest_and_the_quiet_ones_lose_nothing() -> None:
+    buffer = MessageBuffer(100_000)
+    quiet = [f"quiet{i}" for i in range(10)]
+    buffer.admit(["busy", *quiet])
+    for key in quiet:
+        put(buffer, key, -1)
+    for number in range(1000):
+        put(buffer, "busy", number)
+    shed, strangers = buffer.take_shed()
+    messages = buffer.drain(10**9)
+    busy = [message[3] for message in messages if message[0] == "busy"]
+    assert busy == list(range(1000 - len(busy), 1000))
+    assert 60 <= len(busy) <= 90
+    assert shed == {"busy": 1000 - len(busy)}
+    assert Counter(message[0] for message in messages if message[0] != "busy") == dict.fromkeys(quiet, 1)
+    assert strangers == 0
+
+
+def test_equally_busy_tags_lose_equally() -> None:
+    buffer = MessageBuffer(100_000)
+    keys = [str(i) for i in range(10)]
+    buffer.admit(keys)
+    for number in range(500):
+        for key in keys:
+            put(buffer, key, number)
+    shed, _ = buffer.take_shed()
+    kept = full_of(buffer)
+    assert sum(shed.values()) + sum(kept.values()) == 5000
+    assert max(kept.values()) - min(kept.values()) <= 1
+
+
+def test_strangers_push_out_only_each_other() -> None:
+    buffer = MessageBuffer(10**6)
+    buffer.admit(["known"])
+    put(buffer, "known", 0)
+    for number in range(100_000):
+        put(buffer, f"stranger{number}", number)
+    assert buffer.take_shed() == ({}, 100_000 - STRANGERS)
+    messages: list[Received] = list(buffer.drain(10**9))
+    assert messages[0][0] == "known"
+    assert len(messages) == 1 + STRANGERS
+    assert messages[-1][0] == "stranger99999"
+
+
+def test_waiting_ends_when_a_message_comes_and_goes_on_when_all_are_taken() -> None:
+    buffer = MessageBuffer(10**6)
+    buffer.admit(["a"])
+    assert not buffer.wait(0.0)
+    threading.Timer(0.02, put, (buffer, "a", 1)).start()
+    assert buffer.wait(5.0)
+    buffer.drain(1)
+    assert not buffer.wait(0.0)
+
+
+def test_nothing_is_lost_or_doubled_between_threads() -> None:
+    buffer = MessageBuffer(10**9)
+    buffer.admit([str(i) for i in range(4)])
+
+    def put_many(key: str) -> None:
+        for number in range(2000):
+            put(buffer, key, number)
+
+    threads = [threading.Thread(target=put_many, args=(str(i),)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    found: Counter[str] = Counter()
+    while any(thread.is_alive() for thread in threads) or buffer.depth:
+        found.update(message[0] for message in buffer.drain(100))
+    assert found == {str(i): 2000 for i in range(4)}

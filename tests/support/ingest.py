@@ -1,0 +1,97 @@
+"""An ingest without threads and network, around an engine whose poses are easy to foresee."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
+from dropanchor_service.admission import Admission
+from dropanchor_service.buffer import MessageBuffer
+from dropanchor_service.clock import UtcClock
+from dropanchor_service.estimation.batch import POSE, Array, PoseBatch, SampleBatch, State
+from dropanchor_service.estimators import Estimators
+from dropanchor_service.ingest import Ingest
+from dropanchor_service.metrics import Metrics
+from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+
+
+@dataclass
+class TransparentEngine:
+    """A pose per range: x is the range. Fails for the rows that a test poisons."""
+
+    name: str = "transparent"
+    anchors: Array | None = None
+    configured: dict[int, list[Array]] = field(default_factory=dict)
+    batches: list[SampleBatch] = field(default_factory=list)
+    poisoned: Callable[[SampleBatch], bool] = lambda _: False
+
+    def set_anchors(self, anchors: Array) -> None:
+        self.anchors = anchors
+
+    def configure(self, row: int, settings: Array) -> None:
+        self.configured.setdefault(row, []).append(settings)
+
+    def process(self, samples: SampleBatch) -> PoseBatch:
+        if self.poisoned(samples):
+            raise FloatingPointError("poison")
+        assert {*samples.ranges["row"].tolist(), *samples.imu["row"].tolist()} <= set(self.configured)
+        self.batches.append(samples)
+        poses = np.zeros(len(samples.ranges), POSE)
+        for name in ("row", "t_ns", "anchor", "range"):
+            poses[name] = samples.ranges[name]
+        poses["x"], poses["state"] = samples.ranges["range"], State.TRACKING
+        return PoseBatch(poses=poses)
+
+
+class Bench:
+    """What a service has between Zenoh and the store."""
+
+    def __init__(self, folder: Path | None = None, capacity: int = 10**8, **options: Any) -> None:
+        settings = load_settings(options=options, environment={})
+        self.engine = TransparentEngine()
+        self.clock = UtcClock()
+        self.metrics = Metrics()
+        self.tags = TagTable()
+        self.latest = LatestPoses()
+        self.site = SiteStore(settings.site, dict(settings.tags), folder)
+        self.buffer = MessageBuffer(capacity)
+        self.estimators = Estimators(self.engine, self.site, self.tags, self.metrics)
+        self.ingest = Ingest(
+            self.buffer,
+            Admission(settings, self.site, self.tags),
+            self.estimators,
+            self.site,
+            self.tags,
+            self.latest,
+            self.metrics,
+            self.clock,
+        )
+
+    def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
+        data = encode_packed(payload) if isinstance(payload, Frame) else payload
+        self.buffer.append(samples_key("default", tag), data, encoding, at_ns or self.clock.now_ns())
+
+    def send(self, tag: str, *payloads: bytes | Frame) -> None:
+        for payload in payloads:
+            self.put(tag, payload)
+        self.ingest.turn()
+
+    def rejected(self) -> dict[str, float]:
+        """All counters of rejections that are not zero."""
+        found = self.metrics.rejected.collect()
+        return {
+            sample.labels["reason"]: sample.value
+            for metric in found
+            for sample in metric.samples
+            if sample.name.endswith("_total") and sample.value
+        }
+
+    def x_of(self, tags: Sequence[str]) -> list[float | None]:
+        rows = [self.tags.find(tag) for tag in tags]
+        poses = [None if tag is None else self.latest.row(tag.row) for tag in rows]
+        return [None if pose is None else float(pose["x"]) for pose in poses]
