@@ -2,6 +2,7 @@
 
 import json
 import logging
+import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +12,8 @@ import zenoh
 
 DEFAULT_CONNECT = "tcp/127.0.0.1:7447"
 _PROTOCOLS = ("tcp", "tls", "quic", "udp", "ws", "unixsock-stream")
-_ATTEMPT_S = 5.0
+_FIRST_ATTEMPT_S, _ATTEMPT_S = 1.0, 5.0
+_LOG_EVERY_S = 10.0
 
 _log = logging.getLogger(__name__)
 
@@ -58,16 +60,20 @@ def open_session(settings: SessionSettings, timeout_s: float | None = None) -> z
 
     Tries for `timeout_s`, or for ever with a line in the log every few seconds; raises ConnectError.
     """
-    deadline = None if timeout_s is None else time.monotonic() + timeout_s
+    deadline_s = math.inf if timeout_s is None else time.monotonic() + timeout_s
+    attempt_s, next_line_s = _FIRST_ATTEMPT_S, 0.0
     while True:
-        left_s = _ATTEMPT_S if deadline is None else min(_ATTEMPT_S, deadline - time.monotonic())
+        left_s = min(attempt_s, deadline_s - time.monotonic())
         try:
             return zenoh.open(zenoh.Config.from_json5(json.dumps(configuration(settings, left_s))))
         except zenoh.ZError as error:
-            if deadline is not None and time.monotonic() + 0.01 >= deadline:
+            if time.monotonic() + 0.01 >= deadline_s:
                 raise ConnectError(_what_to_check(settings)) from error
+        if time.monotonic() >= next_line_s:
+            next_line_s = time.monotonic() + _LOG_EVERY_S
             _log.warning("%s Still trying.", _what_to_check(settings))
-            time.sleep(0.1)
+        attempt_s = _ATTEMPT_S
+        time.sleep(0.1)  # some settings fail at once, every time
 
 
 def configuration(settings: SessionSettings, attempt_s: float = _ATTEMPT_S) -> dict[str, Any]:

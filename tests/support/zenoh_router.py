@@ -30,31 +30,34 @@ def free_endpoint() -> str:
     return f"tcp/127.0.0.1:{free_port()}"
 
 
-def configuration(mode: str, endpoint: str, extra: dict[str, Any] | None = None) -> str:
-    """JSON5 of a router that listens at the endpoint, or of a client that connects to it."""
-    role = {"listen": {"endpoints": [endpoint]}} if mode == "router" else {"connect": {"endpoints": [endpoint]}}
-    quiet = {"scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}}}
+def configuration(mode: str, endpoints: list[str], extra: dict[str, Any] | None = None) -> str:
+    """JSON5 of a router that listens at the endpoints, or of a client that connects to one of them."""
+    retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+    connect = {"endpoints": endpoints, "timeout_ms": 5000, "exit_on_failure": True, "retry": retry}
+    role = {"listen": {"endpoints": endpoints}} if mode == "router" else {"connect": connect}
+    quiet = {"scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}}}
     transport = {"shared_memory": {"enabled": False}, **(extra or {})}
     return json.dumps({"mode": mode, **role, **quiet, "transport": transport})
 
 
 @contextmanager
-def running_router(endpoint: str, extra: dict[str, Any] | None = None) -> Iterator[zenoh.Session]:
+def running_router(endpoints: str | list[str], extra: dict[str, Any] | None = None) -> Iterator[zenoh.Session]:
     """A router inside this process, closed at the end. `extra` goes into its transport section."""
-    with zenoh.open(zenoh.Config.from_json5(configuration("router", endpoint, extra))) as session:
+    listed = [endpoints] if isinstance(endpoints, str) else endpoints
+    with zenoh.open(zenoh.Config.from_json5(configuration("router", listed, extra))) as session:
         yield session
 
 
 @contextmanager
 def connected_session(endpoint: str) -> Iterator[zenoh.Session]:
     """A client session, closed at the end."""
-    with zenoh.open(zenoh.Config.from_json5(configuration("client", endpoint))) as session:
+    with zenoh.open(zenoh.Config.from_json5(configuration("client", [endpoint]))) as session:
         yield session
 
 
 def start_router_process(endpoint: str) -> subprocess.Popen[str]:
     """A router in a process of its own, so that it can be killed. The caller ends it."""
-    command = [sys.executable, "-c", _ROUTER_PROGRAM, configuration("router", endpoint)]
+    command = [sys.executable, "-c", _ROUTER_PROGRAM, configuration("router", [endpoint])]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert process.stdout.readline() == "up\n", "the router did not start"

@@ -4,47 +4,18 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
 import pytest
-import zenoh
 
-from dropanchor_schemas import decode_json, keys
-from dropanchor_schemas.wire import ENCODING_PACKED, Frame, Reason, anchor_number, decode_packed
+from dropanchor_schemas import keys
+from dropanchor_schemas.wire import Reason, anchor_number
 from dropanchor_tag_client import ConnectError, SessionSettings, TagClient
+from support.listening import listening
 from support.zenoh_router import connected_session, free_endpoint, running_router, wait_until
 
 T = 1_760_000_000_000_000_000
-
-
-class Heard:
-    """The frames that a subscriber receives."""
-
-    def __init__(self) -> None:
-        self.frames: list[Frame] = []
-        self.keys: list[str] = []
-
-    def take(self, message: zenoh.Sample) -> None:
-        packed = str(message.encoding) == ENCODING_PACKED
-        frame = (decode_packed if packed else decode_json)(bytes(message.payload))
-        assert isinstance(frame, Frame), frame
-        self.frames.append(frame)
-        self.keys.append(str(message.key_expr))
-
-    def ranges(self) -> list[float]:
-        return [sample.range_m for frame in self.frames for sample in frame.ranges]
-
-
-@contextmanager
-def listening(endpoint: str, site: str = "default") -> Iterator[Heard]:
-    heard = Heard()
-    everything = keys.all_tags(site, "samples")
-    with connected_session(endpoint) as session, session.declare_subscriber(everything, heard.take):
-        list(session.get("nobody/answers", timeout=1.0))  # a round trip: the router knows of the subscription
-        yield heard
 
 
 @pytest.mark.parametrize("encoding", ["packed", "json"])

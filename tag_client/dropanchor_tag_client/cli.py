@@ -1,0 +1,96 @@
+"""The command `dropanchor-tag`."""
+
+import argparse
+import logging
+import signal
+import sys
+from importlib import import_module
+from types import FrameType, ModuleType
+
+from dropanchor_tag_client.recording import RecordingError
+from dropanchor_tag_client.session import ConnectError
+
+_TEACH = argparse.RawDescriptionHelpFormatter
+_INTERRUPTED, _TERMINATED = 130, 143
+
+_EXAMPLES = """examples:
+  dropanchor-tag simulate                                     tags that drive around the anchor
+  dropanchor-tag replay recordings/yard --anchor L0           a recording, in real time
+  dropanchor-tag replay recordings/yard --speed 10 --tag cart ten times as fast, as the tag "cart"
+  echo '{"anchor": 7, "range_m": 3.21}' | dropanchor-tag publish --tag cart
+
+`dropanchor-tag COMMAND --help` explains each of them.
+"""
+_REPLAY = """Publishes a recording as if its tag were here, with the original spacing of its samples."""
+_REPLAY_EXAMPLES = """examples:
+  dropanchor-tag replay recordings/yard --anchor L0 --speed 10
+  dropanchor-tag replay recordings/yard --loop --connect tls/router.example:7447 --ca ca.pem
+
+A recording is a folder of CSV files, plain or gzipped: range.csv (t_s, anchor_id, range_m, perhaps std_m),
+anchors.csv (id, x, y, z) and, where there are any, imu.csv (t_s, ax, ay, az, gx, gy, gz, perhaps mx, my, mz) and
+heading.csv (t_s, yaw_rad, perhaps std_rad).
+"""
+_PUBLISH = """Reads one JSON object per line from standard input and publishes it: any script can be a tag."""
+_PUBLISH_EXAMPLES = """a line is one sample,
+  {"anchor": 7, "range_m": 3.21, "std_m": 0.1}
+  {"acc": [0, 0, 9.81], "gyro": [0, 0, 0.1], "mag": [0, 20, -44]}
+  {"heading_rad": 1.57}
+  {"anchor": "L0", "bearing_rad": 0.3}
+or a samples message as in the protocol:
+  {"range": [{"t_ns": 1760000000000000000, "anchor": 7, "range_m": 3.21}]}
+
+Without t_ns the time is that of reading. A bad line is reported with its number and left out; the exit code is then 1.
+example:
+  my_uwb_reader | dropanchor-tag publish --tag cart
+"""
+_SIMULATE = """Publishes what the sensors of simulated tags measure while they drive around one anchor."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    logging.basicConfig(format="%(message)s", level=logging.INFO)
+    signal.signal(signal.SIGTERM, _terminate)
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        parsed = parser(given[0] if given else "").parse_args(given)
+        return int(_source(parsed.command).run(parsed))
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+    except ModuleNotFoundError as error:
+        if error.name != "numpy":
+            raise
+        return _failed('the simulator needs numpy: pip install "dropanchor-tag-client[simulator]"')
+    except (ConnectError, RecordingError, ValueError) as error:
+        return _failed(str(error))
+
+
+def parser(command: str) -> argparse.ArgumentParser:
+    """The parser of the whole command line, with the options of this one command: no other source is imported."""
+    top = argparse.ArgumentParser(
+        prog="dropanchor-tag",
+        description="Publishes the raw samples of a tag: UWB ranges and IMU.",
+        epilog=_EXAMPLES,
+        formatter_class=_TEACH,
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, about, examples in (
+        ("replay", _REPLAY, _REPLAY_EXAMPLES),
+        ("simulate", _SIMULATE, ""),
+        ("publish", _PUBLISH, _PUBLISH_EXAMPLES),
+    ):
+        one = commands.add_parser(name, help=about, description=about, epilog=examples, formatter_class=_TEACH)
+        if name == command:
+            _source(name).add_arguments(one)
+    return top
+
+
+def _source(command: str) -> ModuleType:
+    return import_module(f"dropanchor_tag_client.sources.{command}")
+
+
+def _failed(why: str) -> int:
+    print(f"dropanchor-tag: {why}", file=sys.stderr)
+    return 2
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> None:
+    raise SystemExit(_TERMINATED)

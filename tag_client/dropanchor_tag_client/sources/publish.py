@@ -1,0 +1,156 @@
+"""Newline-delimited JSON on standard input: any script can be a tag."""
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable
+from typing import Any, BinaryIO, TextIO
+
+from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.options import add_connection_options, opened_client
+
+_MAX_LINE_BYTES = 1_000_000
+
+
+class BadLineError(ValueError):
+    """The line is not a sample and not a message of samples."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--tag", required=True, help="id of the tag")
+    parser.add_argument(
+        "--clock", choices=["utc", "boot"], default="utc", help="what t_ns counts from (default: %(default)s)"
+    )
+    add_connection_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Raises ConnectError, ValueError. Returns 1 when lines were left out."""
+    with opened_client(arguments, arguments.tag, clock=arguments.clock) as client:
+        bad = publish_lines(client, sys.stdin.buffer, sys.stderr, clock=arguments.clock)
+    refused = sum(client.refused.values())
+    sys.stderr.write(f"{client.sent.samples} samples sent, {bad} bad lines, {refused} samples left out\n")
+    return 1 if bad or refused else 0
+
+
+def publish_lines(client: TagClient, lines: BinaryIO, errors: TextIO, *, clock: str = "utc") -> int:
+    """Publishes every line; what is wrong with a line goes to `errors`. Returns the number of bad lines."""
+    bad = 0
+    for number, line in enumerate(_lines(lines), start=1):
+        if line.isspace() and len(line) < _MAX_LINE_BYTES:
+            continue
+        try:
+            for publish in [_publisher(kind, sample) for kind, sample in samples_of(line, clock)]:
+                publish(client)
+        except ValueError as error:
+            bad += 1
+            errors.write(f"line {number}: {error}\n")
+    return bad
+
+
+def _lines(lines: BinaryIO) -> Iterable[bytes]:
+    """Lines, of which none is read beyond a limit: the rest of a longer one counts with it."""
+    while line := lines.readline(_MAX_LINE_BYTES):
+        tail = line
+        while len(tail) == _MAX_LINE_BYTES and not tail.endswith(b"\n"):
+            tail = lines.readline(_MAX_LINE_BYTES)
+        yield line
+
+
+def samples_of(line: bytes, clock: str = "utc") -> list[tuple[str, dict[str, Any]]]:
+    """The samples of a line, each with its kind: a samples message, or one sample object. Raises BadLineError."""
+    if len(line) >= _MAX_LINE_BYTES:
+        raise BadLineError(f"the line is longer than {_MAX_LINE_BYTES} bytes")
+    try:
+        value = json.loads(line, parse_constant=_no_constant)
+    except RecursionError:
+        raise BadLineError("the JSON is nested too deeply") from None
+    except ValueError as error:
+        raise BadLineError(f"not JSON: {error}") from None
+    if not isinstance(value, dict):
+        raise BadLineError("a JSON object was expected")
+    if value.keys() & {*_FIELDS, "version", "clock"}:
+        return _message(value, clock)
+    for kind, (needed, _) in _FIELDS.items():
+        if needed[-1] in value:
+            return [(kind, value)]
+    raise BadLineError("none of range_m, acc, heading_rad, bearing_rad, imu, range, heading, bearing is there")
+
+
+# Per kind: the fields that a sample must have, the last of which tells the kind, and those that it may have.
+_FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "imu": (("gyro", "acc"), ("mag", "t_ns")),
+    "range": (("anchor", "range_m"), ("std_m", "t_ns")),
+    "heading": (("heading_rad",), ("std_rad", "t_ns")),
+    "bearing": (("anchor", "bearing_rad"), ("std_rad", "t_ns")),
+}
+
+
+def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any]]]:
+    unknown = value.keys() - {*_FIELDS, "version", "clock", "sequence", "boot_id"}
+    if unknown:
+        raise BadLineError(f"a samples message has no field {min(unknown)!r}")
+    if value.get("version", 1) != 1:
+        raise BadLineError(f"version {value['version']!r} is not known, 1 is")
+    if value.get("clock", clock) != clock:
+        raise BadLineError(f"the clock is {value['clock']!r}; this program was started for {clock!r}")
+    samples = []
+    for kind in _FIELDS.keys() & value.keys():
+        if not isinstance(value[kind], list) or not all(isinstance(sample, dict) for sample in value[kind]):
+            raise BadLineError(f"{kind}: a list of objects was expected")
+        samples += [(kind, sample) for sample in value[kind]]
+    return samples
+
+
+def _publisher(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], None]:
+    """What publishes the sample, after all of it has been checked. Raises BadLineError."""
+    needed, optional = _FIELDS[kind]
+    for name in needed:
+        if name not in sample:
+            raise BadLineError(f"{kind}: {name} is missing")
+    known = {*needed, *optional}
+    for name in sample.keys() - known:
+        raise BadLineError(f"{kind}: there is no field {name!r}; known are {', '.join(sorted(known))}")
+    given = {name: _CHECKS[name](name, value) for name, value in sample.items() if value is not None or name in needed}
+    return lambda client: getattr(client, f"publish_{kind}")(**given)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise BadLineError(f"{name} is {value!r}, a number was expected")
+    try:
+        return float(value)
+    except OverflowError:
+        raise BadLineError(f"{name} is too large a number") from None
+
+
+def _vector(name: str, value: Any) -> list[float]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise BadLineError(f"{name} is {value!r}, a list of three numbers was expected")
+    return [_number(name, part) for part in value]
+
+
+def _anchor(name: str, value: Any) -> int | str:
+    if isinstance(value, bool) or not isinstance(value, int | str):
+        raise BadLineError(f"{name} is {value!r}, a number or a text was expected")
+    return value
+
+
+def _time(name: str, value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise BadLineError(f"{name} is {value!r}, an integer was expected")
+    return value
+
+
+_CHECKS: dict[str, Callable[[str, Any], Any]] = {
+    "acc": _vector,
+    "gyro": _vector,
+    "mag": _vector,
+    "anchor": _anchor,
+    "t_ns": _time,
+    **dict.fromkeys(("range_m", "std_m", "heading_rad", "std_rad", "bearing_rad"), _number),
+}
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not JSON")

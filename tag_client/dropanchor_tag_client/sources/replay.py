@@ -1,0 +1,153 @@
+"""A recording, published as if its tag were here."""
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Iterator
+from heapq import merge
+from operator import itemgetter
+from typing import Protocol
+
+from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.options import add_connection_options, opened_client
+from dropanchor_tag_client.progress import Progress
+from dropanchor_tag_client.recording import Recording, read_recording
+
+_NS_PER_S = 1_000_000_000
+
+
+class Publish(Protocol):
+    """Hands one sample to a client."""
+
+    def __call__(self, client: TagClient, t_ns: int) -> None: ...
+
+
+Event = tuple[float, Publish]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("recording", metavar="RECORDING", help="folder with range.csv, anchors.csv, imu.csv, …")
+    parser.add_argument("--tag", help="id under which it is published (default: the name of the folder)")
+    parser.add_argument("--anchor", metavar="ID", help="publish the ranges to this anchor only (default: all)")
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, metavar="N", help="N times real time; 0: as fast as possible (default: 1)"
+    )
+    parser.add_argument("--loop", action="store_true", help="start again at the end, until Ctrl-C")
+    parser.add_argument(
+        "--t0-ns",
+        type=int,
+        metavar="NS",
+        help="UTC of the recording's t_s = 0, ns (default: so that the last sample is not in the future)",
+    )
+    add_connection_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Raises RecordingError, ConnectError, ValueError."""
+    recording = read_recording(arguments.recording)
+    if arguments.anchor is not None:
+        recording.anchor(arguments.anchor)
+    first_s, last_s = span(recording, arguments.anchor)
+    t0_ns = arguments.t0_ns
+    if t0_ns is None:
+        t0_ns = time.time_ns() - round(_behind(arguments.speed) * (last_s - first_s) * _NS_PER_S)
+        t0_ns -= round(first_s * _NS_PER_S)
+    tag = arguments.tag or recording.name
+    with opened_client(arguments, tag, wait_when_congested=arguments.speed == 0) as client:
+        while True:
+            replay(client, recording, anchor=arguments.anchor, speed=arguments.speed, t0_ns=t0_ns)
+            if not arguments.loop:
+                break
+            t0_ns += round((last_s - first_s) * _NS_PER_S) + _NS_PER_S // 10
+    sys.stderr.write(f"{client.sent.samples} samples of {tag} in {client.sent.messages} messages\n")
+    return 0
+
+
+def replay(
+    client: TagClient,
+    recording: Recording,
+    *,
+    anchor: str | None = None,
+    speed: float = 1.0,
+    t0_ns: int,
+) -> None:
+    """Publishes the samples in order of time with their spacing divided by `speed` (0: no spacing).
+
+    anchor: the one whose ranges are published; None: all. t0_ns: UTC of the recording's t_s = 0.
+    """
+    progress = Progress()
+    first_s, last_s = span(recording, anchor)
+    began_s = time.monotonic()
+    for t_s, publish in timeline(recording, anchor):
+        if speed > 0:
+            time.sleep(max(0.0, began_s + (t_s - first_s) / speed - time.monotonic()))
+        publish(client, t0_ns + round(t_s * _NS_PER_S))
+        share = (t_s - first_s) / (last_s - first_s) if last_s > first_s else 1.0
+        progress.show(share, f"{t_s - first_s:.0f} of {last_s - first_s:.0f} s, {client.sent.samples} samples sent")
+    client.flush()
+    progress.end()
+
+
+def timeline(recording: Recording, anchor: str | None = None) -> Iterator[Event]:
+    """Every sample of the recording in order of time, with what publishes it."""
+    return merge(_imu(recording), _ranges(recording, anchor), _headings(recording), key=itemgetter(0))
+
+
+def span(recording: Recording, anchor: str | None = None) -> tuple[float, float]:
+    """Times of the first and the last sample, s; (0, 0) without any."""
+    times = [t_s for t_s, _ in timeline(recording, anchor)]
+    return (times[0], times[-1]) if times else (0.0, 0.0)
+
+
+def _imu(recording: Recording) -> Iterator[Event]:
+    columns = recording.imu
+    if not columns:
+        return
+    for t_s, *v in zip(*(columns[name] for name in _IMU_COLUMNS), strict=True):
+        yield t_s, _imu_sample(v)
+
+
+_IMU_COLUMNS = ("t_s", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz")
+
+
+def _imu_sample(v: list[float]) -> Publish:
+    mag = None if all(math.isnan(m) for m in v[6:]) else v[6:]
+    return lambda client, t_ns: client.publish_imu(v[0:3], v[3:6], mag, t_ns=t_ns)
+
+
+def _ranges(recording: Recording, only: str | None) -> Iterator[Event]:
+    columns = recording.ranges
+    for anchor, *row in zip(recording.range_anchors, columns["t_s"], columns["range_m"], columns["std_m"], strict=True):
+        if only is None or anchor == only:
+            yield row[0], _range_sample(anchor, row[1], row[2])
+
+
+def _range_sample(anchor: str, range_m: float, std_m: float) -> Publish:
+    return lambda client, t_ns: client.publish_range(anchor, range_m, t_ns=t_ns, std_m=std_m)
+
+
+def _headings(recording: Recording) -> Iterator[Event]:
+    columns = recording.headings
+    if not columns:
+        return
+    for t_s, yaw_rad, std_rad in zip(columns["t_s"], columns["yaw_rad"], columns["std_rad"], strict=True):
+        yield t_s, _heading_sample(yaw_rad, std_rad)
+
+
+def _heading_sample(yaw_rad: float, std_rad: float) -> Publish:
+    return lambda client, t_ns: client.publish_heading(yaw_rad, t_ns=t_ns, std_rad=std_rad)
+
+
+def _behind(speed: float) -> float:
+    """By which share of its length a replay must lie in the past to end at the present."""
+    if speed == 0:
+        return 1.0
+    return max(0.0, 1.0 - 1.0 / speed)
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0 <= speed < math.inf:
+        raise argparse.ArgumentTypeError(f"{text} is not 0 or a positive number")
+    return speed

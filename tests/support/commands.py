@@ -1,0 +1,39 @@
+"""Programs of ours in processes of their own."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+_ROOT = Path(__file__).parents[2]
+_PACKAGES = os.pathsep.join(str(_ROOT / name) for name in ("schemas", "tag_client", "service"))
+
+
+def environment() -> dict[str, str]:
+    """The environment of this process, with our packages importable from the checkout."""
+    return os.environ | {"PYTHONPATH": _PACKAGES}
+
+
+def python(*arguments: str, text_input: str | None = None, timeout_s: float = 60.0) -> subprocess.CompletedProcess[str]:
+    """Runs `python ARGUMENTS` to its end."""
+    return subprocess.run(
+        [sys.executable, *arguments],
+        input=text_input,
+        capture_output=True,
+        text=True,
+        env=environment(),
+        timeout=timeout_s,
+        check=False,
+    )
+
+
+def start_python(*arguments: str) -> subprocess.Popen[str]:
+    """Starts `python ARGUMENTS`; the caller ends it."""
+    return subprocess.Popen(
+        [sys.executable, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )

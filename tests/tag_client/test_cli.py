@@ -1,0 +1,99 @@
+"""The command line: it teaches, it fails with a sentence, and it ends when it is told to."""
+
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from dropanchor_tag_client.cli import main
+from support.commands import python, start_python
+from support.listening import listening
+from support.zenoh_router import free_endpoint, wait_until
+
+COMMAND = ("-m", "dropanchor_tag_client")
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    (tmp_path / "anchors.csv").write_text("id,x,y,z\n7,0,0,0\n")
+    lines = "".join(f"{i / 10},7,{i}\n" for i in range(1000))
+    (tmp_path / "range.csv").write_text("t_s,anchor_id,range_m\n" + lines)
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", [[], ["replay"], ["publish"]])
+def test_help_teaches_with_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main([*command, "--help"])
+    assert end.value.code == 0
+    assert "example" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["replay", "nowhere"], "nowhere is not a folder"),
+        (["publish", "--tag", "", "--connect-timeout", "1"], "an id has 1 to 64 characters"),
+        (["publish", "--tag", "a", "--connect", "nonsense"], "an endpoint such as tcp/127.0.0.1:7447 was expected"),
+        (["publish", "--tag", "a", "--cert", "x"], "cert and key go together"),
+        (["publish", "--tag", "a", "--user", "x"], "DROPANCHOR_PASSWORD"),
+        (["publish", "--tag", "a", "--connect", free_endpoint(), "--connect-timeout", "0.2"], "Cannot connect to"),
+    ],
+)
+def test_what_cannot_work_ends_with_a_sentence_and_code_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert message in said
+    assert "Traceback" not in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["dance"], ["publish"], ["replay"], ["replay", "x", "--speed", "-1"], ["replay", "x", "--speed", "fast"]],
+)
+def test_a_command_line_that_makes_no_sense_ends_with_code_2(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+
+
+def test_an_anchor_that_the_recording_does_not_have_is_named_with_those_it_has(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["replay", str(recording), "--anchor", "9"]) == 2
+    assert "no anchor '9'; it has: 7" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_ctrl_c_ends_a_replay_quickly_and_sends_what_waits(
+    router_endpoint: str, recording: Path, number: signal.Signals, code: int
+) -> None:
+    with listening(router_endpoint) as heard:
+        process = start_python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--loop")
+        wait_until(lambda: len(heard.ranges()) >= 3)
+        began = time.monotonic()
+        process.send_signal(number)
+        _, said = process.communicate(timeout=10)
+        assert time.monotonic() - began < 2.0
+    assert process.returncode == code
+    assert "Traceback" not in said
+    assert heard.ranges() == [float(i) for i in range(len(heard.ranges()))]
+
+
+def test_ctrl_c_ends_a_client_that_still_looks_for_its_router(recording: Path) -> None:
+    endpoint = free_endpoint()
+    process = start_python(*COMMAND, "replay", str(recording), "--connect", endpoint)
+    assert process.stderr is not None
+    assert f"Cannot connect to {endpoint}" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=2.0)
+    assert process.returncode == -signal.SIGINT
+
+
+def test_a_replay_says_how_much_it_sent(router_endpoint: str, recording: Path) -> None:
+    done = python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--speed", "0")
+    assert done.returncode == 0
+    assert "1000 samples of" in done.stderr

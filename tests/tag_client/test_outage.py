@@ -1,0 +1,68 @@
+"""A router that is killed and comes back: what was published meanwhile arrives all the same."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from dropanchor_tag_client import TagClient
+from support.listening import listening, listening_with_recovery
+from support.zenoh_router import free_endpoint, start_router_process, wait_until
+
+
+class KillableRouter:
+    def __init__(self) -> None:
+        self.endpoint = free_endpoint()
+        self._process = start_router_process(self.endpoint)
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def restart(self) -> None:
+        self._process = start_router_process(self.endpoint)
+
+
+@pytest.fixture
+def router() -> Iterator[KillableRouter]:
+    router = KillableRouter()
+    yield router
+    router.kill()
+
+
+def publish_through_an_outage(tag: TagClient, router: KillableRouter) -> int:
+    """100 samples per second, the router away in the middle for longer than a second; the number of samples."""
+    for i in range(300):
+        if i == 100:
+            router.kill()
+        if i == 220:
+            router.restart()
+        tag.publish_range(1, float(i))
+        time.sleep(0.01)
+    return 300
+
+
+def test_a_killed_router_loses_nothing(router: KillableRouter) -> None:
+    with listening_with_recovery(router.endpoint) as heard, TagClient("a", connect=router.endpoint) as tag:
+        published = publish_through_an_outage(tag, router)
+        wait_until(lambda: len(heard.ranges()) >= published)
+    assert heard.ranges() == [float(i) for i in range(published)]
+
+
+def test_without_the_cache_the_same_outage_does_lose_samples(router: KillableRouter) -> None:
+    with listening(router.endpoint) as heard, TagClient("a", connect=router.endpoint, cache_messages=0) as tag:
+        publish_through_an_outage(tag, router)
+        time.sleep(1.0)
+    assert 299.0 in heard.ranges()
+    assert len(heard.ranges()) < 250
+
+
+def test_publishing_does_not_wait_while_the_router_is_away(router: KillableRouter) -> None:
+    with TagClient("a", connect=router.endpoint) as tag:
+        router.kill()
+        began = time.monotonic()
+        for i in range(1000):
+            tag.publish_range(1, float(i))
+        assert time.monotonic() - began < 1.0
+        closing = time.monotonic()
+    assert time.monotonic() - closing < 2.0
