@@ -4,7 +4,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from support.kernel_cache import use_cache_of_these_sources
 from support.zenoh_router import free_endpoint, running_router
+
+use_cache_of_these_sources()
 
 
 @pytest.fixture

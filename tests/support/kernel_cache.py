@@ -1,0 +1,20 @@
+"""A compile cache that knows all sources.
+
+numba looks only at the file of the outermost kernel: after a change in a file that kernel calls into, it would go on
+running the old code. So the cache's place is named after the sources. Takes effect before numba is imported.
+"""
+
+import hashlib
+import os
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def use_cache_of_these_sources() -> None:
+    """Set NUMBA_CACHE_DIR, for this process and its children, unless somebody has."""
+    sources = sorted((ROOT / "service" / "dropanchor_service" / "estimation" / "fleet").glob("*.py"))
+    digest = hashlib.sha256(
+        b"".join(source.read_bytes() for source in [*sources, *sorted(ROOT.glob("tests/support/*.py"))])
+    )
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / digest.hexdigest()[:16]))
