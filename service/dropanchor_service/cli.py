@@ -1,6 +1,8 @@
 """`dropanchor`: one module of `commands` per subcommand."""
 
 import argparse
+import re
+import sys
 from collections.abc import Sequence
 
 from dropanchor_service.commands import replay, router, serve
@@ -36,5 +38,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         command.add_arguments(one)
         one.set_defaults(run=command.run)
-    chosen = parser.parse_args(arguments)
+    chosen = parser.parse_args(_with_negative_values(sys.argv[1:] if arguments is None else arguments))
     return int(chosen.run(chosen))
+
+
+def _with_negative_values(arguments: Sequence[str]) -> list[str]:
+    """`--start -1,2,0` as `--start=-1,2,0`: argparse takes what begins with a minus for an option."""
+    joined: list[str] = []
+    for argument in arguments:
+        if joined and re.fullmatch(r"--[a-z-]+", joined[-1]) and re.match(r"-\.?\d", argument):
+            joined[-1] += f"={argument}"
+        else:
+            joined.append(argument)
+    return joined

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from dropanchor_service.cli import main
 from dropanchor_service.commands import replay
 from support.recordings import recording_or_skip, write_square
 
@@ -68,6 +69,24 @@ def test_a_start_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureF
     with pytest.raises(SystemExit, match="2"):
         call(write_square(tmp_path), "--start", start)
     assert "X,Y,HEADING" in capsys.readouterr().err
+
+
+def test_values_may_begin_with_a_minus(tmp_path: Path) -> None:
+    out = tmp_path / "poses.csv"
+    folder = str(write_square(tmp_path))
+    options = [
+        "--start",
+        "-4.5,-2,-1.5",
+        "--range-bias",
+        "-1e-3",
+        "--mount-angle",
+        "-.1",
+        "--out",
+        str(out),
+        "--no-plot",
+    ]
+    assert main(["replay", folder, "--anchor", "A", "--engine", "paper", *options, "--no-plot"]) == 0
+    assert float(rows(out)[0]["x"]) < -3.0
 
 
 @pytest.mark.recordings
