@@ -4,6 +4,7 @@ const CLICK_PX = 6;
 const PAN_KEY_PX = 60;
 const ZOOM_KEY = 1.4;
 const DOUBLE_TAP_MS = 300;
+const DOUBLE_TAP_PX = 24;
 
 /** @typedef {import("./map.js").LiveMap} LiveMap */
 /** @typedef {{x: number, y: number}} Point */
@@ -26,7 +27,7 @@ class Pointers {
   #at = new Map();
   /** Where a press began that may still be a click. @type {Point | null} */
   #pressed = null;
-  #lastTap = -Infinity;
+  #lastTap = { x: NaN, y: NaN, time_ms: -Infinity };
 
   /** @param {LiveMap} map @param {(row: number) => void} pick */
   constructor(map, pick) {
@@ -82,8 +83,8 @@ class Pointers {
   /** @param {PointerEvent} event @param {Point} at */
   #click(event, at) {
     const row = this.map.tagAt(at.x, at.y);
-    const double = event.timeStamp - this.#lastTap < DOUBLE_TAP_MS;
-    this.#lastTap = event.timeStamp;
+    const double = event.timeStamp - this.#lastTap.time_ms < DOUBLE_TAP_MS && apart(at, this.#lastTap) < DOUBLE_TAP_PX;
+    this.#lastTap = { ...at, time_ms: event.timeStamp };
     if (double && row < 0) this.map.zoom(2, at.x, at.y);
     else this.pick(row);
   }

@@ -68,9 +68,8 @@ connection.addEventListener("snapshot", receiver((frame, now_ms) => {
 connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
 connection.addEventListener("site", (event) => {
   const site = /** @type {CustomEvent} */ (event).detail;
-  map.anchors = site.anchors;
+  map.setAnchors(site.anchors);
   byId("site").textContent = site.name || site.id;
-  map.redraw();
 });
 
 /** The panels need no more than a few updates a second; ages go on while nothing comes in. */

@@ -48,6 +48,14 @@ export class LiveMap extends EventTarget {
     choice.addEventListener("change", () => this.redraw());
   }
 
+  /** @param {readonly import("./draw_site.js").Anchor[]} anchors */
+  setAnchors(anchors) {
+    if (JSON.stringify(anchors) === JSON.stringify(this.anchors)) return;
+    this.anchors = anchors;
+    if (this.autoFit) this.#aimAtAll();
+    this.redraw();
+  }
+
   redraw() {
     if (this.#asked) return;
     this.#asked = true;

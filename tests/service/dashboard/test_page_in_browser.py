@@ -1,0 +1,261 @@
+"""The page in a real browser on the real interface, over a store that the tests fill."""
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+from api_house import House, make_house
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
+from support.browser import Watched, running_chromium, watched_page
+from support.http_server import running_server
+
+pytestmark = pytest.mark.browser
+
+TRACKING_BLUE = (0, 103, 184)
+
+
+@dataclass
+class Place:
+    house: House
+    url: str
+
+    def move(self, *names: str, **fields: Any) -> None:
+        self.house.move(*names, **({"t_ns": time.time_ns()} | fields))
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with running_chromium() as browser:
+        yield browser
+
+
+def live_house() -> House:
+    house = make_house()
+    house.answers.now_ns = time.time_ns
+    return house
+
+
+@pytest.fixture
+def place() -> Iterator[Place]:
+    house = live_house()
+    with running_server(house.app(DASHBOARD), house.stopping) as port:
+        yield Place(house, f"http://127.0.0.1:{port}/")
+
+
+def colour_at(page: Watched, tag: str) -> tuple[int, ...]:
+    x, y = page.tags()[tag]["pixel"]
+    return page.pixel(x, y)[:3]
+
+
+def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> None:
+    """modes: weight, x, y."""
+    row = place.house.answers.tags.register(tag).row
+    pose, hypotheses = np.zeros(1, POSE), np.zeros(len(modes), HYPOTHESIS)
+    pose["row"] = hypotheses["row"] = row
+    pose["t_ns"], pose["state"], pose["reason"] = time.time_ns(), State.AMBIGUOUS, StateReason.SEVERAL_MODES
+    pose["range"], pose["x"], pose["y"], pose["p_mode"] = 5.0, modes[0][1], modes[0][2], modes[0][0]
+    for name, column in zip(("weight", "x", "y"), zip(*modes, strict=True), strict=True):
+        hypotheses[name] = column
+    hypotheses["cov"] = np.eye(2) * 0.1
+    place.house.answers.latest.write(pose, hypotheses)
+
+
+def test_without_a_tag_the_page_tells_how_to_start_one(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url) as page:
+        assert page.page.locator("#empty").is_visible()
+        assert page.page.locator("#command").inner_text() == "dropanchor-tag simulate"
+        place.move("cart", x=1.0, y=2.0)
+        page.page.locator("#empty").wait_for(state="hidden")
+
+
+def test_a_pose_is_a_dot_and_a_line_in_the_table_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=1.0, y=2.0, speed=0.5)
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        line = page.page.locator("tr[data-tag='cart']")
+        assert line.inner_text().split()[:4] == ["cart", "Tracking", "1.00", "2.00"]
+        before = page.tags()["cart"]["pixel"]
+        place.move("cart", x=1.5, y=2.0)
+        page.wait_for("dropanchor.tags()[0].x === 1.5")
+        assert page.tags()["cart"]["pixel"][0] > before[0] + 10
+        page.page.locator("tr[data-tag='cart'] td.c-x", has_text="1.50").wait_for()
+        assert page.complaints == []
+
+
+def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        for i, state in enumerate(State):
+            place.move(state.name, x=float(i), y=1.0, state=state, heading=np.nan, cov=np.eye(3) * 1e-6)
+        page.wait_for("dropanchor.drawing().visible === 6")
+        colours = {state.name: colour_at(page, state.name) for state in State}
+        full = {name for name, colour in colours.items() if colour == TRACKING_BLUE}
+        assert full == {"TRACKING"}
+
+
+def test_a_pose_that_grows_old_is_no_full_dot_any_more(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        place.move("cart", x=2.0, y=1.0, heading=np.nan, cov=np.eye(3) * 1e-6)
+        page.wait_for("dropanchor.drawing().visible === 1")
+        assert colour_at(page, "cart") == TRACKING_BLUE
+        page.page.locator("tr[data-tag='cart'][data-stale='1']").wait_for(timeout=10_000)
+        page.wait_for("dropanchor.tags()[0].state === 'coasting'")
+        assert colour_at(page, "cart") != TRACKING_BLUE
+
+
+def test_an_ambiguous_tag_is_shown_as_every_place_where_it_may_be(chromium: Browser, place: Place) -> None:
+    ambiguous(place, "cart", (0.6, 3.0, 4.0), (0.4, 3.0, -4.0))
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        page.page.locator("tr[data-tag='cart']").click()
+        texts = page.page.locator("#detail li").all_inner_texts()
+        assert [text.split() for text in texts] == [["3.0,", "4.0", "m", "60", "%"], ["3.0,", "−4.0", "m", "40", "%"]]
+        page.page.locator("[data-part='hint']", has_text="Move a few metres").wait_for()
+        assert colour_at(page, "cart") != TRACKING_BLUE
+
+
+def test_a_tag_without_a_pose_is_listed_as_initialising(chromium: Browser, place: Place) -> None:
+    place.house.answers.tags.register("new")
+    with watched_page(chromium, place.url) as page:
+        line = page.page.locator("tr[data-tag='new']")
+        line.wait_for()
+        assert line.inner_text().split()[:4] == ["new", "Initialising", "–", "–"]
+        line.click()
+        assert page.page.locator("#detail").is_visible()
+        assert page.complaints == []
+
+
+def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place) -> None:
+    place.move("a-1", "a-2", "a-10", x=[1.0, 2.0, 3.0], y=0.5, cov=np.diag([0.04, 0.01, 0.001]))
+    with watched_page(chromium, place.url) as page:
+        page.page.locator("tr[data-tag='a-10']").wait_for()
+        page.page.locator("#table").focus()
+        for key in ("ArrowDown", "ArrowDown", "ArrowDown", "Enter"):
+            page.page.keyboard.press(key)
+        assert page.page.locator("#detail [data-part='name']").inner_text() == "a-10"
+        assert page.page.locator("tr[aria-selected='true']").get_attribute("data-tag") == "a-10"
+        assert page.page.locator("#spoken").inner_text().startswith("a-10 selected")
+        page.page.keyboard.press("Escape")
+        assert page.page.locator("#detail").is_hidden()
+
+
+def test_a_click_on_a_dot_selects_it_and_a_click_on_the_ground_ends_that(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=2.0, y=1.0)
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        page.wait_for("dropanchor.drawing().visible === 1")
+        x, y = page.tags()["cart"]["pixel"]
+        page.page.locator("#map").click(position={"x": x, "y": y})
+        assert page.page.locator("#detail [data-part='name']").inner_text() == "cart"
+        page.page.locator("#map").click(position={"x": 40, "y": 300})
+        assert page.page.locator("#detail").is_hidden()
+
+
+def test_the_map_moves_by_mouse_and_keys_and_comes_back_with_fit(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=2.0, y=1.0)
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        page.wait_for("dropanchor.drawing().visible === 1 && document.getElementById('site').textContent")
+        fitted = page.tags()["cart"]["pixel"]
+        page.page.locator("#map").focus()
+        page.page.keyboard.press("ArrowLeft")
+        assert page.tags()["cart"]["pixel"][0] == pytest.approx(fitted[0] + 60)
+        page.page.mouse.move(200, 400)
+        page.page.mouse.down()
+        page.page.mouse.move(250, 430, steps=4)
+        page.page.mouse.up()
+        assert page.tags()["cart"]["pixel"] == pytest.approx([fitted[0] + 110, fitted[1] + 30])
+        page.page.mouse.wheel(0, -400)
+        page.page.locator("#fit").click()
+        page.wait_for(f"Math.abs(dropanchor.tags()[0].pixel[0] - {fitted[0]}) < 1")
+
+
+def test_names_and_states_filter_table_and_map(chromium: Browser, place: Place) -> None:
+    place.move(
+        "fork-1", "cart-1", "cart-2", x=[1.0, 2.0, 3.0], y=1.0, state=[State.TRACKING, State.LOST, State.TRACKING]
+    )
+    with watched_page(chromium, place.url) as page:
+        page.wait_for("dropanchor.drawing().visible === 3")
+        page.page.keyboard.press("/")
+        page.page.keyboard.type("CART")
+        page.wait_for("dropanchor.drawing().visible === 2")
+        page.page.locator(".chip[data-state='lost']").click()
+        page.wait_for("dropanchor.drawing().visible === 1")
+        assert page.page.locator("#count").inner_text() == "1 of 3 tags"
+        page.page.locator("#show-all").click()
+        page.wait_for("dropanchor.drawing().visible === 3")
+
+
+def test_dark_follows_the_system_until_the_user_chooses(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url, scheme="dark") as page:
+        ground = "getComputedStyle(document.body).backgroundColor"
+        assert page.page.evaluate(ground) == "rgb(13, 18, 23)"
+        page.page.locator("#theme").click()
+        assert page.page.evaluate(ground) == "rgb(244, 246, 248)"
+        page.page.reload()
+        page.wait_for("window.dropanchor?.status() === 'live'")
+        assert page.page.evaluate(ground) == "rgb(244, 246, 248)"
+
+
+def test_names_from_tags_are_text_never_markup(chromium: Browser, place: Place) -> None:
+    name = "<img src=x onerror=alert(1)>"
+    place.move(name, x=1.0, y=1.0)
+    with watched_page(chromium, place.url) as page:
+        cell = page.page.locator("tbody tr:visible td.c-tag")
+        cell.wait_for()
+        assert cell.inner_text() == name
+        cell.click()
+        assert page.page.locator("#detail [data-part='name']").inner_text() == name
+        page.wait_for("document.querySelector('[data-part=\"v-turn\"]').textContent !== '–'")
+        assert page.complaints == []
+
+
+def test_a_new_anchor_appears_without_a_reload(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url) as page:
+        added = """() => fetch("api/v1/anchors/42", {
+            method: "PUT", headers: {"content-type": "application/json"}, body: '{"id": "42", "x": 80, "y": 0}',
+        }).then((answer) => answer.status)"""
+        place.move("cart", x=1.0, y=1.0)
+        page.wait_for("dropanchor.drawing().visible === 1")
+        narrow = page.tags()["cart"]["pixel"][0]
+        assert page.page.evaluate(added) in (200, 201)
+        page.wait_for(f"dropanchor.tags()[0].pixel[0] < {narrow} - 100")
+
+
+def test_the_page_comes_back_by_itself_after_the_service(chromium: Browser) -> None:
+    house = live_house()
+    with ExitStack() as open_pages:
+        with running_server(house.app(DASHBOARD), house.stopping) as port:
+            place = Place(house, f"http://127.0.0.1:{port}/")
+            place.move("old", x=1.0, y=1.0)
+            page = open_pages.enter_context(watched_page(chromium, place.url))
+            page.wait_for("dropanchor.tags().length === 1")
+        page.page.locator("#lost").wait_for(state="visible", timeout=10_000)
+        house.stopping = Event()
+        with running_server(house.app(DASHBOARD), house.stopping, port):
+            page.wait_for("dropanchor.status() === 'live'")
+            page.page.locator("#lost").wait_for(state="hidden")
+            place.move("new", x=2.0, y=2.0)
+            page.wait_for("dropanchor.tags().length === 2")
+
+
+def test_ten_thousand_tags_cost_less_than_50_ms_of_javascript_a_frame(chromium: Browser, place: Place) -> None:
+    count = 10_000
+    random = np.random.default_rng(1)
+    names = [f"tag-{i}" for i in range(count)]
+    with watched_page(chromium, place.url) as page:
+        spent: list[float] = []
+        for _ in range(12):
+            place.move(*names, x=random.normal(0, 20, count), y=random.normal(0, 20, count))
+            page.page.wait_for_timeout(250)
+            spent.append(page.page.evaluate("dropanchor.drawing().ms + dropanchor.received().ms"))
+        drawing = page.page.evaluate("dropanchor.drawing()")
+        assert drawing["visible"] > 5000
+        assert drawing["density"]
+        assert page.page.locator("tbody tr").count() < 60
+        assert page.page.locator("#crowd").is_visible()
+        assert np.median(spent) <= 50
+        assert page.complaints == []

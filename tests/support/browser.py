@@ -1,0 +1,78 @@
+"""A real Chromium, and a page that keeps account of what it asked for and complained about."""
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+_ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+Scheme = Literal["light", "dark"]
+
+
+@contextmanager
+def running_chromium() -> Iterator[Browser]:
+    """Debian's Chromium, driven by Playwright. An event loop runs in this thread as long as it is open."""
+    executable = shutil.which("chromium") or shutil.which("chromium-browser")
+    if executable is None:
+        pytest.skip("Chromium is not installed: the browser tests need it")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=executable, args=_ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@dataclass
+class Watched:
+    """A page, the hosts that it asked, and what went wrong in it."""
+
+    page: Page
+    origins: set[str] = field(default_factory=set)
+    complaints: list[str] = field(default_factory=list)
+
+    def tags(self) -> dict[str, dict[str, Any]]:
+        """What the page knows about each tag."""
+        tags: list[dict[str, Any]] = self.page.evaluate("dropanchor.tags()")
+        return {tag["tag"]: tag for tag in tags}
+
+    def wait_for(self, condition: str, timeout_s: float = 15) -> None:
+        """Until a JavaScript expression is true. Asked from outside: the page's own policy forbids evaluation in it."""
+        end_s = time.monotonic() + timeout_s
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}"
+            self.page.wait_for_timeout(50)
+
+    def pixel(self, x: float, y: float) -> tuple[int, ...]:
+        """Red, green, blue and opacity of the map at a place in CSS pixels."""
+        script = """([x, y]) => {
+            const ratio = devicePixelRatio;
+            const pen = document.getElementById("map").getContext("2d");
+            return [...pen.getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data];
+        }"""
+        return tuple(self.page.evaluate(script, [x, y]))
+
+
+@contextmanager
+def watched_page(
+    browser: Browser,
+    url: str,
+    scheme: Scheme = "light",
+    size: tuple[int, int] = (1280, 800),
+    reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
+) -> Iterator[Watched]:
+    context = browser.new_context(
+        viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion=reduced_motion
+    )
+    watched = Watched(context.new_page())
+    page = watched.page
+    page.on("request", lambda request: watched.origins.add("/".join(request.url.split("/", 3)[:3])))
+    page.on("pageerror", lambda error: watched.complaints.append(str(error)))
+    page.on("console", lambda said: watched.complaints.append(said.text) if said.type in ("error", "warning") else None)
+    page.goto(url)
+    watched.wait_for("window.dropanchor?.status() === 'live'")
+    yield watched
+    context.close()

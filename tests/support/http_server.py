@@ -1,0 +1,26 @@
+"""The real HTTP server on loopback, in a thread."""
+
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+
+from starlette.types import ASGIApp
+
+from dropanchor_service.api.server import build_server, listen
+
+
+@contextmanager
+def running_server(app: ASGIApp, stopping: Event, port: int = 0) -> Iterator[int]:
+    """The port at which the app answers."""
+    socket = listen("127.0.0.1", port)
+    server = build_server(app, stopping)
+    thread = Thread(target=lambda: asyncio.run(server.serve(sockets=[socket])))
+    thread.start()
+    try:
+        yield socket.getsockname()[1]
+    finally:
+        server.should_exit = True
+        thread.join(timeout=10)
+        assert not thread.is_alive()
+        socket.close()
