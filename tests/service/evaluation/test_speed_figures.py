@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from dropanchor_tag_client.simulator.scenarios import trajectory
 
 from dropanchor_service.evaluation.paper import fig3, fig4
+from dropanchor_tag_client.simulator.scenarios import trajectory
 
 
 def test_straight_stages_give_their_speed_exactly_and_changes_give_peaks() -> None:

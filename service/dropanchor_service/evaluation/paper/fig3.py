@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from dropanchor_tag_client.simulator.scenarios import trajectory
-from dropanchor_tag_client.simulator.trajectory import Trajectory
 from matplotlib.figure import Figure
 
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.evaluation.report import Section, Table
+from dropanchor_tag_client.simulator.scenarios import trajectory
+from dropanchor_tag_client.simulator.trajectory import Trajectory
 
 LAG_S = 0.5  # between the three ranges
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from dropanchor_tag_client.simulator.scenarios import trajectory
 from matplotlib.figure import Figure
 
 from dropanchor_service.estimation.batch import Array
@@ -12,6 +11,7 @@ from dropanchor_service.estimation.paper_parameters import PaperParameters
 from dropanchor_service.estimation.range_filter import RangeFilter
 from dropanchor_service.estimation.speed import SpeedEstimator
 from dropanchor_service.evaluation.report import Section, Table
+from dropanchor_tag_client.simulator.scenarios import trajectory
 
 SPEED = 10.0
 SIGMA_M = 0.2
