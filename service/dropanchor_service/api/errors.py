@@ -30,6 +30,7 @@ class Kind(Enum):
     NOT_ACCEPTABLE = (406, "None of the accepted media types is offered")
     NOT_GEOREFERENCED = (409, "The site has no georeference")
     SITE_ID_FIXED = (409, "The site's id cannot change while the service runs")
+    ANCHOR_ID_DIFFERS = (409, "The id in the body is not that in the path")
     TAGS_FULL = (409, "The service holds as many tags as it may")
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")

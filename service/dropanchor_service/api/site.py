@@ -79,11 +79,11 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
         operation_id="put_anchor",
         summary="Place an anchor, new or known",
         response_model=Anchor,
-        responses=shown(examples.ANCHOR) | problems(*_BAD_CHANGE),
+        responses=shown(examples.ANCHOR) | problems(Kind.ANCHOR_ID_DIFFERS, *_BAD_CHANGE),
     )
     def put_anchor(anchor: AnchorId, body: Annotated[Anchor, Body(examples=[examples.ANCHOR])]) -> Response:
         if body.id != anchor:
-            raise ProblemError(Kind.INVALID_REQUEST, "body.id: has to be the id in the path")
+            raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The path says {anchor!r}, the body {body.id!r}.")
         with saving():
             store.set_anchor(body)
         return json_response(body.model_dump())

@@ -138,7 +138,7 @@ def test_an_anchor_is_placed_moved_read_and_removed() -> None:
 
 def test_an_anchor_has_one_id() -> None:
     response = ask(make_house().app(), "PUT", "/api/v1/anchors/1", json={"id": "2"})
-    assert kind_of(response) == "invalid-request"
+    assert kind_of(response) == "anchor-id-differs"
 
 
 def test_a_change_that_cannot_be_saved_is_not_made(tmp_path: Path) -> None:
