@@ -17,6 +17,10 @@ def create_engine(settings: Settings) -> Engine:
             from dropanchor_service.estimation.paper import PaperEngine
 
             return PaperEngine(settings.paper.values())
+        case "fleet":
+            from dropanchor_service.estimation.fleet.engine import FleetEngine
+
+            return FleetEngine()
 
 
 def anchor_columns(anchors: Sequence[Anchor]) -> Array:

@@ -107,7 +107,7 @@ def _replaced(preset: Parameters, changes: Mapping[str, float]) -> Parameters:
 class Settings(_Section):
     """Everything that can be set. Built once, at the start, and passed down."""
 
-    engine: Literal["paper"] = Field(default="paper", description="The estimator.")
+    engine: Literal["fleet", "paper"] = Field(default="paper", description="The estimator.")
     data_dir: Path | None = Field(
         default=None, description="Where changes made over REST are kept; without it a restart forgets them."
     )

@@ -9,8 +9,10 @@ from typing import Final
 import numpy as np
 
 NO_HEADING: Final = 0
-ABSOLUTE_HEADING: Final = 1  # against a reference (magnetic north, a platform that knows the site frame)
+ABSOLUTE_HEADING: Final = 1  # magnetic north; heading_var is of an error common to all nodes of a minute
 RELATIVE_HEADING: Final = 2  # gyro only: zero is arbitrary or given at the start
+MEASURED_HEADING: Final = 3  # the platform's readings beside an IMU; heading_var is what it claims
+DERIVED_HEADING: Final = 4  # the platform's, without an IMU: dyaw is its own increment; it may be stable or drift
 
 NO_MEASUREMENT: Final = 0
 RANGE: Final = 1
@@ -29,10 +31,11 @@ NODE: Final = np.dtype(
         ("heading", np.float64),  # rad, body yaw at the end of the interval
         ("heading_var", np.float64),  # rad^2
         ("heading_kind", np.uint8),
-        ("rest", np.uint8),  # 1: standstill, confirmed
+        ("rest", np.uint8),  # 1: standstill, confirmed; 2: not moved since the start, so far as can be told
         ("kind", np.uint8),  # NO_MEASUREMENT, RANGE or BEARING
         ("anchor", np.int32),  # index into the anchor table
         ("z", np.float64),  # m (slant range) or rad (azimuth of the tag seen from the anchor)
         ("z_std", np.float64),  # m or rad; NaN: the tag's setting
+        ("lag_s", np.float64),  # the measurement is that much older than the end of the interval (it came late)
     ]
 )

@@ -1,0 +1,289 @@
+"""The pose belief of many rows over a batch of nodes, in one compiled call."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from . import layout
+from .blocked import open_alternative, recover, unblock
+from .heading import judge_models, model_of, predict_models, reset_models
+from .layout import COMMON, PHI, REF, STEADY, WORK, YAW, N, R, Work
+from .manage import best_of, limit, merge, normalise, prune, split
+from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
+from .pool import load, mirror, release, store
+from .predict import diffuse, fill_decay, move, transport
+from .publish import publish
+from .start import give_reference_error, is_referred, median, second_class, start_known, start_ring, turn_about
+from .tuning import Tuning
+from .update import bound_speed, predict_range, settle, update_bearing, update_heading, update_range, update_rest, wrap
+
+
+@njit(nogil=True)
+def _predict_all(work: Work, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
+    decay, growth, F, A = scratch
+    _, slow, tau = model_of(row.model, node.heading_var)
+    for kind in range(2):
+        std, seconds = slow, tau
+        if kind == 1 and row.model != STEADY:
+            std = math.sqrt(slow * slow + t.second_std**2)
+            seconds = max(t.second_tau, tau)
+        fill_decay(decay, growth, node, row, t, std, seconds)
+        if row.model == COMMON:  # a constant that the front-end is still learning
+            decay[REF] = 1.0
+            growth[REF] = node.heading_var * node.dt_s / t.common_tau if node.heading_kind == ABSOLUTE_HEADING else 0.0
+        for h in range(count):
+            if work.kind[h] == kind:
+                move(work.mean[h], node, decay, F)
+                transport(work.cov[h], F, decay, A)
+                diffuse(work.mean[h], work.cov[h], growth, node, t, work.blocked[h])
+
+
+@njit(nogil=True)
+def _range_all(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, H: Any, PH: Any, out: Any) -> None:
+    """Update every hypothesis; row.history gets what the best one saw."""
+    anchor, primary = anchors[node.anchor], anchors[row.anchor]
+    ox, oy = anchor.x - primary.x, anchor.y - primary.y
+    dz = row.height - anchor.z
+    z = node.z / row.range_scale
+    std = node.z_std if math.isfinite(node.z_std) and node.z_std > 0.0 else row.range_std
+    best = best_of(work, count)
+    y, S, p_outlier = 0.0, 1.0, 0.0
+    low = -row.v_max if row.reverse == 1 else -t.reverse_slack
+    for h in range(count):
+        s, P = work.mean[h], work.cov[h]
+        e = z - predict_range(s, ox, oy, dz, node.lag_s, H)
+        variance = std * std + (dz * row.height_std / max(z, 0.1)) ** 2
+        if node.anchor != row.anchor:
+            variance += row.offset_std**2
+        update_range(s, P, H, PH, e, variance, t, out)
+        work.log_weight[h] += t.temper * out[0]
+        if s[R] < 0.0:
+            s[R] = 1e-3
+        work.log_weight[h] += bound_speed(s, P, PH, low, row.v_max)
+        if h == best:
+            y, S, p_outlier = e, out[1], out[2]
+    _remember(row, node, y, S, p_outlier)
+
+
+@njit(nogil=True)
+def _remember(row: Any, node: Any, y: float, S: float, p_outlier: float) -> None:
+    entry = row.history[row.history_count % layout.HISTORY]
+    entry.t_ns = node.t_ns
+    entry.y = y
+    entry.variance = S
+    entry.p_outlier = p_outlier
+    row.history_count += 1
+    row.high_run = row.high_run + 1 if y > 1.5 * math.sqrt(S) else 0
+    row.low_run = row.low_run + 1 if y < -1.5 * math.sqrt(S) else 0
+    row.misfit += 0.1 * (p_outlier - row.misfit)
+
+
+@njit(nogil=True)
+def _judge_reference(work: Work, count: int, row: Any, node: Any, t: Tuning) -> None:
+    """Let the readings say how their error behaves; a new model gives every hypothesis its slow error."""
+    if row.hm_started == 0:
+        reset_models(row, node.heading, node.heading_var, t)
+        return
+    predict_models(row, node, node.heading_var, t)
+    chosen = judge_models(row, node, t)
+    if chosen != row.model:
+        _, before, _ = model_of(row.model, node.heading_var)
+        _, after, _ = model_of(chosen, node.heading_var)
+        row.model = chosen
+        if after > before:
+            for h in range(count):
+                give_reference_error(work.cov[h], math.sqrt(after * after - before * before), False)
+
+
+@njit(nogil=True)
+def _refer(work: Work, count: int, row: Any, node: Any) -> None:
+    """The first heading from a reference: turn a belief of arbitrary zero, or learn north from the given start."""
+    row.model = COMMON
+    std = math.sqrt(node.heading_var)
+    delta = wrap(node.heading - work.mean[best_of(work, count), YAW])
+    for h in range(count):
+        if row.referred == 0:
+            work.mean[h, YAW] += delta
+            work.mean[h, PHI] += delta
+            turn_about(work.cov[h], std)
+        else:
+            give_reference_error(work.cov[h], std, False)
+    row.north = delta if row.referred == 1 else 0.0
+    row.referred = 1
+
+
+@njit(nogil=True)
+def _heading_all(work: Work, count: int, row: Any, node: Any, t: Tuning, H: Any, PH: Any) -> None:
+    if node.heading_kind == MEASURED_HEADING:
+        _judge_reference(work, count, row, node, t)
+    elif node.heading_kind == ABSOLUTE_HEADING and row.model != COMMON:
+        _refer(work, count, row, node)
+    white, _, _ = model_of(row.model, node.heading_var)
+    for h in range(count):
+        if row.model != STEADY or work.kind[h] == 0:
+            update_heading(work.mean[h], work.cov[h], H, PH, node.heading - row.north, white)
+
+
+@njit(nogil=True)
+def _manage(work: Work, count: int, row: Any, node: Any, t: Tuning) -> int:
+    """Normalise, prune, now and then merge, split and re-seed the second class; returns the count."""
+    normalise(work, count)
+    count = prune(work, count, t.prune)
+    row.since_manage_s += node.dt_s
+    row.since_seed_s += node.dt_s
+    if row.since_manage_s >= 0.1:
+        row.since_manage_s = 0.0
+        if count > 1:
+            count = merge(work, count, t.merge_distance)
+        count = split(work, count, t.split_angle, 6.0)
+        count = limit(work, count, t.keep_tracking if row.declared == 1 else layout.KEEP)
+    if row.since_seed_s >= 2.0 and is_referred(node.heading_kind):
+        row.since_seed_s = 0.0
+        count = _reseed(work, count, row, t)
+    return count
+
+
+@njit(nogil=True)
+def _reseed(work: Work, count: int, row: Any, t: Tuning) -> int:
+    """Keep the possibility of a wrong heading reference alive while tracking."""
+    if row.declared == 0 or count >= WORK - 1:
+        return count
+    for h in range(count):
+        if work.kind[h] == 1:
+            return count
+    best = best_of(work, count)
+    return count + second_class(work, best, count, row, t, False)
+
+
+@njit(nogil=True)
+def _begin(work: Work, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
+    """Collect what a start needs and make the first hypotheses; returns their count."""
+    row.ring_s += node.dt_s
+    if node.kind == RANGE and row.anchor < 0:
+        row.anchor = node.anchor
+    if node.heading_kind == NO_HEADING:
+        row.reason = 1
+        return 0
+    if node.heading_kind == MEASURED_HEADING and row.hm_started == 0:
+        reset_models(row, node.heading, node.heading_var, t)
+    if row.anchor < 0:
+        row.reason = 0
+        return 0
+    anchor = anchors[row.anchor]
+    if row.start_known == 1:
+        return start_known(work, row, anchor, node, t)
+    if node.kind == RANGE and node.anchor == row.anchor:
+        row.ring[row.ring_count % layout.RING_RANGES] = node.z / row.range_scale - row.offset
+        row.ring_count += 1
+    if row.ring_count < 5 or (row.ring_count < layout.RING_RANGES and row.ring_s < 1.0):
+        row.reason = 0
+        return 0
+    slant = median(row.ring, min(row.ring_count, layout.RING_RANGES))
+    horizontal = math.sqrt(max(slant**2 - (row.height - anchor.z) ** 2, 0.01))
+    return start_ring(work, row, horizontal, node, node.rest == 1, t)
+
+
+@njit(nogil=True)
+def _finite(work: Work, count: int) -> bool:
+    """Every hypothesis is a number with a positive variance in every direction that can be checked cheaply."""
+    for h in range(count):
+        if not math.isfinite(work.log_weight[h]):
+            return False
+        for i in range(N):
+            if not (math.isfinite(work.mean[h, i]) and work.cov[h, i, i] > -1e-9 and work.cov[h, i, i] < 1e12):
+                return False
+    return count > 0
+
+
+@njit(nogil=True)
+def _step(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, small: Any) -> int:
+    """One node on a running row; returns the count of hypotheses."""
+    H, PH, out = small
+    _predict_all(work, count, row, node, t, scratch)
+    if is_referred(node.heading_kind):
+        _heading_all(work, count, row, node, t, H, PH)
+    for h in range(count):
+        if node.rest > 0:
+            work.log_weight[h] += update_rest(work.mean[h], work.cov[h], PH, node, t)
+        else:
+            settle(work.mean[h], work.cov[h], PH, node, t)
+    row.since_range_s += node.dt_s
+    recover(work, count, row, node, t)
+    if node.kind == RANGE and row.anchor >= 0:
+        _range_all(work, count, row, node, anchors, t, H, PH, out)
+        row.since_range_s = 0.0
+        count = open_alternative(work, count, row, t)
+        unblock(work, count, t)
+    if node.kind == BEARING and row.anchor >= 0:
+        anchor, primary = anchors[node.anchor], anchors[row.anchor]
+        for h in range(count):
+            work.log_weight[h] += t.temper * update_bearing(
+                work.mean[h], work.cov[h], H, PH, anchor.x - primary.x, anchor.y - primary.y, node.z, node.z_std**2
+            )
+    if not _finite(work, count):
+        return 0
+    count = _manage(work, count, row, node, t)
+    for h in range(count):
+        mirror(work.cov[h])
+    return count
+
+
+@njit(nogil=True)
+def _reset(row: Any, pool: Any) -> None:
+    release(row, pool)
+    row.ring_count = 0
+    row.ring_s = 0.0
+    row.hm_started = 0
+    row.model = 0
+    row.referred = 0
+    row.declared = 0
+    row.state = layout.INITIALISING
+    row.information[:] = 0.0
+    row.good_s = 0.0
+    row.misfit = 0.0
+    row.since_nlos_s = 0.0
+
+
+@njit(nogil=True, cache=True)
+def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Work, beliefs: Any) -> int:
+    """Run the nodes (of one row in order of time; a row's nodes may be apart) and write one belief per node.
+
+    Returns how many times the pool was too small.
+    """
+    scratch = (np.ones(N), np.zeros(N), np.zeros((4, N)), np.zeros((4, N)))
+    small = (np.zeros(N), np.zeros(N), np.zeros(3))
+    buffers = (np.zeros(WORK, np.bool_), np.zeros(WORK, np.bool_), np.zeros(5), np.zeros((3, 3)))
+    short = 0
+    current = -1
+    count = 0
+    for k in range(len(nodes)):
+        node = nodes[k]
+        if node.row != current:
+            if current >= 0 and not store(rows[current], pool, work, count):
+                short += 1
+            current = node.row
+            load(rows[current], pool, work)
+            count = rows[current].count
+        row = rows[current]
+        row.t_ns = node.t_ns
+        belief = beliefs[k]
+        if count > 0:
+            count = _step(work, count, row, node, anchors, t, scratch, small)
+            if count == 0:
+                row.fault += 1
+                row.reason = 10
+                row.start_known = 0  # it is not there any more
+                _reset(row, pool)
+        else:
+            count = _begin(work, row, node, anchors, t)
+            for h in range(count):
+                mirror(work.cov[h])
+        if count > 0:
+            publish(work, count, row, node, anchors, t, belief, buffers)
+        belief.state, belief.reason = row.state, row.reason
+        belief.hypotheses = count
+    if current >= 0 and not store(rows[current], pool, work, count):
+        short += 1
+    return short

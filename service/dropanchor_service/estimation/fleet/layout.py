@@ -1,0 +1,170 @@
+"""Where things lie: the state vector, one row per tag, and the pool of hypothesis slots rows point into."""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+# State of one hypothesis, polar around the primary anchor.
+R: Final = 0  # m, horizontal distance
+PHI: Final = 1  # rad, bearing of the tag seen from the anchor
+YAW: Final = 2  # rad, body yaw in the site frame
+V: Final = 3  # m/s along the course
+MOUNT: Final = 4  # rad, course minus body yaw, constant part
+CRAB: Final = 5  # rad, course minus body yaw, Gauss-Markov part
+GYRO: Final = 6  # rad/s, residual gyro bias
+ACC: Final = 7  # m/s^2, forward acceleration bias
+REF: Final = 8  # rad, error of the heading reference
+OFFSET: Final = 9  # m, range offset of the primary anchor
+N: Final = 10
+PACKED: Final = N * (N + 1) // 2
+
+WORK: Final = 320  # hypotheses of one row while it is being worked on
+KEEP: Final = 192  # hypotheses of one row between batches, at most
+RING_RANGES: Final = 15
+HISTORY: Final = 32
+MODELS: Final = 4  # models of the heading error that are judged by their predictions
+COMMON: Final = 4  # and two that are given by where the heading comes from
+STEADY: Final = 5
+
+INITIALISING: Final = 0
+AMBIGUOUS: Final = 1
+TRACKING: Final = 2
+COASTING: Final = 3
+DEGRADED: Final = 4
+LOST: Final = 5
+
+SETTINGS: Final = [
+    ("mount", np.float64),
+    ("mount_std", np.float64),
+    ("crab_std", np.float64),
+    ("height", np.float64),  # m, tag antenna above the site's zero
+    ("height_std", np.float64),
+    ("range_std", np.float64),
+    ("range_scale", np.float64),
+    ("offset", np.float64),
+    ("offset_std", np.float64),
+    ("reference_std", np.float64),  # rad, constant error of the heading reference
+    ("gyro_std", np.float64),  # rad/s, residual bias of the yaw increments
+    ("v_max", np.float64),
+    ("reverse", np.uint8),
+    ("heading_source", np.uint8),
+    ("start_known", np.uint8),
+    ("start_x", np.float64),
+    ("start_y", np.float64),
+    ("start_std", np.float64),
+    ("start_heading", np.float64),  # rad, body yaw, NaN: unknown
+    ("start_heading_std", np.float64),
+    ("start_speed_std", np.float64),
+]
+
+INNOVATION: Final = np.dtype(
+    [
+        ("t_ns", np.int64),
+        ("y", np.float64),
+        ("variance", np.float64),
+        ("p_outlier", np.float64),
+    ]
+)
+
+ROW: Final = np.dtype(
+    [
+        *SETTINGS,
+        ("head", np.int32),  # first slot of this row, -1: none
+        ("count", np.int32),
+        ("t_ns", np.int64),
+        ("anchor", np.int32),  # primary anchor, -1: none heard yet
+        ("state", np.uint8),
+        ("reason", np.uint8),
+        ("fault", np.uint8),
+        ("declared", np.uint8),
+        ("model", np.uint8),  # of the heading error
+        ("north", np.float64),  # rad, constant error of the heading reference, learned from a given start heading
+        ("ring_count", np.int32),
+        ("ring", np.float64, (RING_RANGES,)),
+        ("ring_yaw", np.float64),
+        ("ring_rest", np.uint8),
+        ("ring_s", np.float64),
+        ("since_manage_s", np.float64),
+        ("since_split_s", np.float64),
+        ("since_range_s", np.float64),
+        ("since_seed_s", np.float64),
+        ("since_nlos_s", np.float64),
+        ("good_s", np.float64),
+        ("bad_s", np.float64),
+        ("high_run", np.int32),
+        ("low_run", np.int32),
+        ("misfit", np.float64),  # forgetting mean of the best hypothesis' outlier probability
+        ("hm_mean", np.float64, (MODELS, 3)),
+        ("hm_cov", np.float64, (MODELS, 3, 3)),
+        ("hm_loglik", np.float64, (MODELS,)),
+        ("hm_started", np.uint8),
+        ("referred", np.uint8),  # 1: the yaw of the hypotheses is in the site frame
+        ("information", np.float64, (3, 3)),
+        ("history", INNOVATION, (HISTORY,)),
+        ("history_count", np.int64),
+    ]
+)
+
+SLOT: Final = np.dtype(
+    [
+        ("next", np.int32),
+        ("kind", np.int32),  # 0: heading reference exact, 1: it has an error of its own
+        ("blocked", np.int32),  # 1: the range is now longer than the line of sight
+        ("log_weight", np.float64),
+        ("clear_offset", np.float64),  # offset before the line of sight was blocked
+        ("clear_variance", np.float64),
+        ("mean", np.float64, (N,)),
+        ("cov", np.float64, (PACKED,)),
+    ]
+)
+
+BELIEF: Final = np.dtype(
+    [
+        ("x", np.float64),
+        ("y", np.float64),
+        ("course", np.float64),
+        ("yaw", np.float64),
+        ("speed", np.float64),
+        ("yaw_rate", np.float64),
+        ("cov", np.float64, (3, 3)),  # of x, y, course
+        ("p_mode", np.float64),
+        ("sigma_pos", np.float64),
+        ("sigma_obs", np.float64),
+        ("range_m", np.float64),
+        ("hypotheses", np.int32),
+        ("state", np.uint8),
+        ("reason", np.uint8),
+    ]
+)
+
+
+class Work(NamedTuple):
+    """The hypotheses of one row, unpacked: what the kernels work on."""
+
+    mean: npt.NDArray[np.float64]  # (WORK, N)
+    cov: npt.NDArray[np.float64]  # (WORK, N, N)
+    log_weight: npt.NDArray[np.float64]
+    kind: npt.NDArray[np.int32]
+    blocked: npt.NDArray[np.int32]
+    clear: npt.NDArray[np.float64]  # (WORK, 2)
+
+
+def make_work() -> Work:
+    """Scratch of one thread."""
+    return Work(
+        np.zeros((WORK, N)),
+        np.zeros((WORK, N, N)),
+        np.zeros(WORK),
+        np.zeros(WORK, np.int32),
+        np.zeros(WORK, np.int32),
+        np.zeros((WORK, 2)),
+    )
+
+
+def make_pool(capacity: int) -> npt.NDArray[np.void]:
+    """Slots in one free list: slot 0 is its head and never used otherwise."""
+    pool = np.zeros(capacity, SLOT)
+    pool["next"] = np.arange(1, capacity + 1)
+    pool["next"][-1] = -1
+    return pool

@@ -1,0 +1,69 @@
+"""What is published of a row: pose, covariance, weight of its mode, observability, state and reason."""
+
+import math
+from typing import Any
+
+from numba import njit
+
+from . import layout
+from .layout import Work
+from .node import RANGE
+from .summary import add_reference, best_mode, forget_information, sigma_obs
+from .tuning import Tuning
+
+
+@njit(nogil=True)
+def publish(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, belief: Any, buffers: Any) -> None:
+    members, taken, mean, cov = buffers
+    p_mode, relative, head = best_mode(work, count, members, taken, mean, cov)
+    anchor = anchors[row.anchor]
+    belief.x, belief.y = mean[0] + anchor.x, mean[1] + anchor.y
+    belief.course, belief.speed, belief.yaw = mean[2], mean[3], mean[4]
+    belief.yaw_rate = node.dyaw / node.dt_s if node.dt_s > 0.0 else 0.0
+    r2 = mean[0] ** 2 + mean[1] ** 2
+    blind = not math.isfinite(node.dv_var)
+    forget_information(row.information, mean[2], node.dt_s, t.obs_q_blind if blind else t.obs_q, t)
+    if node.kind == RANGE and r2 > 1e-6:
+        c, s = mean[0] / math.sqrt(r2), mean[1] / math.sqrt(r2)
+        weight = 1.0 / row.range_std**2
+        row.information[0, 0] += c * c * weight
+        row.information[0, 1] += c * s * weight
+        row.information[1, 0] = row.information[0, 1]
+        row.information[1, 1] += s * s * weight
+    belief.sigma_obs = sigma_obs(row.information)
+    if row.start_known == 0:
+        reference = row.reference_std if row.referred == 1 else 1.8  # nothing known: sd of a uniform angle
+        add_reference(cov, mean[0], mean[1], reference**2)
+    for i in range(3):
+        for j in range(3):
+            belief.cov[i, j] = cov[i, j]
+    belief.p_mode = min(p_mode, 1.0)
+    belief.sigma_pos = math.sqrt(max(cov[0, 0] + cov[1, 1], 0.0))
+    belief.hypotheses = count
+    _judge(row, node, p_mode, relative, belief.sigma_pos, math.sqrt(r2), work.blocked[head] == 1, t)
+
+
+@njit(nogil=True)
+def _judge(
+    row: Any, node: Any, p_mode: float, relative: float, sigma: float, r: float, blocked: bool, t: Tuning
+) -> None:
+    """State and reason."""
+    resolved = p_mode > t.resolved and relative < max(1.5, 0.05 * r)
+    row.good_s = row.good_s + node.dt_s if resolved else 0.0
+    row.bad_s = 0.0 if p_mode > 0.9 else row.bad_s + node.dt_s
+    if row.good_s >= t.resolved_s or (row.start_known == 1 and row.declared == 0 and resolved):
+        row.declared = 1
+    if row.bad_s > 1.0:
+        row.declared = 0
+    if row.since_range_s > 30.0:
+        row.state, row.reason = layout.LOST, 5
+    elif row.declared == 0:
+        row.state, row.reason = layout.AMBIGUOUS, 3
+    elif row.since_range_s > 1.5:
+        row.state, row.reason = layout.COASTING, 5
+    elif sigma > max(3.0, 0.35 * r):
+        row.state, row.reason = layout.AMBIGUOUS, 9
+    elif row.misfit > 0.5 or blocked:
+        row.state, row.reason = layout.DEGRADED, 7
+    else:
+        row.state, row.reason = layout.TRACKING, 4

@@ -1,0 +1,168 @@
+"""The first hypotheses: around a known start, or a ring of bearings and speeds at the first ranges."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from .heading import model_of
+from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, STEADY, YAW, R, V, Work
+from .manage import copy_hypothesis
+from .node import ABSOLUTE_HEADING, DERIVED_HEADING, NO_HEADING, RELATIVE_HEADING
+from .tuning import Tuning
+from .update import wrap
+
+
+@njit(nogil=True)
+def _common(work: Work, h: int, row: Any, yaw: float, yaw_variance: float, t: Tuning) -> None:
+    s, P = work.mean[h], work.cov[h]
+    s[:] = 0.0
+    P[:] = 0.0
+    s[YAW] = yaw
+    s[MOUNT] = row.mount
+    s[OFFSET] = row.offset
+    P[YAW, YAW] = yaw_variance
+    P[MOUNT, MOUNT] = row.mount_std**2
+    P[CRAB, CRAB] = row.crab_std**2
+    P[GYRO, GYRO] = row.gyro_std**2
+    P[ACC, ACC] = t.acc_std**2
+    P[OFFSET, OFFSET] = row.offset_std**2
+    work.log_weight[h] = 0.0
+    work.kind[h] = 0
+    work.blocked[h] = 0
+
+
+@njit(nogil=True)
+def give_reference_error(P: Any, std: float, yaw_follows: bool) -> None:
+    """Let the heading reference be wrong by `std`; the yaw known only from it shares that error."""
+    P[REF, REF] += std * std
+    if yaw_follows:
+        P[YAW, YAW] += std * std
+        P[YAW, REF] -= std * std
+        P[REF, YAW] = P[YAW, REF]
+
+
+@njit(nogil=True)
+def turn_about(P: Any, std: float) -> None:
+    """An error of the reference that turned bearing and yaw together about the anchor."""
+    v = std * std
+    P[YAW, YAW] += v
+    P[PHI, PHI] += v
+    P[REF, REF] += v
+    P[YAW, PHI] += v
+    P[YAW, REF] -= v
+    P[PHI, REF] -= v
+    P[PHI, YAW], P[REF, YAW], P[REF, PHI] = P[YAW, PHI], P[YAW, REF], P[PHI, REF]
+
+
+@njit(nogil=True)
+def is_referred(kind: int) -> bool:
+    """The heading is in the site frame."""
+    return kind != NO_HEADING and kind != RELATIVE_HEADING
+
+
+@njit(nogil=True)
+def choose_model(row: Any, node: Any) -> None:
+    """The heading error's model where the kind of heading gives it."""
+    if node.heading_kind == ABSOLUTE_HEADING:
+        row.model = COMMON
+        if row.start_known == 1 and math.isfinite(row.start_heading):
+            row.north = wrap(node.heading - row.start_heading)
+    elif node.heading_kind == DERIVED_HEADING:
+        row.model = STEADY
+
+
+@njit(nogil=True)
+def _aligned(work: Work, count: int, row: Any, t: Tuning) -> int:
+    """Copies of the hypotheses for a body axis along the course, where it mostly is; returns their number."""
+    if row.mount_std <= t.aligned_std:
+        return 0
+    for h in range(count):
+        copy_hypothesis(work, h, count + h)
+        work.cov[count + h, MOUNT, MOUNT] = t.aligned_std**2
+        work.log_weight[count + h] += t.aligned_log_prior
+    return count
+
+
+@njit(nogil=True)
+def start_known(work: Work, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
+    """Hypotheses at the given start, one per class, or a ring of headings where none is known; returns the count."""
+    x, y = row.start_x - anchor.x, row.start_y - anchor.y
+    r = max(math.hypot(x, y), 1e-3)
+    given = math.isfinite(row.start_heading)
+    known = given or is_referred(node.heading_kind)
+    ring = 1 if known else t.ring_bearings
+    cell = 2.0 * math.pi / ring
+    choose_model(row, node)
+    for h in range(ring):
+        yaw = row.start_heading if given else node.heading + cell * h
+        variance = row.start_heading_std**2 if given else node.heading_var
+        _common(work, h, row, yaw, variance if known else (cell / 2.0) ** 2, t)
+        s, P = work.mean[h], work.cov[h]
+        s[R], s[PHI] = r, math.atan2(y, x)
+        P[R, R] = row.start_std**2
+        P[PHI, PHI] = (row.start_std / r) ** 2
+        P[V, V] = row.start_speed_std**2
+    row.referred = 1
+    if not is_referred(node.heading_kind):
+        return ring + _aligned(work, ring, row, t)
+    _, slow, _ = model_of(row.model, node.heading_var)
+    give_reference_error(work.cov[0], slow, not given)
+    return ring + second_class(work, 0, ring, row, t, not given)
+
+
+@njit(nogil=True)
+def second_class(work: Work, source: int, target: int, row: Any, t: Tuning, yaw_follows: bool) -> int:
+    """A copy of `source` whose heading reference has a slow error of its own, or drifts; returns 1."""
+    work.mean[target] = work.mean[source]
+    work.cov[target] = work.cov[source]
+    work.blocked[target] = work.blocked[source]
+    work.clear[target] = work.clear[source]
+    work.kind[target] = 1
+    if row.model == STEADY:
+        work.log_weight[target] = work.log_weight[source] + t.drift_log_prior
+        work.cov[target, GYRO, GYRO] = t.drift_std**2
+    else:
+        work.log_weight[target] = work.log_weight[source] + t.second_class
+        give_reference_error(work.cov[target], t.second_std, yaw_follows)
+    return 1
+
+
+@njit(nogil=True)
+def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool, t: Tuning) -> int:
+    """Bearings x speeds with a standard deviation of half a cell; speeds forward unless reverse is allowed."""
+    speeds = 1 if at_rest else t.ring_speeds
+    top = min(t.ring_speed_max, row.v_max)
+    signs = 2 if row.reverse == 1 and not at_rest else 1
+    cell = 2.0 * math.pi / t.ring_bearings
+    choose_model(row, node)
+    row.referred = 1 if is_referred(node.heading_kind) else 0
+    variance = node.heading_var if row.referred == 1 else 1e-4
+    h = 0
+    for i in range(t.ring_bearings):
+        for k in range(speeds):
+            for g in range(signs):
+                _common(work, h, row, node.heading, variance, t)
+                s, P = work.mean[h], work.cov[h]
+                s[R], s[PHI] = horizontal, cell * i
+                P[R, R] = row.range_std**2 / 4.0 + row.offset_std**2
+                P[R, OFFSET] = P[OFFSET, R] = -(row.offset_std**2)
+                P[PHI, PHI] = (cell / 2.0) ** 2
+                # an error of the mounting angle turns everything about the anchor: the ring covers the angle between
+                P[PHI, PHI] += row.mount_std**2
+                P[PHI, MOUNT] = P[MOUNT, PHI] = row.mount_std**2
+                speed_cell = top / t.ring_speeds
+                s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
+                P[V, V] = 0.01 if at_rest else (speed_cell / 2.0) ** 2
+                if row.referred == 1:
+                    _, slow, _ = model_of(row.model, node.heading_var)
+                    turn_about(P, slow)
+                h += 1
+    return h
+
+
+@njit(nogil=True)
+def median(values: Any, count: int) -> float:
+    """Of the first `count`."""
+    return float(np.median(values[:count]))

@@ -1,0 +1,172 @@
+"""From the Gaussian sum to what is published: the heaviest mode's mean and covariance, its weight, observability."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from .layout import CRAB, MOUNT, PHI, YAW, R, V, Work
+from .manage import angle_variance, best_of
+from .tuning import Tuning
+from .update import wrap
+
+
+@njit(nogil=True)
+def planar(s: Any, P: Any, out: Any) -> None:
+    """out (3, 3): covariance of (x, y, course) from the polar covariance."""
+    c, sn = math.cos(s[PHI]), math.sin(s[PHI])
+    r = s[R]
+    prr, ppp, prp = P[R, R], P[PHI, PHI], P[R, PHI]
+    out[0, 0] = c * c * prr - 2 * c * sn * r * prp + sn * sn * r * r * ppp
+    out[1, 1] = sn * sn * prr + 2 * c * sn * r * prp + c * c * r * r * ppp
+    out[0, 1] = c * sn * prr + (c * c - sn * sn) * r * prp - c * sn * r * r * ppp
+    rk = P[R, YAW] + P[R, MOUNT] + P[R, CRAB]
+    pk = P[PHI, YAW] + P[PHI, MOUNT] + P[PHI, CRAB]
+    out[0, 2] = c * rk - sn * r * pk
+    out[1, 2] = sn * rk + c * r * pk
+    out[2, 2] = P[YAW, YAW] + P[MOUNT, MOUNT] + P[CRAB, CRAB]
+    out[2, 2] += 2 * (P[YAW, MOUNT] + P[YAW, CRAB] + P[MOUNT, CRAB])
+    out[1, 0], out[2, 0], out[2, 1] = out[0, 1], out[0, 2], out[1, 2]
+    bend(out, r, c, sn, ppp)
+
+
+@njit(nogil=True)
+def bend(cov: Any, r: float, c: float, s: float, variance: float) -> None:
+    """An arc is not its tangent: a bearing error e moves the tag r e^2/2 inwards; add (1.5 r variance)^2 radially.
+
+    The factor keeps a two-sigma bearing error inside the 95 % ellipse.
+    """
+    radial = (1.5 * r * variance) ** 2
+    cov[0, 0] += c * c * radial
+    cov[0, 1] += c * s * radial
+    cov[1, 0] = cov[0, 1]
+    cov[1, 1] += s * s * radial
+
+
+@njit(nogil=True)
+def add_reference(cov: Any, x: float, y: float, variance: float) -> None:
+    """A heading reference wrong by an unknown constant turns everything about the anchor: error r * bias."""
+    cov[0, 0] += variance * y * y
+    cov[1, 1] += variance * x * x
+    cov[0, 1] -= variance * x * y
+    cov[0, 2] -= variance * y
+    cov[1, 2] += variance * x
+    cov[2, 2] += variance
+    cov[1, 0], cov[2, 0], cov[2, 1] = cov[0, 1], cov[0, 2], cov[1, 2]
+    r = max(math.hypot(x, y), 1e-6)
+    bend(cov, r, x / r, y / r, variance)
+
+
+@njit(nogil=True)
+def course_of(s: Any) -> float:
+    """Direction of travel, rad."""
+    return wrap(s[YAW] + s[MOUNT] + s[CRAB])
+
+
+@njit(nogil=True)
+def relative_sigma(s: Any, P: Any) -> float:
+    """Position standard deviation but for a rotation of everything about the anchor, m."""
+    return math.sqrt(max(P[R, R] + s[R] ** 2 * min(angle_variance(P), P[PHI, PHI]), 0.0))
+
+
+@njit(nogil=True)
+def cluster(work: Work, count: int, head: int, taken: Any, members: Any) -> float:
+    """Mark the members of head's mode that are not taken; returns their weight. Weights must be normalised.
+
+    A member lies within 1 m + 2 sigma (of the head) of the head.
+    """
+    hx = work.mean[head, R] * math.cos(work.mean[head, PHI])
+    hy = work.mean[head, R] * math.sin(work.mean[head, PHI])
+    reach = 1.0 + 2.0 * relative_sigma(work.mean[head], work.cov[head])
+    weight = 0.0
+    for h in range(count):
+        dx = work.mean[h, R] * math.cos(work.mean[h, PHI]) - hx
+        dy = work.mean[h, R] * math.sin(work.mean[h, PHI]) - hy
+        members[h] = not taken[h] and dx * dx + dy * dy <= reach * reach
+        if members[h]:
+            weight += math.exp(work.log_weight[h])
+    return weight
+
+
+@njit(nogil=True)
+def moments(work: Work, count: int, members: Any, head: int, mean: Any, cov: Any) -> float:
+    """Mean (x, y, course, speed, yaw) and covariance (x, y, course) of the members; returns the mean relative sigma."""
+    total, sigma = 0.0, 0.0
+    mean[:] = 0.0
+    cov[:] = 0.0
+    course0, yaw0 = course_of(work.mean[head]), work.mean[head, YAW]
+    part = np.empty((3, 3))
+    point = np.empty(3)
+    for h in range(count):
+        if not members[h]:
+            continue
+        w = math.exp(work.log_weight[h])
+        s = work.mean[h]
+        point[0], point[1] = s[R] * math.cos(s[PHI]), s[R] * math.sin(s[PHI])
+        point[2] = wrap(course_of(s) - course0)
+        planar(s, work.cov[h], part)
+        for i in range(3):
+            mean[i] += w * point[i]
+            for j in range(3):
+                cov[i, j] += w * (part[i, j] + point[i] * point[j])
+        mean[3] += w * s[V]
+        mean[4] += w * wrap(s[YAW] - yaw0)
+        sigma += w * relative_sigma(s, work.cov[h])
+        total += w
+    for i in range(5):
+        mean[i] /= total
+    for i in range(3):
+        for j in range(3):
+            cov[i, j] = cov[i, j] / total - mean[i] * mean[j]
+    mean[2] = wrap(mean[2] + course0)
+    mean[4] = wrap(mean[4] + yaw0)
+    return sigma / total
+
+
+@njit(nogil=True)
+def forget_information(J: Any, course: float, dt: float, q: float, t: Tuning) -> None:
+    """J <- e^(-dt/W) A^-T J A^-1 for p += v u dt, then lose speed information: J -= J e_v e_v^T J q/(1 + q J_vv)."""
+    c, s = math.cos(course) * dt, math.sin(course) * dt
+    for j in range(3):
+        J[2, j] -= c * J[0, j] + s * J[1, j]
+    for i in range(3):
+        J[i, 2] -= c * J[i, 0] + s * J[i, 1]
+    keep = math.exp(-dt / t.obs_window)
+    loss = q * dt / (1.0 + q * dt * keep * J[2, 2])
+    v0, v1, v2 = J[0, 2] * keep, J[1, 2] * keep, J[2, 2] * keep
+    for i in range(3):
+        for j in range(3):
+            J[i, j] *= keep
+    J[0, 0] -= v0 * v0 * loss
+    J[0, 1] -= v0 * v1 * loss
+    J[0, 2] -= v0 * v2 * loss
+    J[1, 1] -= v1 * v1 * loss
+    J[1, 2] -= v1 * v2 * loss
+    J[2, 2] -= v2 * v2 * loss
+    J[1, 0], J[2, 0], J[2, 1] = J[0, 1], J[0, 2], J[1, 2]
+
+
+@njit(nogil=True)
+def sigma_obs(J: Any) -> float:
+    """sqrt(lambda_max(J^-1)_xy), inf where the ranges of the window alone do not fix a position."""
+    if J[2, 2] <= 0.0:
+        return math.inf
+    a = J[0, 0] - J[0, 2] ** 2 / J[2, 2]  # Schur complement: information on (x, y) alone
+    b = J[0, 1] - J[0, 2] * J[1, 2] / J[2, 2]
+    d = J[1, 1] - J[1, 2] ** 2 / J[2, 2]
+    smallest = 0.5 * (a + d) - math.sqrt(0.25 * (a - d) ** 2 + b * b)
+    if smallest < 1e-6:
+        return math.inf
+    return 1.0 / math.sqrt(smallest)
+
+
+@njit(nogil=True)
+def best_mode(work: Work, count: int, members: Any, taken: Any, mean: Any, cov: Any) -> tuple[float, float, int]:
+    """(p_mode, relative sigma, head) of the mode around the heaviest hypothesis."""
+    head = best_of(work, count)
+    for h in range(count):
+        taken[h] = False
+    weight = cluster(work, count, head, taken, members)
+    sigma = moments(work, count, members, head, mean, cov)
+    return weight, sigma, head

@@ -1,0 +1,56 @@
+"""The numbers of the pose belief, in one value that is handed to the kernels."""
+
+from typing import NamedTuple
+
+
+class Tuning(NamedTuple):
+    """Defaults for every tag; what an operator knows of one tag is in its row instead."""
+
+    q_position: float = 1e-4  # m^2/s
+    q_speed: float = 1e-4  # m^2/s^3, with an accelerometer
+    q_speed_blind: float = 0.03  # m^2/s^3, without one
+    q_speed_blind_moving: float = 0.04  # per (m/s)^2 of speed, up to 1 m/s
+    q_mount: float = 1e-6  # rad^2/s
+    aligned_std: float = 0.08  # rad, mounting angle of a tag whose body axis points along the course
+    aligned_log_prior: float = 1.0
+    crab_tau: float = 3.0  # s
+    gyro_std: float = 0.02  # rad/s, residual bias
+    drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
+    drift_log_prior: float = -1.0
+    q_gyro: float = 1e-6  # (rad/s)^2/s
+    acc_std: float = 0.12  # m/s^2
+    acc_tau: float = 5.0  # s
+    offset_std: float = 0.15  # m, of a tag and anchor pair that nobody calibrated: antenna delays
+    q_offset: float = 1e-5  # m^2/s
+    q_blocked: float = 0.02  # m^2/s, offset while the line of sight is blocked
+    temper: float = 0.7
+    outlier: float = 0.02
+    outlier_mean: float = 0.8  # m
+    outlier_std: float = 0.8  # m
+    outlier_floor: float = 1e-4
+    blocked_log_prior: float = -2.5
+    blocked_min: float = 0.15  # m, less than that is a clear line of sight
+    blocked_run: int = 4
+    second_class: float = -1.5  # log prior of an error of the heading reference of its own
+    second_std: float = 0.15  # rad
+    second_tau: float = 60.0  # s
+    common_tau: float = 10.0  # s in which the error of a magnetic heading changes by its own standard deviation
+    split_angle: float = 0.08  # rad
+    merge_distance: float = 0.5
+    keep_tracking: int = 32
+    prune: float = 16.0
+    rest_std: float = 0.02  # m/s
+    rest_rate_std: float = 0.003  # rad/s
+    misfit_s: float = 3.0
+    settle_speed: float = 0.2  # m/s
+    settle_std: float = 0.4  # m/s, after one second
+    reverse_slack: float = 0.05  # m/s
+    ring_bearings: int = 36
+    ring_speeds: int = 5
+    ring_speed_max: float = 5.0
+    resolved: float = 0.99
+    resolved_s: float = 2.0
+    model_forget: float = 60.0  # s
+    obs_window: float = 10.0  # s
+    obs_q: float = 0.003
+    obs_q_blind: float = 0.05

@@ -1,0 +1,188 @@
+"""The engine `fleet` from samples to poses."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.batch import (
+    ANCHOR,
+    BEARING,
+    HEADING,
+    IMU,
+    RANGE,
+    HeadingSource,
+    SampleBatch,
+    State,
+    default_settings,
+)
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+
+from .tracks import CALIBRATED, DT, drive
+
+STEP = 10  # IMU samples per range
+
+
+def settings(known: bool = True) -> Any:
+    columns = default_settings()
+    columns["mount_angle"], columns["range_std"] = 0.0, 0.1
+    columns["heading_source"] = HeadingSource.PLATFORM
+    if known:
+        columns["start_known"], columns["start_x"], columns["start_y"] = True, 10.0, 0.0
+    return columns
+
+
+def samples(seed: int, row: int = 0) -> tuple[SampleBatch, Any]:
+    """A drive as 100 Hz IMU, 10 Hz headings and 10 Hz ranges; the last a hundredth of a second after its IMU sample."""
+    truth = drive(seed, row=row)
+    nodes, n = truth.nodes, len(truth.nodes)
+    imu = np.zeros((n - 1) * STEP, IMU)
+    imu["row"], imu["t_ns"] = row, np.arange(len(imu)) * 10_000_000
+    imu["gyro"][:, 2] = np.repeat(nodes["dyaw"][1:] / DT, STEP)
+    imu["acc"][:, 0] = np.repeat(nodes["dv_forward"][1:] / DT, STEP)
+    imu["acc"][:, 2] = 9.80665
+    shaking = np.repeat(np.abs(truth.speed[1:]) > 0.0, STEP)[:, None] * np.random.default_rng(seed).standard_normal(
+        (len(imu), 3)
+    )
+    imu["acc"] += 0.3 * shaking
+    imu["gyro"] += 0.02 * shaking
+    imu["mag"] = np.nan
+    headings, ranges = np.zeros(n - 1, HEADING), np.zeros(n - 1, RANGE)
+    headings["row"] = ranges["row"] = row
+    headings["t_ns"] = ranges["t_ns"] = nodes["t_ns"][:-1]
+    headings["heading"], headings["std"] = nodes["heading"][:-1], 0.03
+    ranges["range"], ranges["std"] = nodes["z"][:-1], 0.1
+    return SampleBatch(imu=imu, ranges=ranges, headings=headings), truth
+
+
+def engine(rows: int = 1, known: bool = True) -> FleetEngine:
+    fleet = FleetEngine(CALIBRATED)
+    fleet.set_anchors(np.zeros(1, ANCHOR))
+    for row in range(rows):
+        fleet.configure(row, settings(known))
+    return fleet
+
+
+def cut(batch: SampleBatch, start_ns: int, end_ns: int) -> SampleBatch:
+    def part(columns: Any) -> Any:
+        return columns[(columns["t_ns"] >= start_ns) & (columns["t_ns"] < end_ns)]
+
+    return SampleBatch(part(batch.imu), part(batch.ranges), part(batch.headings), part(batch.bearings))
+
+
+def in_pieces(fleet: FleetEngine, batch: SampleBatch, step_ns: int) -> Any:
+    end = int(batch.imu["t_ns"][-1]) + 1
+    return np.concatenate([fleet.process(cut(batch, t, t + step_ns)).poses for t in range(0, end, step_ns)])
+
+
+def error_of(poses: Any, truth: Any) -> Any:
+    index = np.round(poses["t_ns"] / (DT * 1e9)).astype(int)
+    return np.hypot(poses["x"] - truth.x[index], poses["y"] - truth.y[index])
+
+
+def test_samples_become_a_pose_per_range_on_the_track() -> None:
+    batch, truth = samples(2000)
+    poses = engine().process(batch).poses
+    assert len(poses) == len(batch.ranges)
+    assert np.sqrt(np.mean(error_of(poses, truth) ** 2)) < 1.0
+    assert poses["state"][-1] == State.TRACKING
+
+
+def test_poses_do_not_depend_on_how_the_stream_was_cut() -> None:
+    batch, _ = samples(2001)
+    whole = in_pieces(engine(), batch, 10**12)
+    for step_ns in (30_000_000, 170_000_000):
+        assert in_pieces(engine(), batch, step_ns).tobytes() == whole.tobytes()
+
+
+def test_ranges_ahead_of_their_imu_wait_for_it() -> None:
+    batch, _ = samples(2002)
+    expected = in_pieces(engine(), batch, 10**12)
+    fleet = engine()
+    ahead = []
+    for t in range(0, int(batch.imu["t_ns"][-1]) + 200_000_000, 100_000_000):
+        early = cut(batch, t, t + 100_000_000)
+        late = cut(batch, t - 100_000_000, t)
+        ahead.append(fleet.process(SampleBatch(imu=late.imu, ranges=early.ranges, headings=late.headings)).poses)
+    poses = np.concatenate(ahead)
+    assert poses["t_ns"].tolist() == expected["t_ns"].tolist()
+    np.testing.assert_allclose(poses["x"][5:], expected["x"][5:], atol=0.3)
+
+
+def test_a_range_that_comes_late_is_used_within_the_window_and_counted_beyond_it() -> None:
+    batch, truth = samples(2003)
+    fleet = engine()
+    fleet.process(cut(batch, 0, 20_000_000_000))
+    late = batch.ranges[[198]].copy()
+    assert len(fleet.process(SampleBatch(ranges=late)).poses) == 1
+    late["t_ns"] -= 2_000_000_000
+    refused = fleet.process(SampleBatch(ranges=late))
+    assert (len(refused.poses), refused.rejected) == (0, {"late": 1})
+    poses = fleet.process(cut(batch, 20_000_000_000, 10**12)).poses
+    assert error_of(poses, truth)[-1] < 1.0
+
+
+def test_nonsense_is_counted_by_reason_and_leaves_the_neighbour_alone() -> None:
+    batch, _ = samples(2004, row=1)
+    expected = engine(2).process(batch).poses
+    bad = batch.ranges[:3].copy()
+    bad["row"] = 0
+    bad["range"][0], bad["anchor"][1], bad["anchor"][2] = np.nan, 7, -1
+    mixed = SampleBatch(batch.imu, np.concatenate([bad, batch.ranges]), batch.headings)
+    result = engine(2).process(mixed)
+    assert result.rejected == {"not_finite": 1, "anchor_unknown": 2}
+    assert result.poses.tobytes() == expected.tobytes()
+
+
+def test_an_unknown_start_publishes_weighted_hypotheses_until_it_is_resolved() -> None:
+    batch, truth = samples(2000)
+    fleet = engine(known=False)
+    first = fleet.process(cut(batch, 0, 2_500_000_000))
+    assert first.poses["state"][-1] == State.AMBIGUOUS
+    assert len(first.hypotheses) >= 2
+    assert 0.5 < first.hypotheses["weight"].sum() <= 1.0 + 1e-9
+    rest = fleet.process(cut(batch, 2_500_000_000, 10**12))
+    assert rest.poses["state"][-1] == State.TRACKING
+    assert len(rest.hypotheses) == 0
+    assert error_of(rest.poses, truth)[-1] < 1.0
+
+
+def test_a_bearing_settles_where_a_standing_tag_is() -> None:
+    fleet = engine(known=False)
+    batch, _ = samples(2005)
+    still = cut(batch, 0, 100_000_000)
+    n = 40
+    imu, ranges, headings = (
+        np.repeat(c[:1], k) for c, k in ((still.imu, n * STEP), (still.ranges, n), (still.headings, n))
+    )
+    imu["t_ns"] = np.arange(n * STEP) * 10_000_000
+    ranges["t_ns"] = headings["t_ns"] = np.arange(n) * 100_000_000
+    ranges["range"] = 10.0
+    assert fleet.process(SampleBatch(imu, ranges, headings)).poses["state"][-1] == State.AMBIGUOUS
+    bearing = np.zeros(20, BEARING)
+    bearing["t_ns"] = int(imu["t_ns"][-1]) + np.arange(20) * 1_000_000
+    bearing["bearing"], bearing["std"] = 0.8, 0.05
+    fleet.process(SampleBatch(bearings=bearing))
+    later = ranges[:5].copy()
+    later["t_ns"] += int(bearing["t_ns"][-1]) + 1
+    pose = fleet.process(SampleBatch(ranges=later)).poses[-1]
+    assert np.arctan2(pose["y"], pose["x"]) == pytest.approx(0.8, abs=0.1)
+
+
+def test_a_row_that_is_configured_again_starts_afresh() -> None:
+    batch, _ = samples(2000)
+    fleet = engine()
+    expected = fleet.process(batch).poses
+    fleet.configure(0, settings())
+    assert fleet.process(batch).poses.tobytes() == expected.tobytes()
+
+
+def test_the_last_innovations_can_be_explained() -> None:
+    batch, _ = samples(2000)
+    fleet = engine()
+    poses = fleet.process(batch).poses
+    history = fleet.explain(0)
+    assert history["t_ns"].tolist() == poses["t_ns"][-len(history) :].tolist()
+    assert (history["variance"] > 0).all()
+    assert np.abs(history["y"] / np.sqrt(history["variance"])).mean() < 2.0
+    assert ((history["p_outlier"] >= 0) & (history["p_outlier"] <= 1)).all()
