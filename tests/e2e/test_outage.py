@@ -1,0 +1,32 @@
+"""A router that is killed and comes back costs no sample of a tag whose cache covers the gap."""
+
+import time
+
+from dropanchor_tag_client import TagClient
+from support.service import running_service
+from support.zenoh_router import free_endpoint, start_router_process, wait_until
+
+
+def test_nothing_is_lost_or_doubled_while_the_router_is_away() -> None:
+    endpoint = free_endpoint()
+    router = start_router_process(endpoint)
+    try:
+        with running_service("--zenoh-connect", endpoint) as service, TagClient("a", connect=endpoint) as client:
+            published = 0
+            started = time.monotonic()
+            while time.monotonic() - started < 4.0:
+                client.publish_range(7, 10.0)
+                published += 1
+                if published == 100:
+                    router.kill()
+                    router.communicate()
+                if published == 200:
+                    router = start_router_process(endpoint)
+                time.sleep(0.01)
+            client.flush()
+            wait_until(lambda: service.get("/api/v1/tags/a")["samples"] == {"range": published}, 10.0)
+            assert service.metric("dropanchor_missed_messages_total") == 0
+            assert service.get("/api/v1/tags/a")["online"]
+    finally:
+        router.kill()
+        router.communicate()
