@@ -1,12 +1,16 @@
-"""`dropanchor`: one module of `commands` per subcommand."""
+"""`dropanchor`: one module of `commands` per subcommand; only the chosen one is imported."""
 
 import argparse
 import re
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
-from dropanchor_service.commands import replay, router, serve
-
+_COMMANDS = {
+    "serve": "run the service",
+    "router": "run a Zenoh router alone",
+    "replay": "run an engine on a recording, offline",
+}
 _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service answers with poses over Zenoh and REST.
@@ -21,6 +25,7 @@ examples:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The exit code."""
+    words = _with_negative_values(sys.argv[1:] if arguments is None else arguments)
     parser = argparse.ArgumentParser(
         "dropanchor",
         description=_DESCRIPTION,
@@ -28,17 +33,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for name, command in {"serve": serve, "router": router, "replay": replay}.items():
-        one = commands.add_parser(
-            name,
-            help=command.HELP,
-            description=command.DESCRIPTION,
-            epilog=command.EPILOG,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        command.add_arguments(one)
-        one.set_defaults(run=command.run)
-    chosen = parser.parse_args(_with_negative_values(sys.argv[1:] if arguments is None else arguments))
+    for name, brief in _COMMANDS.items():
+        one = commands.add_parser(name, help=brief, formatter_class=argparse.RawDescriptionHelpFormatter)
+        if words[:1] == [name]:
+            command = import_module(f"dropanchor_service.commands.{name}")
+            one.description, one.epilog = command.DESCRIPTION, command.EPILOG
+            command.add_arguments(one)
+            one.set_defaults(run=command.run)
+    chosen = parser.parse_args(words)
     return int(chosen.run(chosen))
 
 

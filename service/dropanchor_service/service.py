@@ -4,7 +4,7 @@ import logging
 import os
 import socket
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from threading import Event
 from types import TracebackType
 from typing import Self
@@ -29,8 +29,8 @@ from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 from dropanchor_service.zenoh_answers import ZenohAnswers
 from dropanchor_service.zenoh_intake import ZenohIntake
+from dropanchor_service.zenoh_link import ZenohLink
 from dropanchor_service.zenoh_poses import ZenohPoses
-from dropanchor_service.zenoh_session import open_session
 
 HTTP_STOP_S = 2.5
 
@@ -47,7 +47,6 @@ class Service:
         self._settings = settings
         self._stopping = Event()
         self._opened = ExitStack()
-        self._session: zenoh.Session | None = None
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.tags = TagTable()
@@ -66,13 +65,16 @@ class Service:
             self.clock,
         )
         self._thread = IngestThread(self._ingest, self._buffer, self.metrics, settings.ingest.period_ms * 1e-3)
+        self._link = ZenohLink(settings.zenoh, self._zenoh_parts)
         self.metrics.watch(FleetGauges(self.tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth))
 
     def __enter__(self) -> Self:
         with self._opened:
             bound = listen(self._settings.http.host, self._settings.http.port)
             self._opened.callback(bound.close)
-            self._open_zenoh()
+            self._thread.start()
+            self._opened.callback(self._thread.stop)
+            self._opened.enter_context(self._link)
             self._open_http(bound)
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
@@ -92,28 +94,29 @@ class Service:
 
     def problems(self) -> Sequence[str]:
         """Why the service cannot do its work at this moment; empty when it can."""
-        found = [] if self._thread.problem is None else [self._thread.problem]
-        if self._settings.zenoh.connect and self._session is not None and not self._session.info.routers_zid():
-            found.append("there is no connection to the Zenoh router")
-        return found
+        return [problem for problem in (self._thread.problem, self._link.problem) if problem is not None]
 
     @property
     def has_died(self) -> bool:
         """Whether a thread that must run does not."""
         return not self._http.is_alive or not self._thread.is_alive
 
-    def _open_zenoh(self) -> None:
-        self._session = self._opened.enter_context(open_session(self._settings.zenoh))
-        self._thread.start()
-        self._opened.callback(self._thread.stop)
-        session, site = self._session, self.site.site.id
-        intake = ZenohIntake(
-            session, site, self._buffer, self._ingest, self.tags, self.metrics, self.clock, self._settings.max_tags
-        )
-        self._opened.enter_context(intake)
+    def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
-        self._opened.enter_context(ZenohAnswers(session, self.answers, service_id, self.metrics))
-        self._opened.enter_context(ZenohPoses(session, self.answers, self.metrics))
+        return [
+            ZenohIntake(
+                session,
+                self.site.site.id,
+                self._buffer,
+                self._ingest,
+                self.tags,
+                self.metrics,
+                self.clock,
+                self._settings.max_tags,
+            ),
+            ZenohAnswers(session, self.answers, service_id, self.metrics),
+            ZenohPoses(session, self.answers, self.metrics),
+        ]
 
     def _open_http(self, bound: socket.socket) -> None:
         app = create_app(

@@ -67,6 +67,7 @@ class ZenohPoses:
 
     def _put_tags(self) -> None:
         if not _is_wanted(self._of_tags):
+            self._tag_version = self._answers.latest.version
             return
         self._tag_version, poses = self._answers.latest.since(self._tag_version)
         for pose in self._answers.poses_of(poses, self._answers.now_ns()):

@@ -8,6 +8,8 @@ import zenoh
 
 from dropanchor_service.settings import ZenohSettings
 
+ATTEMPT_S = 1.0
+
 
 class ZenohError(Exception):
     """The session could not be opened; the message says what to check."""
@@ -45,8 +47,9 @@ def _client(settings: ZenohSettings) -> dict[str, Any]:
         "mode": "client",
         "connect": {
             "endpoints": list(settings.connect),
-            "timeout_ms": -1,
-            "exit_on_failure": False,
+            # An endless attempt inside Zenoh could not be interrupted; a finite one still reconnects for ever.
+            "timeout_ms": round(ATTEMPT_S * 1000),
+            "exit_on_failure": True,
             "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
         },
         "transport": {"shared_memory": {"enabled": False}, "link": _link()},

@@ -12,7 +12,7 @@ from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
 from dropanchor_service.admission import Admission
 from dropanchor_service.buffer import MessageBuffer
 from dropanchor_service.clock import UtcClock
-from dropanchor_service.estimation.batch import POSE, Array, PoseBatch, SampleBatch, State
+from dropanchor_service.estimation.batch import POSE, Array, Engine, PoseBatch, SampleBatch, State
 from dropanchor_service.estimators import Estimators
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.metrics import Metrics
@@ -51,7 +51,9 @@ class TransparentEngine:
 class Bench:
     """What a service has between Zenoh and the store."""
 
-    def __init__(self, folder: Path | None = None, capacity: int = 10**8, **options: Any) -> None:
+    def __init__(
+        self, folder: Path | None = None, capacity: int = 10**8, engine: Engine | None = None, **options: Any
+    ) -> None:
         settings = load_settings(options=options, environment={})
         self.engine = TransparentEngine()
         self.clock = UtcClock()
@@ -60,7 +62,7 @@ class Bench:
         self.latest = LatestPoses()
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
-        self.estimators = Estimators(self.engine, self.site, self.tags, self.metrics)
+        self.estimators = Estimators(engine or self.engine, self.site, self.tags, self.metrics)
         self.ingest = Ingest(
             self.buffer,
             Admission(settings, self.site, self.tags),

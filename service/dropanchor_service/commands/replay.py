@@ -18,7 +18,6 @@ from dropanchor_service.evaluation.track_plot import plot_track
 from dropanchor_service.settings_sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 
-HELP = "run an engine on a recording, offline"
 DESCRIPTION = """\
 Runs the same engine as the service on a recording, as fast as it can, and reports the error where the recording
 brings the truth. A recording is a folder with range.csv and anchors.csv, and imu.csv, heading.csv and truth.csv where

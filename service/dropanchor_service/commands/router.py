@@ -10,7 +10,6 @@ from dropanchor_service.settings_sources import SettingsError, load_settings
 from dropanchor_service.signals import interrupts
 from dropanchor_service.zenoh_session import ZenohError, open_session
 
-HELP = "run a Zenoh router alone"
 DESCRIPTION = "Runs a Zenoh router until Ctrl-C or SIGTERM. Tags and services connect to it."
 EPILOG = """\
 examples:

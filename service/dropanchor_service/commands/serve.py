@@ -11,7 +11,6 @@ from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.signals import interrupts
 from dropanchor_service.zenoh_session import ZenohError
 
-HELP = "run the service"
 DESCRIPTION = """\
 Runs the service until Ctrl-C or SIGTERM. Without settings: site `default`, a Zenoh router of its own on the loopback,
 the first anchor that is heard becomes the origin, and every tag that is heard gets a track.

@@ -26,6 +26,7 @@ from dropanchor_service.estimation.speed import SpeedEstimator
 from dropanchor_service.estimation.tag import Tag
 
 NAN = math.nan
+LARGEST_STD = 1e3  # m or rad; what claims more is not known
 NO_COV = np.full((3, 3), NAN)
 
 PoseRow = tuple[int, int, int, int, float, float, float, float, float, float, object, float, float, float]
@@ -72,12 +73,12 @@ class Algorithm1:
         course = self._course.take_platform(t_ns, heading)
         if self._ekf is not None and not self._course.from_imu and self._course.newest is not None:
             self._advance(self._ekf, t_ns)
-            self._ekf.update_heading(course, (std if std > 0 else self._p.heading_std) ** 2)
+            self._ekf.update_heading(course, _first_std(std, self._p.heading_std) ** 2)
 
     def take_range(self, t_ns: int, index: int, anchor: Position, measured: float, std: float) -> PoseRow:
         """A range, m, with its standard deviation or NaN, to the anchor of this index and (x, y, height above tag)."""
         z = (measured - self._tag.range_bias) / self._tag.range_scale
-        R = (self._range_std(std) / self._tag.range_scale) ** 2
+        R = (_first_std(std, self._tag.range_std, self._p.range_std) / self._tag.range_scale) ** 2
         if self._ekf is None:
             self._start(t_ns)
         if self._ekf is None:
@@ -94,17 +95,13 @@ class Algorithm1:
         """Whether the belief still holds numbers."""
         return self._ekf is None or self._ekf.finite
 
-    def _range_std(self, std: float) -> float:
-        """The sample's own, else the tag's, else the default."""
-        return next(s for s in (std, self._tag.range_std, self._p.range_std) if s > 0)
-
     def _start(self, t_ns: int) -> None:
         course = self._course.newest
         if course is None or not self._tag.start_known:
             return
         p, tag = self._p, self._tag
         theta = course[1] if math.isnan(tag.start_heading) else tag.start_heading + tag.mount_angle
-        sd = tag.start_std if tag.start_std > 0 else p.start_std
+        sd = _first_std(tag.start_std, p.start_std)
         self._ekf = PoseFilter(
             x=np.array([tag.start_x, tag.start_y, theta, 0.0, 0.0]),
             P=np.diag([sd, sd, p.start_heading_std, p.start_speed_std, p.start_turn_rate_std]) ** 2,
@@ -161,15 +158,16 @@ class Algorithm1:
 
     def _pose(self, t_ns: int, z: float) -> PoseRow:
         if self._ekf is None:
-            return self._pose_before_start(t_ns)
+            return self.pose_before_start(t_ns)
         x, y, theta, v, w = self._ekf.x.tolist()
         cov = self._ekf.P[:3, :3].copy()
         sigma = math.sqrt(cov[0, 0] + cov[1, 1])
-        state, reason = self._state(t_ns, sigma, z)
+        state, reason = self._state(self._ekf, t_ns, sigma, z)
         heading = wrapped(theta - self._tag.mount_angle)
         return (t_ns, state, reason, *self._fused, x, y, heading, v, w, cov, NAN, sigma, NAN)
 
-    def _pose_before_start(self, t_ns: int) -> PoseRow:
+    def pose_before_start(self, t_ns: int) -> PoseRow:
+        """The pose of a tag that may be anywhere."""
         state, reason = self._state_before_start()
         course = self._course.newest
         heading = NAN if course is None else wrapped(course[1] - self._tag.mount_angle)
@@ -183,8 +181,10 @@ class Algorithm1:
             return State.INITIALISING, StateReason.NO_HEADING
         return State.AMBIGUOUS, StateReason.START_UNKNOWN
 
-    def _state(self, t_ns: int, sigma: float, z: float) -> tuple[State, StateReason]:
-        """LOST, COASTING: no range fused for long; DEGRADED: no heading for long, or sigma_pos too large for use."""
+    def _state(self, ekf: PoseFilter, t_ns: int, sigma: float, z: float) -> tuple[State, StateReason]:
+        """LOST, COASTING: no range fused for long. DEGRADED: no heading for long; or a tag that cannot drive
+        backwards is believed to, the mark of the mirror image (p, v) -> (-p, -v); or sigma_pos too large for use.
+        """
         p = self._p
         silent = self._heard_ns is not None and (t_ns - self._heard_ns) * S_PER_NS > p.coasting_after
         why = StateReason.RANGES_MISSING if silent else StateReason.RANGES_REJECTED
@@ -195,6 +195,13 @@ class Algorithm1:
         course = self._course.newest
         if course is None or (t_ns - course[0]) * S_PER_NS > p.heading_stale_after:
             return State.DEGRADED, StateReason.IMU_MISSING
+        if not self._tag.reverse_allowed and ekf.x[3] < -p.backwards * math.sqrt(ekf.P[3, 3]):
+            return State.DEGRADED, StateReason.SEVERAL_MODES
         if not sigma <= max(p.degraded_sigma, p.degraded_share * z):
             return State.DEGRADED, StateReason.UNCERTAIN
         return State.TRACKING, StateReason.RESOLVED
+
+
+def _first_std(*candidates: float) -> float:
+    """The first that can be a standard deviation: the sample's own, else the tag's, else the default."""
+    return next(s for s in candidates if 0 < s < LARGEST_STD)

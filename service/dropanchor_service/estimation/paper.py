@@ -21,6 +21,7 @@ from dropanchor_service.estimation.tag import Tag
 __all__ = ["TUNED", "PaperEngine", "PaperParameters"]
 
 IMU, HEADING, RANGE = range(3)  # the order in which samples of the same instant are taken
+ABSURD = 1e6  # in any unit of a sample
 Event = tuple[int, int, int, tuple[Any, ...]]
 """Row, t_ns, kind, the rest of the sample."""
 
@@ -72,11 +73,11 @@ class PaperEngine:
             return "late"
         if kind == RANGE and not 0 <= values[0] < len(self._anchors):
             return "anchor_unknown"
-        return None if _usable(kind, values) else "not_finite"
+        return _fault_of(kind, values)
 
     def _take(self, event: Event) -> PoseRow | None:
         """One sample into its row. Numbers that blow up cost the row its state, and no other row anything."""
-        row, t_ns, _, _ = event
+        row, t_ns, kind, _ = event
         self._times[row] = t_ns
         try:
             pose = self._fuse(event)
@@ -86,7 +87,7 @@ class PaperEngine:
         if healthy:
             return pose
         self._filters[row] = Algorithm1(self._parameters, replace(self._tags[row], start_known=False), faulted=True)
-        return self._fuse(event) if event[2] == RANGE else None
+        return self._filters[row].pose_before_start(t_ns) if kind == RANGE else None
 
     def _fuse(self, event: Event) -> PoseRow | None:
         row, t_ns, kind, values = event
@@ -117,9 +118,11 @@ def _in_order(samples: SampleBatch) -> Iterator[Event]:
     yield from events
 
 
-def _usable(kind: int, values: tuple[Any, ...]) -> bool:
-    """Whether the numbers that a sample must have are finite; a magnetic field and a std may be missing."""
-    if kind == IMU:
-        acc, gyro, _ = values
-        return all(map(math.isfinite, acc)) and all(map(math.isfinite, gyro))
-    return math.isfinite(values[0 if kind == HEADING else 1])
+def _fault_of(kind: int, values: tuple[Any, ...]) -> str | None:
+    """What is wrong with the numbers that a sample must have; a magnetic field and a std may be missing."""
+    needed = (*values[0], *values[1]) if kind == IMU else values[:1] if kind == HEADING else values[1:2]
+    if not all(map(math.isfinite, needed)):
+        return "not_finite"
+    if max(map(abs, needed)) > ABSURD:
+        return ("imu_absurd", "heading_absurd", "range_absurd")[kind]
+    return None

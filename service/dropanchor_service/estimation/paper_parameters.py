@@ -52,25 +52,34 @@ class PaperParameters:
     degraded_sigma: float = 1.5  # m of sigma_pos ...
     degraded_share: float = 0.05  # ... or this share of the range, whichever is larger
 
+    backwards: float = 1.0  # standard deviations of the speed below zero that count as driving backwards
+
     attitude: AttitudeParameters = field(default_factory=AttitudeParameters)
 
 
 TUNED = PaperParameters(
-    q_position=1e-3,
-    q_heading=1e-3,
-    q_speed=0.05,
-    q_turn_rate=0.05,
-    range_std=0.2,
+    q_position=0.002,
+    q_heading=0.2,
+    q_speed=0.5,
+    q_turn_rate=2.0,
+    range_std=0.25,
     heading_std=0.1,
     start_std=0.1,
     start_heading_std=0.1,
     start_speed_std=0.1,
     start_turn_rate_std=0.1,
-    q_smooth=0.05,
-    r_smooth=0.04,
+    q_smooth=0.5,
+    r_smooth=0.05,
     th_distance=2.0,
+    th_turn_rate=0.07,
     pair_spacing=1,
     window_base=1.0,
-    window_ratio=0.1,
-    blend=0.95,
+    window_ratio=0.12,
 )
+"""Algorithm 1 for realistic noise: a random search on simulated tags alone, never on recordings.
+
+The tags: straight legs of 8 to 14 s at 0.5 to 4 m/s from a known start, ranges at 10 Hz with 0.1 m, headings of a
+platform with 0.05 rad or a 9-axis IMU at 100 Hz; seeds 1000 to 1011. On other seeds (2000 to 2023) the median RMSE is
+0.27 m (platform) and 0.73 m (IMU), and 8 % and 21 % of the runs are lost to the mirror image of the track. With these
+values the speed estimator hardly matters (0.26 and 0.71 m without it): its gain in the paper is over an untuned filter.
+"""

@@ -8,13 +8,14 @@ from dropanchor_service.estimation.batch import Array
 
 @dataclass(frozen=True)
 class Tag:
-    """TAG_SETTINGS. `reverse_allowed` is absent: the published filter does not know it."""
+    """TAG_SETTINGS."""
 
     height: float  # m
     range_std: float  # m, NaN: not given
     range_bias: float  # m
     range_scale: float
     mount_angle: float  # rad; not known: 0
+    reverse_allowed: bool  # the published filter does not use it; it only judges the state
     heading_source: int
     start_known: bool
     start_x: float  # m

@@ -1,0 +1,203 @@
+"""Samples of tags through a real service: out over Zenoh and REST, counted where they are bad."""
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from dropanchor_schemas import Pose, keys
+from dropanchor_schemas.answers import PoseFrame
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encode_json, encode_packed
+from dropanchor_service.engine import create_engine
+from dropanchor_service.settings_sources import load_settings
+from dropanchor_tag_client import TagClient
+from support.ingest import Bench
+from support.service import Running, running_service, settings_file, straight_north
+from support.zenoh_router import connected_session, wait_until
+
+TAGS = ["a", "b", "Gabelstapler Süd"]
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return settings_file(tmp_path_factory.mktemp("service"), TAGS)
+
+
+@pytest.fixture(scope="module")
+def service(config: Path) -> Iterator[Running]:
+    with running_service("--config", str(config)) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def session(service: Running) -> Iterator[zenoh.Session]:
+    with connected_session(service.zenoh) as opened:
+        yield opened
+
+
+def put(session: zenoh.Session, tag: str, frame: Frame) -> None:
+    session.put(keys.samples_key("default", tag), encode_packed(frame), encoding=ENCODING_PACKED)
+
+
+def send(client: TagClient, frame: Frame) -> None:
+    for imu, heading, distance in zip(frame.imu, frame.headings, frame.ranges, strict=True):
+        client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns)
+        client.publish_heading(heading.heading_rad, t_ns=heading.t_ns, std_rad=heading.std_rad)
+        client.publish_range("7", distance.range_m, t_ns=distance.t_ns, std_m=distance.std_m)
+    client.flush()
+
+
+def ask(session: zenoh.Session, key: str) -> dict[str, dict[str, object]]:
+    """Replies by key; an error under the key `error`."""
+    found = {}
+    for reply in session.get(key, timeout=5.0):
+        if reply.ok is not None:
+            found[str(reply.ok.key_expr)] = json.loads(reply.ok.payload.to_string())
+        elif reply.err is not None:
+            found["error"] = json.loads(reply.err.payload.to_string())
+    return found
+
+
+def samples_of(service: Running, tag: str) -> dict[str, int]:
+    tags = {status["tag"]: status for status in service.get("/api/v1/tags")["tags"]}
+    return dict(tags[tag]["samples"]) if tag in tags else {}
+
+
+def offline(config: Path, tag: str, frame: Frame) -> list[float]:
+    """x and y after these samples, by the engine without threads, network and clocks."""
+    settings = load_settings(config, environment={})
+    bench = Bench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
+    bench.send(tag, frame)
+    pose = bench.latest.row(bench.tags.register(tag).row)
+    assert pose is not None
+    return [float(pose["x"]), float(pose["y"])]
+
+
+@pytest.mark.parametrize("encoding", ["packed", "json"])
+def test_what_a_client_publishes_comes_out_as_the_same_pose_over_zenoh_and_rest(
+    service: Running, session: zenoh.Session, config: Path, encoding: str
+) -> None:
+    tag = "a" if encoding == "packed" else "b"
+    frame = straight_north(100)
+    with TagClient(tag, connect=service.zenoh, encoding=encoding) as client:  # type: ignore[arg-type]
+        send(client, frame)
+        wait_until(lambda: samples_of(service, tag) == {"imu": 100, "heading": 100, "range": 100})
+        over_rest = Pose.model_validate(service.get(f"/api/v1/tags/{tag}/pose"))
+        over_zenoh = Pose.model_validate(ask(session, keys.pose_key("default", tag))[keys.pose_key("default", tag)])
+    assert over_rest.t_ns == over_zenoh.t_ns == frame.ranges[-1].t_ns
+    assert (over_rest.x, over_rest.y, over_rest.state) == (over_zenoh.x, over_zenoh.y, over_zenoh.state)
+    assert [over_rest.x, over_rest.y] == pytest.approx(offline(config, tag, frame), abs=1e-3)  # float32 on the wire
+    assert over_rest.y == pytest.approx(-10.1, abs=1.0)
+    assert over_rest.online
+    assert over_rest.anchor == "7"
+
+
+def test_one_query_with_wildcards_asks_for_many_tags_and_each_answer_has_its_own_key(
+    service: Running, session: zenoh.Session
+) -> None:
+    for tag in TAGS:
+        put(session, tag, straight_north(3))
+    wait_until(lambda: len(service.get("/api/v1/poses")["poses"]) == len(TAGS))
+    expected = {keys.pose_key("default", tag): tag for tag in TAGS}
+    for key in (keys.all_tags("default", "pose"), f"{keys.PREFIX}/*/tag/*/pose", f"{keys.PREFIX}/**"):
+        replies = ask(session, key)
+        assert {name: reply["tag"] for name, reply in replies.items() if name in expected} == expected
+    assert list(ask(session, f"{keys.PREFIX}/default/tag/a$*/pose")) == [keys.pose_key("default", "a")]
+
+
+def test_a_query_that_has_no_answer_says_why(session: zenoh.Session) -> None:
+    assert ask(session, keys.pose_key("default", "nobody")) == {"error": {"error": "no tag 'nobody' is known"}}
+    assert "anchor '99'" in str(ask(session, keys.anchor_key("default", "99"))["error"])
+    assert "parameter 'at'" in str(ask(session, keys.pose_key("default", "a") + "?at=5")["error"])
+
+
+def test_the_anchor_can_be_asked_for(session: zenoh.Session) -> None:
+    answer = ask(session, keys.anchor_key("default", "7"))[keys.anchor_key("default", "7")]
+    assert (answer["id"], answer["x"], answer["y"], answer["z"]) == ("7", 0.0, 0.0, 0.0)
+    assert list(ask(session, keys.all_anchors("default"))) == [keys.anchor_key("default", "7")]
+
+
+def test_poses_are_published_to_whom_subscribes_to_a_tag_and_to_nobody_else(
+    service: Running, session: zenoh.Session
+) -> None:
+    with connected_session(service.zenoh) as listener:
+        found: list[tuple[str, Pose]] = []
+        subscriber = listener.declare_subscriber(
+            keys.pose_key("default", "b"),
+            lambda message: found.append((str(message.key_expr), Pose.model_validate_json(message.payload.to_bytes()))),
+        )
+        time.sleep(0.2)
+        frame = straight_north(2)
+        put(session, "a", straight_north(2))
+        put(session, "b", frame)
+        wait_until(lambda: found)
+        subscriber.undeclare()
+    assert {key for key, _ in found} == {keys.pose_key("default", "b")}
+    assert found[-1][1].t_ns == frame.ranges[-1].t_ns
+
+
+def test_frames_of_all_poses_come_at_most_ten_times_a_second(service: Running, session: zenoh.Session) -> None:
+    with connected_session(service.zenoh) as listener:
+        frames: list[PoseFrame] = []
+        subscriber = listener.declare_subscriber(
+            keys.poses_key("default"),
+            lambda message: frames.append(PoseFrame.model_validate_json(message.payload.to_bytes())),
+        )
+        time.sleep(0.2)
+        started = time.monotonic()
+        while time.monotonic() - started < 1.5:
+            put(session, "a", straight_north(1))
+            time.sleep(0.01)
+        subscriber.undeclare()
+    assert 5 <= len(frames) <= 16
+    assert set(TAGS) >= set(frames[-1].tags) >= {"a"}
+
+
+def test_a_tag_is_online_as_long_as_its_client_is_open(service: Running) -> None:
+    def online() -> bool:
+        return bool({tag["tag"]: tag["online"] for tag in service.get("/api/v1/tags")["tags"]}.get("visitor"))
+
+    with TagClient("visitor", connect=service.zenoh):
+        wait_until(online)
+        assert service.metric("dropanchor_tags_online") >= 1
+    wait_until(lambda: not online())
+
+
+def test_the_service_itself_has_a_liveliness_token(session: zenoh.Session) -> None:
+    tokens = [str(r.ok.key_expr) for r in session.liveliness().get(f"{keys.PREFIX}/default/service/*/alive") if r.ok]
+    assert len(tokens) == 1
+
+
+def test_garbage_is_counted_for_its_tag_and_the_service_goes_on(service: Running, session: zenoh.Session) -> None:
+    key = keys.samples_key("default", "rogue")
+    for payload, encoding in (
+        (b"", ENCODING_PACKED),
+        (b"\xff" * 100, ENCODING_PACKED),
+        (encode_packed(straight_north(3))[:-1], ENCODING_PACKED),
+        (b"null", ENCODING_JSON),
+        (b'{"range":[{"t_ns":1,"anchor":7,"range_m":NaN}]}', ENCODING_JSON),
+        (encode_json(straight_north(1)), "zenoh/bytes"),
+    ):
+        session.put(key, payload, encoding=encoding)
+    session.put(f"{keys.PREFIX}/default/tag/%zz/samples", b"x", encoding=ENCODING_PACKED)
+    before = samples_of(service, "a").get("range", 0)
+    put(session, "a", straight_north(2))
+    wait_until(lambda: samples_of(service, "a")["range"] == before + 2)
+    rejected = service.get("/api/v1/tags/rogue")["rejected"]
+    assert sum(rejected.values()) == 6
+    assert rejected["payload_empty"] == rejected["length_mismatch"] == rejected["encoding_unknown"] == 1
+    assert service.metric('dropanchor_rejected_total{reason="key_invalid"}') == 1
+    assert service.process.poll() is None
+
+
+def test_settings_given_over_rest_start_the_tag_afresh(service: Running, session: zenoh.Session) -> None:
+    put(session, "late", straight_north(3))
+    wait_until(lambda: samples_of(service, "late").get("range") == 3)
+    assert service.get("/api/v1/tags/late/pose")["state"] == "ambiguous"
+    service.put("/api/v1/tags/late/settings", {"start": {"x": 10.0, "y": -20.0, "heading_rad": 1.5707963}})
+    put(session, "late", straight_north(5))
+    wait_until(lambda: service.get("/api/v1/tags/late/pose")["x"] is not None)
+    assert service.get("/api/v1/tags/late/pose")["x"] == pytest.approx(10.0, abs=1.0)

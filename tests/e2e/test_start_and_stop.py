@@ -1,0 +1,125 @@
+"""The program: starts with a sentence where it cannot, stops within three seconds, exit code 0."""
+
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+
+from support.service import command, environment, running_service
+from support.zenoh_router import (
+    free_endpoint,
+    free_port,
+    running_router,
+    start_router_process,
+    wait_until,
+)
+
+
+def run(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(*arguments), capture_output=True, text=True, env=environment(**more), timeout=60.0, check=False
+    )
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_service_within_three_seconds_even_with_a_stream_open(how: signal.Signals) -> None:
+    with running_service() as service, httpx.stream("GET", f"{service.url}/api/v1/stream", timeout=30.0) as stream:
+        assert stream.status_code == 200
+        started = time.monotonic()
+        assert service.stop(how) == 0
+        assert time.monotonic() - started < 3.0
+    assert "Traceback" not in "".join(service.log)
+
+
+def test_a_taken_http_port_is_told_in_one_sentence() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        result = run("serve", "--port", str(port), "--zenoh-listen", free_endpoint())
+    assert result.returncode == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert f"port {port}: another program uses it" in result.stderr
+
+
+@pytest.mark.parametrize("subcommand", ["serve", "router"])
+def test_a_taken_zenoh_port_is_told_in_one_sentence(subcommand: str) -> None:
+    endpoint = free_endpoint()
+    with running_router(endpoint):
+        result = run(subcommand, *(("--port", "0") if subcommand == "serve" else ()), "--zenoh-listen", endpoint)
+    assert result.returncode == 2
+    assert [line for line in result.stderr.splitlines() if line.startswith("dropanchor")] == [
+        f"dropanchor {subcommand}: Zenoh cannot listen on {endpoint}: the port is taken. "
+        "Choose another one with --zenoh-listen."
+    ]
+
+
+def test_bad_settings_are_told_with_file_and_key(tmp_path: Path) -> None:
+    file = tmp_path / "yard.toml"
+    file.write_text("[http]\nprot = 80\n")
+    result = run("serve", "--config", str(file), DROPANCHOR_MAX_TAGS="none")
+    assert result.returncode == 2
+    assert f"{file}: http.prot is not a setting; did you mean port?" in result.stderr
+    assert "the environment: max_tags" in result.stderr
+
+
+def test_a_kept_site_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    (tmp_path / "site.json").write_text("{")
+    result = run("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(tmp_path))
+    assert result.returncode == 2
+    assert f"the site kept in {tmp_path} cannot be read" in result.stderr
+
+
+def test_what_was_set_over_rest_is_there_after_a_restart(tmp_path: Path) -> None:
+    for _ in range(2):
+        with running_service("--data-dir", str(tmp_path)) as service:
+            anchors = service.get("/api/v1/anchors")["anchors"]
+            service.put("/api/v1/anchors/gate", {"id": "gate", "x": 1.5, "y": 2.0, "z": 0.0})
+            assert service.stop() == 0
+    assert [(anchor["id"], anchor["x"]) for anchor in anchors] == [("gate", 1.5)]
+
+
+def test_the_service_is_not_ready_without_its_router_and_ready_again_with_it() -> None:
+    endpoint = free_endpoint()
+
+    def is_ready() -> bool:
+        return httpx.get(f"{service.url}/api/v1/health/ready").status_code == 200
+
+    with running_service("--zenoh-connect", endpoint, ready=False) as service:
+        problem = httpx.get(f"{service.url}/api/v1/health/ready")
+        assert problem.status_code == 503
+        assert "no connection to the Zenoh router" in problem.text
+        router = start_router_process(endpoint)
+        try:
+            wait_until(is_ready)
+            router.kill()
+            wait_until(lambda: not is_ready())
+        finally:
+            router.kill()
+            router.communicate()
+        assert service.stop() == 0
+
+
+def test_the_router_command_routes_between_a_service_and_its_tags_and_stops_on_a_signal() -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with subprocess.Popen(
+        command("router", "--zenoh-listen", endpoint), stderr=subprocess.PIPE, text=True, env=environment()
+    ) as router:
+        try:
+            assert router.stderr is not None
+            assert f"ready at {endpoint}" in router.stderr.readline()
+            with running_service("--zenoh-connect", endpoint) as service:
+                assert service.stop() == 0
+            router.send_signal(signal.SIGTERM)
+            assert router.wait(3.0) == 0
+        finally:
+            router.kill()
+
+
+def test_help_teaches_with_examples() -> None:
+    for arguments in ((), ("serve",)):
+        result = run(*arguments, "--help")
+        assert result.returncode == 0
+        assert "examples:" in result.stdout

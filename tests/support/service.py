@@ -1,0 +1,119 @@
+"""The service in a process of its own, found by what it logs."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import httpx
+
+from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
+from support.zenoh_router import free_endpoint, wait_until
+
+ROOT = Path(__file__).parents[2]
+S = 1_000_000_000
+
+
+@dataclass
+class Running:
+    """A service that runs. log: its lines on stderr so far."""
+
+    process: subprocess.Popen[str]
+    zenoh: str
+    log: list[str]
+    url: str = ""
+
+    def get(self, path: str) -> Any:
+        return httpx.get(f"{self.url}{path}", timeout=10.0).raise_for_status().json()
+
+    def put(self, path: str, body: object) -> None:
+        httpx.put(f"{self.url}{path}", json=body, timeout=10.0).raise_for_status()
+
+    def metric(self, sample: str) -> float:
+        """The value of one sample, such as `dropanchor_samples_total{kind="imu"}`."""
+        text = httpx.get(f"{self.url}/metrics", timeout=10.0).text
+        found = re.search(rf"^{re.escape(sample)} (\S+)$", text, re.MULTILINE)
+        return float(found[1]) if found else 0.0
+
+    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 10.0) -> int:
+        self.process.send_signal(how)
+        return self.process.wait(timeout_s)
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "dropanchor_service", *arguments]
+
+
+def environment(**more: str) -> dict[str, str]:
+    """Ours alone: no setting of whoever runs the tests gets in."""
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("DROPANCHOR_")}
+    packages = os.pathsep.join(str(ROOT / name) for name in ("schemas", "tag_client", "service"))
+    return clean | {"PYTHONPATH": packages} | more
+
+
+@contextmanager
+def running_service(
+    *arguments: str, endpoint: str | None = None, ready: bool = True, subcommand: str = "serve"
+) -> Iterator[Running]:
+    """`dropanchor serve` on free ports, ended at the end. ready: wait until it can do its work."""
+    zenoh = endpoint or free_endpoint()
+    listening = () if any("--zenoh" in argument for argument in arguments) else ("--zenoh-listen", zenoh)
+    process = subprocess.Popen(
+        command(subcommand, "--port", "0", *listening, *arguments), stderr=subprocess.PIPE, text=True, env=environment()
+    )
+    running = Running(process, zenoh, [])
+    reader = Thread(target=_read, args=(running,), daemon=True)
+    reader.start()
+    try:
+        wait_until(lambda: running.url or process.poll() is not None, 60.0)
+        assert running.url, "".join(running.log)
+        if ready:
+            wait_until(lambda: httpx.get(f"{running.url}/api/v1/health/ready").status_code == 200, 10.0)
+        yield running
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait()
+        reader.join(5.0)
+        if process.stderr is not None:
+            process.stderr.close()
+
+
+def _read(running: Running) -> None:
+    assert running.process.stderr is not None
+    for line in running.process.stderr:
+        running.log.append(line)
+        found = re.search(r"ready at (http://\S+?),", line)
+        if found:
+            running.url = found[1]
+
+
+def settings_file(folder: Path, tags: Sequence[str], text: str = "") -> Path:
+    """A site with anchor 7 at the origin, and tags that start at (10, -20) and look north."""
+    start = "start = { x = 10.0, y = -20.0, heading_rad = 1.5707963 }"
+    tables = "\n".join(f"[tags.{json.dumps(tag)}]\n{start}" for tag in tags)
+    file = folder / "dropanchor.toml"
+    file.write_text(f'{text}\n[[site.anchors]]\nid = "7"\n{tables}\n[paper]\npreset = "tuned"\n')
+    return file
+
+
+def straight_north(count: int, t_ns: int | None = None, speed_mps: float = 1.0) -> Frame:
+    """Perfect samples of a tag that goes north from (10, -20): a range every 0.1 s with a heading and an IMU sample.
+    The last one is of now, or of `t_ns`."""
+    end_ns = time.time_ns() if t_ns is None else t_ns
+    times = [end_ns - (count - 1 - i) * S // 10 for i in range(count)]
+    distances = [(100.0 + (speed_mps * 0.1 * i - 20.0) ** 2) ** 0.5 for i in range(count)]
+    return Frame(
+        imu=[ImuSample(t, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (20.0, 0.0, -40.0)) for t in times],
+        ranges=[RangeSample(t, 7, distance, 0.1) for t, distance in zip(times, distances, strict=True)],
+        headings=[HeadingSample(t, 1.5707963, 0.05) for t in times],
+    )
