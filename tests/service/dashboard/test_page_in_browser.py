@@ -55,6 +55,12 @@ def colour_at(page: Watched, tag: str) -> tuple[int, ...]:
     return page.pixel(x, y)[:3]
 
 
+def drawn_again(page: Watched) -> None:
+    """After two drawings everything that was known is on the map."""
+    drawings = page.page.evaluate("dropanchor.drawing().drawings")
+    page.wait_for(f"dropanchor.drawing().drawings >= {drawings} + 2")
+
+
 def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> None:
     """modes: weight, x, y."""
     row = place.house.answers.tags.register(tag).row
@@ -70,17 +76,18 @@ def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> Non
 
 def test_without_a_tag_the_page_tells_how_to_start_one(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url) as page:
-        assert page.page.locator("#empty").is_visible()
+        page.page.locator("#empty").wait_for(state="visible")
         assert page.page.locator("#command").inner_text() == "dropanchor-tag simulate"
         place.move("cart", x=1.0, y=2.0)
         page.page.locator("#empty").wait_for(state="hidden")
 
 
 def test_a_pose_is_a_dot_and_a_line_in_the_table_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
-    place.move("cart", x=1.0, y=2.0, speed=0.5)
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        place.move("cart", x=1.0, y=2.0, speed=0.5)
         line = page.page.locator("tr[data-tag='cart']")
         assert line.inner_text().split()[:4] == ["cart", "Tracking", "1.00", "2.00"]
+        drawn_again(page)
         before = page.tags()["cart"]["pixel"]
         place.move("cart", x=1.5, y=2.0)
         page.wait_for("dropanchor.tags()[0].x === 1.5")
@@ -159,6 +166,7 @@ def test_the_map_moves_by_mouse_and_keys_and_comes_back_with_fit(chromium: Brows
     place.move("cart", x=2.0, y=1.0)
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.wait_for("dropanchor.drawing().visible === 1 && document.getElementById('site').textContent")
+        drawn_again(page)
         fitted = page.tags()["cart"]["pixel"]
         page.page.locator("#map").focus()
         page.page.keyboard.press("ArrowLeft")

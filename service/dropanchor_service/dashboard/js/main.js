@@ -54,9 +54,11 @@ function receiver(take) {
   return (event) => {
     const now_ms = performance.now();
     const frame = /** @type {CustomEvent} */ (event).detail;
+    const membership = fleet.membership;
     take(frame, now_ms);
     trails.note(fleet, frame.tags, now_ms);
-    map.redraw();
+    if (membership === fleet.membership) map.redraw();
+    else updatePanels();
   };
 }
 

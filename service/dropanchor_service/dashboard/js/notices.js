@@ -26,7 +26,7 @@ export class Notices {
     write(byId("status-text"), label);
     byId("lost").hidden = status !== "lost";
     write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
-    byId("empty").hidden = status !== "live" || this.fleet.size > 0;
+    byId("empty").hidden = status !== "live" || this.connection.stats.frames === 0 || this.fleet.size > 0;
   }
 }
 

@@ -1,0 +1,106 @@
+"""The whole path: tags publish over Zenoh, the service tracks them, and a real browser shows them move."""
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from threading import Event, Thread
+
+import pytest
+from playwright.sync_api import Browser
+
+from dropanchor_tag_client import TagClient
+from support.browser import Watched, running_chromium, watched_page
+from support.service_process import running_service
+from support.zenoh_router import free_endpoint, free_port
+
+pytestmark = pytest.mark.browser
+
+# Both tags drive round the same circle, which the anchor at the origin lies outside of; one says where it starts.
+CENTRE_M, RADIUS_M, SPEED_MPS = (5.0, 1.0), 2.5, 1.0
+CONFIG = """
+[[site.anchors]]
+id = "7"
+
+[tags.cart]
+start = { x = 7.5, y = 1.0, heading_rad = 1.570796 }
+"""
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with running_chromium() as browser:
+        yield browser
+
+
+@contextmanager
+def driving_tag(name: str, endpoint: str) -> Iterator[None]:
+    """A tag with a platform heading and ten ranges a second, until the end."""
+    stop = Event()
+    with TagClient(name, connect=endpoint, connect_timeout_s=20) as client:
+        thread = Thread(target=_drive, args=(client, stop))
+        thread.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            thread.join()
+
+
+def _drive(client: TagClient, stop: Event) -> None:
+    begun_s = time.monotonic()
+    while not stop.wait(0.1):
+        turned = (time.monotonic() - begun_s) * SPEED_MPS / RADIUS_M
+        x, y = CENTRE_M[0] + RADIUS_M * math.cos(turned), CENTRE_M[1] + RADIUS_M * math.sin(turned)
+        client.publish_heading(math.remainder(turned + math.pi / 2, math.tau), std_rad=0.03)
+        client.publish_range("7", math.hypot(x, y), std_m=0.1)
+
+
+def wait_until_moved(page: Watched, tag: str, pixels: float) -> None:
+    """Until the dot of a tag has come so far on the screen."""
+    x, y = page.tags()[tag]["pixel"]
+    place = f"dropanchor.tags().find((tag) => tag.tag === '{tag}').pixel"
+    page.wait_for(f"Math.hypot({place}[0] - {x}, {place}[1] - {y}) > {pixels}")
+
+
+def test_dots_move_in_light_and_dark_and_nothing_is_asked_from_elsewhere(chromium: Browser, tmp_path: Path) -> None:
+    config, endpoint = tmp_path / "yard.toml", free_endpoint()
+    config.write_text(CONFIG)
+    with ExitStack() as stack:
+        url = stack.enter_context(running_service(free_port(), endpoint, config))
+        page = stack.enter_context(watched_page(chromium, url))
+        stack.enter_context(driving_tag("cart", endpoint))
+        stack.enter_context(driving_tag("stray", endpoint))
+        cart = page.page.locator("tr[data-tag='cart']")
+        cart.wait_for()
+        page.page.locator("tr[data-tag='stray']").wait_for()
+        page.wait_for("dropanchor.tags().some((tag) => tag.tag === 'cart' && tag.semiMajor > 0)")
+        wait_until_moved(page, "cart", 20)
+        assert page.tags()["stray"]["state"] != "tracking"
+        cart.click()
+        page.page.screenshot(path=tmp_path / "light.png")
+        dark = stack.enter_context(watched_page(chromium, url, scheme="dark", size=(390, 844)))
+        dark.wait_for("dropanchor.tags().length === 2")
+        assert dark.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(13, 18, 23)"
+        dark.page.screenshot(path=tmp_path / "dark.png")
+        for watched in (page, dark):
+            assert watched.complaints == []
+            assert watched.origins == {url.rstrip("/")}
+
+
+def test_the_page_reconnects_when_the_service_comes_back(chromium: Browser, tmp_path: Path) -> None:
+    config, endpoint, port = tmp_path / "yard.toml", free_endpoint(), free_port()
+    config.write_text(CONFIG)
+    with ExitStack() as stack:
+        with running_service(port, endpoint, config) as url:
+            page = stack.enter_context(watched_page(chromium, url))
+            stack.enter_context(driving_tag("cart", endpoint))
+            page.page.locator("tr[data-tag='cart']").wait_for()
+        page.page.locator("#lost").wait_for(state="visible")
+        with running_service(port, endpoint, config):
+            page.wait_for("dropanchor.status() === 'live'", timeout_s=20)
+            page.page.locator("#lost").wait_for(state="hidden")
+            frames = page.page.evaluate("dropanchor.received().frames")
+            page.wait_for(f"dropanchor.received().frames > {frames} + 5", timeout_s=20)
+            page.wait_for("dropanchor.tags().some((tag) => tag.tag === 'cart')")
