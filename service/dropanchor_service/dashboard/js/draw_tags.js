@@ -71,7 +71,7 @@ export function traceTick(ctx, x, y, heading, radius) {
   ctx.lineTo(x + length * cos, y + length * sin);
 }
 
-/** Names beside the dots as far as they do not cover each other; the selected and the hovered one always.
+/** Names beside the dots as far as they cover neither each other nor dots; the selected and the hovered one always.
  * @param {Scene} scene */
 export function drawLabels(scene) {
   const { ctx, palette } = scene;
@@ -80,12 +80,18 @@ export function drawLabels(scene) {
   ctx.textAlign = "left";
   ctx.textBaseline = "middle";
   /** @type {number[][]} */
-  const taken = [];
+  const taken = scene.rows.length <= LABELS_UP_TO ? [...scene.rows].map((row) => dotBox(scene, row)) : [];
   for (const row of new Set([...first, ...rest])) {
     const important = first.includes(row);
     ctx.font = `${important ? 600 : 400} 12px ${palette.font}`;
     drawLabel(scene, row, important, taken);
   }
+}
+
+/** The ground that a dot needs for itself. @param {Scene} scene @param {number} row */
+function dotBox({ view, fleet }, row) {
+  const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
+  return [x - 7, y - 4, x + 7, y + 4];
 }
 
 /** @param {Scene} scene @param {number} row @param {boolean} important @param {number[][]} taken */

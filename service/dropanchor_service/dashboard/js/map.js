@@ -203,7 +203,7 @@ export class LiveMap extends EventTarget {
     drawGhosts(scene, shown);
     const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
     drawSelection(apart);
-    drawMarkers(apart);
     drawLabels(apart);
+    drawMarkers(apart);
   }
 }
