@@ -7,8 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import zenoh
+
 from dropanchor_tag_client.client import TagClient
-from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings
+from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
 
 PASSWORD_VARIABLE = "DROPANCHOR_PASSWORD"
 
@@ -67,6 +69,17 @@ def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> I
         yield client
     finally:
         client.close()
+
+
+@contextmanager
+def opened_session(arguments: argparse.Namespace) -> Iterator[zenoh.Session]:
+    """One session for many tags, with the common options. Ctrl-C while it connects ends at once."""
+    with _interruptible():
+        session = open_session(session_settings(arguments), arguments.connect_timeout)
+    try:
+        yield session
+    finally:
+        session.close()
 
 
 @contextmanager

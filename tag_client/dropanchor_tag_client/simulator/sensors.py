@@ -55,12 +55,19 @@ def with_noise(range_std: float, heading_std: float, range_hz: float | None = No
     return SensorModels(ranges=RangeModel(hz=range_hz, std=range_std), scalar=ScalarModel(heading_std=heading_std))
 
 
-# paper: as its text says; released: what the data that its authors released really has; real: a DW1000-class tag.
+def calibrated(models: SensorModels) -> SensorModels:
+    """The sensors with a magnetometer that has been calibrated: some iron is always left."""
+    return replace(models, imu=replace(models.imu, hard_iron_std=0.5, soft_iron_std=0.01))
+
+
+# paper: as its text says; released: what the data that its authors released really has; real: a DW1000-class tag;
+# calibrated: the same with a calibrated magnetometer; none: perfect sensors.
 PRESETS: Mapping[str, SensorModels] = MappingProxyType(
     {
         "paper": with_noise(0.2, 0.1),
         "released": with_noise(0.005, 0.01),
         "real": with_noise(0.1, 0.05, range_hz=10.0),
+        "calibrated": calibrated(with_noise(0.1, 0.05, range_hz=10.0)),
         "none": noiseless(),
     }
 )

@@ -70,11 +70,18 @@ def simulate(scenario: str, seed: int, models: SensorModels | None = None) -> Si
 
 
 def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) -> Simulation:
-    """What the sensors say about a motion; `scenario` only names it."""
+    """What the sensors say about a motion; `scenario` only names it.
+
+    Raises ValueError when the motion ends before the tag is first seen.
+    """
+    if len(motion) < 2:
+        raise ValueError("the motion is shorter than the time between two IMU samples")
     error = models.heading_error.draw(motion, stream(seed, Stream.HEADING_ERROR))
     unit = draw_unit(models.imu, models.mount_rad, stream(seed, Stream.IMU_UNIT))
     seen = _first_seen(motion, models.first_seen_s)
     kept = motion.t >= seen
+    if np.count_nonzero(kept) < 2:
+        raise ValueError(f"nothing is left: the tag is first seen at {seen:.1f} s, and the motion ends before")
     ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
     scalars = models.scalar.measure(motion, models.mount_rad, error, stream(seed, Stream.SCALAR))
     before = _with_row_before(motion)

@@ -112,6 +112,12 @@ def _ease(segment: Segment, before: Segment, dt: float) -> tuple[Array, Array]:
     return v, w
 
 
+def joined(first: Trajectory, then: Trajectory) -> Trajectory:
+    """Two stretches as one; the first row of the second is the last of the first."""
+    columns = [np.concatenate([getattr(first, f.name), getattr(then, f.name)[1:]]) for f in fields(first)]
+    return Trajectory(*columns)
+
+
 def integrate(v: Array, w: Array, start: Start, dt: float) -> Trajectory:
     """The path of speed v and yaw rate w, both (n,) at instants `dt` apart.
 

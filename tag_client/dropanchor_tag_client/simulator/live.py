@@ -1,0 +1,193 @@
+"""Simulated tags as they would be heard live: samples of the wire in order of time, made as they are needed."""
+
+import heapq
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_schemas.wire import ImuSample, RangeSample, Vector, anchor_number
+from dropanchor_tag_client.simulator.imu import Imu, draw_unit
+from dropanchor_tag_client.simulator.noise import Stream, stream
+from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges
+from dropanchor_tag_client.simulator.scenarios import trajectory
+from dropanchor_tag_client.simulator.sensors import SensorModels
+from dropanchor_tag_client.simulator.simulation import Simulation, observe, simulate
+from dropanchor_tag_client.simulator.trajectory import Array, Trajectory, joined
+from dropanchor_tag_client.simulator.wander import HABITS, Wanderer
+
+YARD = "yard"
+YARD_IMU_HZ = 100.0
+REST_BEFORE_S = 2.0
+
+
+class StartPose(NamedTuple):
+    """Where a tag is at t = 0, m, and the heading of its body, rad."""
+
+    x: float
+    y: float
+    heading_rad: float
+
+
+class Delivery(NamedTuple):
+    """Samples of one tag (its index), all to be published at `due_s` after the start; each group in order of time."""
+
+    due_s: float
+    tag: int
+    imu: list[ImuSample]
+    ranges: list[RangeSample]
+
+
+class _Heard(NamedTuple):
+    imu: Imu
+    ranges: Ranges
+
+
+def tag_name(index: int) -> str:
+    return f"sim-{index + 1}"
+
+
+def start_poses(count: int, seed: int = 0, scenario: str = YARD, mount_rad: float = 0.0) -> list[StartPose]:
+    """The true start poses of the tags that `deliveries` makes of the same count, seed and scenario."""
+    if scenario == YARD:
+        starts = [_wanderer(seed, index, YARD_IMU_HZ).start for index in range(count)]
+        return [StartPose(start.x, start.y, start.course - mount_rad) for start in starts]
+    motions = [trajectory(scenario, seed + index) for index in range(count)]
+    return [StartPose(float(m.x[0]), float(m.y[0]), float(m.course[0]) - mount_rad) for m in motions]
+
+
+def deliveries(
+    count: int, scenario: str, seed: int, models: SensorModels, t0_ns: int, step_s: float = 0.05
+) -> Iterator[Delivery]:
+    """What `count` tags send, in order of time, each in bundles of `step_s`; `t0_ns` is the time of t = 0.
+
+    The scenario "yard" goes on for ever and is made leg by leg; tag i of another has seed + i and begins with 2 s
+    more of rest. Raises UnknownScenarioError, and ValueError for sensors that need an end where there is none.
+    """
+    if scenario == YARD:
+        _check_endless(models)
+    tags = [_tag(scenario, seed, index, models) for index in range(count)]
+    bundles = [_bundles(index, heard, models.anchors, t0_ns, step_s) for index, heard in enumerate(tags)]
+    return heapq.merge(*bundles, key=attrgetter("due_s"))
+
+
+def simulation(scenario: str, seed: int, index: int, models: SensorModels, duration_s: float | None) -> Simulation:
+    """The run of tag `index` with its truth, for a recording. The yard needs a duration; the rest is cut to it.
+
+    The motion is that of the live tag; its noise is drawn in one go and is another.
+    """
+    if scenario != YARD:
+        motion = trajectory(scenario, seed + index)
+        return _until(motion, scenario, seed + index, models, duration_s)
+    motion = _yard_motion(seed, index, models.imu.hz or YARD_IMU_HZ, duration_s or 60.0)
+    return observe(YARD, _tag_seed(seed, index), motion, models)
+
+
+def _until(motion: Trajectory, scenario: str, seed: int, models: SensorModels, duration_s: float | None) -> Simulation:
+    if duration_s is None:
+        return simulate(scenario, seed, models)
+    hz = models.imu.hz or 1.0 / motion.dt
+    times = np.arange(0.0, min(duration_s, float(motion.t[-1])) + 1e-9, 1.0 / hz)
+    return observe(scenario, seed, motion.at(times), models)
+
+
+def _yard_motion(seed: int, index: int, hz: float, duration_s: float) -> Trajectory:
+    stretches = _wanderer(seed, index, hz).motions()
+    motion = next(stretches)
+    while motion.t[-1] < duration_s:
+        motion = joined(motion, next(stretches))
+    return motion.at(np.arange(0.0, duration_s + 1e-9, 1.0 / hz))
+
+
+def _check_endless(models: SensorModels) -> None:
+    ranges, error = models.ranges, models.heading_error
+    if (
+        ranges.burst_count
+        or ranges.outage_s
+        or ranges.delay_s
+        or error.correlated_std
+        or models.first_seen_s is not None
+    ):
+        raise ValueError(
+            "nlosburst, outage5, hcorr, late15, combo and delays need a scenario with an end, not the yard"
+        )
+
+
+def _wanderer(seed: int, index: int, hz: float) -> Wanderer:
+    return Wanderer(HABITS[index % len(HABITS)], stream(seed, Stream.MOTION, index), 1.0 / hz)
+
+
+def _tag_seed(seed: int, index: int) -> int:
+    """A seed of its own for each tag of the yard's sensors."""
+    return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1)[0])
+
+
+def _tag(scenario: str, seed: int, index: int, models: SensorModels) -> Iterator[_Heard]:
+    if scenario == YARD:
+        return _in_the_yard(seed, index, models)
+    return _in_a_scenario(scenario, seed + index, models)
+
+
+def _in_a_scenario(scenario: str, seed: int, models: SensorModels) -> Iterator[_Heard]:
+    motion = trajectory(scenario, seed)
+    if motion.v[0] == 0.0:
+        motion = motion.after_rest(REST_BEFORE_S)
+    hz = models.imu.hz or 1.0 / motion.dt
+    run = observe(scenario, seed, motion.at(np.arange(0.0, float(motion.t[-1]) + 1e-9, 1.0 / hz)), models)
+    yield _Heard(run.imu, run.ranges)
+
+
+def _in_the_yard(seed: int, index: int, models: SensorModels) -> Iterator[_Heard]:
+    own = _tag_seed(seed, index)
+    unit = draw_unit(models.imu, models.mount_rad, stream(own, Stream.IMU_UNIT))
+    imu_rng, range_rng = stream(own, Stream.IMU), stream(own, Stream.RANGE)
+    ranging = models.ranges if models.ranges.hz else replace(models.ranges, hz=YARD_IMU_HZ)
+    for motion in _wanderer(seed, index, models.imu.hz or YARD_IMU_HZ).motions():
+        error = models.heading_error.draw(motion, imu_rng)
+        ranges = ranging.measure(motion, models.height_m, models.anchors, range_rng)
+        new = ranges.t_s > float(motion.t[0]) + 1e-6
+        yield _Heard(unit.measure(motion, imu_rng, error), ranges.where(new & (ranges.t_s > -1e-6)))
+
+
+def _bundles(
+    tag: int, stretches: Iterator[_Heard], anchors: Sequence[AnchorPlace], t0_ns: int, step_s: float
+) -> Iterator[Delivery]:
+    numbers = [anchor_number(anchor.id) for anchor in anchors]
+    for imu, ranges in stretches:
+        first, last = imu.t_s[0], max(imu.t_s[-1], ranges.t_s.max(initial=0.0))
+        edges = np.arange(np.floor(first / step_s) + 1, np.ceil(last / step_s) + 2) * step_s
+        samples, measured = iter(_imu_samples(imu, t0_ns)), iter(_range_samples(ranges, numbers, t0_ns))
+        imu_counts, range_counts = _counts(imu.t_s, edges), _counts(ranges.t_s, edges)
+        for edge, n_imu, n_ranges in zip(edges.tolist(), imu_counts, range_counts, strict=True):
+            bundle = Delivery(min(edge, float(last)), tag, [*islice(samples, n_imu)], [*islice(measured, n_ranges)])
+            if n_imu or n_ranges:
+                yield bundle
+
+
+def _counts(times: Array, edges: Array) -> list[int]:
+    """How many of the times lie before each edge and not before the edge in front of it."""
+    return [int(n) for n in np.diff(np.searchsorted(times, edges - 1e-9), prepend=0)]
+
+
+def _imu_samples(imu: Imu, t0_ns: int) -> Iterator[ImuSample]:
+    rows = zip(_times_ns(imu.t_s, t0_ns), imu.acc.tolist(), imu.gyro.tolist(), imu.mag.tolist(), strict=True)
+    for t_ns, acc, gyro, mag in rows:
+        yield ImuSample(t_ns, _vector(acc), _vector(gyro), _vector(mag))
+
+
+def _range_samples(ranges: Ranges, numbers: Sequence[int], t0_ns: int) -> Iterator[RangeSample]:
+    columns = (ranges.anchor.tolist(), ranges.range_m.tolist(), ranges.std_m.tolist())
+    for t_ns, anchor, range_m, std_m in zip(_times_ns(ranges.t_s, t0_ns), *columns, strict=True):
+        yield RangeSample(t_ns, numbers[anchor], range_m, std_m)
+
+
+def _times_ns(times: Array, t0_ns: int) -> list[int]:
+    return [t0_ns + round(t * 1e9) for t in times.tolist()]
+
+
+def _vector(values: Sequence[float]) -> Vector:
+    x, y, z = values
+    return x, y, z
