@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 _COMMANDS = {
+    "demo": "the service with simulated tags, to look at in a browser",
     "serve": "run the service",
     "router": "run a Zenoh router alone",
     "replay": "run an engine on a recording, offline",
@@ -17,6 +18,7 @@ Tags publish raw ranges and IMU samples over Zenoh; the service answers with pos
 """
 _EPILOG = """\
 examples:
+  dropanchor demo                          the service with simulated tags: look at it in a browser
   dropanchor serve                         the service with a Zenoh router of its own, nothing to configure
   dropanchor replay RECORDING --anchor 7   the same estimator on a recording, with its error
   dropanchor COMMAND --help                everything about one command

@@ -18,10 +18,10 @@ class Interrupt:
 
     def wait(self, goes_on: Callable[[], bool]) -> bool:
         """Until a signal comes; False when `goes_on` has become false before."""
-        while goes_on():
-            if self._event.wait(CHECK_S):
-                return True
-        return False
+        while not self._event.wait(CHECK_S):
+            if not goes_on():
+                return self._event.is_set()
+        return True
 
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
         if self._event.is_set():

@@ -2,6 +2,8 @@
 
 import math
 
+import pytest
+
 from dropanchor_schemas import Anchor, StartPose, TagSettings
 from dropanchor_service.engine import anchor_columns, create_engine, tag_columns
 from dropanchor_service.estimation.batch import HeadingSource
@@ -29,5 +31,6 @@ def test_anchors_keep_their_order() -> None:
     assert len(anchor_columns([])) == 0
 
 
-def test_the_chosen_engine_is_built() -> None:
-    assert create_engine(load_settings(environment={"DROPANCHOR_ENGINE": "paper"})).name == "paper"
+@pytest.mark.parametrize("name", ["paper", "fleet"])
+def test_the_chosen_engine_is_built(name: str) -> None:
+    assert create_engine(load_settings(environment={"DROPANCHOR_ENGINE": name})).name == name

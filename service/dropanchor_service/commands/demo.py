@@ -1,0 +1,107 @@
+"""`dropanchor demo`: the service with simulated tags, to look at in a browser."""
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from dropanchor_schemas.site import StartPose, TagSettings
+from dropanchor_service import logs
+from dropanchor_service.api.server import ListenError
+from dropanchor_service.commands.options import add_service_options, settings_of
+from dropanchor_service.service import Service
+from dropanchor_service.settings import PaperSettings, Settings, ZenohSettings
+from dropanchor_service.settings_sources import SettingsError
+from dropanchor_service.signals import interrupts
+from dropanchor_service.zenoh_session import ZenohError
+from dropanchor_tag_client.simulator.live import start_poses, tag_name
+
+DESCRIPTION = """\
+Starts the service and simulated tags that drive around one anchor, and prints where to look. The tags run in a
+process of their own and send raw ranges and IMU samples like real ones; their start poses are given to the service.
+Unless the settings say otherwise the engine `paper` runs with its tuned parameters: the published ones are made for
+sensors almost without noise. Ctrl-C ends both.
+"""
+EPILOG = """\
+examples:
+  dropanchor demo
+  dropanchor demo --tags 20 --port 8081 --zenoh-listen tcp/127.0.0.1:7448
+"""
+UNUSABLE = 2
+DIED = 1
+START_STD_M = 0.1
+END_S = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--tags", type=_count, default=6, metavar="N", help="how many tags (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="same seed, same motion (default: %(default)s)")
+    add_service_options(parser)
+    parser.set_defaults(log_level="WARNING")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when it was stopped, 1 when a part of it died, 2 when it could not start."""
+    logs.configure(arguments.log_level)
+    try:
+        settings = _for_demo(settings_of(arguments), arguments.tags, arguments.seed)
+        with (
+            interrupts() as interrupt,
+            Service(settings) as service,
+            _simulated_tags(settings, arguments.tags, arguments.seed) as tags,
+        ):
+            sys.stdout.write(_where_to_look(service.url))
+            sys.stdout.flush()
+            stopped = interrupt.wait(lambda: tags.poll() is None and not service.has_died)
+    except (SettingsError, ListenError, ZenohError) as error:
+        sys.stderr.write(f"dropanchor demo: {error}\n")
+        return UNUSABLE
+    if not stopped:
+        sys.stderr.write("dropanchor demo: the simulated tags or the service ended by themselves; see the log above\n")
+    return 0 if stopped else DIED
+
+
+def _for_demo(settings: Settings, count: int, seed: int) -> Settings:
+    """The engine `paper` cannot find out by itself where a tag starts, so it is told."""
+    starts = {
+        tag_name(index): TagSettings(
+            start=StartPose(x=start.x, y=start.y, heading_rad=start.heading_rad, std_m=START_STD_M)
+        )
+        for index, start in enumerate(start_poses(count, seed))
+    }
+    paper = PaperSettings(preset="tuned") if settings.paper == PaperSettings() else settings.paper
+    return settings.model_copy(update={"tags": starts | dict(settings.tags), "paper": paper})
+
+
+@contextmanager
+def _simulated_tags(settings: Settings, count: int, seed: int) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", "dropanchor_tag_client", "simulate"]
+    command += ["--tags", str(count), "--seed", str(seed)]
+    command += ["--site", settings.site.id, "--connect", _endpoint(settings.zenoh)]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _endpoint(zenoh: ZenohSettings) -> str:
+    """Where the tags connect: any address that we listen on is ours on the loopback too."""
+    return (zenoh.connect or zenoh.listen)[0].replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+
+
+def _where_to_look(url: str) -> str:
+    return f"the page:   {url}/\nthe poses:  curl {url}/api/v1/poses\nCtrl-C ends the demo.\n"
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 1:
+        raise argparse.ArgumentTypeError("at least 1")
+    return count

@@ -1,0 +1,79 @@
+"""The demo: moving tags within seconds, and nothing left behind when it is stopped."""
+
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from support.service import command, environment
+from support.zenoh_router import free_endpoint, wait_until
+
+
+@contextmanager
+def running_demo(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The demo in a process group of its own, and the address of its page."""
+    process = subprocess.Popen(
+        command("demo", "--port", "0", "--zenoh-listen", free_endpoint(), *arguments),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+        start_new_session=True,
+    )
+    try:
+        assert process.stdout is not None
+        found = re.search(r"(http://\S+)/\n", process.stdout.readline())
+        assert found, process.communicate(timeout=10.0)
+        yield process, found[1]
+    finally:
+        for child in children(process.pid):
+            os.kill(child, signal.SIGKILL)
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def children(pid: int) -> list[int]:
+    path = Path(f"/proc/{pid}/task/{pid}/children")
+    return [int(child) for child in path.read_text().split()] if path.exists() else []
+
+
+def poses(url: str) -> dict[str, dict[str, Any]]:
+    return {pose["tag"]: pose for pose in httpx.get(f"{url}/api/v1/poses").json()["poses"]}
+
+
+def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_of_it_within_three_seconds() -> None:
+    with running_demo("--tags", "3") as (process, url):
+        wait_until(lambda: len(poses(url)) == 3, 20.0)
+        before = poses(url)
+        wait_until(
+            lambda: all(
+                abs(pose["x"] - before[tag]["x"]) + abs(pose["y"] - before[tag]["y"]) > 1.0
+                for tag, pose in poses(url).items()
+            ),
+            20.0,
+        )
+        assert {pose["state"] for pose in poses(url).values()} == {"tracking"}
+        assert "<html" in httpx.get(url).text.lower()
+        (tags,) = children(process.pid)
+        started = time.monotonic()
+        os.killpg(process.pid, signal.SIGINT)  # what a terminal sends on Ctrl-C
+        assert process.wait(10.0) == 0
+        assert time.monotonic() - started < 3.0
+        assert not Path(f"/proc/{tags}").exists()
+
+
+def test_the_demo_ends_with_a_sentence_when_its_tags_die() -> None:
+    with running_demo("--tags", "1") as (process, _):
+        (tags,) = children(process.pid)
+        os.kill(tags, signal.SIGKILL)
+        assert process.wait(10.0) == 1
+        assert process.stderr is not None
+        assert "the simulated tags or the service ended by themselves" in process.stderr.read()
