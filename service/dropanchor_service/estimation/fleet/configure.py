@@ -15,7 +15,7 @@ START_HEADING_STD = 0.05  # rad
 REFERENCE_STD = 0.1  # rad, constant error of a heading reference
 V_MAX = 10.0  # m/s
 MOUNT_KNOWN_STD, MOUNT_UNKNOWN_STD = 0.02, 0.5  # rad
-CRAB_KNOWN_STD, CRAB_UNKNOWN_STD = 0.05, 0.15  # rad, of a tag that is fixed to what drives, and of one that is carried
+CRAB_KNOWN_STD, CRAB_UNKNOWN_STD = 0.05, 0.2  # rad, slip of what drives, and sway of what is carried
 GYRO_STD = 0.003  # rad/s, what is left of the gyroscope's bias after the front-end
 
 

@@ -17,7 +17,7 @@ from .predict import diffuse, fill_decay, move, transport
 from .publish import publish
 from .start import give_reference_error, is_referred, median, second_class, start_known, start_ring, turn_about
 from .tuning import Tuning
-from .update import bound_speed, predict_range, settle, update_bearing, update_heading, update_range, update_rest, wrap
+from .update import bound_speed, predict_range, update_bearing, update_heading, update_range, update_rest, wrap
 
 
 @njit(nogil=True)
@@ -207,8 +207,6 @@ def _step(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, 
     for h in range(count):
         if node.rest > 0:
             work.log_weight[h] += update_rest(work.mean[h], work.cov[h], PH, node, t)
-        else:
-            settle(work.mean[h], work.cov[h], PH, node, t)
     row.since_range_s += node.dt_s
     recover(work, count, row, node, t)
     if node.kind == RANGE and row.anchor >= 0:

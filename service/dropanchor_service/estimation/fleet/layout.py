@@ -90,6 +90,8 @@ ROW: Final = np.dtype(
         ("since_range_s", np.float64),
         ("since_seed_s", np.float64),
         ("since_nlos_s", np.float64),
+        ("last_x", np.float64),  # m, of the mode that was published last, from the anchor
+        ("last_y", np.float64),
         ("good_s", np.float64),
         ("bad_s", np.float64),
         ("high_run", np.int32),

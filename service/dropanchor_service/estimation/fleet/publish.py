@@ -15,7 +15,7 @@ from .tuning import Tuning
 @njit(nogil=True)
 def publish(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, belief: Any, buffers: Any) -> None:
     members, taken, mean, cov = buffers
-    p_mode, relative, head = best_mode(work, count, members, taken, mean, cov)
+    p_mode, relative, head = best_mode(work, count, row, members, taken, mean, cov, t)
     anchor = anchors[row.anchor]
     belief.x, belief.y = mean[0] + anchor.x, mean[1] + anchor.y
     belief.course, belief.speed, belief.yaw = mean[2], mean[3], mean[4]

@@ -63,14 +63,16 @@ def is_referred(kind: int) -> bool:
 
 
 @njit(nogil=True)
-def choose_model(row: Any, node: Any) -> None:
-    """The heading error's model where the kind of heading gives it."""
+def choose_model(row: Any, node: Any, t: Tuning) -> None:
+    """The heading error's model where the kind of heading gives it; a platform's heading is that of its travel."""
     if node.heading_kind == ABSOLUTE_HEADING:
         row.model = COMMON
         if row.start_known == 1 and math.isfinite(row.start_heading):
             row.north = wrap(node.heading - row.start_heading)
     elif node.heading_kind == DERIVED_HEADING:
         row.model = STEADY
+        row.mount_std = min(row.mount_std, t.platform_mount_std)
+        row.crab_std = t.platform_crab_std
 
 
 @njit(nogil=True)
@@ -94,7 +96,7 @@ def start_known(work: Work, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     known = given or is_referred(node.heading_kind)
     ring = 1 if known else t.ring_bearings
     cell = 2.0 * math.pi / ring
-    choose_model(row, node)
+    choose_model(row, node, t)
     for h in range(ring):
         yaw = row.start_heading if given else node.heading + cell * h
         variance = row.start_heading_std**2 if given else node.heading_var
@@ -136,7 +138,7 @@ def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool
     top = min(t.ring_speed_max, row.v_max)
     signs = 2 if row.reverse == 1 and not at_rest else 1
     cell = 2.0 * math.pi / t.ring_bearings
-    choose_model(row, node)
+    choose_model(row, node, t)
     row.referred = 1 if is_referred(node.heading_kind) else 0
     variance = node.heading_var if row.referred == 1 else 1e-4
     h = 0

@@ -162,11 +162,33 @@ def sigma_obs(J: Any) -> float:
 
 
 @njit(nogil=True)
-def best_mode(work: Work, count: int, members: Any, taken: Any, mean: Any, cov: Any) -> tuple[float, float, int]:
-    """(p_mode, relative sigma, head) of the mode around the heaviest hypothesis."""
+def stay(work: Work, count: int, x: float, y: float, loyalty: float) -> int:
+    """The heaviest hypothesis, but one near (x, y) if it is not lighter by more than `loyalty`.
+
+    Of two mirrored modes of equal weight the one that was published last stays, rather than both in turn.
+    """
     head = best_of(work, count)
+    near = -1
+    for h in range(count):
+        dx = work.mean[h, R] * math.cos(work.mean[h, PHI]) - x
+        dy = work.mean[h, R] * math.sin(work.mean[h, PHI]) - y
+        close = dx * dx + dy * dy <= (1.0 + 2.0 * relative_sigma(work.mean[h], work.cov[h])) ** 2
+        if close and (near < 0 or work.log_weight[h] > work.log_weight[near]):
+            near = h
+    if near >= 0 and work.log_weight[near] > work.log_weight[head] - loyalty:
+        return near
+    return head
+
+
+@njit(nogil=True)
+def best_mode(
+    work: Work, count: int, row: Any, members: Any, taken: Any, mean: Any, cov: Any, t: Tuning
+) -> tuple[float, float, int]:
+    """(p_mode, relative sigma, head) of the mode that is published."""
+    head = stay(work, count, row.last_x, row.last_y, t.loyalty)
     for h in range(count):
         taken[h] = False
     weight = cluster(work, count, head, taken, members)
     sigma = moments(work, count, members, head, mean, cov)
+    row.last_x, row.last_y = mean[0], mean[1]
     return weight, sigma, head

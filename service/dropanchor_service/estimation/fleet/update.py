@@ -145,13 +145,6 @@ def update_rest(s: Any, P: Any, PH: Any, node: Any, t: Tuning) -> float:
 
 
 @njit(nogil=True)
-def settle(s: Any, P: Any, PH: Any, node: Any, t: Tuning) -> None:
-    """A speed that cannot be told from zero is pulled there: a tag stands or goes, it does not creep."""
-    if abs(s[V]) < t.settle_speed and s[V] ** 2 < 4.0 * P[V, V] and node.dt_s > 0.0:
-        update_component(s, P, PH, V, 0.0, t.settle_std**2 / node.dt_s)
-
-
-@njit(nogil=True)
 def bound_speed(s: Any, P: Any, PH: Any, low: float, high: float) -> float:
     """Truncate the speed to [low, high] where its mean is outside; returns the log of the probability it kept.
 
