@@ -9,7 +9,7 @@ from typing import Any
 
 from numba import njit
 
-from .layout import OFFSET, PHI, WORK, N, R, V, Work
+from .layout import KEEP, OFFSET, PHI, N, R, V, Work
 from .manage import best_of, copy_hypothesis
 from .tuning import Tuning
 
@@ -22,7 +22,7 @@ def open_alternative(work: Work, count: int, row: Any, t: Tuning) -> int:
     blocked = row.high_run >= t.blocked_run
     row.high_run = row.low_run = 0
     source = best_of(work, count)
-    if count >= WORK - 2 or (work.blocked[source] == 0) != blocked:
+    if count >= KEEP or (work.blocked[source] == 0) != blocked:
         return count
     copy_hypothesis(work, source, count)
     s, P = work.mean[count], work.cov[count]

@@ -148,7 +148,7 @@ def _manage(work: Work, count: int, row: Any, node: Any, t: Tuning) -> int:
 @njit(nogil=True)
 def _reseed(work: Work, count: int, row: Any, t: Tuning) -> int:
     """Keep the possibility of a wrong heading reference alive while tracking."""
-    if row.declared == 0 or count >= WORK - 1:
+    if row.declared == 0 or count >= layout.KEEP:
         return count
     for h in range(count):
         if work.kind[h] == 1:

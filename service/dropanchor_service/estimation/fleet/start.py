@@ -134,9 +134,9 @@ def second_class(work: Work, source: int, target: int, row: Any, t: Tuning, yaw_
 @njit(nogil=True)
 def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool, t: Tuning) -> int:
     """Bearings x speeds with a standard deviation of half a cell; speeds forward unless reverse is allowed."""
-    speeds = 1 if at_rest else t.ring_speeds
-    top = min(t.ring_speed_max, row.v_max)
     signs = 2 if row.reverse == 1 and not at_rest else 1
+    speeds = 1 if at_rest else t.ring_speeds // signs  # within KEEP in every case
+    top = min(t.ring_speed_max, row.v_max)
     cell = 2.0 * math.pi / t.ring_bearings
     choose_model(row, node, t)
     row.referred = 1 if is_referred(node.heading_kind) else 0
@@ -154,7 +154,7 @@ def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool
                 # an error of the mounting angle turns everything about the anchor: the ring covers the angle between
                 P[PHI, PHI] += row.mount_std**2
                 P[PHI, MOUNT] = P[MOUNT, PHI] = row.mount_std**2
-                speed_cell = top / t.ring_speeds
+                speed_cell = top / speeds
                 s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
                 P[V, V] = 0.01 if at_rest else (speed_cell / 2.0) ** 2
                 if row.referred == 1:

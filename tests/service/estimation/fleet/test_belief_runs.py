@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.batch import State, StateReason
-from dropanchor_service.estimation.fleet.layout import make_pool
+from dropanchor_service.estimation.fleet.layout import KEEP, make_pool
 
 from .tracks import Drive, drive, rows_of, run, track
 
@@ -99,3 +99,15 @@ def test_ranges_alone_do_not_fix_a_tag_that_stands_still() -> None:
     beliefs = run(rows_of(1, known=True), make_pool(512), nodes)
     assert np.isinf(beliefs["sigma_obs"][-1])
     assert np.isfinite(track(truth, known=True)["sigma_obs"][-1])
+
+
+def test_a_tag_that_may_reverse_is_found_too_or_stays_ambiguous() -> None:
+    for truth in map(drive, range(2000, 2004)):
+        rows = rows_of(1, known=False)
+        rows["reverse"] = 1
+        moving = truth.nodes[15:]  # first seen in motion: the ring has both directions of travel
+        beliefs = run(rows, make_pool(512), moving)
+        assert rows["count"][0] <= KEEP
+        assert rows["fault"][0] == 0
+        if beliefs["state"][-1] == State.TRACKING:
+            assert np.hypot(beliefs["x"][-1] - truth.x[-1], beliefs["y"][-1] - truth.y[-1]) < 2.0
