@@ -7,19 +7,22 @@ import numpy as np
 
 from dropanchor_schemas.site import Anchor, TagSettings
 from dropanchor_service.estimation.batch import ANCHOR, Array, Engine, HeadingSource, default_settings
+from dropanchor_service.kernels import keep_compiled, warm_up
 from dropanchor_service.settings import Settings
 
 
 def create_engine(settings: Settings) -> Engine:
-    """Each engine is imported when it is chosen: filterpy alone costs seconds."""
+    """Each engine is imported when it is chosen: filterpy alone costs seconds, compiling the kernels a minute, once."""
     match settings.engine:
         case "paper":
             from dropanchor_service.estimation.paper import PaperEngine
 
             return PaperEngine(settings.paper.values())
         case "fleet":
+            keep_compiled()
             from dropanchor_service.estimation.fleet.engine import FleetEngine
 
+            warm_up(FleetEngine())
             return FleetEngine()
 
 
