@@ -1,5 +1,6 @@
 """The JSON payload of samples: one object that anything can send."""
 
+import json
 import math
 from typing import Annotated, Literal
 
@@ -8,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dropanchor_schemas.wire import (
     MAX_PAYLOAD_BYTES,
     MAX_T_NS,
+    VERSION,
     BearingSample,
     Frame,
     HeadingSample,
@@ -28,7 +30,9 @@ Std = Annotated[float | None, Field(description="Standard deviation; leave it ou
 
 
 class _Message(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    """Strict: a text or a truth value where a number belongs is a mistake of the sender, not a number."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Imu(_Message):
@@ -70,8 +74,6 @@ class SamplesMessage(_Message):
     """A batch of raw samples of one tag."""
 
     model_config = ConfigDict(
-        extra="forbid",
-        frozen=True,
         json_schema_extra={
             "examples": [
                 {"range": [{"t_ns": 1760000000000000000, "anchor": "7", "range_m": 12.34}]},
@@ -94,7 +96,7 @@ class SamplesMessage(_Message):
         },
     )
 
-    version: int = Field(default=1, description="Version of this schema; decoders refuse what they do not know.")
+    version: int = Field(default=1, ge=1, le=1, description="Of this schema; decoders refuse what they do not know.")
     clock: Literal["utc", "boot"] = Field(
         default="utc", description="utc: ns since 1970; boot: ns since the tag's start."
     )
@@ -115,11 +117,21 @@ def decode_json(payload: bytes) -> Frame | Rejection:
     try:
         message = SamplesMessage.model_validate_json(payload)
     except ValidationError as error:
-        return _rejection(error)
-    if message.version != 1:
-        return Rejection(Reason.VERSION_UNKNOWN, f"version {message.version}, this decoder knows 1")
+        return _unknown_version(payload) or _rejection(error)
     frame = _frame(message)
     return frame if len(frame) else Rejection(Reason.NO_SAMPLES, "the message holds no samples")
+
+
+def _unknown_version(payload: bytes) -> Rejection | None:
+    """Why a payload that this schema does not fit was refused, when its version says that it need not fit."""
+    try:
+        message = json.loads(payload)
+    except (ValueError, RecursionError):
+        return None
+    version = message.get("version") if isinstance(message, dict) else None
+    if not isinstance(version, int) or isinstance(version, bool) or version == VERSION:
+        return None
+    return Rejection(Reason.VERSION_UNKNOWN, f"version {version}, this decoder knows {VERSION}")
 
 
 def _rejection(error: ValidationError) -> Rejection:

@@ -108,7 +108,7 @@ class Frame:
     """The samples of one message. Times are UTC, or since the tag's boot when `boot_clock` is set.
 
     sequence: counts the messages of one publisher, None when it does not count.
-    boot_id: random per start of the publisher, None when it has none.
+    boot_id: random per start of the publisher; None or 0 when it has none, and then its messages are not numbered.
     anchor_names: number → text of the anchors that the message named by text.
     """
 
@@ -149,21 +149,20 @@ def anchor_number(anchor: int | str) -> int:
 def encode_packed(frame: Frame) -> bytes:
     """The packed payload of a frame.
 
-    Raises ValueError when the samples span more than 4,294 s or the payload would exceed MAX_PAYLOAD_BYTES.
+    Raises ValueError when the samples span more than 4,294 s, the payload would exceed MAX_PAYLOAD_BYTES, or a value
+    does not fit into its field (a number beyond float32, an anchor beyond u32).
     """
     times = frame.times()
     t0_ns = min(times, default=0)
-    if (max(times, default=0) - t0_ns) // 1000 >= 2**32:
+    if _dt_us(max(times, default=0), t0_ns) >= 2**32:
         raise ValueError("the samples of one frame span at most 4,294 s")
     size = packed_size(len(frame.imu), len(frame.ranges), len(frame.headings), len(frame.bearings))
     if size > MAX_PAYLOAD_BYTES:
         raise ValueError(f"a payload has at most {MAX_PAYLOAD_BYTES} bytes, this one would have {size}")
-    parts = [_pack_header(frame, t0_ns)]
-    parts += [IMU.pack(_dt_us(s.t_ns, t0_ns), *s.acc, *s.gyro, *(s.mag or _NO_FIELD)) for s in frame.imu]
-    parts += [RANGE.pack(_dt_us(s.t_ns, t0_ns), s.anchor, s.range_m, s.std_m) for s in frame.ranges]
-    parts += [HEADING.pack(_dt_us(s.t_ns, t0_ns), s.heading_rad, s.std_rad) for s in frame.headings]
-    parts += [BEARING.pack(_dt_us(s.t_ns, t0_ns), s.anchor, s.bearing_rad, s.std_rad) for s in frame.bearings]
-    return b"".join(parts)
+    try:
+        return _packed(frame, t0_ns)
+    except (struct.error, OverflowError) as error:
+        raise ValueError(f"a value does not fit into its field: {error}") from error
 
 
 def packed_size(imu: int, ranges: int, headings: int, bearings: int) -> int:
@@ -237,6 +236,15 @@ def encode_json(frame: Frame) -> bytes:
     }
     message |= {name: samples for name, samples in groups.items() if samples}
     return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
+
+
+def _packed(frame: Frame, t0_ns: int) -> bytes:
+    parts = [_pack_header(frame, t0_ns)]
+    parts += [IMU.pack(_dt_us(s.t_ns, t0_ns), *s.acc, *s.gyro, *(s.mag or _NO_FIELD)) for s in frame.imu]
+    parts += [RANGE.pack(_dt_us(s.t_ns, t0_ns), s.anchor, s.range_m, s.std_m) for s in frame.ranges]
+    parts += [HEADING.pack(_dt_us(s.t_ns, t0_ns), s.heading_rad, s.std_rad) for s in frame.headings]
+    parts += [BEARING.pack(_dt_us(s.t_ns, t0_ns), s.anchor, s.bearing_rad, s.std_rad) for s in frame.bearings]
+    return b"".join(parts)
 
 
 def _pack_header(frame: Frame, t0_ns: int) -> bytes:

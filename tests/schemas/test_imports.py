@@ -1,0 +1,22 @@
+"""What a tag imports of the contract needs the standard library only."""
+
+import pytest
+
+from support.commands import python
+
+
+def loaded_by(statement: str) -> set[str]:
+    done = python("-c", f"{statement}\nimport sys\nprint(*sys.modules)")
+    assert done.returncode == 0, done.stderr
+    return {name.partition(".")[0] for name in done.stdout.split()}
+
+
+@pytest.mark.parametrize("module", ["wire", "keys"])
+def test_the_publishing_path_pulls_in_neither_pydantic_nor_numpy(module: str) -> None:
+    loaded = loaded_by(f"import dropanchor_schemas.{module}")
+    assert "dropanchor_schemas" in loaded
+    assert not loaded & {"pydantic", "pydantic_core", "numpy", "zenoh"}
+
+
+def test_the_models_come_when_they_are_asked_for() -> None:
+    assert "pydantic" in loaded_by("from dropanchor_schemas import Pose")
