@@ -3,11 +3,14 @@
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 from support.kernel_cache import use_cache_of_these_sources
 from support.zenoh_router import free_endpoint, running_router
 
 use_cache_of_these_sources()
+settings.register_profile("house", deadline=None)  # machines that run tests are slow now and then
+settings.load_profile("house")
 
 
 @pytest.fixture

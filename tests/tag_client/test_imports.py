@@ -1,0 +1,39 @@
+"""The publishing path stays light: which modules a tag loads."""
+
+import pytest
+
+from support.commands import python
+from support.zenoh_router import free_endpoint, running_router
+
+HEAVY = ("numpy", "pydantic", "pydantic_core", "fastapi", "dropanchor_service")
+PUBLISH = """
+import sys
+from dropanchor_tag_client import TagClient
+with TagClient("a", connect=sys.argv[1], encoding=sys.argv[2]) as tag:
+    tag.publish_range("L0", 1.0)
+    tag.publish_imu((0, 0, 9.8), (0, 0, 0))
+print(*sys.modules)
+"""
+
+
+def heavy_in(modules: str) -> set[str]:
+    assert "zenoh" in modules.split()
+    return set(HEAVY) & set(modules.split())
+
+
+@pytest.mark.parametrize("encoding", ["packed", "json"])
+def test_publishing_loads_neither_numpy_nor_pydantic(encoding: str) -> None:
+    endpoint = free_endpoint()
+    with running_router(endpoint):
+        done = python("-c", PUBLISH, endpoint, encoding)
+    assert done.returncode == 0, done.stderr
+    assert heavy_in(done.stdout) == set()
+
+
+@pytest.mark.parametrize("source", ["replay", "publish"])
+def test_the_commands_for_recordings_and_scripts_load_neither_as_well(source: str) -> None:
+    done = python(
+        "-c", f"import sys, dropanchor_tag_client.cli, dropanchor_tag_client.sources.{source}\nprint(*sys.modules)"
+    )
+    assert done.returncode == 0, done.stderr
+    assert heavy_in(done.stdout) == set()
