@@ -44,6 +44,10 @@ example:
   my_uwb_reader | dropanchor-tag publish --tag cart
 """
 _SIMULATE = """Publishes what the sensors of simulated tags measure while they drive around one anchor."""
+_SIMULATE_EXAMPLES = """examples:
+  dropanchor-tag simulate --tags 5                              five tags, live, until Ctrl-C
+  dropanchor-tag simulate --duration 60 --out recordings/made   a minute of one tag as a recording with its truth
+"""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -74,7 +78,7 @@ def parser(command: str) -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, about, examples in (
         ("replay", _REPLAY, _REPLAY_EXAMPLES),
-        ("simulate", _SIMULATE, ""),
+        ("simulate", _SIMULATE, _SIMULATE_EXAMPLES),
         ("publish", _PUBLISH, _PUBLISH_EXAMPLES),
     ):
         one = commands.add_parser(name, help=about, description=about, epilog=examples, formatter_class=_TEACH)

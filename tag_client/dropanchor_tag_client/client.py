@@ -60,6 +60,13 @@ class TagClient:
         in the log. An open client reconnects by itself for ever; its publishing never blocks.
     """
 
+    _session: zenoh.Session | None = None
+    _publisher: Publisher | None = None
+    _token: zenoh.LivelinessToken | None = None
+    _timer: threading.Thread | None = None
+    _due_s = math.inf
+    _sent = Sent(0, 0, 0)
+
     def __init__(
         self,
         tag: str,
@@ -89,13 +96,7 @@ class TagClient:
         self._wait_when_congested = wait_when_congested
         self._connect_timeout_s = connect_timeout_s
         self._buffer = SampleBuffer(batch_samples)
-        self._due_s = math.inf
-        self._sent = Sent(0, 0, 0)
         self._wake = threading.Condition()
-        self._timer: threading.Thread | None = None
-        self._session: zenoh.Session | None = None
-        self._publisher: Publisher | None = None
-        self._token: zenoh.LivelinessToken | None = None
 
     def __enter__(self) -> Self:
         self.open()
