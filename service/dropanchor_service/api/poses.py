@@ -11,6 +11,7 @@ from dropanchor_service.api.errors import Kind, ProblemError, problems
 from dropanchor_service.api.parts import NO_QUERY, TagFilter, TagId, json_response
 from dropanchor_service.store.answers import Answer, Answers
 
+_VARY = {"vary": "accept"}
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
 
@@ -41,10 +42,12 @@ def poses_router(answers: Answers) -> APIRouter:
     async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
         as_geojson = geojson.wanted(request, answers)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
-        poses = answers.pose_list(found if query.tags else None)
+        wanted = found if query.tags else None
         if as_geojson:
-            return _response(geojson.collection_of(poses), geojson.MEDIA_TYPE)
-        return _response(poses, geojson.JSON)
+            return _response(geojson.collection_of(answers.pose_list(wanted)), geojson.MEDIA_TYPE)
+        return Response(
+            answers.pose_list_text(wanted), media_type=geojson.JSON, headers={"cache-control": "no-store"} | _VARY
+        )
 
     return router
 
@@ -61,7 +64,7 @@ def _pose_of(answers: Answers, name: str) -> Answer:
 
 def _response(answer: Answer, media_type: str) -> Response:
     response = json_response(answer, media_type)
-    response.headers["vary"] = "accept"
+    response.headers.update(_VARY)
     return response
 
 
