@@ -103,13 +103,18 @@ def _rms_aligned(found: Array, true: Array, pivot_found: Array, pivot_true: Arra
     return _rms(np.hypot(*(a @ rotation.T - b).T))
 
 
-def _coverage(error: Array, cov: Array) -> float:
-    """Share of errors (n, 2) inside the 95 % ellipse of their covariance (n, 2, 2); a singular one holds nothing."""
+def nees(error: Array, cov: Array) -> Array:
+    """Normalised squares of errors (n, 2) under their covariance (n, 2, 2); NaN where that is singular."""
     det = cov[:, 0, 0] * cov[:, 1, 1] - cov[:, 0, 1] ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        nees = (
+        squared = (
             cov[:, 1, 1] * error[:, 0] ** 2
             - 2 * cov[:, 0, 1] * error[:, 0] * error[:, 1]
             + cov[:, 0, 0] * error[:, 1] ** 2
         ) / det
-    return float(np.mean((det > 0) & (nees <= CHI2_95_2DOF)))
+    return np.where(det > 0, squared, np.nan)
+
+
+def _coverage(error: Array, cov: Array) -> float:
+    """Share of errors (n, 2) inside the 95 % ellipse of their covariance (n, 2, 2); a singular one holds nothing."""
+    return float(np.mean(nees(error, cov) <= CHI2_95_2DOF))

@@ -1,0 +1,40 @@
+"""Independent tasks on several processes, with results in the order of the tasks, so that reports stay reproducible."""
+
+import multiprocessing
+import multiprocessing.pool
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from types import TracebackType
+from typing import TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+class Workers:
+    """A context: its processes end with it, also on Ctrl-C. With one process everything runs in this one."""
+
+    def __init__(self, processes: int) -> None:
+        self._processes = processes
+        self._pool: multiprocessing.pool.Pool | None = None
+
+    def __enter__(self) -> "Workers":
+        if self._processes > 1:
+            # spawn: threads of this process (numba, Zenoh) do not survive a fork
+            self._pool = multiprocessing.get_context("spawn").Pool(self._processes, _leave_interrupts_to_parent)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._pool is not None:
+            self._pool.terminate()
+            self._pool.join()
+
+    def map(self, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
+        """The results, each as soon as it and all before it are there."""
+        return map(function, tasks) if self._pool is None else self._pool.imap(function, tasks)
+
+
+def _leave_interrupts_to_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
