@@ -1,0 +1,25 @@
+"""The engines of the product that go through raw samples and recordings: the paper's filter four times, and ours."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from dropanchor_service.estimation.batch import Engine
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.paper import TUNED, PaperEngine, PaperParameters
+
+WITHOUT_SPEED = 1.0  # blend: the whole weight on the speed of the EKF
+
+
+def engines() -> dict[str, Callable[[], Engine]]:
+    """By name. Tuned: the tuned parameters of the service."""
+
+    def paper(parameters: PaperParameters) -> Callable[[], Engine]:
+        return lambda: PaperEngine(parameters)
+
+    return {
+        "vanilla EKF, authors'": paper(replace(PaperParameters(), blend=WITHOUT_SPEED)),
+        "Algorithm 1, authors'": paper(PaperParameters()),
+        "vanilla EKF, tuned": paper(replace(TUNED, blend=WITHOUT_SPEED)),
+        "Algorithm 1, tuned": paper(TUNED),
+        "fleet": FleetEngine,
+    }
