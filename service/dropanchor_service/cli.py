@@ -11,6 +11,7 @@ _COMMANDS = {
     "serve": "run the service",
     "router": "run a Zenoh router alone",
     "replay": "run an engine on a recording, offline",
+    "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }
 _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
@@ -21,6 +22,7 @@ examples:
   dropanchor demo                          the service with simulated tags: look at it in a browser
   dropanchor serve                         the service with a Zenoh router of its own, nothing to configure
   dropanchor replay RECORDING --anchor 7   the same estimator on a recording, with its error
+  dropanchor evaluate paper --out report   the paper's experiments, its figures beside ours
   dropanchor COMMAND --help                everything about one command
 """
 

@@ -11,7 +11,6 @@ from dropanchor_service.api.errors import Kind, ProblemError, problems
 from dropanchor_service.api.parts import NO_QUERY, TagFilter, TagId, json_response
 from dropanchor_service.store.answers import Answer, Answers
 
-_VARY = {"vary": "accept"}
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
 
@@ -42,12 +41,10 @@ def poses_router(answers: Answers) -> APIRouter:
     async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
         as_geojson = geojson.wanted(request, answers)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
-        wanted = found if query.tags else None
+        poses = answers.pose_list(found if query.tags else None)
         if as_geojson:
-            return _response(geojson.collection_of(answers.pose_list(wanted)), geojson.MEDIA_TYPE)
-        return Response(
-            answers.pose_list_text(wanted), media_type=geojson.JSON, headers={"cache-control": "no-store"} | _VARY
-        )
+            return _response(geojson.collection_of(poses), geojson.MEDIA_TYPE)
+        return _response(poses, geojson.JSON)
 
     return router
 
@@ -64,7 +61,7 @@ def _pose_of(answers: Answers, name: str) -> Answer:
 
 def _response(answer: Answer, media_type: str) -> Response:
     response = json_response(answer, media_type)
-    response.headers.update(_VARY)
+    response.headers["vary"] = "accept"
     return response
 
 

@@ -14,7 +14,6 @@ import orjson
 from dropanchor_service.estimation.batch import POSE, Array, State
 from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95
 from dropanchor_service.store.latest import LatestPoses
-from dropanchor_service.store.pose_text import pose_list_text
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
 
@@ -48,16 +47,6 @@ class Answers:
         """`PoseList` of these tags, or of all, as far as they have a pose."""
         now_ns = self.now_ns()
         return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
-
-    def pose_list_text(self, tags: Sequence[Tag] | None = None) -> bytes:
-        """`pose_list` as JSON, without a dictionary per tag."""
-        now_ns = self.now_ns()
-        columns = columns_of(self.rows(tags), self.site, self.tags, now_ns)
-        hypotheses = [b"[]"] * len(columns.states)
-        for index in np.flatnonzero(columns.poses["state"] == State.AMBIGUOUS).tolist():
-            modes = self.latest.hypotheses(int(columns.poses["row"][index]))
-            hypotheses[index] = to_json(_hypotheses(modes))
-        return pose_list_text(columns, hypotheses, now_ns)
 
     def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
         """`Pose` for each of the POSE rows."""

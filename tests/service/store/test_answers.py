@@ -127,30 +127,6 @@ def test_a_list_holds_the_tags_that_have_a_pose_or_the_chosen_ones() -> None:
     assert answers.pose_list([])["poses"] == []
 
 
-@pytest.mark.parametrize("site", [Site(anchors=[Anchor(id="17")]), Site(georeference=Georeference(lat=50, lon=8))])
-def test_the_list_as_text_is_that_of_the_dictionaries_byte_for_byte(site: Site) -> None:
-    answers = make_answers(site)
-    assert answers.pose_list_text() == to_json(answers.pose_list())
-    names = ("a", 'quoted ",{}[]', "Gerät 7", "lost", "unknown", "several")
-    for name in names:
-        answers.tags.register(name)
-    answers.tags.set_online("a", True)
-    modes = np.zeros(2, HYPOTHESIS)
-    modes["row"], modes["weight"], modes["cov"] = 5, [0.7, 0.3], np.stack([np.eye(2) * 0.01, np.full((2, 2), np.nan)])
-    rows = [
-        make_pose(0, x=math.pi, y=1e-17, cov=np.eye(3) / 3, heading=-0.0),
-        make_pose(1, anchor=-1, speed=1e300),
-        make_pose(2, cov=np.diag([1.0, 2.0, np.inf])),
-        make_pose(3, t_ns=T_NS - 20 * 10**9),
-        make_pose(4, x=np.nan, y=np.nan, cov=np.nan, range=np.nan, sigma_obs=np.inf),
-        make_pose(5, state=State.AMBIGUOUS, reason=StateReason.SEVERAL_MODES),
-    ]
-    answers.latest.write(np.concatenate(rows), modes)
-    assert answers.pose_list_text() == to_json(answers.pose_list())
-    chosen = [answers.tags.register(name) for name in names[4:1:-1]]
-    assert answers.pose_list_text(chosen) == to_json(answers.pose_list(chosen))
-
-
 def test_a_frame_has_one_entry_per_tag_in_every_column() -> None:
     answers = make_answers(Site(georeference=Georeference(lat=50, lon=8)))
     for name in "abc":

@@ -1,0 +1,107 @@
+"""`dropanchor evaluate`: the experiments of the paper, and real recordings, as a report."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from dropanchor_service.evaluation import recordings
+from dropanchor_service.evaluation.paper.whole import FULL, QUICK, TITLE, Experiment, experiments, preface
+from dropanchor_service.evaluation.parallel import Workers
+from dropanchor_service.evaluation.plaza import FILES, read_plaza
+from dropanchor_service.evaluation.report import Section, markdown_table, write_report
+from dropanchor_tag_client.recording import RecordingError
+
+DESCRIPTION = """\
+paper       every experiment of the paper that needs none of its hardware, as a report with the paper's own numbers
+            beside ours: report.html, report.md, results.json and pictures; some minutes on two cores
+recordings  the paper's filter and our engine on real recordings with ground truth
+"""
+EPILOG = """\
+examples:
+  dropanchor evaluate paper --out report            the whole report
+  dropanchor evaluate paper --out report --quick    a handful of seeds: does it run?
+  dropanchor evaluate recordings --plaza            real ranges and RTK truth from PyPI's gtsam
+  dropanchor evaluate recordings --data FOLDER      recordings of your own, one folder each, with truth.csv
+"""
+DATA = Path("../shared/data")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    what = parser.add_subparsers(required=True, metavar="WHAT", dest="what")
+    paper = what.add_parser("paper", help="the experiments of the paper")
+    paper.add_argument("--out", type=Path, default=Path("report"), metavar="DIR", help="where to write (report)")
+    paper.add_argument("--quick", action="store_true", help="few seeds: shows that it runs, not how good it is")
+    _add_common(paper)
+    real = what.add_parser("recordings", help="real recordings with ground truth")
+    real.add_argument("--plaza", action="store_true", help="the Plaza sets of the package gtsam")
+    real.add_argument("--out", type=Path, metavar="DIR", help="write a report there, too")
+    _add_common(real)
+
+
+def _add_common(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--data",
+        type=Path,
+        default=Path(os.environ.get("DROPANCHOR_DATA", DATA)),
+        metavar="DIR",
+        help=f"folder with recordings ($DROPANCHOR_DATA, else {DATA})",
+    )
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="(one per core)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0 when it ran to the end, 2 when recordings cannot be used or nothing can be written, 130 on Ctrl-C."""
+    try:
+        return _paper(arguments) if arguments.what == "paper" else _recordings(arguments)
+    except (RecordingError, OSError) as error:
+        print(f"dropanchor evaluate: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("stopped", file=sys.stderr)
+        return 130
+
+
+def _paper(arguments: argparse.Namespace) -> int:
+    plan = QUICK if arguments.quick else FULL
+    arguments.out.mkdir(parents=True, exist_ok=True)  # before the minutes of work, not after them
+    with Workers(arguments.processes) as workers:
+        sections = _run_all(experiments(plan, workers, arguments.data))
+    write_report(arguments.out, TITLE, preface(plan), sections)
+    print(f"report: {arguments.out / 'report.html'}")
+    return 0
+
+
+def _recordings(arguments: argparse.Namespace) -> int:
+    with Workers(arguments.processes) as workers:
+        if arguments.plaza:
+            plaza = [read_plaza(name) for name in FILES]
+            todo = Experiment("Plaza", len(plaza), lambda step: recordings.run_read(workers, step, plaza))
+        else:
+            folders = recordings.recordings_in(arguments.data)
+            if not folders:
+                raise RecordingError(f"{arguments.data} holds no recording with a truth.csv")
+            todo = Experiment("recordings", len(folders), lambda step: recordings.run(workers, step, folders))
+        sections = _run_all([todo])
+    for section in sections:
+        print(section.finding, *section.text, *(markdown_table(table) for table in section.tables), sep="\n\n")
+    if arguments.out:
+        write_report(arguments.out, "Real recordings", [], sections)
+        print(f"report: {arguments.out / 'report.html'}")
+    return 0
+
+
+def _run_all(todo: Sequence[Experiment]) -> list[Section]:
+    sections = []
+    with tqdm(total=sum(one.steps for one in todo), unit="step") as bar:
+
+        def step() -> None:
+            bar.update()
+
+        for one in todo:
+            bar.set_description(one.name)
+            sections.append(one.run(step))
+    return sections

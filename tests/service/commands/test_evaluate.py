@@ -1,0 +1,119 @@
+"""`dropanchor evaluate` as a user calls it, with a handful of seeds."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dropanchor_service.cli import main
+from dropanchor_service.commands import evaluate
+from dropanchor_service.evaluation.paper import families, robots, unknown_start
+from dropanchor_service.evaluation.paper.whole import Plan
+from support.commands import environment
+from support.recordings import write_square
+
+TINY = Plan(families=2, table1=1, fig4=1, robots=1, draws=2000, anchors=1)
+CASES = (
+    *(families.Case("L1", name) for name in families.NOISES),
+    families.Case("L1", "paper", ("late15",)),
+    families.Case("L1", "real", ("nlos10", "drop20")),
+)
+
+
+@pytest.fixture
+def tiny(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(evaluate, "QUICK", TINY)
+    monkeypatch.setattr(families, "CASES", CASES)
+    monkeypatch.setattr(unknown_start, "CASES", (families.Case("S5", "paper"), families.Case("L1", "paper")))
+    monkeypatch.setattr(robots, "MAGNETOMETERS", ("calibrated",))
+
+
+def results(folder: Path) -> Any:
+    found = json.loads((folder / "results.json").read_text())
+    assert found["families"].pop("timing")
+    return found
+
+
+@pytest.mark.usefixtures("tiny")
+def test_the_report_has_every_experiment_and_the_same_seeds_give_the_same_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "data" / "square").mkdir(parents=True)
+    write_square(tmp_path / "data" / "square", range_std_m=0.05)
+    out = {processes: tmp_path / str(processes) for processes in (1, 2)}
+    for processes, folder in out.items():
+        options = ["--quick", "--out", str(folder), "--data", str(tmp_path / "data"), "--processes", str(processes)]
+        assert main(["evaluate", "paper", *options]) == 0
+    assert "100%" in capsys.readouterr().err
+    one, two = (results(folder) for folder in out.values())
+    assert one == two
+    assert set(one) == {
+        *("observability", "fig3", "error_propagation", "fig4", "table1"),
+        *("families", "unknown_start", "robots", "recordings"),
+    }
+    assert one["families"]["rows"]["L1-paper"]["vanilla EKF, tuned"]["median"] > 0
+    assert one["recordings"]["square"]["A"]["Algorithm 1, tuned"]["rmse"] < 2.0
+    report = (out[1] / "report.html").read_text()
+    assert "seeds 1000 to 1007" in report
+    assert "2.81" in report
+    for picture in ("families_paper", "perturbations", "robots_triangle", "robots_TUM"):
+        assert f'src="{picture}.png"' in report
+        assert (out[1] / f"{picture}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_recordings_are_compared_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "square").mkdir()
+    write_square(tmp_path / "square", range_std_m=0.05)
+    assert main(["evaluate", "recordings", "--data", str(tmp_path), "--processes", "1"]) == 0
+    printed = capsys.readouterr().out
+    assert "| square | A |" in printed
+    assert "development set" in printed
+
+
+def test_a_folder_without_recordings_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["evaluate", "recordings", "--data", str(tmp_path / "none"), "--processes", "1"]) == 2
+    assert "none holds no recording" in capsys.readouterr().err
+
+
+def test_a_report_that_cannot_be_written_is_said_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert main(["evaluate", "paper", "--out", str(tmp_path / "file"), "--processes", "1"]) == 2
+    assert "file" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_it_and_its_processes_at_once(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "dropanchor_service", "evaluate", "paper"]
+    command += ["--out", str(tmp_path), "--data", str(tmp_path), "--processes", "2"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, env=environment(), start_new_session=True)
+    assert process.stderr is not None
+    shown = b""
+    while b"families" not in shown:  # by now the processes run
+        read = os.read(process.stderr.fileno(), 4096)
+        assert read, shown
+        shown += read
+    time.sleep(1.0)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
+    _, rest = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert rest.endswith(b"stopped\n")
+    assert b"Traceback" not in rest
+    assert _all_ended(process.pid, within_s=5.0)
+
+
+def _all_ended(group: int, within_s: float) -> bool:
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
