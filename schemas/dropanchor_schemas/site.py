@@ -15,6 +15,7 @@ def _has_a_key(identifier: str) -> str:
 
 Id = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_has_a_key)]
 Positive = Annotated[FiniteFloat, Field(gt=0)]
+NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
 class _Settings(BaseModel):
@@ -58,9 +59,17 @@ class TagSettings(_Settings):
     height_m: FiniteFloat = Field(default=0.0, description="Height of the tag's antenna, on the anchors' z axis.")
     range_std_m: Positive | None = Field(default=None, description="Of one range; null: the engine's default.")
     range_bias_m: FiniteFloat = 0.0
+    range_bias_std_m: NotNegative | None = Field(
+        default=None, description="How well that is known; 0: exactly, null: not calibrated, the engine's default."
+    )
     range_scale: Positive = 1.0
     mount_angle_rad: FiniteFloat | None = Field(
         default=None, description="Direction of travel minus body x axis, counter-clockwise; null: not known."
+    )
+    slip_std_rad: NotNegative | None = Field(
+        default=None,
+        description="Of the direction of travel about body x axis plus mounting angle: slip of what drives, sway of "
+        "what is carried; 0: none, null: the engine's default.",
     )
     reverse_allowed: bool = Field(default=False, description="Whether the tag may move backwards.")
     heading_source: Literal["auto", "imu", "platform"] = Field(

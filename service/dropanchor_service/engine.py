@@ -37,8 +37,10 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["height"] = tag.height_m
     columns["range_std"] = _or_nan(tag.range_std_m)
     columns["range_bias"] = tag.range_bias_m
+    columns["range_bias_std"] = _or_nan(tag.range_bias_std_m)
     columns["range_scale"] = tag.range_scale
     columns["mount_angle"] = _or_nan(tag.mount_angle_rad)
+    columns["slip_std"] = _or_nan(tag.slip_std_rad)
     columns["reverse_allowed"] = tag.reverse_allowed
     columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
     columns["declination"] = declination_rad

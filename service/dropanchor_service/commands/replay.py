@@ -58,8 +58,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known.add_argument("--tag-height", type=float, default=0.0, metavar="M", help="on the z axis of anchors.csv (0)")
     known.add_argument("--range-std", type=float, metavar="M", help="standard deviation of one range")
     known.add_argument("--range-bias", type=float, default=0.0, metavar="M")
+    known.add_argument("--range-bias-std", type=float, metavar="M", help="how well the bias is known; 0: exactly")
     known.add_argument("--range-scale", type=float, default=1.0, metavar="K")
     known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
+    known.add_argument("--slip-std", type=float, metavar="RAD", help="of the direction of travel about that; 0: none")
     known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
     add("--out", type=Path, metavar="CSV", help=f"write the poses: {','.join(COLUMNS)}")
     add(
@@ -107,8 +109,10 @@ def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
             height_m=arguments.tag_height,
             range_std_m=arguments.range_std,
             range_bias_m=arguments.range_bias,
+            range_bias_std_m=arguments.range_bias_std,
             range_scale=arguments.range_scale,
             mount_angle_rad=arguments.mount_angle,
+            slip_std_rad=arguments.slip_std,
             reverse_allowed=arguments.reverse,
             heading_source=arguments.heading,
             start=arguments.start,

@@ -25,8 +25,10 @@ TAG_SETTINGS = np.dtype(
         ("height", "f8"),
         ("range_std", "f8"),  # NaN: the engine's default
         ("range_bias", "f8"),
+        ("range_bias_std", "f8"),  # NaN: the engine's default
         ("range_scale", "f8"),
         ("mount_angle", "f8"),  # NaN: not known
+        ("slip_std", "f8"),  # of the course about body axis and mounting angle, NaN: the engine's default
         ("reverse_allowed", "?"),
         ("heading_source", "u1"),
         ("start_known", "?"),
@@ -37,6 +39,17 @@ TAG_SETTINGS = np.dtype(
         ("declination", "f8"),  # true minus magnetic north, positive east
     ]
 )
+
+UNKNOWN = (
+    "range_std",
+    "range_bias_std",
+    "mount_angle",
+    "slip_std",
+    "start_x",
+    "start_y",
+    "start_heading",
+    "start_std",
+)  # NaN by default
 
 POSE = np.dtype(
     [
@@ -148,6 +161,6 @@ def default_settings() -> Array:
     """TAG_SETTINGS (0-d) of a tag about which nothing is known."""
     settings = np.zeros((), TAG_SETTINGS)
     settings["range_scale"] = 1.0
-    for name in ("range_std", "mount_angle", "start_x", "start_y", "start_heading", "start_std"):
+    for name in UNKNOWN:
         settings[name] = np.nan
     return settings

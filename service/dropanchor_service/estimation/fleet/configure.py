@@ -28,10 +28,13 @@ def configured(settings: Any, tuning: Tuning) -> Any:
     told = math.isfinite(settings["mount_angle"])
     row["mount"] = settings["mount_angle"] if told else 0.0
     row["mount_std"] = MOUNT_KNOWN_STD if told else MOUNT_UNKNOWN_STD
-    row["crab_std"] = CRAB_KNOWN_STD if told else CRAB_UNKNOWN_STD
+    slip = settings["slip_std"]
+    row["slip_known"] = math.isfinite(slip)
+    row["crab_std"] = slip if row["slip_known"] else (CRAB_KNOWN_STD if told else CRAB_UNKNOWN_STD)
     row["range_std"] = _or_default(settings["range_std"], RANGE_STD)
     row["offset"] = settings["range_bias"]
-    row["offset_std"] = tuning.offset_std
+    bias_std = settings["range_bias_std"]
+    row["offset_std"] = bias_std if math.isfinite(bias_std) else tuning.offset_std
     row["height_std"] = HEIGHT_STD
     row["start_std"] = _or_default(settings["start_std"], START_STD)
     row["start_heading_std"] = START_HEADING_STD

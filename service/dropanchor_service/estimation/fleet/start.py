@@ -72,7 +72,8 @@ def choose_model(row: Any, node: Any, t: Tuning) -> None:
     elif node.heading_kind == DERIVED_HEADING:
         row.model = STEADY
         row.mount_std = min(row.mount_std, t.platform_mount_std)
-        row.crab_std = t.platform_crab_std
+        if row.slip_known == 0:
+            row.crab_std = t.platform_crab_std
 
 
 @njit(nogil=True)

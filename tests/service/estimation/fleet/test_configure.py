@@ -1,0 +1,43 @@
+"""What an operator tells of a tag, in its row."""
+
+import numpy as np
+import pytest
+
+from dropanchor_schemas import TagSettings
+from dropanchor_service.engine import tag_columns
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.fleet.configure import CRAB_KNOWN_STD, CRAB_UNKNOWN_STD, configured
+from dropanchor_service.estimation.fleet.layout import STEADY
+from dropanchor_service.estimation.fleet.node import DERIVED_HEADING, NODE
+from dropanchor_service.estimation.fleet.start import choose_model
+from dropanchor_service.estimation.fleet.tuning import Tuning
+
+
+def row_of(settings: TagSettings) -> Array:
+    row: Array = configured(tag_columns(settings, 0.0), Tuning())
+    return row
+
+
+def test_a_bias_that_is_not_calibrated_has_the_default_spread() -> None:
+    assert row_of(TagSettings())["offset_std"] == Tuning().offset_std
+
+
+@pytest.mark.parametrize("std", [0.0, 0.04])
+def test_a_bias_is_known_as_well_as_the_operator_says(std: float) -> None:
+    row = row_of(TagSettings(range_bias_m=0.2, range_bias_std_m=std))
+    assert [row[name].item() for name in ("offset", "offset_std")] == [0.2, std]
+
+
+def test_a_known_mounting_angle_leaves_slip_and_an_unknown_one_sway() -> None:
+    assert row_of(TagSettings(mount_angle_rad=0.3))["crab_std"] == CRAB_KNOWN_STD
+    assert row_of(TagSettings())["crab_std"] == CRAB_UNKNOWN_STD
+
+
+@pytest.mark.parametrize(("told", "kept"), [(None, Tuning().platform_crab_std), (0.0, 0.0), (0.4, 0.4)])
+def test_a_platforms_slip_is_the_default_only_where_it_is_not_told(told: float | None, kept: float) -> None:
+    rows = row_of(TagSettings(slip_std_rad=told)).reshape(1)
+    node = np.zeros(1, NODE)
+    node["heading_kind"] = DERIVED_HEADING
+    choose_model(rows[0], node[0], Tuning())
+    assert rows[0]["model"] == STEADY
+    assert rows[0]["crab_std"] == kept
