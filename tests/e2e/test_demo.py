@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 
+from support.recordings import write_square
 from support.service import command, environment
 from support.zenoh_router import free_endpoint, wait_until
 
@@ -77,3 +79,27 @@ def test_the_demo_ends_with_a_sentence_when_its_tags_die() -> None:
         assert process.wait(10.0) == 1
         assert process.stderr is not None
         assert "the simulated tags or the service ended by themselves" in process.stderr.read()
+
+
+def test_a_recording_is_played_as_a_live_tag_and_the_page_stays_at_its_end(tmp_path: Path) -> None:
+    write_square(tmp_path)
+    for name in ("range", "heading"):  # its first 3 s
+        path = tmp_path / f"{name}.csv"
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join([lines[0], *(line for line in lines[1:] if float(line.split(",")[0]) < 3.0)]) + "\n")
+    with running_demo("--recording", str(tmp_path), "--engine", "fleet") as (process, url):
+        wait_until(lambda: tmp_path.name in poses(url) and poses(url)[tmp_path.name]["y"] > 2.0, 30.0)
+        assert poses(url)[tmp_path.name]["x"] == pytest.approx(10.0, abs=0.5)
+        time.sleep(1.5)
+        assert process.poll() is None
+        assert httpx.get(url).status_code == 200
+        os.killpg(process.pid, signal.SIGINT)
+        assert process.wait(10.0) == 0
+
+
+def test_a_recording_that_is_not_there_is_said() -> None:
+    found = subprocess.run(
+        command("demo", "--recording", "nowhere"), capture_output=True, text=True, env=environment(), timeout=30
+    )
+    assert found.returncode == 2
+    assert "nowhere is not a folder" in found.stderr

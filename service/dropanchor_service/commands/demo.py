@@ -5,16 +5,19 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service import logs
 from dropanchor_service.api.server import ListenError
 from dropanchor_service.commands.options import add_service_options, settings_of
+from dropanchor_service.commands.recorded import recorded
 from dropanchor_service.service import Service
 from dropanchor_service.settings import PaperSettings, Settings, ZenohSettings
 from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.signals import interrupts
 from dropanchor_service.zenoh_session import ZenohError
+from dropanchor_tag_client.recording import RecordingError
 from dropanchor_tag_client.simulator.live import start_poses, tag_name
 
 DESCRIPTION = """\
@@ -26,6 +29,7 @@ sensors almost without noise. Ctrl-C ends both.
 EPILOG = """\
 examples:
   dropanchor demo
+  dropanchor demo --recording plaza2 --engine fleet
   dropanchor demo --tags 20 --port 8081 --zenoh-listen tcp/127.0.0.1:7448
 """
 UNUSABLE = 2
@@ -37,6 +41,11 @@ END_S = 1.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tags", type=_count, default=6, metavar="N", help="how many tags (default: %(default)s)")
     parser.add_argument("--seed", type=int, default=0, help="same seed, same motion (default: %(default)s)")
+    parser.add_argument(
+        "--recording",
+        metavar="NAME",
+        help="a real tag instead: plaza1 or plaza2 (needs the extra `recordings`), or the folder of a recording",
+    )
     add_service_options(parser)
     parser.set_defaults(log_level="WARNING")
 
@@ -45,16 +54,17 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 1 when a part of it died, 2 when it could not start."""
     logs.configure(arguments.log_level)
     try:
-        settings = _for_demo(settings_of(arguments), arguments.tags, arguments.seed)
         with (
             interrupts() as interrupt,
-            Service(settings) as service,
-            _simulated_tags(settings, arguments.tags, arguments.seed) as tags,
+            _cast(arguments) as cast,
+            Service(cast.settings) as service,
+            _tags(cast) as tags,
         ):
             sys.stdout.write(_where_to_look(service.url))
             sys.stdout.flush()
-            stopped = interrupt.wait(lambda: tags.poll() is None and not service.has_died)
-    except (SettingsError, ListenError, ZenohError) as error:
+            # A recording that was played to its end (0) is no failure: the page stays.
+            stopped = interrupt.wait(lambda: tags.poll() in (None, 0) and not service.has_died)
+    except (SettingsError, ListenError, ZenohError, RecordingError) as error:
         sys.stderr.write(f"dropanchor demo: {error}\n")
         return UNUSABLE
     if not stopped:
@@ -62,7 +72,28 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if stopped else DIED
 
 
-def _for_demo(settings: Settings, count: int, seed: int) -> Settings:
+@dataclass(frozen=True)
+class Cast:
+    """Who takes part: settings of the service, and the arguments of `dropanchor-tag` that play the tags."""
+
+    settings: Settings
+    tags: list[str]
+
+
+@contextmanager
+def _cast(arguments: argparse.Namespace) -> Iterator[Cast]:
+    settings = settings_of(arguments)
+    if settings.paper == PaperSettings():
+        settings = settings.model_copy(update={"paper": PaperSettings(preset="tuned")})
+    if arguments.recording is None:
+        simulate = ["simulate", "--tags", str(arguments.tags), "--seed", str(arguments.seed)]
+        yield Cast(_with_starts(settings, arguments.tags, arguments.seed), simulate)
+        return
+    with recorded(arguments.recording) as tag:
+        yield Cast(tag.into(settings), ["replay", str(tag.folder), "--tag", tag.name])
+
+
+def _with_starts(settings: Settings, count: int, seed: int) -> Settings:
     """The engine `paper` cannot find out by itself where a tag starts, so it is told."""
     starts = {
         tag_name(index): TagSettings(
@@ -70,15 +101,13 @@ def _for_demo(settings: Settings, count: int, seed: int) -> Settings:
         )
         for index, start in enumerate(start_poses(count, seed))
     }
-    paper = PaperSettings(preset="tuned") if settings.paper == PaperSettings() else settings.paper
-    return settings.model_copy(update={"tags": starts | dict(settings.tags), "paper": paper})
+    return settings.model_copy(update={"tags": starts | dict(settings.tags)})
 
 
 @contextmanager
-def _simulated_tags(settings: Settings, count: int, seed: int) -> Iterator[subprocess.Popen[bytes]]:
-    command = [sys.executable, "-m", "dropanchor_tag_client", "simulate"]
-    command += ["--tags", str(count), "--seed", str(seed)]
-    command += ["--site", settings.site.id, "--connect", _endpoint(settings.zenoh)]
+def _tags(cast: Cast) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", "dropanchor_tag_client", *cast.tags]
+    command += ["--site", cast.settings.site.id, "--connect", _endpoint(cast.settings.zenoh)]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
     try:
         yield process

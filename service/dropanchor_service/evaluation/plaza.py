@@ -19,6 +19,9 @@ from dropanchor_tag_client.recording import Anchor, Recording, RecordingError
 FILES = {"plaza1": ("Plaza1_.mat", 0.0), "plaza2": ("Plaza2_.mat", math.pi)}
 """The file, and how far the direction of travel is from the heading in it, rad."""
 
+PLAZA_SCALE, PLAZA_STD = 1.069, 0.6
+"""Of its radios: measured distance over true distance, and standard deviation, m, by a fit to the truth."""
+
 MISSING = "the Plaza sets come with gtsam, which is not installed: pip install dropanchor-service[recordings]"
 
 

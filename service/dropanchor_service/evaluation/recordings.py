@@ -10,13 +10,13 @@ from dropanchor_service.estimation.batch import Array, Engine, default_settings
 from dropanchor_service.evaluation.accuracy import Truth, accuracy
 from dropanchor_service.evaluation.paper.engines import engines
 from dropanchor_service.evaluation.parallel import Workers
+from dropanchor_service.evaluation.plaza import PLAZA_SCALE, PLAZA_STD
 from dropanchor_service.evaluation.replay import anchors_of, replay, samples_of, track_of, truth_of
 from dropanchor_service.evaluation.report import Cell, Section, Table
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 
 AUTHORS = "authors'"
 SAME_M = 0.05
-PLAZA_SCALE, PLAZA_STD = 1.069, 0.6  # of its radios, m; borglab/gtsam ships ranges that are 7 % too long
 
 
 @dataclass(frozen=True)
