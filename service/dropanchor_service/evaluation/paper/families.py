@@ -208,5 +208,5 @@ def _figure(found: Results, cases: Sequence[str], title: str) -> Figure:
         axes.plot(at, [row.worst for row in rows], "x", markersize=4, color=line.get_color())
     axes.set_xticks(np.arange(len(cases)), cases, rotation=20, ha="right", fontsize="small")
     axes.set(yscale="log", ylabel="RMSE, m", title=f"{title}: median (dot), 90 % (line), worst (cross)")
-    axes.legend(fontsize="small")
+    figure.legend(loc="outside right upper", fontsize="small")
     return figure
