@@ -7,6 +7,7 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from dropanchor_schemas.answers import PoseFrame
+from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, Site, TagSettings
@@ -17,6 +18,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "pose": Pose,
     "poses": PoseList,
     "pose_frame": PoseFrame,
+    "explanation": Explanation,
     "site": Site,
     "anchor": Anchor,
     "tag_settings": TagSettings,

@@ -208,7 +208,7 @@ class Ingest:
         return SampleBatch(free["imu"], free["range"], free["heading"], free["bearing"])
 
     def _store(self, batch: PoseBatch) -> None:
-        self._latest.write(batch.poses, batch.hypotheses)
+        self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
         self._metrics.poses.inc(len(batch.poses))
         for reason, count in batch.rejected.items():
             self._metrics.rejected.labels(reason).inc(count)

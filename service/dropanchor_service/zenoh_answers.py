@@ -4,7 +4,8 @@ A queryable that raises leaves the asker without reply or error, so everything u
 """
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
@@ -13,7 +14,9 @@ import zenoh
 from dropanchor_schemas import keys
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
-from dropanchor_service.store.answers import Answers, to_json
+from dropanchor_service.store.answers import Answer, Answers, to_json
+from dropanchor_service.store.at_time import NoPoseThenError
+from dropanchor_service.store.tags import Tag
 
 Reply = tuple[str, bytes]
 """Key and JSON."""
@@ -52,20 +55,34 @@ class ZenohAnswers:
             declared.undeclare()
 
     def poses(self, asked: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
-        """Raises QueryError when one tag is asked for and has no pose."""
-        _refuse(parameters)
+        """Raises QueryError when one tag is asked for and has no pose, at that time if one is given."""
+        at_ns = _time_of(parameters)
         name = _one_tag(str(asked))
         tags = self._answers.tags
         if name is not None:
             tag = tags.find(name)
-            pose = None if tag is None else self._answers.pose_of(tag)
+            pose = None if tag is None else self._pose(tag, at_ns)
             if pose is None:
                 raise QueryError(f"no tag {name!r} is known" if tag is None else f"tag {name!r} has no pose yet")
             yield keys.pose_key(self._site, name), to_json(pose)
             return
         wanted = [tag for tag in tags.all() if asked.includes(keys.pose_key(self._site, tag.name))]
-        for pose in self._answers.pose_list(wanted)["poses"]:
+        for pose in self._answers.pose_list(wanted)["poses"] if at_ns is None else self._poses_at(wanted, at_ns):
             yield keys.pose_key(self._site, pose["tag"]), to_json(pose)
+
+    def _pose(self, tag: Tag, at_ns: int | None) -> Answer | None:
+        try:
+            return self._answers.pose_of(tag) if at_ns is None else self._answers.pose_at(tag, at_ns)
+        except NoPoseThenError as error:
+            raise QueryError(f"tag {tag.name!r}: {error}") from error
+
+    def _poses_at(self, tags: Sequence[Tag], at_ns: int) -> Iterator[Answer]:
+        """Of those tags that have a pose for that time."""
+        for tag in tags:
+            with suppress(QueryError):
+                pose = self._pose(tag, at_ns)
+                if pose is not None:
+                    yield pose
 
     def anchors(self, asked: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
         """Raises QueryError when one anchor is asked for and is not there."""
@@ -104,6 +121,18 @@ def _one_tag(key: str) -> str | None:
         return keys.tag_from_key(key)
     except keys.InvalidKeyError as error:
         raise QueryError(str(error)) from error
+
+
+def _time_of(parameters: str) -> int | None:
+    """The time in `at=<t_ns>`, None without it. Raises QueryError for anything else."""
+    given = [part for part in parameters.split(";") if part.startswith("at=")]
+    _refuse(";".join(part for part in parameters.split(";") if part not in given))
+    if not given:
+        return None
+    digits = given[0].removeprefix("at=")
+    if len(given) > 1 or not (digits.isascii() and digits.isdigit()) or int(digits) >= 2**63:
+        raise QueryError("parameter 'at' takes one time, UTC in ns")
+    return int(digits)
 
 
 def _refuse(parameters: str) -> None:

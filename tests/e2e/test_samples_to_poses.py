@@ -10,6 +10,7 @@ import zenoh
 
 from dropanchor_schemas import Pose, keys
 from dropanchor_schemas.answers import PoseFrame
+from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encode_json, encode_packed
 from dropanchor_service.engine import create_engine
 from dropanchor_service.settings_sources import load_settings
@@ -23,7 +24,7 @@ TAGS = ["a", "b", "Gabelstapler Süd"]
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return settings_file(tmp_path_factory.mktemp("service"), TAGS)
+    return settings_file(tmp_path_factory.mktemp("service"), [*TAGS, "then"])
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +112,27 @@ def test_one_query_with_wildcards_asks_for_many_tags_and_each_answer_has_its_own
 def test_a_query_that_has_no_answer_says_why(session: zenoh.Session) -> None:
     assert ask(session, keys.pose_key("default", "nobody")) == {"error": {"error": "no tag 'nobody' is known"}}
     assert "anchor '99'" in str(ask(session, keys.anchor_key("default", "99"))["error"])
-    assert "parameter 'at'" in str(ask(session, keys.pose_key("default", "a") + "?at=5")["error"])
+    assert "parameter 'when'" in str(ask(session, keys.pose_key("default", "a") + "?when=5")["error"])
+    assert "takes one time" in str(ask(session, keys.pose_key("default", "a") + "?at=noon")["error"])
+
+
+def test_the_pose_at_a_time_is_the_same_over_zenoh_and_rest_and_an_explanation_tells_what_led_there(
+    service: Running, session: zenoh.Session
+) -> None:
+    frame, key = straight_north(100), keys.pose_key("default", "then")
+    put(session, "then", frame)
+    newest_ns = frame.ranges[-1].t_ns
+    wait_until(lambda: newest_ns in [pose["t_ns"] for pose in service.get("/api/v1/poses")["poses"]])
+    explanation = Explanation.model_validate(service.get("/api/v1/tags/then/explain"))
+    assert len(explanation.innovations) == 50
+    assert explanation.innovations[-1].t_ns == newest_ns
+    at_ns = newest_ns - 1_100_000_000
+    over_rest = Pose.model_validate(service.get(f"/api/v1/tags/then/pose?at={at_ns}"))
+    over_zenoh = Pose.model_validate(ask(session, f"{key}?at={at_ns}")[key])
+    assert over_rest.t_ns == at_ns
+    assert over_rest.model_copy(update={"age_s": 0.0}) == over_zenoh.model_copy(update={"age_s": 0.0})
+    assert "ahead" in str(ask(session, f"{key}?at={newest_ns + 3_000_000_000}")["error"])
+    assert ask(session, keys.all_tags("default", "pose") + f"?at={at_ns}")[key]["t_ns"] == at_ns
 
 
 def test_the_anchor_can_be_asked_for(session: zenoh.Session) -> None:
@@ -153,7 +174,7 @@ def test_frames_of_all_poses_come_at_most_ten_times_a_second(service: Running, s
             time.sleep(0.01)
         subscriber.undeclare()
     assert 3 <= len(frames) <= 16
-    assert set(TAGS) >= set(frames[-1].tags) >= {"a"}
+    assert {*TAGS, "then"} >= set(frames[-1].tags) >= {"a"}
 
 
 def test_a_tag_is_online_as_long_as_its_client_is_open(service: Running) -> None:

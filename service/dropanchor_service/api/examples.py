@@ -28,6 +28,29 @@ POSE: dict[str, Any] = {
     "lon": 13.412345678,
     "online": True,
 }
+EXPLANATION: dict[str, Any] = {
+    "pose": POSE,
+    "hypotheses": [],
+    "speed": {"speed_mps": 1.1, "range_rate_mps": 0.82, "predicted_range_rate_mps": 0.79},
+    "speed_track": {"t_ns": [1_799_999_999_750_000_000, 1_800_000_000_000_000_000], "speed_mps": [1.08, 1.1]},
+    "innovations": [
+        {
+            "t_ns": 1_800_000_000_000_000_000,
+            "kind": "range",
+            "anchor": "17",
+            "measured": 3.64,
+            "predicted": 3.58,
+            "innovation": 0.06,
+            "variance": 0.0144,
+            "nis": 0.25,
+            "p_outlier": 0.02,
+            "fused": True,
+        }
+    ],
+    "refused": 0,
+    "samples": {"imu": 60000, "range": 6000},
+    "rejected": {"range_negative": 2},
+}
 POSE_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "poses": [POSE]}
 POSE_FRAME: dict[str, Any] = {
     "t_ns": 1_800_000_000_042_000_000,

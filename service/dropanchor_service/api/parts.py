@@ -77,6 +77,30 @@ class TagFilter(BaseModel):
     )
 
 
+class AtTime(BaseModel):
+    """The query of a route that can answer for another time."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    at: int | None = Field(
+        default=None,
+        ge=0,
+        lt=2**63,
+        description="UTC, ns: the pose at that time instead of the latest one. In the past between two poses that are "
+        "at most 1 s apart, as far back as the memory goes (a minute, less in a very large fleet); up to 2 s after the "
+        "newest pose, carried on with its speed and yaw rate, with a covariance that grows. Without hypotheses.",
+        examples=[1_800_000_000_000_000_000],
+    )
+
+
+class LastInnovations(BaseModel):
+    """The query of an explanation."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    last: int = Field(default=50, ge=1, le=300, description="How many innovations, the newest ones.")
+
+
 @contextmanager
 def saving() -> Iterator[None]:
     """Around a change of the site: what could not be written was not changed either."""

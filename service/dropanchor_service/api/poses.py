@@ -5,11 +5,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from starlette.responses import Response
 
+from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_service.api import examples, geojson
 from dropanchor_service.api.errors import Kind, ProblemError, problems
-from dropanchor_service.api.parts import NO_QUERY, TagFilter, TagId, json_response
+from dropanchor_service.api.parts import AtTime, LastInnovations, TagFilter, TagId, json_response, shown
 from dropanchor_service.store.answers import Answer, Answers
+from dropanchor_service.store.at_time import NoPoseThenError, TooFarAheadError
+from dropanchor_service.store.explain import explanation_of
+from dropanchor_service.store.tags import Tag
 
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
@@ -20,16 +24,28 @@ def poses_router(answers: Answers) -> APIRouter:
     @router.get(
         "/tags/{tag}/pose",
         operation_id="get_pose",
-        summary="The latest pose of a tag",
+        summary="The latest pose of a tag, or its pose at a time",
         response_model=Pose,
-        dependencies=[NO_QUERY],
         responses=_offers(examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the place is unknown.")
-        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, *_NEGOTIATION),
+        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
     )
-    async def get_pose(tag: TagId, request: Request) -> Response:
+    async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
         as_geojson = geojson.wanted(request, answers)
-        pose = _pose_of(answers, tag)
+        pose = _pose_of(answers, tag, query.at)
         return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
+
+    @router.get(
+        "/tags/{tag}/explain",
+        operation_id="explain_pose",
+        summary="Why the latest pose of a tag is what it is",
+        response_model=Explanation,
+        responses=shown(examples.EXPLANATION) | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
+    )
+    async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()]) -> Response:
+        explanation = explanation_of(answers, _known(answers, tag), query.last)
+        if explanation is None:
+            raise _no_pose_yet(tag)
+        return json_response(explanation)
 
     @router.get(
         "/poses",
@@ -49,13 +65,27 @@ def poses_router(answers: Answers) -> APIRouter:
     return router
 
 
-def _pose_of(answers: Answers, name: str) -> Answer:
+def _known(answers: Answers, name: str) -> Tag:
     tag = answers.tags.find(name)
     if tag is None:
         raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {name!r} has been heard or configured.")
-    pose = answers.pose_of(tag)
+    return tag
+
+
+def _no_pose_yet(name: str) -> ProblemError:
+    return ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet.")
+
+
+def _pose_of(answers: Answers, name: str, at_ns: int | None) -> Answer:
+    tag = _known(answers, name)
+    try:
+        pose = answers.pose_of(tag) if at_ns is None else answers.pose_at(tag, at_ns)
+    except TooFarAheadError as error:
+        raise ProblemError(Kind.TOO_FAR_AHEAD, f"Tag {name!r}: {error}.") from error
+    except NoPoseThenError as error:
+        raise ProblemError(Kind.NO_POSE_THEN, f"Tag {name!r}: {error}.") from error
     if pose is None:
-        raise ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet.")
+        raise _no_pose_yet(name)
     return pose
 
 

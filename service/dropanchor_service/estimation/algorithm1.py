@@ -19,7 +19,7 @@ import numpy as np
 from dropanchor_service.estimation.attitude import Vector, wrapped
 from dropanchor_service.estimation.batch import State, StateReason
 from dropanchor_service.estimation.course import S_PER_NS, Course
-from dropanchor_service.estimation.ekf import PoseFilter, Position
+from dropanchor_service.estimation.ekf import Innovation, PoseFilter, Position
 from dropanchor_service.estimation.paper_parameters import PaperParameters
 from dropanchor_service.estimation.range_filter import RangeFilter
 from dropanchor_service.estimation.speed import SpeedEstimator
@@ -61,6 +61,7 @@ class Algorithm1:
         self._fused_ns = 0  # of the newest range fused
         self._fused = (-1, NAN)  # its anchor, and the range as measured
         self._lost = False
+        self.innovation: Innovation | None = None  # of the last range, None if it met no belief
 
     def take_imu(self, t_ns: int, acc: Vector, gyro: Vector, mag: Vector) -> None:
         """An IMU sample: line 10; and lines 11-12 with the heading alone while ranges are missing."""
@@ -78,6 +79,7 @@ class Algorithm1:
     def take_range(self, t_ns: int, index: int, anchor: Position, measured: float, std: float) -> PoseRow:
         """A range, m, with its standard deviation or NaN, to the anchor of this index and (x, y, height above tag)."""
         z = (measured - self._tag.range_bias) / self._tag.range_scale
+        self.innovation = None
         R = (_first_std(std, self._tag.range_std, self._p.range_std) / self._tag.range_scale) ** 2
         if self._ekf is None:
             self._start(t_ns)
@@ -124,7 +126,8 @@ class Algorithm1:
             self._lost = True
             return False
         self._advance(ekf, t_ns)
-        return ekf.update_range(z, R, anchor, self._p.gate)
+        self.innovation = ekf.update_range(z, R, anchor, self._p.gate)
+        return self.innovation.fused
 
     def _correct_speed(self, ekf: PoseFilter, t_ns: int, index: int, z: float) -> None:
         """Lines 13 to 19. The covariance stays, as in the paper and in the released code."""

@@ -83,6 +83,28 @@ HYPOTHESIS = np.dtype(
     ]
 )
 
+INNOVATION = np.dtype(
+    [
+        ("row", "i4"),
+        ("t_ns", "i8"),
+        ("kind", "u1"),  # MeasurementKind
+        ("anchor", "i4"),
+        ("measured", "f8"),
+        ("predicted", "f8"),
+        ("innovation", "f8"),  # measured minus predicted
+        ("S", "f8"),  # variance of the innovation
+        ("p_outlier", "f8"),  # NaN: the engine has a hard gate instead
+        ("fused", "?"),
+    ]
+)
+
+
+class MeasurementKind(IntEnum):
+    """What an innovation is of; its numbers are in m or rad."""
+
+    RANGE = 0
+    BEARING = 1
+
 
 class HeadingSource(IntEnum):
     """AUTO: the IMU where it is sent, else the platform's heading."""
@@ -134,11 +156,14 @@ class PoseBatch:
     """poses: POSE, one for every range that was fused or refused, per row in order of time.
 
     hypotheses: HYPOTHESIS, the modes behind the last pose of each row that is ambiguous.
+    innovations: INNOVATION of the likeliest hypothesis, one for every range or bearing that met a running belief, per
+    row in order of time.
     rejected: samples that were not used, counted by reason (names of the contract).
     """
 
     poses: Array = field(default_factory=lambda: np.empty(0, POSE))
     hypotheses: Array = field(default_factory=lambda: np.empty(0, HYPOTHESIS))
+    innovations: Array = field(default_factory=lambda: np.empty(0, INNOVATION))
     rejected: dict[str, int] = field(default_factory=dict)
 
 

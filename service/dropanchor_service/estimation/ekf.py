@@ -5,7 +5,7 @@ Functions take the state as an array of shape (5,) and give arrays of shape (5,)
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -65,6 +65,15 @@ def H_range(x: Array, anchor: Position) -> Array:  # noqa: N802
     return np.array([[(px - anchor[0]) / r, (py - anchor[1]) / r, 0.0, 0.0, 0.0]])
 
 
+class Innovation(NamedTuple):
+    """What a range, m, told: predicted, y = z - predicted, its variance S, m², and whether it was fused."""
+
+    predicted: float
+    y: float
+    S: float
+    fused: bool
+
+
 class PoseFilter(ExtendedKalmanFilter):  # type: ignore[misc]
     """Belief (x, P) of one tag.
 
@@ -96,16 +105,17 @@ class PoseFilter(ExtendedKalmanFilter):  # type: ignore[misc]
         self.update(np.array([innovation]), lambda _: H_HEADING, lambda _: np.zeros(1), R=R)
         self.x[2] = math.remainder(float(self.x[2]), math.tau)
 
-    def update_range(self, z: float, R: float, anchor: Position, gate: float) -> bool:
-        """Fuse a range z, m, of variance R, m², unless its nis y²/S exceeds gate²; say whether it was fused."""
+    def update_range(self, z: float, R: float, anchor: Position, gate: float) -> Innovation:
+        """Fuse a range z, m, of variance R, m², unless its nis y²/S exceeds gate²."""
         H = H_range(self.x, anchor)
-        y = z - h_range(self.x, anchor)
+        predicted = h_range(self.x, anchor)
+        y = z - predicted
         S = float((H @ self.P @ H.T)[0, 0]) + R
         if not y * y <= gate * gate * S:
-            return False
+            return Innovation(predicted, y, S, False)
         self.update(np.array([y]), lambda _: H, lambda _: np.zeros(1), R=R)
         self.x[2] = math.remainder(float(self.x[2]), math.tau)
-        return True
+        return Innovation(predicted, y, S, True)
 
     @property
     def finite(self) -> bool:

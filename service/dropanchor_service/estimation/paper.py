@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.algorithm1 import Algorithm1, PoseRow
-from dropanchor_service.estimation.batch import ANCHOR, POSE, Array, PoseBatch, SampleBatch
+from dropanchor_service.estimation.batch import ANCHOR, INNOVATION, POSE, Array, MeasurementKind, PoseBatch, SampleBatch
 from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
 from dropanchor_service.estimation.tag import Tag
 
@@ -55,6 +55,7 @@ class PaperEngine:
         """
         rejected: Counter[str] = Counter()
         poses = []
+        innovations: list[tuple[Any, ...]] = []
         with np.errstate(all="ignore"):  # numbers out of bounds are a fault of their row, not a warning
             for event in _in_order(samples):
                 reason = self._refusal(event)
@@ -64,7 +65,18 @@ class PaperEngine:
                 pose = self._take(event)
                 if pose is not None:
                     poses.append((event[0], *pose))
-        return PoseBatch(poses=np.array(poses, POSE), rejected=dict(rejected))
+                    innovations.extend(self._innovation(event))
+        return PoseBatch(np.array(poses, POSE), innovations=np.array(innovations, INNOVATION), rejected=dict(rejected))
+
+    def _innovation(self, event: Event) -> Iterator[tuple[Any, ...]]:
+        """INNOVATION of a range that met a belief, in metres as measured."""
+        row, t_ns, _, (anchor, measured, _) = event
+        told = self._filters[row].innovation
+        if told is not None:
+            scale = self._tags[row].range_scale
+            y = told.y * scale
+            S = told.S * scale**2
+            yield row, t_ns, MeasurementKind.RANGE, anchor, measured, measured - y, y, S, math.nan, told.fused
 
     def _refusal(self, event: Event) -> str | None:
         """Why a sample is not used. Values are screened before; this keeps the state safe all the same."""

@@ -12,7 +12,8 @@ import numpy as np
 import orjson
 
 from dropanchor_service.estimation.batch import POSE, Array, State
-from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95
+from dropanchor_service.store.at_time import pose_at
+from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95, with_age
 from dropanchor_service.store.latest import LatestPoses
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
@@ -43,18 +44,33 @@ class Answers:
         row = self.latest.row(tag.row)
         return None if row is None else self.poses_of(row[None], self.now_ns())[0]
 
+    def pose_at(self, tag: Tag, t_ns: int) -> Answer | None:
+        """`Pose` at a time, None before the tag's first one. Raises NoPoseThenError."""
+        latest = self.latest.row(tag.row)
+        if latest is None:
+            return None
+        now_ns = self.now_ns()
+        aged = with_age(latest[None], (now_ns - latest["t_ns"][None]) * 1e-9)[0]
+        pose = pose_at(self.latest.history(tag.row), latest if t_ns <= latest["t_ns"] else aged, t_ns)
+        answer = self._poses(pose[None], now_ns, then=True)[0]
+        return answer | {"hypotheses": []}
+
     def pose_list(self, tags: Sequence[Tag] | None = None) -> Answer:
         """`PoseList` of these tags, or of all, as far as they have a pose."""
         now_ns = self.now_ns()
         return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
 
     def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
-        """`Pose` for each of the POSE rows."""
-        columns = columns_of(poses, self.site, self.tags, now_ns)
-        answers = [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
+        """`Pose` for each of the POSE rows, which are the latest."""
+        answers = self._poses(poses, now_ns)
         for answer, row in zip(answers, poses["row"].tolist(), strict=True):
             answer["hypotheses"] = self._hypotheses_of(row, answer["state"]) or []
         return answers
+
+    def _poses(self, poses: Array, now_ns: int, then: bool = False) -> list[Answer]:
+        """`Pose` for each of the POSE rows, without hypotheses."""
+        columns = columns_of(poses, self.site, self.tags, now_ns, then)
+        return [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
 
     def frame_of(self, poses: Array, now_ns: int) -> Answer:
         """`PoseFrame` of the POSE rows: columns, for many tags many times a second."""

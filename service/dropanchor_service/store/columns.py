@@ -55,10 +55,10 @@ class PoseColumns:
     lon: Array | None
 
 
-def columns_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> PoseColumns:
-    """poses: POSE, of any rows that `tags` knows."""
+def columns_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int, then: bool = False) -> PoseColumns:
+    """poses: POSE, of any rows that `tags` knows; then: they hold for their own time, and do not get old."""
     age_s = (now_ns - poses["t_ns"]) * 1e-9
-    aged = with_age(poses, age_s)
+    aged = poses if then else with_age(poses, age_s)
     names = [tags.at(row) for row in aged["row"].tolist()]
     anchor_ids = [anchor.id for anchor in site.anchors_by_index()]
     reasons = aged["reason"].tolist()

@@ -1,10 +1,16 @@
-"""The latest pose of every tag: one array, one row per tag, written by one thread and read by any."""
+"""The latest pose of every tag, one array with one row per tag, and what led to it; written by one thread and read by
+any."""
 
 from threading import Lock
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, Array
+from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array
+from dropanchor_service.store.history import PoseHistory
+from dropanchor_service.store.rings import RowRings
+
+INNOVATIONS = 300  # of each tag: half a minute at ten ranges a second
+MOST_BYTES = 64 * 2**20  # of all of them
 
 
 class LatestPoses:
@@ -15,6 +21,8 @@ class LatestPoses:
         self._poses = np.zeros(0, POSE)
         self._changed = np.zeros(0, np.int64)
         self._hypotheses: dict[int, Array] = {}
+        self._history = PoseHistory()
+        self._innovations = RowRings(INNOVATION, INNOVATIONS, MOST_BYTES)
         self._version = 0
 
     @property
@@ -22,8 +30,9 @@ class LatestPoses:
         """Grows with every write."""
         return self._version
 
-    def write(self, poses: Array, hypotheses: Array) -> None:
-        """Take the last pose of each row in `poses` (POSE, per row in order of time) and the modes behind them."""
+    def write(self, poses: Array, hypotheses: Array, innovations: Array | None = None) -> None:
+        """Take the last pose of each row in `poses` (POSE, per row in order of time), the modes behind them, and the
+        innovations (INNOVATION) that led there."""
         if len(poses) == 0:
             return
         with self._lock:
@@ -36,6 +45,9 @@ class LatestPoses:
                 self._hypotheses.pop(int(row), None)
             for row in np.unique(hypotheses["row"]):
                 self._hypotheses[int(row)] = hypotheses[hypotheses["row"] == row]
+            self._history.write(poses)
+            if innovations is not None:
+                self._innovations.write(innovations)
 
     def row(self, row: int) -> Array | None:
         """POSE (0-d) of one row, None before its first pose."""
@@ -52,6 +64,16 @@ class LatestPoses:
         """HYPOTHESIS behind the latest pose of the row; empty when it is not ambiguous."""
         with self._lock:
             return self._hypotheses.get(row, np.empty(0, HYPOTHESIS))
+
+    def history(self, row: int) -> Array:
+        """POSE of the row over the last minute or less, thinned, in order of time."""
+        with self._lock:
+            return self._history.of(row)
+
+    def innovations(self, row: int) -> Array:
+        """INNOVATION of the row, oldest first."""
+        with self._lock:
+            return self._innovations.of(row)
 
     def _grow(self, rows: int) -> None:
         missing = rows - len(self._poses)

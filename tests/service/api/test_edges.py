@@ -7,6 +7,7 @@ from prometheus_client import Counter
 
 from api_house import ask, kind_of, make_house
 from dropanchor_schemas.answers import PoseFrame, TagList
+from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import PoseList
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.api import examples, export
@@ -139,6 +140,7 @@ def test_every_kind_of_problem_is_documented() -> None:
 def test_the_examples_are_true_to_the_contract() -> None:
     PoseList.model_validate(examples.POSE_LIST, strict=False)
     PoseFrame.model_validate(examples.POSE_FRAME)
+    Explanation.model_validate(examples.EXPLANATION)
     TagList.model_validate(examples.TAG_LIST)
     TagSettings.model_validate(examples.TAG_SETTINGS)
     Site.model_validate(examples.SITE)

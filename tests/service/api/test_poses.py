@@ -58,8 +58,8 @@ def test_a_query_that_is_not_understood_is_a_problem(query: str) -> None:
     assert kind_of(ask(make_house().app(), "GET", f"/api/v1/poses?{query}")) == "invalid-request"
 
 
-def test_a_single_pose_takes_no_query() -> None:
-    assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/pose?at=1")) == "invalid-request"
+def test_a_single_pose_takes_no_query_but_a_time() -> None:
+    assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/pose?tags=a")) == "invalid-request"
 
 
 def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_place() -> None:

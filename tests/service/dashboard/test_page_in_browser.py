@@ -267,3 +267,14 @@ def test_ten_thousand_tags_cost_less_than_50_ms_of_javascript_a_frame(chromium: 
         assert page.page.locator("#crowd").is_visible()
         assert np.median(spent) <= 50
         assert page.complaints == []
+
+
+def test_a_negative_speed_can_be_read_in_the_table(chromium: Browser, place: Place) -> None:
+    place.move("a", x=-12.34, y=-56.78, speed=-10.31, sigma_pos=0.25)
+    with watched_page(chromium, place.url, size=(1280, 800)) as page:
+        speed = page.page.locator("tr[data-tag='a'] td.c-speed")
+        speed.wait_for()
+        assert speed.inner_text() == "−10.31"
+        for column in ("x", "y", "sigma", "speed", "age"):
+            cell = page.page.locator(f"tr[data-tag='a'] td.c-{column}")
+            assert cell.evaluate("cell => cell.scrollWidth <= cell.clientWidth"), column

@@ -64,7 +64,7 @@ def test_on_a_linear_problem_it_equals_the_kalman_filter_written_out() -> None:
         K = P @ H.T / (H @ P @ H.T + 0.04)
         x, P = x + K[:, 0] * (z - x[0]), (np.eye(2) - K @ H) @ P
         pose.advance(dt)
-        assert pose.update_range(z, 0.04, (0.0, 0.0, 0.0), gate=math.inf)
+        assert pose.update_range(z, 0.04, (0.0, 0.0, 0.0), gate=math.inf).fused
         np.testing.assert_allclose(pose.x[[0, 3]], x, rtol=1e-10)
         np.testing.assert_allclose(pose.P[np.ix_([0, 3], [0, 3])], P, rtol=1e-8)
 
@@ -93,7 +93,7 @@ def test_headings_that_cross_pi_while_turning_are_followed() -> None:
 def test_a_range_beyond_the_gate_leaves_the_belief_alone(z: float) -> None:
     pose = PoseFilter(np.array([5.0, 0.0, 0.0, 0.0, 0.0]), np.eye(5), Q)
     with np.errstate(all="ignore"):
-        assert not pose.update_range(z, 0.04, (0.0, 0.0, 0.0), gate=5.0)
+        assert not pose.update_range(z, 0.04, (0.0, 0.0, 0.0), gate=5.0).fused
     assert pose.x.tolist() == [5.0, 0.0, 0.0, 0.0, 0.0]
 
 

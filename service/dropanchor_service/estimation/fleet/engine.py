@@ -8,6 +8,7 @@ import numpy as np
 from dropanchor_service.estimation.batch import ANCHOR, HYPOTHESIS, POSE, Array, PoseBatch, SampleBatch
 
 from .configure import configured
+from .explain import explained
 from .frontend import FRONTEND, start_frontend
 from .gather import gather
 from .kernel import advance
@@ -67,7 +68,8 @@ class FleetEngine:
         self._make_room(np.unique(nodes["row"]))
         beliefs = np.zeros(len(nodes), BELIEF)
         advance(self._rows, self._pool, nodes, self._anchors, self._tuning, self._work, beliefs)
-        return PoseBatch(_poses(nodes, beliefs), self._hypotheses(nodes, beliefs), dict(rejected))
+        innovations = explained(nodes, beliefs, self._rows["range_scale"][nodes["row"]])
+        return PoseBatch(_poses(nodes, beliefs), self._hypotheses(nodes, beliefs), innovations, dict(rejected))
 
     def explain(self, row: int) -> Array:
         """The row's last innovations, oldest first: INNOVATION of `layout`."""

@@ -41,8 +41,10 @@ def _predict_all(work: Work, count: int, row: Any, node: Any, t: Tuning, scratch
 
 
 @njit(nogil=True)
-def _range_all(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, H: Any, PH: Any, out: Any) -> None:
-    """Update every hypothesis; row.history gets what the best one saw."""
+def _range_all(
+    work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, H: Any, PH: Any, out: Any, belief: Any
+) -> None:
+    """Update every hypothesis; row.history and belief get what the best one saw."""
     anchor, primary = anchors[node.anchor], anchors[row.anchor]
     ox, oy = anchor.x - primary.x, anchor.y - primary.y
     dz = row.height - anchor.z
@@ -65,6 +67,14 @@ def _range_all(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tun
         if h == best:
             y, S, p_outlier = e, out[1], out[2]
     _remember(row, node, y, S, p_outlier)
+    _tell(belief, y, S, p_outlier)
+
+
+@njit(nogil=True)
+def _tell(belief: Any, y: float, S: float, p_outlier: float) -> None:
+    belief.innovation = y
+    belief.innovation_variance = S
+    belief.p_outlier = p_outlier
 
 
 @njit(nogil=True)
@@ -198,7 +208,9 @@ def _finite(work: Work, count: int) -> bool:
 
 
 @njit(nogil=True)
-def _step(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, small: Any) -> int:
+def _step(
+    work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, small: Any, belief: Any
+) -> int:
     """One node on a running row; returns the count of hypotheses."""
     H, PH, out = small
     _predict_all(work, count, row, node, t, scratch)
@@ -210,16 +222,19 @@ def _step(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, 
     row.since_range_s += node.dt_s
     recover(work, count, row, node, t)
     if node.kind == RANGE and row.anchor >= 0:
-        _range_all(work, count, row, node, anchors, t, H, PH, out)
+        _range_all(work, count, row, node, anchors, t, H, PH, out, belief)
         row.since_range_s = 0.0
         count = open_alternative(work, count, row, t)
         unblock(work, count, t)
     if node.kind == BEARING and row.anchor >= 0:
         anchor, primary = anchors[node.anchor], anchors[row.anchor]
+        best = best_of(work, count)
         for h in range(count):
             work.log_weight[h] += t.temper * update_bearing(
-                work.mean[h], work.cov[h], H, PH, anchor.x - primary.x, anchor.y - primary.y, node.z, node.z_std**2
+                work.mean[h], work.cov[h], H, PH, anchor.x - primary.x, anchor.y - primary.y, node.z, node.z_std**2, out
             )
+            if h == best:
+                _tell(belief, out[0], out[1], out[2])
     if not _finite(work, count):
         return 0
     count = _manage(work, count, row, node, t)
@@ -268,7 +283,7 @@ def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Wor
         row.t_ns = node.t_ns
         belief = beliefs[k]
         if count > 0:
-            count = _step(work, count, row, node, anchors, t, scratch, small)
+            count = _step(work, count, row, node, anchors, t, scratch, small, belief)
             if count == 0:
                 row.fault += 1
                 row.reason = 10

@@ -135,6 +135,9 @@ BELIEF: Final = np.dtype(
         ("sigma_pos", np.float64),
         ("sigma_obs", np.float64),
         ("range_m", np.float64),
+        ("innovation", np.float64),  # of the likeliest hypothesis; innovation_variance 0: nothing was compared
+        ("innovation_variance", np.float64),
+        ("p_outlier", np.float64),
         ("hypotheses", np.int32),
         ("state", np.uint8),
         ("reason", np.uint8),

@@ -93,8 +93,11 @@ def update_range(s: Any, P: Any, H: Any, PH: Any, e: float, variance: float, t: 
 
 
 @njit(nogil=True)
-def update_bearing(s: Any, P: Any, H: Any, PH: Any, ox: float, oy: float, z: float, variance: float) -> float:
-    """Azimuth of the tag seen from an anchor at (ox, oy) from the primary one; returns the log likelihood."""
+def update_bearing(s: Any, P: Any, H: Any, PH: Any, ox: float, oy: float, z: float, variance: float, out: Any) -> float:
+    """Azimuth of the tag seen from an anchor at (ox, oy) from the primary one; returns the log likelihood.
+
+    out = (innovation, S, probability of an outlier).
+    """
     H[:] = 0.0
     c, sn = math.cos(s[PHI]), math.sin(s[PHI])
     dx, dy = s[R] * c - ox, s[R] * sn - oy
@@ -106,6 +109,9 @@ def update_bearing(s: Any, P: Any, H: Any, PH: Any, ox: float, oy: float, z: flo
     inside = 0.95 * gaussian(e, S)
     beta = inside / (inside + 0.05 / TWO_PI)
     correct(s, P, PH, S, e, beta)
+    out[0] = e
+    out[1] = S
+    out[2] = 1.0 - beta
     return math.log(inside + 0.05 / TWO_PI)
 
 

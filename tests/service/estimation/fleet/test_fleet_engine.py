@@ -177,6 +177,23 @@ def test_a_row_that_is_configured_again_starts_afresh() -> None:
     assert fleet.process(batch).poses.tobytes() == expected.tobytes()
 
 
+def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
+    fleet, (batch, _) = engine(), samples(5)
+    batch.ranges["range"][40] += 5.0
+    result = fleet.process(batch)
+    told = result.innovations
+    assert len(told) >= len(result.poses) - 1
+    assert (told["t_ns"] == result.poses["t_ns"][-len(told) :]).all()
+    assert (told["measured"] == result.poses["range"][-len(told) :]).all()
+    np.testing.assert_allclose(told["predicted"] + told["innovation"], told["measured"])
+    outlier = np.abs(told["measured"] - batch.ranges["range"][40]) < 1e-12
+    assert told["p_outlier"][outlier] > 0.9
+    assert not told["fused"][outlier]
+    good = told[~outlier]
+    assert good["fused"].mean() > 0.95
+    assert np.mean(good["innovation"] ** 2 / good["S"]) == pytest.approx(1.0, abs=0.5)
+
+
 def test_the_last_innovations_can_be_explained() -> None:
     batch, _ = samples(2000)
     fleet = engine()

@@ -1,0 +1,138 @@
+"""Explanations, and poses at a time, over REST."""
+
+import numpy as np
+import pytest
+
+from api_house import T_NS, House, ask, kind_of, make_house
+from dropanchor_schemas.explain import Explanation
+from dropanchor_schemas.pose import Pose
+from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, State
+
+SECOND = 1_000_000_000
+
+
+def driven(seconds: float = 5.0, speed: float = 2.0) -> House:
+    """A tag that has driven east until now, with ten poses a second."""
+    house = make_house()
+    for i in range(round(seconds * 10) + 1):
+        house.now_ns = T_NS - round((seconds - i / 10) * SECOND)
+        house.move("a", x=speed * i / 10, speed=speed, sigma_pos=0.2)
+    return house
+
+
+def pose_at(house: House, offset_s: float) -> Pose:
+    path = f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}"
+    return Pose.model_validate(ask(house.app(), "GET", path).json())
+
+
+def problem_at(house: House, offset_s: float) -> tuple[str, str]:
+    response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
+    return kind_of(response), response.json()["detail"]
+
+
+def test_the_past_lies_between_the_poses_that_were() -> None:
+    house = driven()
+    for offset_s in (-4.0, -3.33, -0.05, 0.0):
+        pose = pose_at(house, offset_s)
+        assert pose.x == pytest.approx(10.0 + 2.0 * offset_s)
+        assert pose.t_ns == T_NS + round(offset_s * SECOND)
+        assert pose.age_s == pytest.approx(-offset_s)
+        assert pose.state == "tracking"
+
+
+def test_a_moment_of_the_past_does_not_get_old() -> None:
+    house = driven()
+    house.now_ns = T_NS + 20 * SECOND
+    assert pose_at(house, -2.0).state == "tracking"
+
+
+def test_the_near_future_goes_on_as_the_tag_moves_and_is_less_certain() -> None:
+    house = driven()
+    now, soon, later = (pose_at(house, offset_s) for offset_s in (0.0, 0.5, 2.0))
+    assert [soon.x, later.x] == pytest.approx([11.0, 14.0])
+    sizes = [pose.ellipse_95.semi_major_m for pose in (now, soon, later) if pose.ellipse_95]
+    assert len(sizes) == 3
+    assert sizes == sorted(set(sizes))
+
+
+def test_what_cannot_be_said_is_refused_with_its_reason() -> None:
+    house = driven()
+    assert problem_at(house, 2.1)[0] == "too-far-ahead"
+    kind, detail = problem_at(house, -9.0)
+    assert (kind, "begin" in detail) == ("no-pose-then", True)
+    house.now_ns = T_NS + 3 * SECOND
+    house.move("a", x=16.0, speed=2.0, sigma_pos=0.2)
+    kind, detail = problem_at(house, 1.5)
+    assert (kind, "apart" in detail) == ("no-pose-then", True)
+
+
+def test_a_jump_of_the_estimate_is_not_interpolated() -> None:
+    house = driven()
+    house.now_ns = T_NS + SECOND // 2
+    house.move("a", x=-30.0, speed=2.0, sigma_pos=0.2)
+    kind, detail = problem_at(house, 0.25)
+    assert (kind, "jumped" in detail) == ("no-pose-then", True)
+
+
+def test_a_tag_that_may_be_in_several_places_is_not_carried_ahead() -> None:
+    house = driven()
+    house.now_ns = T_NS + SECOND // 10
+    house.move("a", x=10.2, speed=2.0, sigma_pos=2.0, state=State.AMBIGUOUS)
+    assert problem_at(house, 0.5)[0] == "no-pose-then"
+
+
+@pytest.mark.parametrize("query", ["at=noon", "at=-1", "at=9223372036854775808", "when=5", "at=1&at=x"])
+def test_a_time_that_is_none_is_refused(query: str) -> None:
+    assert kind_of(ask(driven(0.1).app(), "GET", f"/api/v1/tags/a/pose?{query}")) == "invalid-request"
+
+
+def explained_house() -> House:
+    house = driven()
+    records = np.zeros(60, INNOVATION)
+    records["t_ns"] = T_NS - np.arange(60)[::-1] * SECOND // 10
+    records["predicted"] = 10.0 + 2.0 * (records["t_ns"] - T_NS) * 1e-9
+    records["innovation"], records["S"], records["p_outlier"], records["fused"] = 0.1, 0.04, 0.02, True
+    records["innovation"][-1], records["p_outlier"][-1], records["fused"][-1] = 3.0, 0.99, False
+    records["measured"] = records["predicted"] + records["innovation"]
+    pose = np.zeros(1, POSE)
+    pose["t_ns"], pose["state"], pose["speed"], pose["cov"] = T_NS + 1, State.TRACKING, 2.0, np.eye(3) * 0.01
+    house.answers.latest.write(pose, np.empty(0, HYPOTHESIS), records)
+    return house
+
+
+def test_an_explanation_holds_the_last_innovations_and_what_the_ranges_say_of_the_speed() -> None:
+    app = explained_house().app()
+    told = Explanation.model_validate(ask(app, "GET", "/api/v1/tags/a/explain").json())
+    assert len(told.innovations) == 50
+    last = told.innovations[-1]
+    assert (last.kind, last.anchor, last.fused, last.p_outlier) == ("range", "17", False, 0.99)
+    assert last.nis == pytest.approx(9.0 / 0.04)
+    assert told.refused == 1
+    assert told.speed.predicted_range_rate_mps == pytest.approx(2.0)
+    assert told.speed.range_rate_mps == pytest.approx(2.2, abs=0.3)
+    assert len(told.speed_track.t_ns) == len(told.speed_track.speed_mps) >= 20
+    assert set(told.speed_track.speed_mps) == {2.0}
+    assert len(ask(app, "GET", "/api/v1/tags/a/explain?last=7").json()["innovations"]) == 7
+
+
+def test_a_gate_has_no_outlier_probability() -> None:
+    house = make_house()
+    house.move("a")
+    record = np.zeros(1, INNOVATION)
+    record["S"], record["p_outlier"] = 1.0, np.nan
+    pose = house.answers.latest.since()[1]
+    house.answers.latest.write(pose, np.empty(0, HYPOTHESIS), record)
+    told = Explanation.model_validate(ask(house.app(), "GET", "/api/v1/tags/a/explain").json())
+    assert told.innovations[0].p_outlier is None
+
+
+@pytest.mark.parametrize("query", ["last=0", "last=301", "last=x", "first=3"])
+def test_a_misspelt_question_for_an_explanation_is_refused(query: str) -> None:
+    assert kind_of(ask(driven(0.1).app(), "GET", f"/api/v1/tags/a/explain?{query}")) == "invalid-request"
+
+
+def test_what_is_not_there_cannot_be_explained() -> None:
+    house = make_house()
+    house.answers.tags.register("quiet")
+    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/explain")) == "unknown-tag"
+    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/quiet/explain")) == "no-pose-yet"
