@@ -71,12 +71,6 @@ class FleetEngine:
         innovations = explained(nodes, beliefs, self._rows["range_scale"][nodes["row"]])
         return PoseBatch(_poses(nodes, beliefs), self._hypotheses(nodes, beliefs), innovations, dict(rejected))
 
-    def explain(self, row: int) -> Array:
-        """The row's last innovations, oldest first: INNOVATION of `layout`."""
-        history, count = self._rows[row]["history"], int(self._rows[row]["history_count"])
-        kept = min(count, len(history))
-        return np.array(np.roll(history, -(count % len(history)))[len(history) - kept :])
-
     def _release(self, row: int) -> None:
         slot = self._rows[row]["head"]
         for _ in range(self._rows[row]["count"]):

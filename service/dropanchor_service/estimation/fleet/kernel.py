@@ -44,7 +44,7 @@ def _predict_all(work: Work, count: int, row: Any, node: Any, t: Tuning, scratch
 def _range_all(
     work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, H: Any, PH: Any, out: Any, belief: Any
 ) -> None:
-    """Update every hypothesis; row.history and belief get what the best one saw."""
+    """Update every hypothesis; the belief gets what the best one saw."""
     anchor, primary = anchors[node.anchor], anchors[row.anchor]
     ox, oy = anchor.x - primary.x, anchor.y - primary.y
     dz = row.height - anchor.z
@@ -66,7 +66,7 @@ def _range_all(
         work.log_weight[h] += bound_speed(s, P, PH, low, row.v_max)
         if h == best:
             y, S, p_outlier = e, out[1], out[2]
-    _remember(row, node, y, S, p_outlier)
+    _judge_fit(row, y, S, p_outlier)
     _tell(belief, y, S, p_outlier)
 
 
@@ -78,13 +78,8 @@ def _tell(belief: Any, y: float, S: float, p_outlier: float) -> None:
 
 
 @njit(nogil=True)
-def _remember(row: Any, node: Any, y: float, S: float, p_outlier: float) -> None:
-    entry = row.history[row.history_count % layout.HISTORY]
-    entry.t_ns = node.t_ns
-    entry.y = y
-    entry.variance = S
-    entry.p_outlier = p_outlier
-    row.history_count += 1
+def _judge_fit(row: Any, y: float, S: float, p_outlier: float) -> None:
+    """How long innovations have stayed on one side, and how much of them are outliers."""
     row.high_run = row.high_run + 1 if y > 1.5 * math.sqrt(S) else 0
     row.low_run = row.low_run + 1 if y < -1.5 * math.sqrt(S) else 0
     row.misfit += 0.1 * (p_outlier - row.misfit)

@@ -22,7 +22,6 @@ PACKED: Final = N * (N + 1) // 2
 WORK: Final = 320  # hypotheses of one row while it is being worked on
 KEEP: Final = 192  # hypotheses of one row between batches, at most
 RING_RANGES: Final = 15
-HISTORY: Final = 32
 MODELS: Final = 4  # models of the heading error that are judged by their predictions
 COMMON: Final = 4  # and two that are given by where the heading comes from
 STEADY: Final = 5
@@ -58,15 +57,6 @@ SETTINGS: Final = [
     ("start_heading_std", np.float64),
     ("start_speed_std", np.float64),
 ]
-
-INNOVATION: Final = np.dtype(
-    [
-        ("t_ns", np.int64),
-        ("y", np.float64),
-        ("variance", np.float64),
-        ("p_outlier", np.float64),
-    ]
-)
 
 ROW: Final = np.dtype(
     [
@@ -104,8 +94,6 @@ ROW: Final = np.dtype(
         ("hm_started", np.uint8),
         ("referred", np.uint8),  # 1: the yaw of the hypotheses is in the site frame
         ("information", np.float64, (3, 3)),
-        ("history", INNOVATION, (HISTORY,)),
-        ("history_count", np.int64),
     ]
 )
 

@@ -196,10 +196,9 @@ def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
 
 def test_the_last_innovations_can_be_explained() -> None:
     batch, _ = samples(2000)
-    fleet = engine()
-    poses = fleet.process(batch).poses
-    history = fleet.explain(0)
-    assert history["t_ns"].tolist() == poses["t_ns"][-len(history) :].tolist()
-    assert (history["variance"] > 0).all()
-    assert np.abs(history["y"] / np.sqrt(history["variance"])).mean() < 2.0
-    assert ((history["p_outlier"] >= 0) & (history["p_outlier"] <= 1)).all()
+    result = engine().process(batch)
+    told = result.innovations
+    assert told["t_ns"].tolist() == result.poses["t_ns"][-len(told) :].tolist()
+    assert (told["S"] > 0).all()
+    assert np.abs(told["innovation"] / np.sqrt(told["S"])).mean() < 2.0
+    assert ((told["p_outlier"] >= 0) & (told["p_outlier"] <= 1)).all()
