@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_tag_client import TagClient
 from support.browser import Watched, running_chromium, watched_page
-from support.service_process import running_service
+from support.service import running_service
 from support.zenoh_router import free_endpoint, free_port
 
 pytestmark = pytest.mark.browser
@@ -68,7 +68,7 @@ def test_dots_move_in_light_and_dark_and_nothing_is_asked_from_elsewhere(chromiu
     config, endpoint = tmp_path / "yard.toml", free_endpoint()
     config.write_text(CONFIG)
     with ExitStack() as stack:
-        url = stack.enter_context(running_service(free_port(), endpoint, config))
+        url = stack.enter_context(running_service("--config", str(config), endpoint=endpoint)).url
         page = stack.enter_context(watched_page(chromium, url))
         stack.enter_context(driving_tag("cart", endpoint))
         stack.enter_context(driving_tag("stray", endpoint))
@@ -93,12 +93,12 @@ def test_the_page_reconnects_when_the_service_comes_back(chromium: Browser, tmp_
     config, endpoint, port = tmp_path / "yard.toml", free_endpoint(), free_port()
     config.write_text(CONFIG)
     with ExitStack() as stack:
-        with running_service(port, endpoint, config) as url:
-            page = stack.enter_context(watched_page(chromium, url))
+        with running_service("--config", str(config), "--port", str(port), endpoint=endpoint) as service:
+            page = stack.enter_context(watched_page(chromium, service.url))
             stack.enter_context(driving_tag("cart", endpoint))
             page.page.locator("tr[data-tag='cart']").wait_for()
         page.page.locator("#lost").wait_for(state="visible")
-        with running_service(port, endpoint, config):
+        with running_service("--config", str(config), "--port", str(port), endpoint=endpoint):
             page.wait_for("dropanchor.status() === 'live'", timeout_s=20)
             page.page.locator("#lost").wait_for(state="hidden")
             frames = page.page.evaluate("dropanchor.received().frames")
