@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from prometheus_client import Counter
+from prometheus_client.samples import Sample
 
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
@@ -85,15 +87,17 @@ class Bench:
 
     def rejected(self) -> dict[str, float]:
         """All counters of rejections that are not zero."""
-        found = self.metrics.rejected.collect()
-        return {
-            sample.labels["reason"]: sample.value
-            for metric in found
-            for sample in metric.samples
-            if sample.name.endswith("_total") and sample.value
-        }
+        return {s.labels["reason"]: s.value for s in _totals(self.metrics.rejected) if s.value}
+
+    def total(self, counter: Counter) -> float:
+        """Over all of its labels."""
+        return sum(s.value for s in _totals(counter))
 
     def x_of(self, tags: Sequence[str]) -> list[float | None]:
         rows = [self.tags.find(tag) for tag in tags]
         poses = [None if tag is None else self.latest.row(tag.row) for tag in rows]
         return [None if pose is None else float(pose["x"]) for pose in poses]
+
+
+def _totals(counter: Counter) -> list[Sample]:
+    return [sample for metric in counter.collect() for sample in metric.samples if sample.name.endswith("_total")]

@@ -1,0 +1,110 @@
+"""One tag's fault stays its own: whatever one tag sends, and whatever its row does, others' poses are the same bits."""
+
+import math
+import random
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from dropanchor_schemas.wire import Frame, ImuSample, RangeSample, encode_packed
+from dropanchor_service.estimation.batch import Engine, PoseBatch, SampleBatch
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from support.ingest import Bench
+from support.traffic import T0_NS, Message, traffic
+
+TAGS = 3
+SECONDS = 60.0
+HOUR_NS = 3_600_000_000_000
+EXTREMES = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-45, -1.0, 0.0)
+
+
+class Recorded(FleetEngine):
+    """Keeps the poses that it gave; fails while `poisoned` says so."""
+
+    def __init__(self, poisoned: Callable[[SampleBatch], bool] = lambda _: False) -> None:
+        super().__init__()
+        self.given: list[Any] = []
+        self._poisoned = poisoned
+
+    def process(self, samples: SampleBatch) -> PoseBatch:
+        if self._poisoned(samples):
+            raise FloatingPointError("poison")
+        batch = super().process(samples)
+        self.given.append(batch.poses.copy())
+        return batch
+
+
+def test_a_tag_that_sends_garbage_for_a_minute_changes_no_bit_of_its_neighbours() -> None:
+    good = traffic(TAGS, SECONDS, seed=5)
+    clean, harmed = Recorded(), Recorded()
+    feed(clean, good)
+    bench = feed(harmed, sorted([*good, *garbage()], key=lambda message: message.due_ns))
+    assert poses_of_good_tags(harmed) == poses_of_good_tags(clean)
+    rejected = bench.rejected()
+    assert {"not_finite", "range_negative", "range_absurd", "imu_absurd", "header_truncated"} <= set(rejected)
+    assert bench.total(bench.metrics.faults) == 0
+
+
+def test_a_row_that_makes_the_engine_fail_changes_no_bit_of_its_neighbours() -> None:
+    good = traffic(TAGS, 20.0, seed=6)
+    clean = Recorded()
+    feed(clean, good)
+    bad_row = TAGS
+    failing = Recorded(poisoned=lambda samples: bool((samples.ranges["row"] == bad_row).any()))
+    bench = feed(failing, sorted([*good, *ordinary("bad", 20.0)], key=lambda message: message.due_ns))
+    assert poses_of_good_tags(failing) == poses_of_good_tags(clean)
+    assert bench.total(bench.metrics.faults) >= 3
+    assert bench.rejected()["estimator_fault"] > 0
+
+
+def feed(engine: Engine, messages: list[Message]) -> Bench:
+    """All messages, those of a fifth of a second at a time; good tags have the rows 0 to TAGS - 1."""
+    bench = Bench(engine=engine)
+    for index in range(TAGS):
+        bench.ingest.announce(f"sim-{index + 1}")
+    due_ns = messages[0].due_ns
+    for message in messages:
+        if message.due_ns != due_ns:
+            bench.ingest.turn()
+            due_ns = message.due_ns
+        bench.put(message.tag, message.payload, at_ns=message.due_ns)
+    bench.ingest.turn()
+    return bench
+
+
+def poses_of_good_tags(engine: Recorded) -> list[bytes]:
+    """The poses of each good tag, bit for bit, in the order in which they were given."""
+    poses = np.concatenate(engine.given)
+    own = [poses[poses["row"] == row] for row in range(TAGS)]
+    assert min(len(column) for column in own) > 100
+    return [column.tobytes() for column in own]
+
+
+def ordinary(tag: str, seconds: float) -> Iterator[Message]:
+    for index in range(int(seconds / 0.2)):
+        t_ns = T0_NS + index * 200_000_000
+        yield Message(t_ns, tag, encode_packed(Frame(ranges=[RangeSample(t_ns, 0, 5.0)])))
+
+
+def garbage() -> Iterator[Message]:
+    """Extreme values, junk, cut frames, and clocks that jump by hours, five times a second."""
+    dice = random.Random(11)
+    for index in range(int(SECONDS / 0.2)):
+        due_ns = T0_NS + index * 200_000_000
+        t_ns = due_ns + dice.choice([0, HOUR_NS, -HOUR_NS, -T0_NS])
+        value = [dice.choice(EXTREMES) for _ in range(11)]
+        frame = Frame(
+            imu=[
+                ImuSample(
+                    t_ns, (value[0], value[1], 9.8), (value[2], value[3], value[4]), (value[5], value[6], value[7])
+                )
+            ],
+            ranges=[RangeSample(t_ns, 0, value[8], value[9]), RangeSample(t_ns, 0, 4_000.0), RangeSample(t_ns, 0, 7.0)],
+            sequence=dice.randrange(2**32),
+            boot_id=dice.randrange(1, 2**32),
+        )
+        payload = encode_packed(frame)
+        yield Message(due_ns, "bad", payload)
+        yield Message(due_ns, "bad", payload[: dice.randrange(len(payload))])
+        yield Message(due_ns, "bad", dice.randbytes(dice.randrange(200)))

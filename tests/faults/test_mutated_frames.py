@@ -1,0 +1,62 @@
+"""Bad input is counted by cause: mutated frames raise nothing, and every frame and every sample is accounted for."""
+
+import os
+import random
+from collections import Counter
+
+from dropanchor_schemas.wire import Rejection, decode_packed
+from support.ingest import Bench
+from support.traffic import traffic
+
+FRAMES = int(os.environ.get("DROPANCHOR_MUTATED_FRAMES", "200000"))
+TAGS = 20
+IN_ONE_TURN = 1000
+
+
+def test_mutated_frames_raise_nothing_and_the_counts_add_up() -> None:
+    seeds = [message.payload for message in traffic(TAGS, 10.0, seed=9, step_s=0.05)]
+    dice = random.Random(9)
+    bench = Bench(max_tags=TAGS)
+    refused: Counter[str] = Counter()
+    offered = 0
+    for start in range(0, FRAMES, IN_ONE_TURN):
+        payloads = [mutated(dice, seeds) for _ in range(IN_ONE_TURN)]
+        for index, payload in enumerate(payloads):
+            frame = decode_packed(payload)
+            if isinstance(frame, Rejection):
+                refused[frame.reason] += 1
+            else:
+                offered += len(frame)
+            bench.put(f"tag-{(start + index) % TAGS}", payload)
+        bench.ingest.turn()
+    rejected = bench.rejected()
+    assert {reason: rejected[reason] for reason in refused} == refused
+    assert min(refused.values()) > 0
+    assert len(refused) >= 6
+    fused = bench.total(bench.metrics.samples)
+    lost = sum(count for reason, count in rejected.items() if reason not in refused)
+    assert fused + lost == offered
+    assert 0 < lost < offered
+    assert bench.total(bench.metrics.messages) == start + IN_ONE_TURN
+    assert bench.total(bench.metrics.faults) == 0
+
+
+def test_a_version_to_come_is_refused_by_name() -> None:
+    payload = bytearray(traffic(1, 1.0, seed=9)[0].payload)
+    payload[0] += 1
+    bench = Bench()
+    bench.send("forward", bytes(payload))
+    assert bench.rejected() == {"version_unknown": 1}
+
+
+def mutated(dice: random.Random, seeds: list[bytes]) -> bytes:
+    """A real payload, most often with a few other bytes; its boot id is 0, so that none is taken for a duplicate."""
+    payload = bytearray(dice.choice(seeds))
+    payload[12:16] = bytes(4)
+    for _ in range(dice.randrange(4)):
+        at = dice.randrange(32 if dice.random() < 0.5 else len(payload))
+        if not 12 <= at < 16:
+            payload[at] = dice.randrange(256)
+    if dice.random() < 0.2:
+        del payload[dice.randrange(len(payload)) :]
+    return bytes(payload)
