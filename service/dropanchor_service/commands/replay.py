@@ -11,9 +11,19 @@ from tqdm import tqdm
 
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.engine import create_engine, tag_columns
-from dropanchor_service.estimation.batch import State
+from dropanchor_service.estimation.batch import Engine, State
 from dropanchor_service.evaluation.accuracy import Accuracy, accuracy, share_of_time
-from dropanchor_service.evaluation.replay import Samples, Track, anchors_of, replay, samples_of, track_of, truth_of
+from dropanchor_service.evaluation.replay import (
+    Samples,
+    Track,
+    anchors_of,
+    replay,
+    samples_of,
+    smoothed,
+    smoothing_engine,
+    track_of,
+    truth_of,
+)
 from dropanchor_service.evaluation.track_plot import plot_track
 from dropanchor_service.settings_sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
@@ -27,8 +37,10 @@ EPILOG = """\
 examples:
   dropanchor replay recordings/yard --anchor 7 --start=10,0,1.57
   dropanchor replay recordings/yard --anchor 7 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
+  dropanchor replay recordings/yard --anchor 7 --start=10,0 --smooth --out track.csv
   dropanchor-tag simulate --out recordings/yard      makes a recording with truth to try it on
 """
+LAG_S, MAX_LAG_S = 2.0, 60.0
 COLUMNS = ("t_s", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
 
 
@@ -63,6 +75,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
     known.add_argument("--slip-std", type=float, metavar="RAD", help="of the direction of travel about that; 0: none")
     known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
+    smoothing = parser.add_argument_group("smoothing (engine fleet): each pose is estimated from later samples too")
+    smoothing.add_argument("--smooth", action="store_true", help="from all samples of the recording")
+    smoothing.add_argument(
+        "--lag",
+        type=_lag,
+        nargs="?",
+        const=LAG_S,
+        metavar="S",
+        help=f"with --smooth: only from samples up to S seconds after the pose ({LAG_S:g})",
+    )
     add("--out", type=Path, metavar="CSV", help=f"write the poses: {','.join(COLUMNS)}")
     add(
         "--plot",
@@ -93,14 +115,25 @@ def run(arguments: argparse.Namespace) -> int:
 def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples) -> Track:
     if len(samples.batch.ranges) == 0:
         raise RecordingError(f"recording {recording.name} has no usable range to this anchor")
-    engine = create_engine(load_settings(arguments.config, {"engine": arguments.engine} if arguments.engine else None))
+    engine = _engine(arguments)
     settings = tag_columns(_tag_settings(arguments), declination_rad=0.0)
     steps = []
     with tqdm(total=samples.end_s, unit="s", unit_scale=True, desc=f"{engine.name} on {recording.name}") as bar:
         for reached_s, poses in replay(engine, anchors_of(recording), settings, samples):
             steps.append(poses)
             bar.update(reached_s - bar.n)
-    return track_of(steps)
+    return smoothed(engine, arguments.lag) if arguments.smooth else track_of(steps)
+
+
+def _engine(arguments: argparse.Namespace) -> Engine:
+    if arguments.lag is not None and not arguments.smooth:
+        raise SettingsError("--lag says how far --smooth may look ahead: give both")
+    settings = load_settings(arguments.config, {"engine": arguments.engine} if arguments.engine else None)
+    if not arguments.smooth:
+        return create_engine(settings)
+    if settings.engine != "fleet":
+        raise SettingsError(f"--smooth works with the engine fleet only, not with {settings.engine}")
+    return smoothing_engine()
 
 
 def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
@@ -190,6 +223,16 @@ def _start(text: str) -> StartPose:
         return StartPose(x=x, y=y, heading_rad=heading[0] if heading else None)
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text!r} is not X,Y or X,Y,HEADING (m, m, rad)") from error
+
+
+def _lag(text: str) -> float:
+    try:
+        lag_s = float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds") from error
+    if not 0.0 <= lag_s <= MAX_LAG_S:
+        raise argparse.ArgumentTypeError(f"{text} s is not within 0 and {MAX_LAG_S:g} s")
+    return lag_s
 
 
 def _only_anchor(recording: Recording) -> list[str]:

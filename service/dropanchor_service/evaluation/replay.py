@@ -10,6 +10,8 @@ import numpy as np
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.decode import FORM, SCALAR, Decoded
 from dropanchor_service.estimation.batch import ANCHOR, HEADING, IMU, POSE, RANGE, Array, Engine, SampleBatch
+from dropanchor_service.estimation.fleet.smoothed import smoothed_poses
+from dropanchor_service.estimation.fleet.trace import TracingEngine
 from dropanchor_service.evaluation.accuracy import Truth
 from dropanchor_service.screening import screen
 from dropanchor_tag_client.recording import Recording
@@ -96,6 +98,22 @@ def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) ->
 def track_of(steps: Sequence[Array]) -> Track:
     """The track of the POSE rows of consecutive steps."""
     poses = np.concatenate([np.empty(0, POSE), *steps])
+    return Track(poses["t_ns"] / NS_PER_S, poses)
+
+
+def smoothing_engine() -> Engine:
+    """An engine whose track can be smoothed after `replay`."""
+    return TracingEngine()
+
+
+def smoothed(engine: Engine, lag_s: float | None) -> Track:
+    """The track of row 0 with what came after each pose: up to lag_s later, or all of it (None).
+
+    Raises TypeError unless the engine is a `smoothing_engine`.
+    """
+    if not isinstance(engine, TracingEngine):
+        raise TypeError(f"{engine.name} keeps nothing that could be smoothed")
+    poses = smoothed_poses(engine, 0, lag_s)
     return Track(poses["t_ns"] / NS_PER_S, poses)
 
 

@@ -66,10 +66,15 @@ class FleetEngine:
         nodes = np.zeros(len(events), NODE)
         nodes = nodes[: gather(events, self._fronts, self._platforms, self._rows, nodes)]
         self._make_room(np.unique(nodes["row"]))
+        beliefs = self._believe(nodes)
+        innovations = explained(nodes, beliefs, self._rows["range_scale"][nodes["row"]])
+        return PoseBatch(poses_of(nodes, beliefs), self._hypotheses(nodes, beliefs), innovations, dict(rejected))
+
+    def _believe(self, nodes: Array) -> Array:
+        """BELIEF, one per node."""
         beliefs = np.zeros(len(nodes), BELIEF)
         advance(self._rows, self._pool, nodes, self._anchors, self._tuning, self._work, beliefs)
-        innovations = explained(nodes, beliefs, self._rows["range_scale"][nodes["row"]])
-        return PoseBatch(_poses(nodes, beliefs), self._hypotheses(nodes, beliefs), innovations, dict(rejected))
+        return beliefs
 
     def _release(self, row: int) -> None:
         slot = self._rows[row]["head"]
@@ -109,7 +114,7 @@ class FleetEngine:
         return np.concatenate(found)
 
 
-def _poses(nodes: Array, beliefs: Array) -> Any:
+def poses_of(nodes: Array, beliefs: Array) -> Any:
     """POSE of every node that ended with a range."""
     chosen = nodes["kind"] == RANGE
     node, belief = nodes[chosen], beliefs[chosen]

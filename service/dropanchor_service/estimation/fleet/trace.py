@@ -1,0 +1,85 @@
+"""What a smoother needs of a run of the engine: its nodes, and the heaviest hypotheses after each of them."""
+
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+
+from dropanchor_service.estimation.batch import Array
+
+from .engine import FleetEngine
+from .kernel import advance
+from .layout import BELIEF, N, Work
+from .node import NODE
+from .pool import load
+from .tuning import Tuning
+
+KEPT: Final = 8  # hypotheses of a node
+
+TRACE: Final = np.dtype(
+    [
+        ("count", np.int32),
+        ("model", np.uint8),  # of the heading error, as in the row
+        ("referred", np.uint8),
+        ("north", np.float64),
+        ("log_weight", np.float64, (KEPT,)),  # heaviest first
+        ("kind", np.int32, (KEPT,)),
+        ("blocked", np.int32, (KEPT,)),
+        ("mean", np.float64, (KEPT, N)),
+        ("cov", np.float64, (KEPT, N, N)),
+    ]
+)
+
+
+class TracingEngine(FleetEngine):
+    """The engine `fleet`, same poses to the last bit, that remembers all it did: for offline use."""
+
+    def __init__(self, tuning: Tuning | None = None) -> None:
+        super().__init__(tuning)
+        self._steps: list[tuple[Array, Array, Array]] = []
+
+    @property
+    def tuning(self) -> Tuning:
+        return self._tuning
+
+    @property
+    def anchors(self) -> Array:
+        """ANCHOR."""
+        return self._anchors
+
+    def row(self, row: int) -> Array:
+        """A copy of the ROW (1,) as it is now."""
+        return self._rows[row : row + 1].copy()
+
+    def traced(self, row: int) -> tuple[Array, Array, Array]:
+        """NODE, BELIEF and TRACE of the row's nodes so far, in order of time."""
+        empty = (np.zeros(0, NODE), np.zeros(0, BELIEF), np.zeros(0, TRACE))
+        nodes, beliefs, traces = (np.concatenate(parts) for parts in zip(empty, *self._steps, strict=True))
+        own = nodes["row"] == row
+        return nodes[own], beliefs[own], traces[own]
+
+    def _believe(self, nodes: Array) -> Array:
+        beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
+        advance_traced(self._rows, self._pool, nodes, self._anchors, self._tuning, self._work, beliefs, traces)
+        self._steps.append((nodes, beliefs, traces))
+        return beliefs
+
+
+@njit(nogil=True, cache=True)
+def advance_traced(
+    rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Work, beliefs: Any, traces: Any
+) -> None:
+    """`advance`, one node at a time, and a copy of the heaviest hypotheses after each."""
+    for k in range(len(nodes)):
+        advance(rows, pool, nodes[k : k + 1], anchors, t, work, beliefs[k : k + 1])
+        row, trace = rows[nodes[k].row], traces[k]
+        trace.model, trace.referred, trace.north = row.model, row.referred, row.north
+        load(row, pool, work)
+        order = np.argsort(-work.log_weight[: row.count], kind="mergesort")
+        trace.count = min(row.count, KEPT)
+        for j in range(trace.count):
+            h = order[j]
+            trace.log_weight[j] = work.log_weight[h]
+            trace.kind[j], trace.blocked[j] = work.kind[h], work.blocked[h]
+            trace.mean[j] = work.mean[h]
+            trace.cov[j] = work.cov[h]
