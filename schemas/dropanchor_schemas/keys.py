@@ -66,6 +66,15 @@ def all_anchors(site: str) -> str:
     return f"{_site_prefix(site)}/anchor/*"
 
 
+def all_services_alive(site: str) -> str:
+    return f"{_site_prefix(site)}/service/*/alive"
+
+
+def everything(site: str) -> str:
+    """All keys of the site, but for verbatim chunks such as Zenoh's own `@adv`."""
+    return f"{_site_prefix(site)}/**"
+
+
 def tag_from_key(key: str) -> str:
     """The tag id in a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError when the key has another form."""
     chunks = key.split("/")

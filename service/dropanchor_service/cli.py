@@ -10,6 +10,8 @@ _COMMANDS = {
     "demo": "the service with simulated tags, to look at in a browser",
     "serve": "run the service",
     "router": "run a Zenoh router alone",
+    "security": "make the credentials of a site",
+    "tag": "give tags their certificates, or take them away",
     "replay": "run an engine on a recording, offline",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }

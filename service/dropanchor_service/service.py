@@ -19,6 +19,7 @@ from dropanchor_service.buffer import MessageBuffer
 from dropanchor_service.clock import UtcClock
 from dropanchor_service.engine import create_engine
 from dropanchor_service.estimators import Estimators
+from dropanchor_service.exposure import credentials_of, refuse_exposure
 from dropanchor_service.http_thread import HttpThread
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.ingest_thread import IngestThread
@@ -45,6 +46,8 @@ class Service:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
+        self._credentials = credentials_of(settings)
+        refuse_exposure(settings, self._credentials)
         self._stopping = Event()
         self._opened = ExitStack()
         self.metrics = Metrics()
@@ -65,7 +68,7 @@ class Service:
             self.clock,
         )
         self._thread = IngestThread(self._ingest, self._buffer, self.metrics, settings.ingest.period_ms * 1e-3)
-        self._link = ZenohLink(settings.zenoh, self._zenoh_parts)
+        self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self.metrics.watch(FleetGauges(self.tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth))
 
     def __enter__(self) -> Self:

@@ -54,9 +54,19 @@ class HttpSettings(_Section):
 class ZenohSettings(_Section):
     """Either a router of our own that listens, or a session that connects to one."""
 
-    listen: Endpoints = ("tcp/127.0.0.1:7447",)
+    listen: Endpoints = Field(
+        default=("tcp/127.0.0.1:7447",), description="With credentials: those endpoints unless others are given here."
+    )
     connect: Endpoints = Field(default=(), description="Endpoints of a router; then `listen` is not used.")
     config_file: Path | None = Field(default=None, description="A Zenoh configuration (JSON5): TLS, access control.")
+
+
+class SecuritySettings(_Section):
+    """Who is let in. Without a folder anybody is, and then only on the loopback unless `insecure` is set."""
+
+    folder: Path | None = Field(
+        default=None, description="Made by `dropanchor security init`: certificates, access control, API keys."
+    )
 
 
 class IngestSettings(_Section):
@@ -115,8 +125,10 @@ class Settings(_Section):
         default="accept", description="Whether a tag that is not listed here is registered when it is heard."
     )
     max_tags: Annotated[int, Field(ge=1, le=1_000_000)] = 20_000
+    insecure: bool = Field(default=False, description="Listen beyond the loopback although anybody may then connect.")
     http: HttpSettings = HttpSettings()
     zenoh: ZenohSettings = ZenohSettings()
+    security: SecuritySettings = SecuritySettings()
     ingest: IngestSettings = IngestSettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}

@@ -9,6 +9,7 @@ from typing import Self
 
 import zenoh
 
+from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings import ZenohSettings
 from dropanchor_service.zenoh_session import ATTEMPT_S, ZenohError, open_session
 
@@ -24,9 +25,13 @@ class ZenohLink:
     """
 
     def __init__(
-        self, settings: ZenohSettings, parts: Callable[[zenoh.Session], list[AbstractContextManager[object]]]
+        self,
+        settings: ZenohSettings,
+        parts: Callable[[zenoh.Session], list[AbstractContextManager[object]]],
+        credentials: SecurityFolder | None = None,
     ) -> None:
         self._settings = settings
+        self._credentials = credentials
         self._parts = parts
         self._opened = ExitStack()
         self._session: zenoh.Session | None = None
@@ -57,7 +62,7 @@ class ZenohLink:
 
     def _open(self) -> None:
         with ExitStack() as opening:
-            session = opening.enter_context(open_session(self._settings))
+            session = opening.enter_context(open_session(self._settings, self._credentials))
             for part in self._parts(session):
                 opening.enter_context(part)
             self._opened = opening.pop_all()

@@ -1,6 +1,7 @@
 """A light client that publishes the raw range and IMU samples of a tag."""
 
 from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.credentials import Credentials, read_credentials
 from dropanchor_tag_client.session import ConnectError, SessionSettings
 
-__all__ = ["ConnectError", "SessionSettings", "TagClient"]
+__all__ = ["ConnectError", "Credentials", "SessionSettings", "TagClient", "read_credentials"]

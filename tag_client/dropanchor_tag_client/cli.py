@@ -7,6 +7,7 @@ import sys
 from importlib import import_module
 from types import FrameType, ModuleType
 
+from dropanchor_tag_client.options import complete
 from dropanchor_tag_client.recording import RecordingError
 from dropanchor_tag_client.session import ConnectError
 
@@ -42,6 +43,7 @@ or a samples message as in the protocol:
 Without t_ns the time is that of reading. A bad line is reported with its number and left out; the exit code is then 1.
 example:
   my_uwb_reader | dropanchor-tag publish --tag cart
+  my_uwb_reader | dropanchor-tag publish --credentials cart/      with the folder that `dropanchor tag add cart` made
 """
 _SIMULATE = """Publishes what the sensors of simulated tags measure while they drive around one anchor."""
 _SIMULATE_EXAMPLES = """examples:
@@ -56,6 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     try:
         parsed = parser(given[0] if given else "").parse_args(given)
+        complete(parsed)
         return int(_source(parsed.command).run(parsed))
     except KeyboardInterrupt:
         return _INTERRUPTED

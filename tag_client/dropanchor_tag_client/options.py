@@ -10,6 +10,7 @@ from typing import Any
 import zenoh
 
 from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.credentials import read_credentials
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
 
 PASSWORD_VARIABLE = "DROPANCHOR_PASSWORD"
@@ -17,12 +18,16 @@ PASSWORD_VARIABLE = "DROPANCHOR_PASSWORD"
 
 def add_connection_options(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("connection")
-    group.add_argument("--site", default="default", help="site that the tag belongs to (default: %(default)s)")
+    group.add_argument(
+        "--credentials",
+        metavar="FOLDER",
+        help="what `dropanchor tag add` made for the tag: certificates, and defaults for --tag, --site and --connect",
+    )
+    group.add_argument("--site", help="site that the tag belongs to (default: default)")
     group.add_argument(
         "--connect",
-        default=DEFAULT_CONNECT,
         metavar="ENDPOINT",
-        help="Zenoh router: tcp/host:port or tls/host:port (default: %(default)s)",
+        help=f"Zenoh router: tcp/host:port or tls/host:port (default: {DEFAULT_CONNECT})",
     )
     group.add_argument("--encoding", choices=["packed", "json"], default="packed", help="default: %(default)s")
     group.add_argument("--ca", metavar="PEM", help="certificate of the authority that signed the router's (tls/)")
@@ -35,6 +40,19 @@ def add_connection_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="give up when the router has not answered for so long (default: try for ever)",
     )
+
+
+def complete(arguments: argparse.Namespace) -> None:
+    """Fills in what was not given: from the credentials, else the defaults. Raises ValueError."""
+    if arguments.credentials is not None:
+        given = read_credentials(arguments.credentials, arguments.connect)
+        arguments.site = arguments.site or given.site
+        arguments.connect = given.session.connect
+        arguments.ca, arguments.cert, arguments.key = given.session.ca, given.session.cert, given.session.key
+        if "tag" in arguments:
+            arguments.tag = arguments.tag or given.tag
+    arguments.site = arguments.site or "default"
+    arguments.connect = arguments.connect or DEFAULT_CONNECT
 
 
 def session_settings(arguments: argparse.Namespace) -> SessionSettings:

@@ -35,6 +35,8 @@ def test_help_teaches_with_examples(command: list[str], capsys: pytest.CaptureFi
     [
         (["replay", "nowhere"], "nowhere is not a folder"),
         (["publish", "--tag", "", "--connect-timeout", "1"], "an id has 1 to 64 characters"),
+        (["publish"], "--tag says so, or --credentials"),
+        (["publish", "--credentials", "nowhere"], "nowhere holds no credentials of a tag"),
         (["publish", "--tag", "a", "--connect", "nonsense"], "an endpoint such as tcp/127.0.0.1:7447 was expected"),
         (["publish", "--tag", "a", "--cert", "x"], "cert and key go together"),
         (["publish", "--tag", "a", "--user", "x"], "DROPANCHOR_PASSWORD"),
@@ -52,7 +54,7 @@ def test_what_cannot_work_ends_with_a_sentence_and_code_2(
 
 @pytest.mark.parametrize(
     "arguments",
-    [[], ["dance"], ["publish"], ["replay"], ["replay", "x", "--speed", "-1"], ["replay", "x", "--speed", "fast"]],
+    [[], ["dance"], ["replay"], ["replay", "x", "--speed", "-1"], ["replay", "x", "--speed", "fast"]],
 )
 def test_a_command_line_that_makes_no_sense_ends_with_code_2(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as end:

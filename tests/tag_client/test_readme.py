@@ -32,9 +32,15 @@ def test_the_secure_tag_can_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.chdir(tmp_path)
     for name in ("ca.pem", "cart-1.pem", "cart-1.key"):
         Path(name).touch()
-    done = python("-c", PROGRAMS[1])
-    assert done.returncode == 0, done.stderr
-    assert len(PROGRAMS) == 2
+    bundle = Path("cart-1")
+    bundle.mkdir()
+    for name in ("ca.pem", "tag.pem", "tag.key"):
+        (bundle / name).touch()
+    (bundle / "tag.json").write_text('{"tag": "cart-1", "site": "yard", "connect": "tls/router.example:7447"}')
+    for program in PROGRAMS[1:]:
+        done = python("-c", program)
+        assert done.returncode == 0, done.stderr
+    assert len(PROGRAMS) == 3
 
 
 def test_the_lines_for_publish_are_samples() -> None:

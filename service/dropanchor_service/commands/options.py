@@ -19,11 +19,26 @@ def add_service_options(parser: argparse.ArgumentParser) -> None:
     zenoh.add_argument("--zenoh-connect", metavar="ENDPOINT", help="use the Zenoh router there, start none")
     parser.add_argument("--engine", metavar="NAME", help="the estimator: paper (default) or fleet")
     parser.add_argument("--data-dir", metavar="FOLDER", help="keep changes made over REST here")
+    add_security_options(parser)
     add_log_option(parser)
+
+
+def add_security_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--security", metavar="FOLDER", help="credentials made by `dropanchor security init`")
+    parser.add_argument(
+        "--insecure", action="store_true", default=None, help="listen beyond the loopback without credentials"
+    )
 
 
 def add_log_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log-level", default="INFO", choices=("DEBUG", "INFO", "WARNING", "ERROR"))
+
+
+def positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError("at least 1")
+    return number
 
 
 def settings_of(arguments: argparse.Namespace, **more: Any) -> Settings:
@@ -31,10 +46,22 @@ def settings_of(arguments: argparse.Namespace, **more: Any) -> Settings:
     options: dict[str, Any] = {
         "http": _given(host=arguments.host, port=arguments.port),
         "zenoh": _given(listen=arguments.zenoh_listen, connect=arguments.zenoh_connect),
-        **_given(engine=arguments.engine, data_dir=arguments.data_dir),
+        "security": _given(folder=arguments.security),
+        **_given(engine=arguments.engine, data_dir=arguments.data_dir, insecure=arguments.insecure),
         **more,
     }
     return load_settings(arguments.config, {key: value for key, value in options.items() if value != {}})
+
+
+def router_settings(arguments: argparse.Namespace) -> Settings:
+    """Of a router alone: the settings of everything else do not matter. Raises SettingsError."""
+    options = {
+        "http": {"host": "127.0.0.1"},
+        "zenoh": {"connect": []} | _given(listen=arguments.zenoh_listen),
+        "security": _given(folder=arguments.security),
+        **_given(insecure=arguments.insecure),
+    }
+    return load_settings(options=options)
 
 
 def _given(**options: Any) -> dict[str, Any]:

@@ -17,7 +17,7 @@ class BadLineError(ValueError):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--tag", required=True, help="id of the tag")
+    parser.add_argument("--tag", help="id of the tag (default: the one of --credentials)")
     parser.add_argument(
         "--clock", choices=["utc", "boot"], default="utc", help="what t_ns counts from (default: %(default)s)"
     )
@@ -26,6 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Raises ConnectError, ValueError. Returns 1 when lines were left out."""
+    if arguments.tag is None:
+        raise ValueError("whose samples are these? --tag says so, or --credentials")
     with opened_client(arguments, arguments.tag, clock=arguments.clock) as client:
         bad = publish_lines(client, sys.stdin.buffer, sys.stderr, clock=arguments.clock)
     refused = sum(client.refused.values())

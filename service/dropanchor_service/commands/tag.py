@@ -1,0 +1,73 @@
+"""`dropanchor tag`: certificates of tags."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from dropanchor_schemas.keys import InvalidKeyError
+from dropanchor_service.commands.security import add_days_option, add_folder_option
+from dropanchor_service.security.folder import ROUTER_FILE, SecurityError, SecurityFolder
+
+DESCRIPTION = """\
+Gives a tag its certificate, or takes it away, and writes the router's configuration anew. Zenoh reads its access
+control at its start only: restart the router afterwards. Tags and service reconnect by themselves, and nothing is lost.
+"""
+EPILOG = """\
+examples:
+  dropanchor tag add forklift-7
+  dropanchor tag add forklift-7 --renew
+  dropanchor tag revoke forklift-7
+  dropanchor tag list
+"""
+UNUSABLE = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    add = actions.add_parser("add", help="issue a certificate")
+    add.add_argument("name", metavar="NAME", nargs="+", help="id of a tag")
+    add.add_argument("--renew", action="store_true", help="a new certificate for tags that have one")
+    add_days_option(add)
+    revoke = actions.add_parser("revoke", help="shut a tag out")
+    revoke.add_argument("name", metavar="NAME", nargs="+", help="id of a tag")
+    listed = actions.add_parser("list", help="who has a certificate")
+    for action in (add, revoke, listed):
+        add_folder_option(action)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0, or 2 when nothing could be done."""
+    try:
+        folder = SecurityFolder.open(arguments.security)
+        {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](folder, arguments)
+    except (SecurityError, InvalidKeyError) as error:
+        sys.stderr.write(f"dropanchor tag: {error}\n")
+        return UNUSABLE
+    return 0
+
+
+def _add(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
+    for name in arguments.name:
+        bundle = folder.add_tag(name, arguments.days, arguments.renew)
+        print(f"{name}: give the folder {bundle} to the tag; there: dropanchor-tag publish --credentials {bundle.name}")
+    print(_restart(folder.path))
+
+
+def _revoke(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
+    for name in arguments.name:
+        folder.revoke_tag(name)
+        print(f"{name}: no longer admitted")
+    print(_restart(folder.path))
+
+
+def _list(folder: SecurityFolder, _arguments: argparse.Namespace) -> None:
+    for name, tag in sorted(folder.table.tags.items()):
+        state = "admitted" if tag.revoked is None else f"revoked {tag.revoked:%Y-%m-%d}"
+        print(f"{name}\t{state}\tcertificate expires {tag.expires:%Y-%m-%d}\tserial {tag.serial}")
+
+
+def _restart(folder: Path) -> str:
+    return (
+        f"{folder / ROUTER_FILE} is written anew. In force after a restart of the router (or of the service, where it "
+        "is its own router)."
+    )

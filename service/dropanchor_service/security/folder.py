@@ -1,0 +1,196 @@
+"""The folder that `dropanchor security init` makes: certificates, the table of tags, the router's configuration."""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE
+from dropanchor_service.security.authority import Authority, Issued
+from dropanchor_service.security.router import router_configuration
+
+TABLE = "issued.json"
+ROUTER_FILE = "router.json5"
+MAX_COMMON_NAME_BYTES = 64  # RFC 5280, ub-common-name
+PRIVATE, PUBLIC = 0o600, 0o644
+
+
+class SecurityError(ValueError):
+    """Credentials that cannot be made or used; the message says what to do."""
+
+
+class IssuedTag(BaseModel):
+    """A tag's certificate."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    serial: str
+    expires: datetime
+    revoked: datetime | None = None
+
+
+class Table(BaseModel):
+    """Who has a certificate."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    site: str
+    hosts: tuple[str, ...]
+    listen: tuple[str, ...]
+    tags: Mapping[str, IssuedTag] = {}
+
+    @property
+    def admitted(self) -> list[str]:
+        return [name for name, tag in self.tags.items() if tag.revoked is None]
+
+
+class SecurityFolder:
+    """Reads and changes the folder. Whatever is written appears whole or not at all; private keys are for the owner."""
+
+    def __init__(self, path: Path, table: Table) -> None:
+        self.path = path
+        self.table = table
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """Raises SecurityError."""
+        try:
+            return cls(path, Table.model_validate_json((path / TABLE).read_bytes()))
+        except FileNotFoundError as error:
+            raise SecurityError(
+                f"there are no credentials in {path}; make them with: dropanchor security init --security {path}"
+            ) from error
+        except OSError as error:
+            raise SecurityError(f"the credentials in {path} cannot be read: {error.strerror}") from error
+        except ValidationError as error:
+            raise SecurityError(f"{path / TABLE} is damaged: {error.errors()[0]['msg']}") from error
+
+    @classmethod
+    def make(cls, path: Path, table: Table, days: int) -> Self:
+        """A new authority and the certificates of router, service and reader. Raises SecurityError."""
+        if path.exists() and any(path.iterdir()):
+            raise SecurityError(f"{path} is not empty, and credentials are never overwritten; choose another folder")
+        try:
+            path.mkdir(parents=True, exist_ok=True, mode=0o700)
+            authority = Authority.make("Dropanchor site authority")
+            folder = cls(path, table)
+            folder._keep("ca", authority.issued)
+            for role in (ROUTER, SERVICE):
+                folder._keep(role, authority.server(role, table.hosts, days))
+            folder._keep(READER, authority.client(READER, days))
+            folder._save(table)
+        except OSError as error:
+            raise SecurityError(f"{path} cannot be written: {error.strerror}") from error
+        return folder
+
+    def add_tag(self, name: str, days: int, renew: bool = False) -> Path:
+        """The folder that goes to the tag. Raises SecurityError or InvalidKeyError."""
+        with self._changing():
+            self._refuse_tag(name, renew)
+            issued = self._authority().client(name, days)
+            bundle = self.bundle(name)
+            bundle.mkdir(parents=True, exist_ok=True, mode=0o700)
+            _write(bundle / "ca.pem", (self.path / "ca.pem").read_bytes(), PUBLIC)
+            _write(bundle / "tag.pem", issued.certificate, PUBLIC)
+            _write(bundle / "tag.key", issued.key, PRIVATE)
+            _write(bundle / "tag.json", _json(self._about(name)), PUBLIC)
+            entry = IssuedTag(serial=issued.serial, expires=issued.expires)
+            self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: entry}}))
+        return bundle
+
+    def revoke_tag(self, name: str) -> None:
+        """Raises SecurityError."""
+        with self._changing():
+            tag = self.table.tags.get(name)
+            if tag is None or tag.revoked is not None:
+                raise SecurityError(f"tag {name!r} has no certificate" + (" any more" if tag else ""))
+            revoked = tag.model_copy(update={"revoked": datetime.now(UTC)})
+            self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: revoked}}))
+
+    def bundle(self, name: str) -> Path:
+        return self.path / "tags" / chunk_from_id(name)
+
+    def certificate(self, role: str) -> Path:
+        return self.path / f"{role}.pem"
+
+    def key(self, role: str) -> Path:
+        return self.path / f"{role}.key"
+
+    def router_configuration(self, listen: Sequence[str] | None = None) -> dict[str, Any]:
+        """Zenoh's, with the access control of the tags that are in the table now."""
+        files = {name: str(path.resolve()) for name, path in self._tls_files().items()}
+        return router_configuration(self.table.site, self.table.admitted, listen or self.table.listen, files)
+
+    def _tls_files(self) -> dict[str, Path]:
+        return {"ca": self.certificate("ca"), "certificate": self.certificate(ROUTER), "key": self.key(ROUTER)}
+
+    def _refuse_tag(self, name: str, renew: bool) -> None:
+        chunk_from_id(name)
+        if len(name.encode()) > MAX_COMMON_NAME_BYTES:
+            raise SecurityError(f"a certificate holds names of {MAX_COMMON_NAME_BYTES} bytes, {name!r} has more")
+        if name in ROLES:
+            raise SecurityError(f"{name!r} is the name of a part of the system; a tag needs another")
+        known = self.table.tags.get(name)
+        if known is None:
+            if renew:
+                raise SecurityError(f"tag {name!r} has no certificate to renew")
+        elif known.revoked is not None and known.expires > datetime.now(UTC):
+            raise SecurityError(
+                f"tag {name!r} was revoked, and its old certificate would be let in again with the name, until it "
+                f"expires on {known.expires:%Y-%m-%d}; choose another name"
+            )
+        elif known.revoked is None and not renew:
+            raise SecurityError(f"tag {name!r} has a certificate; --renew makes a new one")
+
+    def _about(self, name: str) -> dict[str, str]:
+        port = self.table.listen[0].rpartition(":")[2]
+        host = self.table.hosts[0]
+        host = f"[{host}]" if ":" in host else host
+        return {"tag": name, "site": self.table.site, "connect": f"tls/{host}:{port}"}
+
+    def _authority(self) -> Authority:
+        try:
+            return Authority(Issued((self.path / "ca.pem").read_bytes(), (self.path / "ca.key").read_bytes()))
+        except OSError as error:
+            raise SecurityError(f"the authority's key is needed: {error.filename}: {error.strerror}") from error
+        except ValueError as error:
+            raise SecurityError(f"the authority in {self.path} is damaged: {error}") from error
+
+    def _keep(self, name: str, issued: Issued) -> None:
+        _write(self.path / f"{name}.pem", issued.certificate, PUBLIC)
+        _write(self.path / f"{name}.key", issued.key, PRIVATE)
+
+    def _save(self, table: Table) -> None:
+        self.table = table
+        _write(self.path / TABLE, _json(table.model_dump(mode="json")), PUBLIC)
+        _write(self.path / ROUTER_FILE, _json(self.router_configuration()), PUBLIC)
+
+    @contextmanager
+    def _changing(self) -> Iterator[None]:
+        """One process at a time, on the table as it is now."""
+        with (self.path / ".lock").open("ab") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            self.table = type(self).open(self.path).table
+            yield
+
+
+def _json(document: Any) -> bytes:
+    return json.dumps(document, indent=2, ensure_ascii=False).encode() + b"\n"
+
+
+def _write(file: Path, content: bytes, mode: int) -> None:
+    """Whole or not at all."""
+    new = file.with_name(f".{file.name}.new")
+    new.unlink(missing_ok=True)
+    with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as opened:
+        opened.write(content)
+        opened.flush()
+        os.fsync(opened.fileno())
+    new.replace(file)

@@ -1,0 +1,133 @@
+"""The folder of credentials: who gets what, and what is never done."""
+
+import json
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from cryptography.x509.oid import ExtendedKeyUsageOID
+
+from dropanchor_service.cli import main
+from dropanchor_service.security.access_control import ROLES
+from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_tag_client import read_credentials
+from support.commands import environment
+from support.secured import secured_site
+
+
+def modes(folder: Path) -> dict[str, int]:
+    return {file.name: stat.S_IMODE(file.stat().st_mode) for file in folder.rglob("*") if file.is_file()}
+
+
+def test_init_says_what_comes_next_and_never_overwrites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "security"
+    init = ["security", "init", "--security", str(folder), "--host", "yard.example", "--host", "192.0.2.7"]
+    assert main(init) == 0
+    said = capsys.readouterr().out
+    assert "dropanchor tag add NAME" in said
+    assert "dropanchor router --security" in said
+    before = {file.name: file.read_bytes() for file in folder.iterdir()}
+    assert main(init) == 2
+    assert "never overwritten" in capsys.readouterr().err
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
+
+
+def test_private_keys_are_for_the_owner_alone(tmp_path: Path) -> None:
+    site = secured_site(tmp_path / "security", "a")
+    found = modes(site.folder.path)
+    assert {name for name, mode in found.items() if mode == 0o600} >= {name for name in found if name.endswith(".key")}
+    assert sum(name.endswith(".key") for name in found) == len(ROLES) + 2
+    assert stat.S_IMODE(site.folder.path.stat().st_mode) == 0o700
+
+
+def test_certificates_are_signed_for_their_hosts_and_their_purpose(tmp_path: Path) -> None:
+    site = secured_site(tmp_path / "security", "a")
+    authority = x509.load_pem_x509_certificate(site.folder.certificate("ca").read_bytes())
+    router = x509.load_pem_x509_certificate(site.folder.certificate("router").read_bytes())
+    tag = x509.load_pem_x509_certificate((site.folder.bundle("a") / "tag.pem").read_bytes())
+    for certificate in (router, tag):
+        certificate.verify_directly_issued_by(authority)
+    names = router.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert names.get_values_for_type(x509.DNSName) == ["localhost"]
+    assert [str(address) for address in names.get_values_for_type(x509.IPAddress)] == ["127.0.0.1"]
+    assert not tag.extensions.get_extension_for_class(x509.BasicConstraints).value.ca
+    usage = list(tag.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value)
+    assert usage == [ExtendedKeyUsageOID.CLIENT_AUTH]
+    assert tag.subject.rfc4514_string() == "CN=a"
+
+
+def test_a_bundle_says_who_the_tag_is_and_where_it_connects(tmp_path: Path) -> None:
+    site = secured_site(tmp_path / "security", "a/ü", site="yard")
+    credentials = read_credentials(site.folder.bundle("a/ü"))
+    assert (credentials.tag, credentials.site, credentials.session.connect) == ("a/ü", "yard", site.endpoint)
+
+
+def test_tags_are_added_listed_and_revoked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = ["--security", str(secured_site(tmp_path / "security").folder.path)]
+    assert main(["tag", "add", "a", "b", *folder]) == 0
+    assert main(["tag", "revoke", "a", *folder]) == 0
+    assert "restart of the router" in capsys.readouterr().out
+    assert main(["tag", "list", *folder]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split("\t")[:2][0] for line in lines] == ["a", "b"]
+    assert "revoked" in lines[0]
+    assert "admitted" in lines[1]
+    configuration = json.loads((tmp_path / "security" / "router.json5").read_text())
+    assert [subject["id"] for subject in configuration["access_control"]["subjects"]] == ["service", "reader", "b"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["tag", "add", "service"], "a tag needs another"),
+        (["tag", "add", "x" * 65], "1 to 64 characters"),
+        (["tag", "add", "ü" * 33], "names of 64 bytes"),
+        (["tag", "add", "known"], "--renew makes a new one"),
+        (["tag", "add", "new", "--renew"], "no certificate to renew"),
+        (["tag", "add", "gone"], "its old certificate would be let in again"),
+        (["tag", "revoke", "nobody"], "'nobody' has no certificate"),
+        (["tag", "revoke", "gone"], "no certificate any more"),
+    ],
+)
+def test_what_cannot_be_is_a_sentence(
+    tmp_path: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = secured_site(tmp_path / "security", "known", "gone").folder
+    folder.revoke_tag("gone")
+    assert main([*arguments, "--security", str(folder.path)]) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_a_folder_that_is_not_there_or_damaged_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SecurityError, match="dropanchor security init"):
+        SecurityFolder.open(tmp_path)
+    (tmp_path / "issued.json").write_text("{")
+    with pytest.raises(SecurityError, match=r"issued\.json is damaged"):
+        SecurityFolder.open(tmp_path)
+
+
+def test_the_key_of_the_authority_may_be_kept_elsewhere_until_it_is_needed(tmp_path: Path) -> None:
+    folder = secured_site(tmp_path / "security", "a").folder
+    folder.key("ca").unlink()
+    folder.revoke_tag("a")
+    with pytest.raises(SecurityError, match="the authority's key is needed"):
+        folder.add_tag("b", 30)
+
+
+def test_tags_that_are_added_at_the_same_time_are_all_there(tmp_path: Path) -> None:
+    path = secured_site(tmp_path / "security").folder.path
+    commands = [
+        [sys.executable, "-m", "dropanchor_service", "tag", "add", f"t{n}", "--security", str(path)] for n in range(4)
+    ]
+    running = [subprocess.Popen(command, env=environment(), stdout=subprocess.DEVNULL) for command in commands]
+    assert [process.wait(60) for process in running] == [0] * 4
+    assert sorted(SecurityFolder.open(path).table.tags) == ["t0", "t1", "t2", "t3"]
+
+
+@pytest.mark.parametrize("host", ["", "a b", "yard.example:7447", "tls/yard"])
+def test_a_host_that_is_none_is_refused(tmp_path: Path, host: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["security", "init", "--security", str(tmp_path / "s"), "--host", host]) == 2
+    assert "neither the name nor the address" in capsys.readouterr().err

@@ -1,0 +1,60 @@
+"""Credentials of a site, a router that asks for them, and sessions that have some."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import zenoh
+
+from dropanchor_service.security.folder import SecurityFolder, Table
+from support.zenoh_router import free_port
+
+
+@dataclass
+class SecuredSite:
+    """What `dropanchor security init` and `dropanchor tag add` made."""
+
+    folder: SecurityFolder
+    endpoint: str
+
+    @contextmanager
+    def router(self, access_control: bool = True) -> Iterator[None]:
+        configuration = self.folder.router_configuration()
+        if not access_control:
+            del configuration["access_control"]
+        with zenoh.open(zenoh.Config.from_json5(json.dumps(configuration))):
+            yield
+
+    @contextmanager
+    def session(self, who: str) -> Iterator[zenoh.Session]:
+        """As `service`, `reader`, or the tag of that name."""
+        path = self.folder.path
+        is_tag = who in self.folder.table.tags
+        cert, key = (
+            self.folder.bundle(who) / f"tag.{end}" if is_tag else path / f"{who}.{end}" for end in ("pem", "key")
+        )
+        tls = {
+            "root_ca_certificate": str(path / "ca.pem"),
+            "enable_mtls": True,
+            "connect_certificate": str(cert),
+            "connect_private_key": str(key),
+        }
+        configuration = {
+            "mode": "client",
+            "connect": {"endpoints": [self.endpoint], "timeout_ms": 10_000},
+            "scouting": {"multicast": {"enabled": False}},
+            "transport": {"shared_memory": {"enabled": False}, "link": {"tls": tls}},
+        }
+        with zenoh.open(zenoh.Config.from_json5(json.dumps(configuration))) as session:
+            yield session
+
+
+def secured_site(path: Path, *tags: str, site: str = "default") -> SecuredSite:
+    port = free_port()
+    table = Table(site=site, hosts=("localhost", "127.0.0.1"), listen=(f"tls/127.0.0.1:{port}",))
+    folder = SecurityFolder.make(path, table, days=30)
+    for tag in tags:
+        folder.add_tag(tag, days=30)
+    return SecuredSite(folder, f"tls/localhost:{port}")
