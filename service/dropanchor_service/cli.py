@@ -12,6 +12,7 @@ _COMMANDS = {
     "router": "run a Zenoh router alone",
     "security": "make the credentials of a site",
     "tag": "give tags their certificates, or take them away",
+    "compile": "compile the estimator ahead of the first start",
     "replay": "run an engine on a recording, offline",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }

@@ -1,0 +1,124 @@
+"""The board and the alert rules ask for what the service really exposes."""
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import promql_parser as promql
+import pytest
+import yaml
+from prometheus_client.parser import text_string_to_metric_families
+
+from support.service import ROOT, running_service
+
+DEPLOY = ROOT / "deploy"
+BOARD = DEPLOY / "grafana" / "dashboards" / "dropanchor.json"
+ALERTS = DEPLOY / "prometheus" / "alerts.yml"
+MADE_BY_PROMETHEUS = {"up": {"job", "instance"}}
+ADDED_BY_PROMETHEUS = {"job", "instance"}
+
+
+def board() -> Any:
+    return json.loads(BOARD.read_text())
+
+
+def rules() -> list[Any]:
+    return [rule for group in yaml.safe_load(ALERTS.read_text())["groups"] for rule in group["rules"]]
+
+
+def expressions() -> list[str]:
+    return [target["expr"] for panel in board()["panels"] for target in panel["targets"]] + [r["expr"] for r in rules()]
+
+
+@pytest.fixture(scope="module")
+def exposed() -> dict[str, dict[str, set[str]]]:
+    """Of a running service: metric → label → the values seen."""
+    with running_service("--engine", "paper") as service:
+        text = httpx.get(f"{service.url}/metrics").text
+    found: dict[str, dict[str, set[str]]] = {}
+    for family in text_string_to_metric_families(text):
+        for sample in family.samples:
+            labels = found.setdefault(sample.name, {})
+            for label, value in sample.labels.items():
+                labels.setdefault(label, set()).add(value)
+        # A counter whose labels come with the first count shows none before.
+        found.setdefault(f"{family.name}_total" if family.type == "counter" else family.name, {})
+    return found
+
+
+@pytest.mark.parametrize("expression", expressions())
+def test_what_is_asked_for_exists(expression: str, exposed: dict[str, dict[str, set[str]]]) -> None:
+    for selector in selectors(promql.parse(expression)):
+        if selector.name in MADE_BY_PROMETHEUS:
+            continue
+        assert selector.name in exposed
+        for matcher in selector.matchers.matchers:
+            if matcher.name in ADDED_BY_PROMETHEUS:
+                continue
+            values = exposed[selector.name][matcher.name]
+            assert set(re.split(r"\|", matcher.value)) <= values
+    for label in re.findall(r"\bby \((\w+)\)", expression):
+        assert label in known_labels(expression, exposed)
+
+
+def test_the_check_notices_a_metric_that_does_not_exist(exposed: dict[str, dict[str, set[str]]]) -> None:
+    with pytest.raises(AssertionError):
+        test_what_is_asked_for_exists("rate(dropanchor_wishes_total[1m])", exposed)
+    with pytest.raises(AssertionError):
+        test_what_is_asked_for_exists('dropanchor_tags{state="asleep"}', exposed)
+
+
+def test_every_alert_says_what_happened_and_what_to_do() -> None:
+    names = [rule["alert"] for rule in rules()]
+    assert len(set(names)) == len(names) >= 8
+    for rule in rules():
+        assert rule["labels"]["severity"] in ("critical", "warning")
+        assert rule["annotations"]["summary"]
+        assert rule["annotations"]["action"]
+
+
+def test_no_two_panels_lie_on_each_other_and_all_have_a_title() -> None:
+    taken: set[tuple[int, int]] = set()
+    for panel in board()["panels"]:
+        assert panel["title"]
+        place = panel["gridPos"]
+        cells = {(place["x"] + i, place["y"] + j) for i in range(place["w"]) for j in range(place["h"])}
+        assert not cells & taken
+        assert max(x for x, _ in cells) < 24
+        taken |= cells
+    assert len({panel["id"] for panel in board()["panels"]}) == len(board()["panels"])
+
+
+def test_grafana_finds_board_and_source_where_compose_puts_them() -> None:
+    compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
+    mounts = dict(volume.split(":")[:2][::-1] for volume in compose["services"]["grafana"]["volumes"])
+    provider = yaml.safe_load((DEPLOY / "grafana/provisioning/dashboards/dropanchor.yaml").read_text())["providers"][0]
+    assert (DEPLOY / mounts[provider["options"]["path"]] / "dropanchor.json").is_file()
+    source = yaml.safe_load((DEPLOY / "grafana/provisioning/datasources/prometheus.yaml").read_text())["datasources"][0]
+    assert {panel["datasource"]["uid"] for panel in board()["panels"]} == {source["uid"]}
+
+
+def known_labels(expression: str, exposed: dict[str, dict[str, set[str]]]) -> set[str]:
+    """Those of the metrics in the expression; of a counter without counts as the source declares them."""
+    declared = {"dropanchor_faults_total": {"where"}}
+    names = [selector.name for selector in selectors(promql.parse(expression))]
+    return {label for name in names for label in (*exposed.get(name, ()), *declared.get(name, ()))}
+
+
+def selectors(node: Any) -> Iterator[Any]:
+    """Every vector selector below a node of a parsed expression."""
+    match type(node).__name__:
+        case "VectorSelector":
+            yield node
+        case "MatrixSelector":
+            yield node.vector_selector
+        case "BinaryExpr":
+            yield from selectors(node.lhs)
+            yield from selectors(node.rhs)
+        case "Call":
+            for argument in node.args:
+                yield from selectors(argument)
+        case "AggregateExpr" | "ParenExpr" | "UnaryExpr" | "SubqueryExpr":
+            yield from selectors(node.expr)
