@@ -18,6 +18,7 @@ from dropanchor_service.api import create_app
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
+from dropanchor_service.store.tracks import Keeping, Tracks
 
 T_NS = 1_800_000_000_000_000_000
 
@@ -40,6 +41,13 @@ class House:
         for name, value in fields.items():
             poses[name] = value
         self.answers.latest.write(poses, np.empty(0, HYPOTHESIS))
+        if self.answers.tracks is not None:
+            self.answers.tracks.offer(poses)
+
+    def keep(self) -> None:
+        """Write the history now."""
+        assert self.answers.tracks is not None
+        assert self.answers.tracks.writer.turn()
 
     def app(self, dashboard: Path | None = None, max_tags: int = 1000) -> FastAPI:
         return create_app(
@@ -52,9 +60,12 @@ class House:
         )
 
 
-def make_house(site: Site | None = None, folder: Path | None = None) -> House:
+def make_house(site: Site | None = None, folder: Path | None = None, keeping: Keeping | None = None) -> House:
+    """keeping: of a history in the folder, whose thread does not run: `House.keep` writes."""
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
-    house = House(Answers(store, TagTable(), LatestPoses()))
+    tags = TagTable()
+    tracks = Tracks(folder, keeping, tags, store, lambda: house.now_ns) if folder and keeping else None
+    house = House(Answers(store, tags, LatestPoses(), tracks=tracks))
     house.answers.now_ns = lambda: house.now_ns
     return house
 

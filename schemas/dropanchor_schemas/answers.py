@@ -69,6 +69,9 @@ class Health(_Answer):
     """The service answers (live), or can do its work (ready)."""
 
     status: str
+    impaired: list[str] = Field(
+        default=[], description="What does not work although live poses do: a history that cannot be written."
+    )
 
 
 class InvalidPart(_Answer):

@@ -3,7 +3,7 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.screening import Rejected, keep, screen, within_time
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.taps import NO_TAPS, Taps
 
 MESSAGES_PER_TURN = 1000
 
@@ -36,6 +37,7 @@ class Ingest:
         latest: LatestPoses,
         metrics: Metrics,
         clock: UtcClock,
+        taps: Taps = NO_TAPS,
     ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._buffer = buffer
@@ -46,6 +48,7 @@ class Ingest:
         self._latest = latest
         self._metrics = metrics
         self._clock = clock
+        self._taps = taps
         self._publishers = Publishers()
         self._rows: dict[str, int] = {}  # by key
         self._announced: deque[str] = deque(maxlen=1024)
@@ -70,6 +73,7 @@ class Ingest:
         admitted = [(row, message) for row, message in zip(rows, messages, strict=True) if row >= 0]
         if not admitted:
             return
+        self._tell(self._taps.messages, [row for row, _ in admitted], [message for _, message in admitted])
         of_row = np.array([row for row, _ in admitted], np.int32)
         arrivals = np.array([message[3] for _, message in admitted], np.int64)
         self._metrics.messages.inc(len(admitted))
@@ -212,6 +216,15 @@ class Ingest:
         self._metrics.poses.inc(len(batch.poses))
         for reason, count in batch.rejected.items():
             self._metrics.rejected.labels(reason).inc(count)
+        self._tell(self._taps.poses, batch.poses)
+
+    def _tell(self, tap: Callable[..., None], *what: object) -> None:
+        """What only listens must not cost a sample."""
+        try:
+            tap(*what)
+        except Exception as error:
+            self._metrics.faults.labels("tap").inc()
+            self._log.exception("tap", error)
 
     def _reject(self, reason: Reason, rows: Array) -> None:
         if len(rows):

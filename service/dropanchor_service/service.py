@@ -23,11 +23,14 @@ from dropanchor_service.exposure import credentials_of, refuse_exposure
 from dropanchor_service.http_thread import HttpThread
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.ingest_thread import IngestThread
+from dropanchor_service.keeping_metrics import HistoryMetrics
 from dropanchor_service.metrics import FleetGauges, Metrics
 from dropanchor_service.settings import Settings
 from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
+from dropanchor_service.store.tracks import Tracks
+from dropanchor_service.taps import NO_TAPS, Taps
 from dropanchor_service.zenoh_answers import ZenohAnswers
 from dropanchor_service.zenoh_intake import ZenohIntake
 from dropanchor_service.zenoh_link import ZenohLink
@@ -55,7 +58,8 @@ class Service:
         self.tags = TagTable()
         self.latest = LatestPoses()
         self.site = _site_store(settings)
-        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns)
+        self._tracks = self._made_tracks()
+        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._tracks)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20))
         self._ingest = Ingest(
             self._buffer,
@@ -66,6 +70,7 @@ class Service:
             self.latest,
             self.metrics,
             self.clock,
+            Taps(poses=self._tracks.offer) if self._tracks else NO_TAPS,
         )
         self._thread = IngestThread(self._ingest, self._buffer, self.metrics, settings.ingest.period_ms * 1e-3)
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
@@ -75,6 +80,8 @@ class Service:
         with self._opened:
             bound = listen(self._settings.http.host, self._settings.http.port)
             self._opened.callback(bound.close)
+            if self._tracks is not None:
+                self._opened.enter_context(self._tracks)
             self._thread.start()
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._link)
@@ -99,10 +106,23 @@ class Service:
         """Why the service cannot do its work at this moment; empty when it can."""
         return [problem for problem in (self._thread.problem, self._link.problem) if problem is not None]
 
+    def impairments(self) -> Sequence[str]:
+        """What does not work although the service does its work."""
+        writers = [part.writer for part in (self._tracks,) if part is not None]
+        return [writer.problem for writer in writers if writer.problem is not None]
+
     @property
     def has_died(self) -> bool:
         """Whether a thread that must run does not."""
         return not self._http.is_alive or not self._thread.is_alive
+
+    def _made_tracks(self) -> Tracks | None:
+        folder, history = self._settings.data_dir, self._settings.history
+        if folder is None or not history.enabled:
+            return None
+        tracks = Tracks(folder, history.keeping(), self.tags, self.site, self.clock.now_ns)
+        self.metrics.watch(HistoryMetrics(tracks))
+        return tracks
 
     def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
@@ -125,6 +145,7 @@ class Service:
         app = create_app(
             self.answers,
             ready=lambda: (not (found := self.problems()), found),
+            impaired=self.impairments,
             registry=self.metrics.registry,
             stopping=self._stopping,
             max_tags=self._settings.max_tags,

@@ -12,6 +12,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
+from dropanchor_service.store.tracks import Keeping
 
 
 def _is_endpoint(text: str) -> str:
@@ -80,6 +81,30 @@ class IngestSettings(_Section):
     )
 
 
+class HistorySettings(_Section):
+    """Which poses are kept in `data_dir`, and for how long."""
+
+    enabled: bool = Field(default=True, description="Without a `data_dir` there is no history.")
+    period_s: Annotated[float, Field(gt=0, le=3600)] = Field(default=1.0, description="At most one pose in so long.")
+    distance_m: Annotated[float, Field(ge=0, le=1000)] = Field(
+        default=0.1, description="A pose nearer than this to the one before it, in the same state, is left out,"
+    )
+    still_s: Annotated[float, Field(ge=0, le=3600)] = Field(
+        default=5.0, description="unless so long has passed. Beyond 10 s no pose at a past time can be given between."
+    )
+    keep_days: Annotated[float, Field(gt=0, le=36_500)] = 30.0
+    most_mib: Annotated[float, Field(ge=1)] = Field(default=4096.0, description="The oldest poses make room.")
+
+    def keeping(self) -> Keeping:
+        return Keeping(
+            period_ns=round(self.period_s * 1e9),
+            distance_m=self.distance_m,
+            still_ns=round(self.still_s * 1e9),
+            keep_ns=round(self.keep_days * 86_400e9),
+            most_bytes=int(self.most_mib * 2**20),
+        )
+
+
 class PaperSettings(_Section):
     """Parameters of the engine `paper`; names, units and sources stand in `estimation/paper_parameters.py`."""
 
@@ -119,7 +144,7 @@ class Settings(_Section):
 
     engine: Literal["fleet", "paper"] = Field(default="paper", description="The estimator.")
     data_dir: Path | None = Field(
-        default=None, description="Where changes made over REST are kept; without it a restart forgets them."
+        default=None, description="Where changes made over REST and tracks are kept; without it a restart forgets them."
     )
     unknown_tags: Literal["accept", "refuse"] = Field(
         default="accept", description="Whether a tag that is not listed here is registered when it is heard."
@@ -130,6 +155,7 @@ class Settings(_Section):
     zenoh: ZenohSettings = ZenohSettings()
     security: SecuritySettings = SecuritySettings()
     ingest: IngestSettings = IngestSettings()
+    history: HistorySettings = HistorySettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}
     paper: PaperSettings = PaperSettings()

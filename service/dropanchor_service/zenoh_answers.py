@@ -61,7 +61,7 @@ class ZenohAnswers:
         tags = self._answers.tags
         if name is not None:
             tag = tags.find(name)
-            pose = None if tag is None else self._pose(tag, at_ns)
+            pose = self._pose(name, at_ns)
             if pose is None:
                 raise QueryError(f"no tag {name!r} is known" if tag is None else f"tag {name!r} has no pose yet")
             yield keys.pose_key(self._site, name), to_json(pose)
@@ -70,17 +70,20 @@ class ZenohAnswers:
         for pose in self._answers.pose_list(wanted)["poses"] if at_ns is None else self._poses_at(wanted, at_ns):
             yield keys.pose_key(self._site, pose["tag"]), to_json(pose)
 
-    def _pose(self, tag: Tag, at_ns: int | None) -> Answer | None:
+    def _pose(self, name: str, at_ns: int | None) -> Answer | None:
         try:
-            return self._answers.pose_of(tag) if at_ns is None else self._answers.pose_at(tag, at_ns)
+            if at_ns is not None:
+                return self._answers.pose_at(name, at_ns)
         except NoPoseThenError as error:
-            raise QueryError(f"tag {tag.name!r}: {error}") from error
+            raise QueryError(f"tag {name!r}: {error}") from error
+        tag = self._answers.tags.find(name)
+        return None if tag is None else self._answers.pose_of(tag)
 
     def _poses_at(self, tags: Sequence[Tag], at_ns: int) -> Iterator[Answer]:
         """Of those tags that have a pose for that time."""
         for tag in tags:
             with suppress(QueryError):
-                pose = self._pose(tag, at_ns)
+                pose = self._pose(tag.name, at_ns)
                 if pose is not None:
                     yield pose
 

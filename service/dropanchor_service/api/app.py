@@ -11,12 +11,13 @@ from prometheus_client import CollectorRegistry
 from dropanchor_schemas.answers import PoseFrame, Problem
 from dropanchor_service.api.dashboard import DashboardMount
 from dropanchor_service.api.errors import Kind, add_error_handlers
-from dropanchor_service.api.health import Ready, health_router, metrics_router
+from dropanchor_service.api.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.poses import poses_router
 from dropanchor_service.api.site import site_router
 from dropanchor_service.api.stream import stream_router
 from dropanchor_service.api.tags import tags_router
+from dropanchor_service.api.track import track_router
 from dropanchor_service.store.answers import Answers
 
 PREFIX = "/api/v1"
@@ -30,11 +31,12 @@ def create_app(
     ready: Ready,
     registry: CollectorRegistry,
     stopping: Event,
+    impaired: Impaired = list,
     max_tags: int = 20_000,
     dashboard: Path | None = DASHBOARD,
 ) -> FastAPI:
-    """ready: whether the service can do its work, and why not. stopping: when set, streams end.
-    dashboard: the folder of the page, None for no page."""
+    """ready: whether the service can do its work, and why not. impaired: what else does not work. stopping: when set,
+    streams end. dashboard: the folder of the page, None for no page."""
     app = FastAPI(
         title="Dropanchor",
         version="1",
@@ -49,9 +51,10 @@ def create_app(
     for router in (
         tags_router(answers, max_tags),
         poses_router(answers),
+        track_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),
-        health_router(ready),
+        health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))

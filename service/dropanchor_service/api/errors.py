@@ -29,6 +29,7 @@ class Kind(Enum):
     UNKNOWN_ANCHOR = (404, "The site has no such anchor")
     METHOD_NOT_ALLOWED = (405, "The method is not allowed here")
     NOT_ACCEPTABLE = (406, "None of the accepted media types is offered")
+    NO_HISTORY = (409, "The service keeps no history")
     TOO_FAR_AHEAD = (409, "That time is too far ahead of the newest pose")
     NOT_GEOREFERENCED = (409, "The site has no georeference")
     SITE_ID_FIXED = (409, "The site's id cannot change while the service runs")
@@ -38,6 +39,7 @@ class Kind(Enum):
     INVALID_REQUEST = (422, "The request is not valid")
     INTERNAL = (500, "The service made a mistake")
     NOT_SAVED = (503, "The change could not be saved")
+    HISTORY_UNREADABLE = (503, "The history cannot be read")
     NOT_READY = (503, "The service is not ready")
     OTHER = (400, "The request cannot be answered")
 

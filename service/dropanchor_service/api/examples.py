@@ -106,3 +106,18 @@ SITE: dict[str, Any] = {
     "georeference": {"lat": 52.5123, "lon": 13.4123, "rotation_rad": 0.0},
     "anchors": [ANCHOR],
 }
+TRACK: dict[str, Any] = {
+    "tag": "tag-1",
+    "from_ns": 1_799_996_400_000_000_000,
+    "to_ns": 1_800_000_000_000_000_000,
+    "poses": [
+        {
+            name: POSE[name]
+            for name in (
+                *("t_ns", "state", "reason", "x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "p_mode"),
+                *("sigma_pos_m", "sigma_obs_m", "range_m", "covariance", "anchor", "lat", "lon"),
+            )
+        }
+    ],
+    "next": None,
+}

@@ -17,18 +17,23 @@ _WEIGHT = re.compile(r"0(\.[0-9]{0,3})?|1(\.0{0,3})?")
 def wanted(request: Request, answers: Answers) -> bool:
     """Whether the client would rather have GeoJSON than JSON. Raises ProblemError when neither can be given."""
     accept = request.headers.get("accept", "*/*")
-    as_json, as_geojson = _quality(accept, JSON), _quality(accept, MEDIA_TYPE)
+    as_json, as_geojson = quality(accept, JSON), quality(accept, MEDIA_TYPE)
     if as_json == as_geojson == 0:
         raise ProblemError(Kind.NOT_ACCEPTABLE, f"{JSON} and {MEDIA_TYPE} are offered.")
     if as_geojson <= as_json:
         return False
+    require_georeference(answers, "GeoJSON")
+    return True
+
+
+def require_georeference(answers: Answers, form: str) -> None:
+    """Raises ProblemError where the site has none."""
     if answers.site.site.georeference is None:
         raise ProblemError(
             Kind.NOT_GEOREFERENCED,
-            "GeoJSON holds WGS 84 coordinates only: set `georeference` with PUT /api/v1/site, or accept "
+            f"{form} holds WGS 84 coordinates only: set `georeference` with PUT /api/v1/site, or accept "
             "application/json for poses in the site frame.",
         )
-    return True
 
 
 def feature_of(pose: Answer) -> Answer:
@@ -44,10 +49,10 @@ def collection_of(pose_list: Answer) -> Answer:
     return {"type": "FeatureCollection", "t_ns": pose_list["t_ns"], "features": features}
 
 
-def _quality(accept: str, media_type: str) -> float:
+def quality(accept: str, media_type: str) -> float:
     """The q of RFC 9110, section 12.5.1: the most specific range that matches counts; 0: not wanted."""
     ranges = {_first(part): _q(part) for part in accept.split(",")}
-    for candidate in (media_type, "application/*", "*/*"):
+    for candidate in (media_type, f"{media_type.partition('/')[0]}/*", "*/*"):
         if candidate in ranges:
             return ranges[candidate]
     return 0.0

@@ -12,9 +12,10 @@ from dropanchor_service.api.errors import Kind, ProblemError, problems
 from dropanchor_service.api.parts import NO_QUERY, json_response
 
 Ready = Callable[[], tuple[bool, Sequence[str]]]
+Impaired = Callable[[], Sequence[str]]
 
 
-def health_router(ready: Ready) -> APIRouter:
+def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
     router = APIRouter(tags=["health"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -38,7 +39,7 @@ def health_router(ready: Ready) -> APIRouter:
         ok, reasons = ready()
         if not ok:
             raise ProblemError(Kind.NOT_READY, "; ".join(reasons), reasons=list(reasons))
-        return json_response({"status": "ready"})
+        return json_response({"status": "ready", "impaired": list(impaired())})
 
     return router
 

@@ -87,8 +87,10 @@ class AtTime(BaseModel):
         ge=0,
         lt=2**63,
         description="UTC, ns: the pose at that time instead of the latest one. In the past between two poses that are "
-        "at most 1 s apart, as far back as the memory goes (a minute, less in a very large fleet); up to 2 s after the "
-        "newest pose, carried on with its speed and yaw rate, with a covariance that grows. Without hypotheses.",
+        "at most 1 s apart, as far back as the memory goes (a minute, less in a very large fleet); before that, where "
+        "the service keeps a history, between two poses at most 10 s apart, with a covariance that says how far the "
+        "tag can have strayed between them; up to 2 s after the newest pose, carried on with its speed and yaw rate, "
+        "with a covariance that grows. Without hypotheses.",
         examples=[1_800_000_000_000_000_000],
     )
 

@@ -3,6 +3,7 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
 from starlette.responses import Response
 
 from dropanchor_schemas.explain import Explanation
@@ -31,7 +32,10 @@ def poses_router(answers: Answers) -> APIRouter:
     )
     async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
         as_geojson = geojson.wanted(request, answers)
-        pose = _pose_of(answers, tag, query.at)
+        if query.at is None:
+            pose = _pose_of(answers, tag)
+        else:  # may have to read from disk
+            pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
         return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
 
     @router.get(
@@ -76,16 +80,22 @@ def _no_pose_yet(name: str) -> ProblemError:
     return ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet.")
 
 
-def _pose_of(answers: Answers, name: str, at_ns: int | None) -> Answer:
-    tag = _known(answers, name)
+def _pose_of(answers: Answers, name: str) -> Answer:
+    pose = answers.pose_of(_known(answers, name))
+    if pose is None:
+        raise _no_pose_yet(name)
+    return pose
+
+
+def _pose_at(answers: Answers, name: str, at_ns: int) -> Answer:
     try:
-        pose = answers.pose_of(tag) if at_ns is None else answers.pose_at(tag, at_ns)
+        pose = answers.pose_at(name, at_ns)
     except TooFarAheadError as error:
         raise ProblemError(Kind.TOO_FAR_AHEAD, f"Tag {name!r}: {error}.") from error
     except NoPoseThenError as error:
         raise ProblemError(Kind.NO_POSE_THEN, f"Tag {name!r}: {error}.") from error
     if pose is None:
-        raise _no_pose_yet(name)
+        raise _no_pose_yet(_known(answers, name).name)
     return pose
 
 

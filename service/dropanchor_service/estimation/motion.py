@@ -50,3 +50,21 @@ def interpolated(before: Array, after: Array, t_ns: int) -> Array:
     between["heading"] = math.remainder(float(before["heading"]) + share * turn, math.tau)
     between["p_mode"] = np.fmin(before["p_mode"], after["p_mode"])
     return between
+
+
+def bridged(before: Array, after: Array, t_ns: int) -> Array:
+    """As `interpolated`, over a gap T in which the tag may have accelerated and turned: at the share u of the gap a
+    motion of constant acceleration a is a u (1 - u) T²/2 away from the straight one, so that
+
+        P' = P + diag(p², p², h²),  p = ACCELERATION_STD u (1 - u) T²/2,  h = TURN_STD u (1 - u) T²/2 <= pi/sqrt(3),
+
+    where the bound is that of a heading of which nothing is known.
+    """
+    gap = (int(after["t_ns"]) - int(before["t_ns"])) * S_PER_NS
+    share = (t_ns - int(before["t_ns"])) * S_PER_NS / gap
+    bow = share * (1 - share) * gap * gap / 2
+    position, heading = ACCELERATION_STD * bow, min(TURN_STD * bow, math.pi / math.sqrt(3.0))
+    between = interpolated(before, after, t_ns)
+    between["cov"] = between["cov"] + np.diag([position**2, position**2, heading**2])
+    between["sigma_pos"] = math.sqrt(between["cov"][0, 0] + between["cov"][1, 1])
+    return between

@@ -12,11 +12,13 @@ import numpy as np
 import orjson
 
 from dropanchor_service.estimation.batch import POSE, Array, State
-from dropanchor_service.store.at_time import pose_at
+from dropanchor_service.store.at_time import BeforeMemoryError, pose_at
 from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95, with_age
 from dropanchor_service.store.latest import LatestPoses
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
+from dropanchor_service.store.track_answers import pose_in_tracks
+from dropanchor_service.store.tracks import Tracks
 
 Answer = dict[str, Any]
 
@@ -32,28 +34,49 @@ class Answers:
     """Reads only; any thread may ask."""
 
     def __init__(
-        self, site: SiteStore, tags: TagTable, latest: LatestPoses, now_ns: Callable[[], int] = time.time_ns
+        self,
+        site: SiteStore,
+        tags: TagTable,
+        latest: LatestPoses,
+        now_ns: Callable[[], int] = time.time_ns,
+        tracks: Tracks | None = None,
     ) -> None:
+        """tracks: where poses are kept for long, None for nowhere."""
         self.site = site
         self.tags = tags
         self.latest = latest
         self.now_ns = now_ns
+        self.tracks = tracks
 
     def pose_of(self, tag: Tag) -> Answer | None:
         """`Pose`, None before the tag's first one."""
         row = self.latest.row(tag.row)
         return None if row is None else self.poses_of(row[None], self.now_ns())[0]
 
-    def pose_at(self, tag: Tag, t_ns: int) -> Answer | None:
-        """`Pose` at a time, None before the tag's first one. Raises NoPoseThenError."""
-        latest = self.latest.row(tag.row)
-        if latest is None:
-            return None
+    def pose_at(self, name: str, t_ns: int) -> Answer | None:
+        """`Pose` of a tag at a time, None when there never was one. Raises NoPoseThenError. May read from disk."""
+        tag = self.tags.find(name)
+        latest = None if tag is None else self.latest.row(tag.row)
         now_ns = self.now_ns()
+        try:
+            pose = None if latest is None else self._pose_in_memory(latest, t_ns, now_ns)
+        except BeforeMemoryError:
+            if self.tracks is None:
+                raise
+            pose = None
+        if pose is None and self.tracks is not None:
+            memory = np.empty(0, POSE) if tag is None or latest is None else self._memory(latest)
+            pose = pose_in_tracks(self.tracks, self.site, name, memory, t_ns)
+        if pose is None:
+            return None
+        return self._poses(pose[None], now_ns, then=True, names=[name])[0] | {"hypotheses": []}
+
+    def _pose_in_memory(self, latest: Array, t_ns: int, now_ns: int) -> Array:
         aged = with_age(latest[None], (now_ns - latest["t_ns"][None]) * 1e-9)[0]
-        pose = pose_at(self.latest.history(tag.row), latest if t_ns <= latest["t_ns"] else aged, t_ns)
-        answer = self._poses(pose[None], now_ns, then=True)[0]
-        return answer | {"hypotheses": []}
+        return pose_at(self.latest.history(int(latest["row"])), latest if t_ns <= latest["t_ns"] else aged, t_ns)
+
+    def _memory(self, latest: Array) -> Array:
+        return np.append(self.latest.history(int(latest["row"])), latest)
 
     def pose_list(self, tags: Sequence[Tag] | None = None) -> Answer:
         """`PoseList` of these tags, or of all, as far as they have a pose."""
@@ -67,9 +90,9 @@ class Answers:
             answer["hypotheses"] = self._hypotheses_of(row, answer["state"]) or []
         return answers
 
-    def _poses(self, poses: Array, now_ns: int, then: bool = False) -> list[Answer]:
+    def _poses(self, poses: Array, now_ns: int, then: bool = False, names: Sequence[str] | None = None) -> list[Answer]:
         """`Pose` for each of the POSE rows, without hypotheses."""
-        columns = columns_of(poses, self.site, self.tags, now_ns, then)
+        columns = columns_of(poses, self.site, self.tags, now_ns, then, names)
         return [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
 
     def frame_of(self, poses: Array, now_ns: int) -> Answer:

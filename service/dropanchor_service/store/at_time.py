@@ -5,10 +5,11 @@ import math
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array, State
-from dropanchor_service.estimation.motion import interpolated, propagated
+from dropanchor_service.estimation.motion import bridged, interpolated, propagated
 
 CLOSE_NS = 1_000_000_000  # poses farther apart are not interpolated between
 AHEAD_NS = 2_000_000_000
+FAR_NS = 10_000_000_000  # poses of the kept history farther apart are not bridged
 FASTEST = 12.0  # m/s; between two poses that are farther apart than this explains, the estimate jumped
 
 _UNPLACED = (State.INITIALISING, State.AMBIGUOUS, State.LOST)
@@ -22,6 +23,10 @@ class TooFarAheadError(NoPoseThenError):
     """The time is too long after the newest pose."""
 
 
+class BeforeMemoryError(NoPoseThenError):
+    """The time lies before what is held in memory."""
+
+
 def pose_at(history: Array, latest: Array, t_ns: int) -> Array:
     """POSE (0-d). history: POSE in order of time; latest: POSE (0-d), the newest of all. Raises NoPoseThenError."""
     newest = int(latest["t_ns"])
@@ -31,11 +36,22 @@ def pose_at(history: Array, latest: Array, t_ns: int) -> Array:
     after = int(np.searchsorted(past["t_ns"], t_ns, "right"))
     if after == 0:
         since = int(past["t_ns"][0]) if len(past) else newest
-        raise NoPoseThenError(f"the poses that are kept begin {(since - t_ns) * 1e-9:.3f} s after that time")
+        raise BeforeMemoryError(f"the poses that are kept begin {(since - t_ns) * 1e-9:.3f} s after that time")
     before = past[after - 1]
     if before["t_ns"] == t_ns:
         return before  # type: ignore[no-any-return]
     return _between(before, past[after] if after < len(past) else latest, t_ns)
+
+
+def pose_between(before: Array | None, after: Array | None, t_ns: int) -> Array:
+    """POSE (0-d) from the kept poses beside a time, one of which may be of that very time. Raises NoPoseThenError."""
+    for pose in (before, after):
+        if pose is not None and pose["t_ns"] == t_ns:
+            return pose
+    if before is None or after is None or after["t_ns"] - before["t_ns"] > FAR_NS:
+        raise NoPoseThenError(f"no two poses at most {FAR_NS * 1e-9:.0f} s apart are kept around that time")
+    _refuse_to_guess(before, after)
+    return bridged(before, after, t_ns)
 
 
 def _ahead(latest: Array, t_ns: int) -> Array:
@@ -54,12 +70,17 @@ def _between(before: Array, after: Array, t_ns: int) -> Array:
     gap_s = int(after["t_ns"] - before["t_ns"]) * 1e-9
     if gap_s > CLOSE_NS * 1e-9:
         raise NoPoseThenError(f"no range was used around that time: the poses beside it are {gap_s:.3f} s apart")
+    _refuse_to_guess(before, after)
+    return interpolated(before, after, t_ns)
+
+
+def _refuse_to_guess(before: Array, after: Array) -> None:
+    gap_s = int(after["t_ns"] - before["t_ns"]) * 1e-9
     if not (_is_known(before) and _is_known(after)):
         raise NoPoseThenError("where the tag was was not known then")
     jump = math.hypot(after["x"] - before["x"], after["y"] - before["y"])
     if jump > FASTEST * gap_s + 3 * math.hypot(before["sigma_pos"], after["sigma_pos"]):
         raise NoPoseThenError(f"the estimate jumped {jump:.1f} m around that time")
-    return interpolated(before, after, t_ns)
 
 
 def _is_known(pose: Array) -> bool:

@@ -1,5 +1,6 @@
 """Poses as columns of the contract: what an engine wrote, with everything an answer derives from it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,11 +56,19 @@ class PoseColumns:
     lon: Array | None
 
 
-def columns_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int, then: bool = False) -> PoseColumns:
-    """poses: POSE, of any rows that `tags` knows; then: they hold for their own time, and do not get old."""
+def columns_of(
+    poses: Array,
+    site: SiteStore,
+    tags: TagTable,
+    now_ns: int,
+    then: bool = False,
+    names: Sequence[str] | None = None,
+) -> PoseColumns:
+    """poses: POSE, of any rows that `tags` knows, or of the tags of these names; then: they hold for their own time,
+    and do not get old."""
     age_s = (now_ns - poses["t_ns"]) * 1e-9
     aged = poses if then else with_age(poses, age_s)
-    names = [tags.at(row) for row in aged["row"].tolist()]
+    of_tags = [tags.at(row).name for row in aged["row"].tolist()] if names is None else list(names)
     anchor_ids = [anchor.id for anchor in site.anchors_by_index()]
     reasons = aged["reason"].tolist()
     ellipse = ellipse_95(aged["cov"][:, :2, :2])
@@ -67,8 +76,8 @@ def columns_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int, then:
     lat, lon = (None, None) if origin is None else lat_lon(origin, aged["x"], aged["y"])
     return PoseColumns(
         poses=aged,
-        tags=[tag.name for tag in names],
-        online=[tag.online for tag in names],
+        tags=of_tags,
+        online=[tags.is_online(tag) for tag in of_tags],
         anchors=[anchor_ids[index] if 0 <= index < len(anchor_ids) else None for index in aged["anchor"].tolist()],
         age_s=age_s,
         states=[STATES[state] for state in aged["state"].tolist()],

@@ -81,7 +81,7 @@ def test_readiness_says_why_not() -> None:
     house = make_house()
     app = house.app()
     assert ask(app, "GET", "/api/v1/health/live").json() == {"status": "live"}
-    assert ask(app, "GET", "/api/v1/health/ready").json() == {"status": "ready"}
+    assert ask(app, "GET", "/api/v1/health/ready").json() == {"status": "ready", "impaired": []}
     house.not_ready = ["no Zenoh session", "disk full"]
     response = ask(app, "GET", "/api/v1/health/ready")
     assert kind_of(response) == "not-ready"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.batch import POSE, Array, State
-from dropanchor_service.estimation.motion import interpolated, propagated
+from dropanchor_service.estimation.motion import bridged, interpolated, propagated
 
 
 def pose(t_s: float = 0.0, **fields: Any) -> Array:
@@ -50,3 +50,22 @@ def test_between_two_poses_headings_turn_the_short_way_and_the_lesser_claim_coun
     assert abs(middle["heading"]) == pytest.approx(math.pi)
     assert int(middle["state"]) == State.AMBIGUOUS
     assert float(middle["p_mode"]) == 0.6
+
+
+def test_a_bridge_is_as_uncertain_as_a_motion_of_constant_acceleration_over_its_gap() -> None:
+    rng = np.random.default_rng(5)
+    before, after = pose(0.0, cov=np.zeros((3, 3))), pose(4.0, x=8.0, cov=np.zeros((3, 3)))
+    for share in (0.0, 0.25, 0.5, 1.0):
+        t = 4.0 * share
+        between = bridged(before, after, round(t * 1e9))
+        assert between["x"] == pytest.approx(2.0 * t)
+        # x(t) with acceleration a and the start speed that ends at the same place
+        a = rng.standard_normal(50_000)
+        x = (8.0 - a * 16.0 / 2) / 4.0 * t + a * t * t / 2
+        assert between["cov"][0, 0] == pytest.approx(np.var(x), rel=0.05, abs=1e-12)
+        assert between["sigma_pos"] == pytest.approx(math.sqrt(2 * between["cov"][0, 0]))
+
+
+def test_the_heading_of_a_long_bridge_is_at_worst_unknown() -> None:
+    between = bridged(pose(0.0), pose(10.0), 5_000_000_000)
+    assert between["cov"][2, 2] == pytest.approx(0.001 + math.pi**2 / 3)

@@ -1,0 +1,77 @@
+"""Which poses are worth keeping: one per slot of time, and fewer of a tag that stands still."""
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import Array
+
+
+class SlotFirsts:
+    """The first pose of every row and slot of time. Not locked: its owner is."""
+
+    def __init__(self, slot_ns: int) -> None:
+        self._slot_ns = slot_ns
+        self._slot = np.zeros(0, np.int64)  # of the newest pose of each row
+
+    def of(self, poses: Array) -> Array:
+        """poses: POSE, not empty, per row in order of time; the answer is ordered by row."""
+        missing = int(poses["row"].max()) + 1 - len(self._slot)
+        if missing > 0:
+            self._slot = np.concatenate([self._slot, np.full(max(missing, len(self._slot)), -1)])
+        ordered = poses[np.argsort(poses["row"], kind="stable")]
+        rows, slots = ordered["row"], ordered["t_ns"] // self._slot_ns
+        before = np.append(-1, slots[:-1])
+        begins = np.append(True, rows[1:] != rows[:-1])
+        before[begins] = self._slot[rows[begins]]
+        self._slot[rows] = slots
+        firsts: Array = ordered[slots != before]
+        return firsts
+
+
+class Thinning:
+    """Of the first poses of the slots those are kept that are `distance_m` away from the one kept before, or have
+    another state, or come `still_ns` after it. Owned by one thread."""
+
+    def __init__(self, period_ns: int, distance_m: float = 0.0, still_ns: int = 0) -> None:
+        self._firsts = SlotFirsts(period_ns)
+        self._distance_m = distance_m
+        self._still_ns = still_ns
+        self._kept = np.zeros(0, np.dtype([("t_ns", "i8"), ("x", "f8"), ("y", "f8"), ("state", "i2")]))
+
+    def of(self, poses: Array) -> Array:
+        """Those of the poses (POSE, per row in order of time) that are kept."""
+        if len(poses) == 0:
+            return poses
+        firsts = self._firsts.of(poses)
+        if len(firsts) == 0:
+            return firsts
+        self._grow(int(firsts["row"].max()) + 1)
+        chosen = np.zeros(len(firsts), bool)
+        left = np.arange(len(firsts))
+        while len(left):  # a turn for each pose of the row that has most
+            _, first = np.unique(firsts["row"][left], return_index=True)
+            turn = left[first]
+            kept = turn[~self._adds_nothing(firsts[turn])]
+            chosen[kept] = True
+            self._remember(firsts[kept])
+            left = np.delete(left, first)
+        return firsts[chosen]
+
+    def _adds_nothing(self, poses: Array) -> Array:
+        before = self._kept[poses["row"]]
+        with np.errstate(invalid="ignore"):  # an unknown place is not near
+            near = np.hypot(poses["x"] - before["x"], poses["y"] - before["y"]) < self._distance_m
+        both_unknown = np.isnan(poses["x"]) & np.isnan(before["x"])
+        soon = np.abs(poses["t_ns"] - before["t_ns"]) < self._still_ns
+        same: Array = (near | both_unknown) & soon & (poses["state"] == before["state"])
+        return same
+
+    def _remember(self, poses: Array) -> None:
+        for name in ("t_ns", "x", "y", "state"):
+            self._kept[name][poses["row"]] = poses[name]
+
+    def _grow(self, rows: int) -> None:
+        missing = rows - len(self._kept)
+        if missing > 0:
+            more = np.zeros(max(missing, len(self._kept)), self._kept.dtype)
+            more["state"] = -1
+            self._kept = np.concatenate([self._kept, more])

@@ -1,0 +1,100 @@
+"""The tracks of all tags, kept on disk: thinned, written in the background, pruned by age and size."""
+
+import sqlite3
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dropanchor_service.background import BackgroundWriter
+from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.store.site import SiteStore
+from dropanchor_service.store.tags import TagTable
+from dropanchor_service.store.thinning import Thinning
+from dropanchor_service.store.track_file import Stored, TrackReader, TrackWriter
+
+FILE_NAME = "history.sqlite"
+WRITE_S = 2.0
+PRUNE_S = 0.5  # at most so long at a time
+MOST_WAITING_BYTES = 64 * 2**20
+
+
+@dataclass(frozen=True)
+class Keeping:
+    """How much is kept; see the settings for what each means."""
+
+    period_ns: int
+    distance_m: float
+    still_ns: int
+    keep_ns: int
+    most_bytes: int
+
+
+class Tracks:
+    """`offer` is called by the ingest thread, `poses` by any; a thread of its own writes while it is open."""
+
+    def __init__(
+        self, folder: Path, keeping: Keeping, tags: TagTable, site: SiteStore, now_ns: Callable[[], int]
+    ) -> None:
+        self._path = folder / FILE_NAME
+        self._keeping = keeping
+        self._tags = tags
+        self._site = site
+        self._now_ns = now_ns
+        self._thinning = Thinning(keeping.period_ns, keeping.distance_m, keeping.still_ns)
+        self._file: TrackWriter | None = None
+        self._reader = TrackReader(self._path)
+        self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MOST_WAITING_BYTES)
+        self.written = 0
+        self.used_bytes = 0
+
+    def __enter__(self) -> "Tracks":
+        self.writer.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.writer.stop()
+        if self._file is not None and not self.writer.is_alive:
+            self._file.close()
+
+    def offer(self, poses: Array) -> None:
+        """POSE, per row in order of time."""
+        kept = self._thinning.of(poses)
+        if len(kept):
+            self.writer.put(kept, kept.nbytes, len(kept))
+
+    def poses(self, tag: str, from_ns: int, to_ns: int, most: int, newest_first: bool = False) -> Stored:
+        """Raises sqlite3.Error."""
+        return self._reader.poses(tag, from_ns, to_ns, most, newest_first)
+
+    def knows(self, tag: str) -> bool:
+        """Whether poses of this tag were ever kept. Raises sqlite3.Error."""
+        return self._reader.knows(tag)
+
+    def _write(self, batches: Sequence[Array]) -> None:
+        if self._file is None:
+            self._file = TrackWriter(self._path)
+        try:
+            self._insert(self._file, np.concatenate([np.empty(0, POSE), *batches]))
+            self._prune(self._file)
+        except sqlite3.Error:
+            self._file.close()  # opened afresh for the next attempt: what was wrong may have been repaired
+            self._file = None
+            raise
+
+    def _insert(self, file: TrackWriter, poses: Array) -> None:
+        if len(poses):
+            anchors = [anchor.id for anchor in self._site.anchors_by_index()]
+            names = [self._tags.at(row).name for row in poses["row"].tolist()]
+            used = [anchors[index] if 0 <= index < len(anchors) else None for index in poses["anchor"].tolist()]
+            file.insert(poses, names, used)
+            self.written += len(poses)
+
+    def _prune(self, file: TrackWriter) -> None:
+        end_s = time.monotonic() + PRUNE_S
+        keep_from_ns = self._now_ns() - self._keeping.keep_ns
+        while file.prune(keep_from_ns, self._keeping.most_bytes) and time.monotonic() < end_s:
+            pass
+        self.used_bytes = file.used_bytes()

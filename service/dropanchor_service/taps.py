@@ -1,0 +1,26 @@
+"""Who else is told of what comes in and what comes out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from dropanchor_service.buffer import Received
+from dropanchor_service.estimation.batch import Array
+
+
+def _nobody(*_: object) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Taps:
+    """Called by the ingest thread, which cannot wait for them.
+
+    messages: with the rows of admitted messages, and the messages, one call per turn. poses: with POSE as the engine
+    gave them, per row in order of time, after `messages` of the same turn.
+    """
+
+    messages: Callable[[Sequence[int], Sequence[Received]], None] = _nobody
+    poses: Callable[[Array], None] = _nobody
+
+
+NO_TAPS = Taps()

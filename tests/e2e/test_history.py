@@ -1,0 +1,69 @@
+"""The history of a real service: over a restart, and on a disk that is full for a while."""
+
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from dropanchor_schemas import keys
+from dropanchor_schemas.track import Track
+from dropanchor_schemas.wire import ENCODING_PACKED, encode_packed
+from support.service import Running, running_service, settings_file, straight_north
+from support.zenoh_router import connected_session, wait_until
+
+S = 1_000_000_000
+
+
+def drive(session: zenoh.Session, end_ns: int) -> None:
+    frame = straight_north(100, end_ns)
+    session.put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
+
+
+def track(service: Running, end_ns: int) -> Track:
+    return Track.model_validate(service.get(f"/api/v1/tags/a/track?from={end_ns - 12 * S}&to={end_ns}"))
+
+
+def test_a_track_outlives_the_service_and_so_does_the_pose_at_a_time(tmp_path: Path) -> None:
+    end_ns, kept = time.time_ns(), ["--data-dir", str(tmp_path)]
+    configured = ["--config", str(settings_file(tmp_path, ["a"])), *kept]
+    with running_service(*configured) as service, connected_session(service.zenoh) as session:
+        drive(session, end_ns)
+        wait_until(lambda: service.metric("dropanchor_poses_total") >= 90)
+        assert service.stop() == 0
+    with running_service(*kept) as service, connected_session(service.zenoh) as session:
+        assert service.get("/api/v1/tags")["tags"] == []
+        poses = track(service, end_ns).poses
+        assert len(poses) >= 8
+        middle = poses[3].t_ns
+        assert service.get(f"/api/v1/tags/a/pose?at={middle}")["state"] == poses[3].state
+        replies = [reply.ok for reply in session.get(f"{keys.pose_key('default', 'a')}?at={middle}", timeout=5.0)]
+        assert replies[0] is not None
+        assert str(middle) in replies[0].payload.to_string()
+
+
+@pytest.mark.parametrize("what", ["history"])
+def test_on_a_full_disk_the_service_stays_says_so_and_goes_on_when_there_is_room(tmp_path: Path, what: str) -> None:
+    options = ["--config", str(settings_file(tmp_path, ["a"])), "--data-dir", str(tmp_path)]
+    with running_service(*options) as service, connected_session(service.zenoh) as session:
+        wait_until(lambda: service.metric("dropanchor_history_bytes") > 0)
+        allow_files(service, 4096)
+        full_ns = time.time_ns()
+        drive(session, full_ns)
+        wait_until(lambda: service.metric(f"dropanchor_{what}_failing") == 1, 20.0)
+        ready: dict[str, Any] = service.get("/api/v1/health/ready")
+        assert any(what in problem for problem in ready["impaired"])
+        assert service.metric(f"dropanchor_{what}_errors_total") >= 1
+        assert service.get("/api/v1/tags/a/pose")["t_ns"] > full_ns - S
+        allow_files(service, resource.RLIM_INFINITY)
+        wait_until(lambda: service.get("/api/v1/health/ready")["impaired"] == [], 20.0)
+        assert len(track(service, full_ns).poses) >= 8
+        assert service.metric(f"dropanchor_{what}_dropped_total") == 0
+        assert service.stop() == 0
+
+
+def allow_files(service: Running, most_bytes: int) -> None:
+    """How large the files of the service may become: beyond it a write fails, as on a full disk."""
+    resource.prlimit(service.process.pid, resource.RLIMIT_FSIZE, (most_bytes, resource.RLIM_INFINITY))
