@@ -66,6 +66,9 @@ class TagSettings(_Settings):
     mount_angle_rad: FiniteFloat | None = Field(
         default=None, description="Direction of travel minus body x axis, counter-clockwise; null: not known."
     )
+    mount_angle_std_rad: NotNegative | None = Field(
+        default=None, description="How well that is known; 0: exactly, null: the engine's default."
+    )
     slip_std_rad: NotNegative | None = Field(
         default=None,
         description="Of the direction of travel about body x axis plus mounting angle: slip of what drives, sway of "
@@ -74,6 +77,11 @@ class TagSettings(_Settings):
     reverse_allowed: bool = Field(default=False, description="Whether the tag may move backwards.")
     heading_source: Literal["auto", "imu", "platform"] = Field(
         default="auto", description="auto: the IMU where it is sent, else the platform's heading."
+    )
+    heading_std_rad: NotNegative | None = Field(
+        default=None,
+        description="Constant or slow error of the platform's heading, which then does not drift; 0: only noise, null: "
+        "not known, it may drift.",
     )
     start: StartPose | None = None
 

@@ -40,9 +40,11 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["range_bias_std"] = _or_nan(tag.range_bias_std_m)
     columns["range_scale"] = tag.range_scale
     columns["mount_angle"] = _or_nan(tag.mount_angle_rad)
+    columns["mount_angle_std"] = _or_nan(tag.mount_angle_std_rad)
     columns["slip_std"] = _or_nan(tag.slip_std_rad)
     columns["reverse_allowed"] = tag.reverse_allowed
     columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
+    columns["heading_std"] = _or_nan(tag.heading_std_rad)
     columns["declination"] = declination_rad
     if tag.start is not None:
         columns["start_known"] = True

@@ -17,13 +17,16 @@ def test_settings_of_a_tag_become_columns_and_what_is_not_known_nan() -> None:
     assert columns["heading_source"] == HeadingSource.PLATFORM
     assert columns["declination"] == 0.1
     assert [columns[name].item() for name in ("start_known", "start_x", "start_y")] == [True, 1.0, 2.0]
-    assert all(math.isnan(columns[name]) for name in ("range_std", "range_bias_std", "mount_angle", "slip_std"))
+    told = ("range_std", "range_bias_std", "mount_angle", "mount_angle_std", "slip_std", "heading_std")
+    assert all(math.isnan(columns[name]) for name in told)
     assert math.isnan(columns["start_heading"])
 
 
 def test_zero_is_an_answer_where_nothing_told_is_nan() -> None:
-    columns = tag_columns(TagSettings(range_bias_std_m=0.0, slip_std_rad=0.0), 0.0)
-    assert [columns[name].item() for name in ("range_bias_std", "slip_std")] == [0.0, 0.0]
+    settings = TagSettings(range_bias_std_m=0.0, mount_angle_std_rad=0.0, slip_std_rad=0.0, heading_std_rad=0.0)
+    columns = tag_columns(settings, 0.0)
+    told = ("range_bias_std", "mount_angle_std", "slip_std", "heading_std")
+    assert [columns[name].item() for name in told] == [0.0] * 4
 
 
 def test_no_start_is_not_a_start_at_the_origin() -> None:

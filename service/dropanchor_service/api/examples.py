@@ -82,9 +82,11 @@ TAG_SETTINGS: dict[str, Any] = {
     "range_bias_std_m": None,
     "range_scale": 1.0,
     "mount_angle_rad": 0.0,
+    "mount_angle_std_rad": None,
     "slip_std_rad": None,
     "reverse_allowed": False,
     "heading_source": "auto",
+    "heading_std_rad": None,
     "start": {"x": 2.0, "y": 0.5, "heading_rad": None, "std_m": 0.1},
 }
 TAG: dict[str, Any] = {

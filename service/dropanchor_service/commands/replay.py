@@ -73,7 +73,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known.add_argument("--range-bias-std", type=float, metavar="M", help="how well the bias is known; 0: exactly")
     known.add_argument("--range-scale", type=float, default=1.0, metavar="K")
     known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
+    known.add_argument("--mount-angle-std", type=float, metavar="RAD", help="how well that is known; 0: exactly")
     known.add_argument("--slip-std", type=float, metavar="RAD", help="of the direction of travel about that; 0: none")
+    known.add_argument("--heading-std", type=float, metavar="RAD", help="of a platform's heading that does not drift")
     known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
     smoothing = parser.add_argument_group("smoothing (engine fleet): each pose is estimated from later samples too")
     smoothing.add_argument("--smooth", action="store_true", help="from all samples of the recording")
@@ -145,9 +147,11 @@ def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
             range_bias_std_m=arguments.range_bias_std,
             range_scale=arguments.range_scale,
             mount_angle_rad=arguments.mount_angle,
+            mount_angle_std_rad=arguments.mount_angle_std,
             slip_std_rad=arguments.slip_std,
             reverse_allowed=arguments.reverse,
             heading_source=arguments.heading,
+            heading_std_rad=arguments.heading_std,
             start=arguments.start,
         )
     except ValidationError as error:

@@ -28,9 +28,11 @@ TAG_SETTINGS = np.dtype(
         ("range_bias_std", "f8"),  # NaN: the engine's default
         ("range_scale", "f8"),
         ("mount_angle", "f8"),  # NaN: not known
+        ("mount_angle_std", "f8"),  # rad, NaN: the engine's default
         ("slip_std", "f8"),  # of the course about body axis and mounting angle, NaN: the engine's default
         ("reverse_allowed", "?"),
         ("heading_source", "u1"),
+        ("heading_std", "f8"),  # rad, of a platform's heading that does not drift; NaN: not known
         ("start_known", "?"),
         ("start_x", "f8"),
         ("start_y", "f8"),
@@ -44,7 +46,9 @@ UNKNOWN = (
     "range_std",
     "range_bias_std",
     "mount_angle",
+    "mount_angle_std",
     "slip_std",
+    "heading_std",
     "start_x",
     "start_y",
     "start_heading",

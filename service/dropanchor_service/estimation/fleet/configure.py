@@ -27,7 +27,8 @@ def configured(settings: Any, tuning: Tuning) -> Any:
             row[name] = settings[name]
     told = math.isfinite(settings["mount_angle"])
     row["mount"] = settings["mount_angle"] if told else 0.0
-    row["mount_std"] = MOUNT_KNOWN_STD if told else MOUNT_UNKNOWN_STD
+    mount_std = settings["mount_angle_std"]
+    row["mount_std"] = mount_std if math.isfinite(mount_std) else (MOUNT_KNOWN_STD if told else MOUNT_UNKNOWN_STD)
     slip = settings["slip_std"]
     row["slip_known"] = math.isfinite(slip)
     row["crab_std"] = slip if row["slip_known"] else (CRAB_KNOWN_STD if told else CRAB_UNKNOWN_STD)

@@ -35,6 +35,21 @@ def model_of(m: int, variance: float) -> tuple[float, float, float]:
 
 
 @njit(nogil=True)
+def error_of(row: Any, variance: float) -> tuple[float, float, float]:
+    """`model_of` the row's model; of a platform's heading, what was told of it goes before."""
+    if not told_of(row):
+        return model_of(row.model, variance)
+    white, _, _ = model_of(STEADY if row.model == STEADY else 0, variance)
+    return white, row.heading_std, 60.0
+
+
+@njit(nogil=True)
+def told_of(row: Any) -> bool:
+    """Whether the operator told the error of the heading in use."""
+    return row.model != COMMON and math.isfinite(row.heading_std)
+
+
+@njit(nogil=True)
 def reset_models(row: Any, heading: float, variance: float, t: Tuning) -> None:
     """Start every model at this heading."""
     for m in range(MODELS):

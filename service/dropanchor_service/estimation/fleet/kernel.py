@@ -8,7 +8,7 @@ from numba import njit
 
 from . import layout
 from .blocked import open_alternative, recover, unblock
-from .heading import judge_models, model_of, predict_models, reset_models
+from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
 from .layout import COMMON, PHI, REF, STEADY, WORK, YAW, N, R, Work
 from .manage import best_of, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
@@ -23,7 +23,7 @@ from .update import bound_speed, predict_range, update_bearing, update_heading, 
 @njit(nogil=True)
 def _predict_all(work: Work, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
     decay, growth, F, A = scratch
-    _, slow, tau = model_of(row.model, node.heading_var)
+    _, slow, tau = error_of(row, node.heading_var)
     for kind in range(2):
         std, seconds = slow, tau
         if kind == 1 and row.model != STEADY:
@@ -122,10 +122,11 @@ def _refer(work: Work, count: int, row: Any, node: Any) -> None:
 @njit(nogil=True)
 def _heading_all(work: Work, count: int, row: Any, node: Any, t: Tuning, H: Any, PH: Any) -> None:
     if node.heading_kind == MEASURED_HEADING:
-        _judge_reference(work, count, row, node, t)
+        if not told_of(row):
+            _judge_reference(work, count, row, node, t)
     elif node.heading_kind == ABSOLUTE_HEADING and row.model != COMMON:
         _refer(work, count, row, node)
-    white, _, _ = model_of(row.model, node.heading_var)
+    white, _, _ = error_of(row, node.heading_var)
     for h in range(count):
         if row.model != STEADY or work.kind[h] == 0:
             update_heading(work.mean[h], work.cov[h], H, PH, node.heading - row.north, white)

@@ -49,6 +49,7 @@ SETTINGS: Final = [
     ("v_max", np.float64),
     ("reverse", np.uint8),
     ("heading_source", np.uint8),
+    ("heading_std", np.float64),  # rad, of a platform's heading that does not drift; NaN: not known
     ("start_known", np.uint8),
     ("start_x", np.float64),
     ("start_y", np.float64),

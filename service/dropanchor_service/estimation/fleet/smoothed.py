@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.batch import Array, State, StateReason
 
 from .engine import poses_of
-from .heading import model_of
+from .heading import error_of
 from .lag import describe_all, smooth_lagged
 from .layout import COMMON, PHI, REF, STEADY, YAW, V
 from .lineage import trace_back
@@ -75,7 +75,7 @@ def _reference_variance(nodes: Array, traces: Array, now: Array, kind: int, t: T
     absolute = nodes["heading_var"][nodes["heading_kind"] == ABSOLUTE_HEADING]
     model = int(now["model"])
     claimed = float(absolute[0]) if model == COMMON and len(absolute) else 0.0
-    slow = model_of(model, claimed)[1] if model != STEADY else float(traces["cov"][0, 0, REF, REF]) ** 0.5
+    slow = error_of(now, claimed)[1] if model != STEADY else float(traces["cov"][0, 0, REF, REF]) ** 0.5
     return slow**2 + (t.second_std**2 if kind == 1 and model != STEADY else 0.0)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from .heading import model_of
+from .heading import error_of
 from .layout import COMMON, GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
 from .node import ABSOLUTE_HEADING, BEARING, RANGE
 from .predict import diffuse, fill_decay, move, transport
@@ -80,7 +80,7 @@ def make_track(n: int) -> Track:
 @njit(nogil=True)
 def noise_of(node: Any, row: Any, kind: int, t: Tuning, decay: Any, growth: Any) -> None:
     """Decay of the states over the node and the variances it adds, as in the filter."""
-    _, std, seconds = model_of(row.model, node.heading_var if math.isfinite(node.heading_var) else 1.0)
+    _, std, seconds = error_of(row, node.heading_var if math.isfinite(node.heading_var) else 1.0)
     if kind == 1 and row.model != STEADY:
         std = math.sqrt(std * std + t.second_std**2)
         seconds = max(t.second_tau, seconds)
@@ -137,7 +137,7 @@ def _inertial(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, H
     s = track.reference[k]
     usable = row.model == COMMON if node.heading_kind == ABSOLUTE_HEADING else is_referred(node.heading_kind)
     if usable and (row.model != STEADY or kind == 0):
-        white, _, _ = model_of(row.model, node.heading_var)
+        white, _, _ = error_of(row, node.heading_var)
         H[:] = 0.0
         H[YAW] = H[REF] = 1.0
         _measure(track, k, H, wrap(node.heading - row.north - s[YAW] - s[REF]), white)

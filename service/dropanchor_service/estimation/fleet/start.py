@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from .heading import model_of
+from .heading import error_of, told_of
 from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, STEADY, YAW, R, V, Work
 from .manage import copy_hypothesis
 from .node import ABSOLUTE_HEADING, DERIVED_HEADING, NO_HEADING, RELATIVE_HEADING
@@ -69,7 +69,9 @@ def choose_model(row: Any, node: Any, t: Tuning) -> None:
         row.model = COMMON
         if row.start_known == 1 and math.isfinite(row.start_heading):
             row.north = wrap(node.heading - row.start_heading)
-    elif node.heading_kind == DERIVED_HEADING:
+    elif is_referred(node.heading_kind) and math.isfinite(row.heading_std):
+        row.reference_std = row.heading_std
+    if node.heading_kind == DERIVED_HEADING:
         row.model = STEADY
         row.mount_std = min(row.mount_std, t.platform_mount_std)
         if row.slip_known == 0:
@@ -110,14 +112,16 @@ def start_known(work: Work, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     row.referred = 1
     if not is_referred(node.heading_kind):
         return ring + _aligned(work, ring, row, t)
-    _, slow, _ = model_of(row.model, node.heading_var)
+    _, slow, _ = error_of(row, node.heading_var)
     give_reference_error(work.cov[0], slow, not given)
     return ring + second_class(work, 0, ring, row, t, not given)
 
 
 @njit(nogil=True)
 def second_class(work: Work, source: int, target: int, row: Any, t: Tuning, yaw_follows: bool) -> int:
-    """A copy of `source` whose heading reference has a slow error of its own, or drifts; returns 1."""
+    """A copy of `source` whose heading reference has a slow error of its own, or drifts; returns how many."""
+    if told_of(row):
+        return 0
     work.mean[target] = work.mean[source]
     work.cov[target] = work.cov[source]
     work.blocked[target] = work.blocked[source]
@@ -159,7 +163,7 @@ def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool
                 s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
                 P[V, V] = 0.01 if at_rest else (speed_cell / 2.0) ** 2
                 if row.referred == 1:
-                    _, slow, _ = model_of(row.model, node.heading_var)
+                    _, slow, _ = error_of(row, node.heading_var)
                     turn_about(P, slow)
                 h += 1
     return h

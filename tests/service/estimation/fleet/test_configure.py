@@ -6,10 +6,17 @@ import pytest
 from dropanchor_schemas import TagSettings
 from dropanchor_service.engine import tag_columns
 from dropanchor_service.estimation.batch import Array
-from dropanchor_service.estimation.fleet.configure import CRAB_KNOWN_STD, CRAB_UNKNOWN_STD, configured
-from dropanchor_service.estimation.fleet.layout import STEADY
+from dropanchor_service.estimation.fleet.configure import (
+    CRAB_KNOWN_STD,
+    CRAB_UNKNOWN_STD,
+    MOUNT_KNOWN_STD,
+    MOUNT_UNKNOWN_STD,
+    configured,
+)
+from dropanchor_service.estimation.fleet.heading import error_of
+from dropanchor_service.estimation.fleet.layout import COMMON, STEADY, make_work
 from dropanchor_service.estimation.fleet.node import DERIVED_HEADING, NODE
-from dropanchor_service.estimation.fleet.start import choose_model
+from dropanchor_service.estimation.fleet.start import choose_model, second_class
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 
@@ -41,3 +48,27 @@ def test_a_platforms_slip_is_the_default_only_where_it_is_not_told(told: float |
     choose_model(rows[0], node[0], Tuning())
     assert rows[0]["model"] == STEADY
     assert rows[0]["crab_std"] == kept
+
+
+@pytest.mark.parametrize(
+    ("angle", "std", "kept"), [(None, None, MOUNT_UNKNOWN_STD), (0.3, None, MOUNT_KNOWN_STD), (0.3, 0.0, 0.0)]
+)
+def test_a_mounting_angle_is_known_as_well_as_the_operator_says(
+    angle: float | None, std: float | None, kept: float
+) -> None:
+    assert row_of(TagSettings(mount_angle_rad=angle, mount_angle_std_rad=std))["mount_std"] == kept
+
+
+def test_a_heading_told_not_to_drift_has_one_class_and_no_error_beyond_what_was_told() -> None:
+    for told, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
+        rows = row_of(TagSettings(heading_std_rad=told)).reshape(1)
+        rows["model"] = STEADY
+        assert second_class(make_work(), 0, 1, rows[0], Tuning(), False) == classes
+        assert error_of(rows[0], 1.0)[1] == slow
+
+
+def test_a_magnetic_heading_is_not_what_was_told_of_the_platforms() -> None:
+    rows = row_of(TagSettings(heading_std_rad=0.0)).reshape(1)
+    rows["model"] = COMMON
+    assert error_of(rows[0], 0.04)[1] == 0.2
+    assert second_class(make_work(), 0, 1, rows[0], Tuning(), False) == 1
