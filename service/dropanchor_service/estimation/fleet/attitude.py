@@ -108,6 +108,8 @@ def correct_tilt(a: Any, dt: float, ax: float, ay: float, az: float, rest: bool)
     tau_g = min(a.age, TAU_GRAVITY)
     a.gravity += dt / (tau_g + dt) * (n - a.gravity)
     weight = down_weight(n / a.gravity - 1.0)
+    if rest:
+        a.age = max(a.age, TAU)  # the tilt is known from now on, and what deviates from it is motion
     ux, uy, uz = up_in_body(a.q)
     k = weight * dt / (min(a.age, TAU_REST if rest else TAU) + dt)
     s = 1.0 / n

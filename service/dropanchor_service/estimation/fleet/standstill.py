@@ -27,7 +27,7 @@ STANDSTILL = np.dtype(
 
 TAU = 0.12  # s
 ACC_SD = 0.08  # m/s^2, root of the sum over three axes: 0.045 per axis
-GYRO_SD = 0.03  # rad/s, likewise
+GYRO_SD = 0.05  # rad/s, likewise
 RATE = 0.08  # rad/s, of the mean rotation before the bias is known
 RATE_KNOWN = 0.02  # rad/s, afterwards
 HOLD = 0.2  # s of quiet that make rest

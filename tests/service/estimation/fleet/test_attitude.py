@@ -18,22 +18,22 @@ Array = NDArray[Any]
 
 
 @njit
-def follow(a: Any, t: Array, acc: Array, gyro: Array, q: Array) -> None:
+def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Array) -> None:
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k else 0.0
-        turn(a, dt, gyro[k], False)
-        correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], False)
+        turn(a, dt, gyro[k], t[k] < rest_until)
+        correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until)
         q[k] = a.q
 
 
-def attitude_of(m: Motion, start: Array) -> tuple[Array, Array]:
+def attitude_of(m: Motion, start: Array, rest_until: float = -1.0) -> tuple[Array, Array]:
     """The quaternions (n, 4) and the row after the motion; start (w, x, y, z)."""
     row = np.zeros(1, ATTITUDE)
     row[0]["q"] = start
     row[0]["gyro"] = m.gyro[0]
     row[0]["gravity"] = G0
     q = np.empty((len(m.t), 4))
-    follow(row[0], m.t, m.acc, m.gyro, q)
+    follow(row[0], m.t, m.acc, m.gyro, rest_until, q)
     return q, row[0]
 
 
@@ -89,6 +89,16 @@ def test_a_hard_push_does_not_tilt_the_attitude() -> None:
     m = synthesise(np.arange(0, 22, 0.01), lambda t: np.zeros((len(t), 3)), push)
     q, _ = attitude_of(m, np.array([1.0, 0, 0, 0]))
     assert angle_between(q, m.attitude).max() < math.radians(0.1)
+
+
+@pytest.mark.parametrize(("rest_until", "least", "most"), [(0.9, 1.0, 3.0), (-1.0, 5.0, 30.0)])  # deg
+def test_a_second_of_rest_makes_the_first_push_one_of_motion(rest_until: float, least: float, most: float) -> None:
+    def push(t: Array) -> Array:
+        return np.stack([np.where(t > 1, 4.0, 0.0), 0 * t, 0 * t], axis=1)
+
+    m = synthesise(np.arange(0, 1.5, 0.01), lambda t: np.zeros((len(t), 3)), push)
+    q, _ = attitude_of(m, np.array([1.0, 0, 0, 0]), rest_until)
+    assert math.radians(least) < angle_between(q, m.attitude).max() < math.radians(most)
 
 
 def test_an_accelerometer_that_reads_six_percent_high_is_its_own_gravity() -> None:

@@ -44,6 +44,7 @@ def noise(seed: int, n: int, acc_sd: float, gyro_sd: float, rate: float = 0.0) -
     [
         (0.014, 0.003, 0.0, True),  # a device on a table
         (0.02, 0.01, 0.005, True),  # noisier, with a bias
+        (0.02, 0.02, 0.0, True),  # a gyroscope of 0.1 deg/s/sqrt(Hz)
         (0.1, 0.003, 0.0, False),  # rolling
         (0.014, 0.1, 0.0, False),  # swaying
         (0.014, 0.003, 0.3, False),  # on a smooth turntable
