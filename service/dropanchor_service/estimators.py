@@ -8,7 +8,17 @@ import numpy as np
 
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.engine import anchor_columns, tag_columns
-from dropanchor_service.estimation.batch import POSE, Array, Engine, PoseBatch, SampleBatch, State, StateReason
+from dropanchor_service.estimation.batch import (
+    POSE,
+    TAG_SETTINGS,
+    Array,
+    Engine,
+    PoseBatch,
+    Restorable,
+    SampleBatch,
+    State,
+    StateReason,
+)
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.store import SiteStore, TagTable
@@ -40,7 +50,34 @@ class Estimators:
         self._anchors = anchor_columns([])
         self._numbers: dict[int, int] = {}
         self._configured: dict[int, _Configured] = {}
+        self._settings = np.zeros(0, TAG_SETTINGS)  # what each row was configured with
         self._faults: dict[int, _Faults] = {}
+
+    @property
+    def keeps_state(self) -> bool:
+        """Whether the engine can go on after a restart."""
+        return isinstance(self._engine, Restorable)
+
+    def state(self) -> dict[str, Array]:
+        """Copies of the engine's state and of what it was made with. Empty where the engine keeps none."""
+        if not isinstance(self._engine, Restorable):
+            return {}
+        settings = self._settings[: len(self._tags)].copy()
+        return {"anchors": self._anchors, "settings": settings} | self._engine.state()
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Take over what `state` gave. Rows start afresh where an anchor has moved or their settings differ since."""
+        assert isinstance(self._engine, Restorable)
+        self.follow_site()
+        anchors, settings = state.pop("anchors"), state.pop("settings")
+        if (self._anchors[: len(anchors)] != anchors).any():
+            return
+        self._engine.restore(state)
+        self._settings = settings
+        for row, known in enumerate(settings):
+            wanted = self._wanted(row)
+            if tag_columns(wanted.tag, wanted.declination_rad).tobytes() == known.tobytes():
+                self._configured[row] = wanted
 
     def follow_site(self) -> bool:
         """Take over what changed in the site since the last call; True when something did.
@@ -109,6 +146,14 @@ class Estimators:
         # After a fault the tag is no longer where it started.
         tag = wanted.tag if start_known else wanted.tag.model_copy(update={"start": None})
         self._engine.configure(row, tag_columns(tag, wanted.declination_rad))
+        self._keep_settings(row, tag_columns(wanted.tag, wanted.declination_rad))
+
+    def _keep_settings(self, row: int, settings: Array) -> None:
+        missing = row + 1 - len(self._settings)
+        if missing > 0:
+            spare = np.zeros(max(missing, len(self._settings)), TAG_SETTINGS)
+            self._settings = np.concatenate([self._settings, spare])
+        self._settings[row] = settings
 
     def _wanted(self, row: int) -> _Configured:
         return _Configured(self._site.tag_settings(self._tags.at(row).name), self._site.site.declination_rad)

@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Callable
 
 from dropanchor_service.buffer import MessageBuffer
 from dropanchor_service.ingest import Ingest
@@ -17,12 +18,20 @@ SILENT_S = 5.0  # without a turn the thread counts as stuck
 class IngestThread:
     """Takes a turn every `period_s` while messages come in."""
 
-    def __init__(self, ingest: Ingest, buffer: MessageBuffer, metrics: Metrics, period_s: float) -> None:
+    def __init__(
+        self,
+        ingest: Ingest,
+        buffer: MessageBuffer,
+        metrics: Metrics,
+        period_s: float,
+        between_turns: Callable[[], None] = lambda: None,
+    ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._ingest = ingest
         self._buffer = buffer
         self._metrics = metrics
         self._period_s = period_s
+        self._between_turns = between_turns
         self._stop = threading.Event()
         self._turned_s = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="ingest", daemon=True)
@@ -56,6 +65,7 @@ class IngestThread:
         self._turned_s = time.monotonic()
         try:
             self._ingest.turn()
+            self._between_turns()
         except Exception as error:
             self._metrics.faults.labels("ingest").inc()
             self._log.exception("ingest", error)

@@ -21,14 +21,18 @@ SLOW_S = 2.0
 _log = logging.getLogger(__name__)
 
 
+def sources_digest() -> str:
+    """Of all that the kernels, and the meaning of their rows, are made of."""
+    sources = sorted((Path(__file__).parent / "estimation").rglob("*.py"))
+    return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
+
+
 def keep_compiled() -> None:
     """Choose the cache's folder, unless the environment has. It takes effect if numba is not imported yet."""
     if VARIABLE in os.environ:
         return
-    sources = sorted((Path(__file__).parent / "estimation").rglob("*.py"))
-    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = home / "dropanchor" / f"kernels-{digest}"
+    folder = home / "dropanchor" / f"kernels-{sources_digest()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         writable = os.access(folder, os.W_OK)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
@@ -44,6 +44,17 @@ class Metrics:
             buckets=_SECONDS,
             registry=self.registry,
         )
+        self.checkpoints = Counter("dropanchor_checkpoints", "Checkpoints.", ["outcome"], registry=self.registry)
+        self.checkpoint_age = Gauge(
+            "dropanchor_checkpoint_age_seconds",
+            "How much of the past a killed service would have to make up for.",
+            registry=self.registry,
+        )
+        self.checkpoint_bytes = Gauge(
+            "dropanchor_checkpoint_bytes", "Size of the newest checkpoint.", registry=self.registry
+        )
+        for outcome in ("written", "failed"):
+            self.checkpoints.labels(outcome)
         for kind in KINDS:
             self.samples.labels(kind)
         for reason in Reason:

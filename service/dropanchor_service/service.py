@@ -16,6 +16,7 @@ from dropanchor_service.admission import Admission
 from dropanchor_service.api import create_app
 from dropanchor_service.api.server import build_server, listen
 from dropanchor_service.buffer import MessageBuffer
+from dropanchor_service.checkpointer import Checkpointer
 from dropanchor_service.clock import UtcClock
 from dropanchor_service.engine import create_engine
 from dropanchor_service.estimators import Estimators
@@ -29,8 +30,10 @@ from dropanchor_service.settings import Settings
 from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
+from dropanchor_service.store.checkpoints import CheckpointFolder
 from dropanchor_service.store.tracks import Tracks
 from dropanchor_service.taps import NO_TAPS, Taps
+from dropanchor_service.whole_state import WholeState
 from dropanchor_service.zenoh_answers import ZenohAnswers
 from dropanchor_service.zenoh_intake import ZenohIntake
 from dropanchor_service.zenoh_link import ZenohLink
@@ -61,10 +64,11 @@ class Service:
         self._tracks = self._made_tracks()
         self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._tracks)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20))
+        estimators = Estimators(create_engine(settings), self.site, self.tags, self.metrics)
         self._ingest = Ingest(
             self._buffer,
             Admission(settings, self.site, self.tags),
-            Estimators(create_engine(settings), self.site, self.tags, self.metrics),
+            estimators,
             self.site,
             self.tags,
             self.latest,
@@ -72,7 +76,14 @@ class Service:
             self.clock,
             Taps(poses=self._tracks.offer) if self._tracks else NO_TAPS,
         )
-        self._thread = IngestThread(self._ingest, self._buffer, self.metrics, settings.ingest.period_ms * 1e-3)
+        self._checkpoints = self._checkpointer(estimators)
+        self._thread = IngestThread(
+            self._ingest,
+            self._buffer,
+            self.metrics,
+            settings.ingest.period_ms * 1e-3,
+            self._checkpoints.between_turns if self._checkpoints else lambda: None,
+        )
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self.metrics.watch(FleetGauges(self.tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth))
 
@@ -82,12 +93,21 @@ class Service:
             self._opened.callback(bound.close)
             if self._tracks is not None:
                 self._opened.enter_context(self._tracks)
+            if self._checkpoints is not None:
+                self._checkpoints.load()
+                self._checkpoints.start()
+                self._opened.callback(self._write_last_checkpoint, self._checkpoints)
             self._thread.start()
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._link)
             self._open_http(bound)
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
+        if self._checkpoints is None:
+            lacking = (
+                "without data_dir" if self._settings.data_dir is None else f"by the engine {self._settings.engine}"
+            )
+            _log.info("%s no checkpoints are kept: after a restart all tags start afresh", lacking)
         return self
 
     def __exit__(
@@ -108,8 +128,9 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """What does not work although the service does its work."""
-        writers = [part.writer for part in (self._tracks,) if part is not None]
-        return [writer.problem for writer in writers if writer.problem is not None]
+        parts = (None if self._tracks is None else self._tracks.writer, self._checkpoints)
+        problems = (part.problem for part in parts if part is not None)
+        return [problem for problem in problems if problem is not None]
 
     @property
     def has_died(self) -> bool:
@@ -123,6 +144,21 @@ class Service:
         tracks = Tracks(folder, history.keeping(), self.tags, self.site, self.clock.now_ns)
         self.metrics.watch(HistoryMetrics(tracks))
         return tracks
+
+    def _checkpointer(self, estimators: Estimators) -> Checkpointer | None:
+        """None where nothing is kept."""
+        folder = self._settings.data_dir
+        if folder is None or not estimators.keeps_state:
+            return None
+        state = WholeState(self.site, self.tags, self.latest, estimators)
+        kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
+        return Checkpointer(state, kept, self.metrics, self._settings.checkpoint_s)
+
+    def _write_last_checkpoint(self, checkpoints: Checkpointer) -> None:
+        if self._thread.is_alive:
+            _log.error("the ingest thread does not stop: there is no last checkpoint")
+        else:
+            checkpoints.stop()
 
     def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]

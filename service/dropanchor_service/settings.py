@@ -144,7 +144,11 @@ class Settings(_Section):
 
     engine: Literal["fleet", "paper"] = Field(default="paper", description="The estimator.")
     data_dir: Path | None = Field(
-        default=None, description="Where changes made over REST and tracks are kept; without it a restart forgets them."
+        default=None,
+        description="Where changes made over REST, tracks and checkpoints are kept; without it a restart forgets all.",
+    )
+    checkpoint_s: Annotated[float, Field(gt=0, le=3600)] = Field(
+        default=0.5, description="From one checkpoint to the next: what a killed service has to make up for."
     )
     unknown_tags: Literal["accept", "refuse"] = Field(
         default="accept", description="Whether a tag that is not listed here is registered when it is heard."

@@ -74,7 +74,7 @@ def running_service(
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()
     try:
-        wait_until(lambda: running.url or process.poll() is not None, 60.0)
+        wait_until(lambda: running.url or process.poll() is not None, 240.0)  # the first start of the fleet compiles it
         assert running.url, "".join(running.log)
         if ready:
             wait_until(lambda: httpx.get(f"{running.url}/api/v1/health/ready").status_code == 200, 10.0)

@@ -6,7 +6,7 @@ y left, z up. An unknown float is NaN.
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,6 +184,17 @@ class Engine(Protocol):
 
     def process(self, samples: SampleBatch) -> PoseBatch:
         """Fuse the samples. Rows must have been configured."""
+
+
+@runtime_checkable
+class Restorable(Protocol):
+    """An engine whose state can be kept: restored, it gives the same poses to the last bit."""
+
+    def state(self) -> dict[str, Array]:
+        """Copies of all that samples have changed. Names and dtypes are the same for every state of one version."""
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Take over what `state` gave, in an engine that has processed nothing."""
 
 
 def default_settings() -> Array:

@@ -5,7 +5,7 @@ from threading import Lock
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array
+from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from dropanchor_service.store.history import PoseHistory
 from dropanchor_service.store.rings import RowRings
 
@@ -48,6 +48,19 @@ class LatestPoses:
             self._history.write(poses)
             if innovations is not None:
                 self._innovations.write(innovations)
+
+    def state(self) -> dict[str, Array]:
+        """Copies of the latest poses, and of the modes behind them."""
+        with self._lock:
+            modes = [np.empty(0, HYPOTHESIS), *self._hypotheses.values()]
+            return {"poses": self._poses[self._changed > 0], "hypotheses": np.concatenate(modes)}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Take over what `state` gave. Nobody has heard those tags since: none of them counts as tracking."""
+        poses = state["poses"]
+        tracking = poses["state"] == State.TRACKING
+        poses["state"][tracking], poses["reason"][tracking] = State.COASTING, StateReason.RANGES_MISSING
+        self.write(poses, state["hypotheses"])
 
     def row(self, row: int) -> Array | None:
         """POSE (0-d) of one row, None before its first pose."""

@@ -1,6 +1,7 @@
 """The site, its anchors and the settings of its tags: from the configuration, changed over REST, kept in a file."""
 
-import os
+import logging
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -8,8 +9,11 @@ from pydantic import BaseModel, ConfigDict
 
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
+from dropanchor_service.store.atomic import write_atomically
 
 FILE_NAME = "site.json"
+
+_log = logging.getLogger(__name__)
 
 
 class SiteDocument(BaseModel):
@@ -61,12 +65,22 @@ class SiteStore:
         """Every anchor the site has or had: an index keeps its meaning for the life of the store."""
         return [anchor for _, anchor in sorted(self._anchors.values(), key=lambda entry: entry[0])]
 
+    def remember(self, anchors: Sequence[Anchor]) -> None:
+        """Give the anchors that another store had, by its index, the same index here. Before anything else is done."""
+        self._anchors = {anchor.number: (index, anchor) for index, anchor in enumerate(anchors)}
+        self._index_anchors()
+
     def bind_first(self, anchor: str) -> bool:
         """Put `anchor` at the origin if the site has none yet. True when it did."""
         with self._lock:
             if self.site.anchors:
                 return False
-            self._replace(self._document.model_copy(update={"site": _with_anchor(self.site, Anchor(id=anchor))}))
+            document = self._document.model_copy(update={"site": _with_anchor(self.site, Anchor(id=anchor))})
+            try:
+                self._keep(document)
+            except OSError as error:  # nobody has been told that it is kept, and the tags cannot wait for a disk
+                _log.error("anchor %s is the origin until a restart: it cannot be kept: %s", anchor, error)
+            self._take_over(document)
             return True
 
     def set_site(self, site: Site) -> None:
@@ -95,8 +109,14 @@ class SiteStore:
 
     def _replace(self, document: SiteDocument) -> None:
         """The file is written first: what was acknowledged is not lost by a restart. Raises OSError."""
+        self._keep(document)
+        self._take_over(document)
+
+    def _keep(self, document: SiteDocument) -> None:
         if self._path is not None:
-            _write_atomically(self._path, document.model_dump_json(indent=2).encode())
+            write_atomically(self._path, [document.model_dump_json(indent=2).encode()])
+
+    def _take_over(self, document: SiteDocument) -> None:
         self._document = document
         self._index_anchors()
         self.version += 1
@@ -110,13 +130,3 @@ class SiteStore:
 def _with_anchor(site: Site, anchor: Anchor) -> Site:
     others = [other for other in site.anchors if other.number != anchor.number]
     return Site.model_validate(site.model_dump() | {"anchors": [*others, anchor]})
-
-
-def _write_atomically(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)

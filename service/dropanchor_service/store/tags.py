@@ -1,6 +1,7 @@
 """The tags that have been heard or configured: the row of each, and what was received from it."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Lock
 
@@ -106,6 +107,16 @@ class TagTable:
     def online_names(self) -> int:
         """How many names have a liveliness token, registered or not."""
         return len(self._online)
+
+    def copy_counts(self) -> Array:
+        """All counters, one record per row."""
+        return self._counts[: len(self._by_row)].copy()
+
+    def restore(self, names: Sequence[str], counts: Array) -> None:
+        """Take over the rows and counters of another table, in an empty one."""
+        for name in names:
+            self.register(name)
+        self._counts[: len(names)] = counts
 
     def counts(self, row: int) -> Array:
         return self._counts[row]  # type: ignore[no-any-return]

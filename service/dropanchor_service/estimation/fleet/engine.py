@@ -23,9 +23,11 @@ HARD_IRON = 1.0  # prior of a magnetometer that nobody calibrated, in units of t
 MODES = 8
 ROOM_PER_ROW = 8
 
+_KEPT = ("rows", "fronts", "platforms", "pool")
+
 
 class FleetEngine:
-    """Implements `Engine`. Rows are plain arrays: a checkpoint is a copy of them and of the pool."""
+    """Implements `Engine` and `Restorable`. Rows are plain arrays: a checkpoint is a copy of them and of the pool."""
 
     name = "fleet"
 
@@ -75,6 +77,17 @@ class FleetEngine:
         beliefs = np.zeros(len(nodes), BELIEF)
         advance(self._rows, self._pool, nodes, self._anchors, self._tuning, self._work, beliefs)
         return beliefs
+
+    def state(self) -> dict[str, Array]:
+        """Copies of the rows, the pool, and the samples that wait."""
+        kept = {name: getattr(self, f"_{name}").copy() for name in _KEPT}
+        return kept | self._order.state()
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Take over a state. The settings are part of the rows; the anchors are not."""
+        for name in _KEPT:
+            setattr(self, f"_{name}", state[name])
+        self._order.restore(state)
 
     def _release(self, row: int) -> None:
         slot = self._rows[row]["head"]

@@ -29,6 +29,12 @@ class Order:
         self._imu[row] = self._newest[row] = NEVER
         self._waiting = self._waiting[self._waiting["row"] != row]
 
+    def state(self) -> dict[str, Array]:
+        return {"waiting": self._waiting.copy(), "imu": self._imu.copy(), "newest": self._newest.copy()}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        self._waiting, self._imu, self._newest = state["waiting"], state["imu"], state["newest"]
+
     def due(self, samples: SampleBatch, anchors: int, rejected: Counter[str]) -> Array:
         """EVENT by row, then time, then kind, then arrival; counts what is not usable in `rejected`."""
         fresh = _usable(_events(samples), anchors, rejected)

@@ -1,0 +1,66 @@
+"""A service that was killed goes on where it was."""
+
+import hashlib
+import signal
+from pathlib import Path
+
+from dropanchor_tag_client import TagClient
+from support.service import Running, running_service, settings_file, straight_north
+from support.zenoh_router import wait_until
+
+
+def send(service: Running, tag: str, count: int, t_ns: int | None = None) -> None:
+    frame = straight_north(count, t_ns)
+    with TagClient(tag, connect=service.zenoh) as client:
+        for imu, heading, distance in zip(frame.imu, frame.headings, frame.ranges, strict=True):
+            client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns)
+            client.publish_heading(heading.heading_rad, t_ns=heading.t_ns, std_rad=heading.std_rad)
+            client.publish_range("7", distance.range_m, t_ns=distance.t_ns, std_m=distance.std_m)
+        client.flush()
+        wait_until(lambda: service.get(f"/api/v1/tags/{tag}")["samples"].get("range", 0) >= count)
+
+
+def test_a_killed_service_comes_back_with_its_poses_and_none_of_them_looks_live(tmp_path: Path) -> None:
+    config = settings_file(tmp_path, ["a"], 'engine = "fleet"')
+    options = ("--config", str(config), "--data-dir", str(tmp_path / "data"))
+    with running_service(*options) as service:
+        send(service, "a", 50)
+        written = service.metric('dropanchor_checkpoints_total{outcome="written"}')
+        wait_until(lambda: service.metric('dropanchor_checkpoints_total{outcome="written"}') > written)
+        wait_until(lambda: service.metric("dropanchor_checkpoint_age_seconds") < 0.5)
+        before = service.get("/api/v1/tags/a/pose")
+        assert before["x"] is not None
+        service.stop(signal.SIGKILL)
+    with running_service(*options) as service:
+        after = service.get("/api/v1/tags/a/pose")
+        status = service.get("/api/v1/tags/a")
+        assert any("going on from a checkpoint with 1 tags" in line for line in service.log)
+    for name in ("t_ns", "x", "y", "heading_rad", "covariance"):
+        assert after[name] == before[name]
+    assert after["state"] != "tracking"
+    assert after["age_s"] > before["age_s"]
+    assert status["samples"] == {"imu": 50, "heading": 50, "range": 50}
+
+
+def test_a_checkpoint_of_another_layout_is_refused_by_name_and_all_start_afresh(tmp_path: Path) -> None:
+    config = settings_file(tmp_path, ["a"], 'engine = "fleet"')
+    options = ("--config", str(config), "--data-dir", str(tmp_path))
+    with running_service(*options) as service:
+        send(service, "a", 20)
+        assert service.stop() == 0
+    newest = max((tmp_path / "checkpoints").iterdir())
+    newest.write_bytes(with_another_layout(newest.read_bytes()))
+    for other in (tmp_path / "checkpoints").iterdir():
+        if other != newest:
+            other.unlink()
+    with running_service(*options) as service:
+        log = "".join(service.log)
+        assert f"{newest.name} is not used: its layout is " in log
+        assert "all tags start afresh" in log
+        assert service.get("/api/v1/poses")["poses"] == []
+
+
+def with_another_layout(checkpoint: bytes) -> bytes:
+    """As an earlier version of the service could have left it: whole, with a layout that it named otherwise."""
+    content = checkpoint[:-32].replace(b'{"layout":"', b'{"layout":"0', 1)
+    return content + hashlib.blake2b(content, digest_size=32).digest()
