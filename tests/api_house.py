@@ -15,7 +15,9 @@ from prometheus_client import CollectorRegistry
 from dropanchor_schemas.answers import Problem
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.api import create_app
+from dropanchor_service.api.rates import Buckets
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
+from dropanchor_service.security.identity import Doorkeeper
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 from dropanchor_service.store.tracks import Keeping, Tracks
@@ -49,7 +51,13 @@ class House:
         assert self.answers.tracks is not None
         assert self.answers.tracks.writer.turn()
 
-    def app(self, dashboard: Path | None = None, max_tags: int = 1000) -> FastAPI:
+    def app(
+        self,
+        dashboard: Path | None = None,
+        max_tags: int = 1000,
+        keeper: Doorkeeper | None = None,
+        buckets: Buckets | None = None,
+    ) -> FastAPI:
         return create_app(
             self.answers,
             ready=lambda: (not self.not_ready, self.not_ready),
@@ -57,6 +65,8 @@ class House:
             stopping=self.stopping,
             max_tags=max_tags,
             dashboard=dashboard,
+            keeper=keeper,
+            buckets=buckets,
         )
 
 
@@ -70,9 +80,11 @@ def make_house(site: Site | None = None, folder: Path | None = None, keeping: Ke
     return house
 
 
-def ask(app: FastAPI, method: str, path: str, **options: Any) -> httpx.Response:
+def ask(app: FastAPI, method: str, path: str, address: str = "127.0.0.1", **options: Any) -> httpx.Response:
+    """address: of whoever asks."""
+
     async def asked() -> httpx.Response:
-        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False, client=(address, 1234))
         async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
             return await client.request(method, path, **options)
 

@@ -13,6 +13,7 @@ _COMMANDS = {
     "security": "make the credentials of a site",
     "tag": "give tags their certificates, or take them away",
     "compile": "compile the estimator ahead of the first start",
+    "key": "API keys of the REST interface",
     "replay": "run an engine on a recording, offline",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }

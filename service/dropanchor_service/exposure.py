@@ -8,7 +8,8 @@ from typing import Any
 
 import zenoh
 
-from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_service.credentials import certificate_of
+from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings import Settings, ZenohSettings
 from dropanchor_service.settings_sources import SettingsError
 
@@ -23,25 +24,22 @@ or, on a network where everybody is trusted, let anybody in:
   add: --insecure      (settings: insecure = true, environment: DROPANCHOR_INSECURE=true)"""
 
 
-def credentials_of(settings: Settings) -> SecurityFolder | None:
-    """Raises SettingsError when there is a folder that cannot be used."""
-    folder = settings.security.folder
-    try:
-        return None if folder is None else SecurityFolder.open(folder)
-    except SecurityError as error:
-        raise SettingsError(f"security.folder: {error}") from error
-
-
 def refuse_exposure(settings: Settings, credentials: SecurityFolder | None) -> None:
     """Raises SettingsError, which says what to do, when anybody beyond this machine could connect."""
     if settings.insecure:
         return
     doors = list(_open_zenoh(settings.zenoh, credentials))
-    if not is_loopback(settings.http.host):
+    if not is_loopback(settings.http.host) and not _is_guarded(settings, credentials):
         doors.insert(0, f"HTTP at {settings.http.host}")
     if doors:
         them = " and ".join(doors)
         raise SettingsError(f"{them} could be reached by anybody on the network without credentials.\n{_WHAT_TO_DO}")
+
+
+def _is_guarded(settings: Settings, credentials: SecurityFolder | None) -> bool:
+    """Whether REST asks who it is, and nobody else hears the answer."""
+    asks = credentials is not None or settings.security.oidc is not None
+    return asks and certificate_of(settings.http, credentials) is not None
 
 
 def is_loopback(host: str) -> bool:

@@ -14,13 +14,15 @@ from pydantic import ValidationError
 
 from dropanchor_service.admission import Admission
 from dropanchor_service.api import create_app
+from dropanchor_service.api.rates import Buckets
 from dropanchor_service.api.server import build_server, listen
 from dropanchor_service.buffer import MessageBuffer
 from dropanchor_service.checkpointer import Checkpointer
 from dropanchor_service.clock import UtcClock
+from dropanchor_service.credentials import certificate_of, credentials_of, doorkeeper_of
 from dropanchor_service.engine import create_engine
 from dropanchor_service.estimators import Estimators
-from dropanchor_service.exposure import credentials_of, refuse_exposure
+from dropanchor_service.exposure import refuse_exposure
 from dropanchor_service.http_thread import HttpThread
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.ingest_thread import IngestThread
@@ -54,6 +56,8 @@ class Service:
         self._settings = settings
         self._credentials = credentials_of(settings)
         refuse_exposure(settings, self._credentials)
+        self._certificate = certificate_of(settings.http, self._credentials)
+        self._keeper = doorkeeper_of(settings.security)
         self._stopping = Event()
         self._opened = ExitStack()
         self.metrics = Metrics()
@@ -120,7 +124,9 @@ class Service:
     @property
     def url(self) -> str:
         """Where the page is."""
-        return f"http://{self._address[0]}:{self._address[1]}"
+        host, port = self._address[:2]
+        scheme = "http" if self._certificate is None else "https"
+        return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
     def problems(self) -> Sequence[str]:
         """Why the service cannot do its work at this moment; empty when it can."""
@@ -185,9 +191,11 @@ class Service:
             registry=self.metrics.registry,
             stopping=self._stopping,
             max_tags=self._settings.max_tags,
+            keeper=self._keeper,
+            buckets=Buckets(self._settings.http.requests_per_s, self._settings.http.burst),
         )
         self._address = bound.getsockname()
-        self._http = HttpThread(build_server(app, self._stopping), bound)
+        self._http = HttpThread(build_server(app, self._stopping, certificate=self._certificate), bound)
         self._http.start()
         self._opened.callback(self._http.join, HTTP_STOP_S)
         self._opened.callback(self._http.ask_to_stop)

@@ -50,6 +50,21 @@ class HttpSettings(_Section):
 
     host: str = Field(default="127.0.0.1", min_length=1)
     port: Port = Field(default=8080, description="0: any free port.")
+    tls: bool = Field(
+        default=True, description="False: plain HTTP although there is a certificate; a proxy is before it."
+    )
+    certificate: Path | None = Field(default=None, description="PEM, with its chain; else that of the credentials.")
+    key: Path | None = Field(default=None, description="PEM, of the certificate.")
+    requests_per_s: Annotated[float, Field(ge=0.1, le=1e6)] = Field(
+        default=200.0, description="Of one key, token or address. On the loopback without credentials: no limit."
+    )
+    burst: Annotated[int, Field(ge=1, le=1_000_000)] = Field(default=400, description="So many at once.")
+
+    @model_validator(mode="after")
+    def _certificate_has_a_key(self) -> "HttpSettings":
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate and key go together: give both or neither")
+        return self
 
 
 class ZenohSettings(_Section):
@@ -62,12 +77,36 @@ class ZenohSettings(_Section):
     config_file: Path | None = Field(default=None, description="A Zenoh configuration (JSON5): TLS, access control.")
 
 
+def is_safe_url(url: str) -> str:
+    """Raises ValueError where others could change what comes from there."""
+    if not url.startswith(("https://", "http://127.0.0.1:", "http://localhost:")):
+        raise ValueError("an address that begins with https:// was expected")
+    return url
+
+
+SafeUrl = Annotated[str, AfterValidator(is_safe_url)]
+
+
+class OidcSettings(_Section):
+    """An OpenID Connect provider whose access tokens are taken over REST."""
+
+    issuer: SafeUrl
+    audience: str = Field(min_length=1, description="What `aud` of a token has to name.")
+    jwks_url: SafeUrl | None = Field(default=None, description="Else it is asked for at the issuer (discovery).")
+    scope_claim: str = Field(default="scope", description="Where a token says its scopes; dots lead into objects.")
+    scopes: dict[Literal["read", "write", "admin"], str] = Field(
+        default={"read": "dropanchor:read", "write": "dropanchor:write", "admin": "dropanchor:admin"},
+        description="What the provider calls ours.",
+    )
+
+
 class SecuritySettings(_Section):
-    """Who is let in. Without a folder anybody is, and then only on the loopback unless `insecure` is set."""
+    """Who is let in. With neither, anybody is, and then only on the loopback unless `insecure` is set."""
 
     folder: Path | None = Field(
         default=None, description="Made by `dropanchor security init`: certificates, access control, API keys."
     )
+    oidc: OidcSettings | None = None
 
 
 class IngestSettings(_Section):

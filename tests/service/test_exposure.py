@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from dropanchor_service.exposure import credentials_of, is_loopback, refuse_exposure
+from dropanchor_service.credentials import credentials_of
+from dropanchor_service.exposure import is_loopback, refuse_exposure
 from dropanchor_service.settings import Settings
 from dropanchor_service.settings_sources import SettingsError
 from support.secured import secured_site

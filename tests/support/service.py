@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import ssl
 import subprocess
 import sys
 import time
@@ -25,12 +26,18 @@ S = 1_000_000_000
 
 @dataclass
 class Running:
-    """A service that runs. log: its lines on stderr so far."""
+    """A service that runs. log: its lines on stderr so far. ca: of whoever signed its certificate."""
 
     process: subprocess.Popen[str]
     zenoh: str
     log: list[str]
     url: str = ""
+    ca: Path | None = None
+
+    def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
+        trusted = True if self.ca is None else ssl.create_default_context(cafile=self.ca)
+        with httpx.Client(verify=trusted, timeout=10.0, trust_env=False) as client:
+            return client.request(method, f"{self.url}{path}", **options)
 
     def get(self, path: str) -> Any:
         return httpx.get(f"{self.url}{path}", timeout=10.0).raise_for_status().json()
@@ -62,7 +69,11 @@ def environment(**more: str) -> dict[str, str]:
 
 @contextmanager
 def running_service(
-    *arguments: str, endpoint: str | None = None, ready: bool = True, subcommand: str = "serve"
+    *arguments: str,
+    endpoint: str | None = None,
+    ready: bool = True,
+    subcommand: str = "serve",
+    ca: Path | None = None,
 ) -> Iterator[Running]:
     """`dropanchor serve` on free ports, ended at the end. ready: wait until it can do its work."""
     zenoh = endpoint or free_endpoint()
@@ -70,14 +81,14 @@ def running_service(
     process = subprocess.Popen(
         command(subcommand, "--port", "0", *listening, *arguments), stderr=subprocess.PIPE, text=True, env=environment()
     )
-    running = Running(process, zenoh, [])
+    running = Running(process, zenoh, [], ca=ca)
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()
     try:
         wait_until(lambda: running.url or process.poll() is not None, 240.0)  # the first start of the fleet compiles it
         assert running.url, "".join(running.log)
         if ready:
-            wait_until(lambda: httpx.get(f"{running.url}/api/v1/health/ready").status_code == 200, 10.0)
+            wait_until(lambda: running.ask("GET", "/api/v1/health/ready").status_code == 200, 10.0)
         yield running
     finally:
         if process.poll() is None:
@@ -92,7 +103,7 @@ def _read(running: Running) -> None:
     assert running.process.stderr is not None
     for line in running.process.stderr:
         running.log.append(line)
-        found = re.search(r"ready at (http://\S+?),", line)
+        found = re.search(r"ready at (https?://\S+?),", line)
         if found:
             running.url = found[1]
 

@@ -9,15 +9,19 @@ from fastapi.openapi.utils import get_openapi
 from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.answers import PoseFrame, Problem
+from dropanchor_service.api.access import OPEN, Access
 from dropanchor_service.api.dashboard import DashboardMount
-from dropanchor_service.api.errors import Kind, add_error_handlers
+from dropanchor_service.api.errors import Kind, add_error_handlers, problems
+from dropanchor_service.api.headers import SecurityHeaders
 from dropanchor_service.api.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.poses import poses_router
+from dropanchor_service.api.rates import Buckets
 from dropanchor_service.api.site import site_router
 from dropanchor_service.api.stream import stream_router
 from dropanchor_service.api.tags import tags_router
 from dropanchor_service.api.track import track_router
+from dropanchor_service.security.identity import Doorkeeper
 from dropanchor_service.store.answers import Answers
 
 PREFIX = "/api/v1"
@@ -34,9 +38,12 @@ def create_app(
     impaired: Impaired = list,
     max_tags: int = 20_000,
     dashboard: Path | None = DASHBOARD,
+    keeper: Doorkeeper | None = None,
+    buckets: Buckets | None = None,
 ) -> FastAPI:
     """ready: whether the service can do its work, and why not. impaired: what else does not work. stopping: when set,
-    streams end. dashboard: the folder of the page, None for no page."""
+    streams end. dashboard: the folder of the page, None for no page. keeper: who knows who asks; None: everybody may do
+    everything. buckets: how often one client may ask."""
     app = FastAPI(
         title="Dropanchor",
         version="1",
@@ -46,7 +53,9 @@ def create_app(
         redirect_slashes=False,
     )
     app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
+    app.add_middleware(Access, keeper=keeper, buckets=buckets)
     app.add_middleware(EscapedPath)
+    app.add_middleware(SecurityHeaders)
     add_error_handlers(app)
     for router in (
         tags_router(answers, max_tags),
@@ -72,10 +81,24 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
         for model in (PoseFrame, Problem):  # neither is the one model of a route
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
             document["components"]["schemas"] |= schema.pop("$defs") | {model.__name__: schema}
+        _add_access(document)
         app.openapi_schema = document
     return app.openapi_schema
 
 
+def _add_access(document: dict[str, Any]) -> None:
+    """How somebody is known, and what is answered otherwise, at every operation that asks."""
+    document["components"]["securitySchemes"] = {
+        "bearer": {"type": "http", "scheme": "bearer", "description": "An API key, or a token of the site's provider."}
+    }
+    refusals = {str(status): told for status, told in problems(*_REFUSALS).items()}
+    for path, operations in document["paths"].items():
+        for operation in operations.values() if path not in OPEN else ():
+            operation["responses"] = dict(sorted((operation["responses"] | refusals).items()))
+            operation["security"] = [{"bearer": []}, {}]
+
+
+_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
 _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What was heard from the tags, and what an operator knows about them."},

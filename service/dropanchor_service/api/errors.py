@@ -22,6 +22,8 @@ _MAX_LOCATION = 200
 class Kind(Enum):
     """The kinds of problem: status and title."""
 
+    UNAUTHENTICATED = (401, "Nobody is known by this")
+    FORBIDDEN = (403, "This is not allowed to whoever asks")
     NOT_FOUND = (404, "There is nothing here")
     UNKNOWN_TAG = (404, "The tag is not known")
     NO_POSE_YET = (404, "The tag has no pose yet")
@@ -37,6 +39,7 @@ class Kind(Enum):
     TAGS_FULL = (409, "The service holds as many tags as it may")
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")
+    TOO_MANY_REQUESTS = (429, "Too many requests")
     INTERNAL = (500, "The service made a mistake")
     NOT_SAVED = (503, "The change could not be saved")
     HISTORY_UNREADABLE = (503, "The history cannot be read")

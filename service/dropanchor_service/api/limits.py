@@ -70,9 +70,10 @@ class GuardedProtocol(H11Protocol):
     _stall: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        # Nothing waits in this process: whatever the kernel does not take at once pauses the writer.
-        transport.set_write_buffer_limits(high=0)
         super().connection_made(transport)
+        # Nothing waits in this process: whatever the kernel does not take at once pauses the writer. (1: with 0 even an
+        # empty buffer counts as full in asyncio's TLS transport.)
+        transport.set_write_buffer_limits(high=1)
         self._deadline = self.loop.call_later(self.request_s, self._cut)
 
     def data_received(self, data: bytes) -> None:

@@ -3,6 +3,9 @@
 import asyncio
 import errno
 import socket
+import ssl
+from dataclasses import dataclass
+from pathlib import Path
 from threading import Event
 
 import uvicorn
@@ -34,8 +37,22 @@ class Server(uvicorn.Server):
         await asyncio.sleep(0)  # the sockets are closed in the loop's next round
 
 
-def build_server(app: ASGIApp, stopping: Event, protocol: type[GuardedProtocol] = GuardedProtocol) -> Server:
-    """A server for `await server.serve(sockets=[listen(host, port)])`. stopping: the event that `app` was made with."""
+@dataclass(frozen=True)
+class Certificate:
+    """PEM files, for HTTPS."""
+
+    certificate: Path
+    key: Path
+
+
+def build_server(
+    app: ASGIApp,
+    stopping: Event,
+    protocol: type[GuardedProtocol] = GuardedProtocol,
+    certificate: Certificate | None = None,
+) -> Server:
+    """A server for `await server.serve(sockets=[listen(host, port)])`. stopping: the event that `app` was made with.
+    Raises ListenError when the certificate cannot be used."""
     config = uvicorn.Config(
         app,
         http=protocol,
@@ -45,7 +62,13 @@ def build_server(app: ASGIApp, stopping: Event, protocol: type[GuardedProtocol] 
         server_header=False,
         timeout_graceful_shutdown=GRACE_S,
         h11_max_incomplete_event_size=_MAX_HEADER_BYTES,
+        ssl_certfile=None if certificate is None else certificate.certificate,
+        ssl_keyfile=None if certificate is None else certificate.key,
     )
+    try:
+        config.load()
+    except (OSError, ssl.SSLError) as error:
+        raise ListenError(f"cannot serve HTTPS: certificate {config.ssl_certfile}: {error}") from error
     return Server(config, stopping)
 
 

@@ -6,7 +6,8 @@ import sys
 
 from dropanchor_service import logs
 from dropanchor_service.commands.options import add_log_option, add_security_options, router_settings
-from dropanchor_service.exposure import credentials_of, refuse_exposure
+from dropanchor_service.credentials import credentials_of
+from dropanchor_service.exposure import refuse_exposure
 from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.signals import interrupts
 from dropanchor_service.zenoh_session import ZenohError, listening_at, open_session

@@ -99,4 +99,5 @@ Next:
                  and give the folder {folder}/tags/NAME to it, over a channel that you trust
   2. the router: dropanchor router --security {folder}        again after tags were added or revoked
   3. the service: dropanchor serve --security {folder} --zenoh-connect tls/localhost:7447{of_site}
+  4. the page and REST (https, with the certificate {folder}/ca.pem): dropanchor key add NAME --security {folder}
 """

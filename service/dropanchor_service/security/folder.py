@@ -1,8 +1,6 @@
 """The folder that `dropanchor security init` makes: certificates, the table of tags, the router's configuration."""
 
-import fcntl
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -14,12 +12,12 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE
 from dropanchor_service.security.authority import Authority, Issued
+from dropanchor_service.security.files import PRIVATE, PUBLIC, one_at_a_time, write_whole
 from dropanchor_service.security.router import router_configuration
 
 TABLE = "issued.json"
 ROUTER_FILE = "router.json5"
 MAX_COMMON_NAME_BYTES = 64  # RFC 5280, ub-common-name
-PRIVATE, PUBLIC = 0o600, 0o644
 
 
 class SecurityError(ValueError):
@@ -97,10 +95,10 @@ class SecurityFolder:
             issued = self._authority().client(name, days)
             bundle = self.bundle(name)
             bundle.mkdir(parents=True, exist_ok=True, mode=0o700)
-            _write(bundle / "ca.pem", (self.path / "ca.pem").read_bytes(), PUBLIC)
-            _write(bundle / "tag.pem", issued.certificate, PUBLIC)
-            _write(bundle / "tag.key", issued.key, PRIVATE)
-            _write(bundle / "tag.json", _json(self._about(name)), PUBLIC)
+            write_whole(bundle / "ca.pem", (self.path / "ca.pem").read_bytes(), PUBLIC)
+            write_whole(bundle / "tag.pem", issued.certificate, PUBLIC)
+            write_whole(bundle / "tag.key", issued.key, PRIVATE)
+            write_whole(bundle / "tag.json", _json(self._about(name)), PUBLIC)
             entry = IssuedTag(serial=issued.serial, expires=issued.expires)
             self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: entry}}))
         return bundle
@@ -164,33 +162,21 @@ class SecurityFolder:
             raise SecurityError(f"the authority in {self.path} is damaged: {error}") from error
 
     def _keep(self, name: str, issued: Issued) -> None:
-        _write(self.path / f"{name}.pem", issued.certificate, PUBLIC)
-        _write(self.path / f"{name}.key", issued.key, PRIVATE)
+        write_whole(self.path / f"{name}.pem", issued.certificate, PUBLIC)
+        write_whole(self.path / f"{name}.key", issued.key, PRIVATE)
 
     def _save(self, table: Table) -> None:
         self.table = table
-        _write(self.path / TABLE, _json(table.model_dump(mode="json")), PUBLIC)
-        _write(self.path / ROUTER_FILE, _json(self.router_configuration()), PUBLIC)
+        write_whole(self.path / TABLE, _json(table.model_dump(mode="json")), PUBLIC)
+        write_whole(self.path / ROUTER_FILE, _json(self.router_configuration()), PUBLIC)
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
         """One process at a time, on the table as it is now."""
-        with (self.path / ".lock").open("ab") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+        with one_at_a_time(self.path):
             self.table = type(self).open(self.path).table
             yield
 
 
 def _json(document: Any) -> bytes:
     return json.dumps(document, indent=2, ensure_ascii=False).encode() + b"\n"
-
-
-def _write(file: Path, content: bytes, mode: int) -> None:
-    """Whole or not at all."""
-    new = file.with_name(f".{file.name}.new")
-    new.unlink(missing_ok=True)
-    with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as opened:
-        opened.write(content)
-        opened.flush()
-        os.fsync(opened.fileno())
-    new.replace(file)

@@ -1,0 +1,64 @@
+"""`dropanchor key`: API keys."""
+
+import argparse
+import sys
+
+from dropanchor_service.commands.options import positive
+from dropanchor_service.commands.security import add_folder_option
+from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
+from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_service.security.identity import SCOPES, Scope
+
+DESCRIPTION = """\
+API keys of the REST interface and the page. A key is shown once and kept as a hash. A running service follows within a
+second. read: poses, tags, metrics, the stream; write: also settings of tags and anchors; admin: everything.
+"""
+EPILOG = """\
+examples:
+  dropanchor key add dashboard --scope read
+  dropanchor key list
+  dropanchor key revoke dashboard
+  curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
+"""
+UNUSABLE = 2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    add = actions.add_parser("add", help="make a key")
+    add.add_argument("name", metavar="NAME", help="who will use it")
+    add.add_argument("--scope", choices=SCOPES, default="read", help="what it allows (default: %(default)s)")
+    add.add_argument("--days", type=positive, metavar="N", help="it expires after so long (default: never)")
+    revoke = actions.add_parser("revoke", help="take a key back")
+    revoke.add_argument("name", metavar="NAME")
+    listed = actions.add_parser("list", help="the keys, without their secrets")
+    for action in (add, revoke, listed):
+        add_folder_option(action)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0, or 2 when nothing could be done."""
+    try:
+        keys = ApiKeys(SecurityFolder.open(arguments.security).path)
+        {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](keys, arguments)
+    except (SecurityError, ApiKeyError) as error:
+        sys.stderr.write(f"dropanchor key: {error}\n")
+        return UNUSABLE
+    return 0
+
+
+def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
+    """The key alone goes to standard output, so that a script can take it."""
+    print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
+    sys.stderr.write("The key above is shown once. Send it as: Authorization: Bearer KEY\n")
+
+
+def _revoke(keys: ApiKeys, arguments: argparse.Namespace) -> None:
+    keys.revoke(arguments.name)
+    print(f"{arguments.name}: revoked")
+
+
+def _list(keys: ApiKeys, _arguments: argparse.Namespace) -> None:
+    for identifier, key in sorted(keys.all().items(), key=lambda entry: entry[1].name):
+        expires = "never expires" if key.expires is None else f"expires {key.expires:%Y-%m-%d}"
+        print(f"{key.name}\t{key.scope.word}\t{expires}\t{identifier}…\tmade {key.made:%Y-%m-%d}")

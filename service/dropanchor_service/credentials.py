@@ -1,0 +1,41 @@
+"""What the settings say about credentials, as objects."""
+
+from dropanchor_service.api.server import Certificate
+from dropanchor_service.security import api_keys, oidc
+from dropanchor_service.security.access_control import SERVICE
+from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
+from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_service.security.identity import Doorkeeper, Register
+from dropanchor_service.settings import HttpSettings, SecuritySettings, Settings
+from dropanchor_service.settings_sources import SettingsError
+
+
+def credentials_of(settings: Settings) -> SecurityFolder | None:
+    """Raises SettingsError when there is a folder that cannot be used."""
+    folder = settings.security.folder
+    try:
+        return None if folder is None else SecurityFolder.open(folder)
+    except SecurityError as error:
+        raise SettingsError(f"security.folder: {error}") from error
+
+
+def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -> Certificate | None:
+    """None for plain HTTP."""
+    if not settings.tls:
+        return None
+    if settings.certificate is not None and settings.key is not None:
+        return Certificate(settings.certificate, settings.key)
+    return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
+
+
+def doorkeeper_of(settings: SecuritySettings) -> Doorkeeper | None:
+    """None when nobody is asked. Raises SettingsError."""
+    registers: dict[str, Register] = {}
+    try:
+        if settings.folder is not None:
+            registers[api_keys.SOURCE] = ApiKeys(settings.folder)
+    except ApiKeyError as error:
+        raise SettingsError(f"security.folder: {error}") from error
+    if settings.oidc is not None:
+        registers[oidc.SOURCE] = oidc.OidcTokens(settings.oidc)
+    return Doorkeeper(registers) if registers else None

@@ -1,0 +1,166 @@
+"""Tokens of a provider that the tests run themselves, on the loopback."""
+
+import json
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
+from typing import Any
+
+import jwt
+import pytest
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from pydantic import ValidationError
+
+from dropanchor_service.security.identity import Scope, UnknownError
+from dropanchor_service.security.oidc import RETRY_S, OidcTokens, SigningKeys
+from dropanchor_service.settings import OidcSettings
+
+AUDIENCE = "dropanchor-yard"
+
+
+@dataclass
+class Provider:
+    """Publishes the keys that it signs with. asked: the paths that were asked for."""
+
+    url: str = ""
+    keys: dict[str, Any] = field(default_factory=dict)
+    asked: list[str] = field(default_factory=list)
+
+    def new_key(self, kid: str) -> None:
+        self.keys[kid] = rsa.generate_private_key(65537, 2048)
+
+    def answer(self, path: str) -> dict[str, Any]:
+        self.asked.append(path)
+        if path == "/.well-known/openid-configuration":
+            return {"issuer": self.url, "jwks_uri": f"{self.url}/keys"}
+        to_jwk = jwt.algorithms.RSAAlgorithm.to_jwk
+        return {"keys": [to_jwk(key.public_key(), as_dict=True) | {"kid": kid} for kid, key in self.keys.items()]}
+
+    def token(self, kid: str = "one", key: Any = None, algorithm: str = "RS256", **claims: Any) -> str:
+        told = {"iss": self.url, "aud": AUDIENCE, "sub": "ann", "exp": time.time() + 60, "scope": "dropanchor:read"}
+        told = {name: value for name, value in (told | claims).items() if value is not None}
+        return jwt.encode(told, key or self.keys[kid], algorithm=algorithm, headers={"kid": kid})
+
+    def settings(self, **more: Any) -> OidcSettings:
+        return OidcSettings.model_validate({"issuer": self.url, "audience": AUDIENCE} | more)
+
+
+@pytest.fixture
+def provider() -> Iterator[Provider]:
+    found = Provider()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            body = json.dumps(found.answer(self.path)).encode()
+            self.send_response(200)
+            self.send_header("content-length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        thread = Thread(target=server.serve_forever)
+        thread.start()
+        found.url = f"http://127.0.0.1:{server.server_port}"
+        found.new_key("one")
+        yield found
+        server.shutdown()
+        thread.join()
+
+
+def test_a_token_of_the_provider_is_known_with_its_subject_and_scope(provider: Provider) -> None:
+    tokens = OidcTokens(provider.settings())
+    identity = tokens.identify(provider.token(scope="openid dropanchor:read dropanchor:write"))
+    assert (identity.source, identity.name, identity.scope) == ("token", "ann", Scope.WRITE)
+    assert tokens.is_still_good(identity)
+    tokens.identify(provider.token())
+    assert provider.asked == ["/.well-known/openid-configuration", "/keys"]
+
+
+@pytest.mark.parametrize(
+    ("more", "claims", "scope"),
+    [
+        ({}, {"scope": "profile"}, None),
+        ({}, {"scope": None}, None),
+        ({}, {"scope": "dropanchor:read"}, Scope.READ),
+        ({}, {"scope": ["dropanchor:admin"]}, Scope.ADMIN),
+        ({"scope_claim": "realm_access.roles", "scopes": {"write": "crew"}}, {"realm_access": {"roles": ["crew"]}}, 2),
+        ({"scope_claim": "realm_access.roles"}, {"realm_access": "crew"}, None),
+    ],
+)
+def test_scopes_are_mapped_as_the_settings_say(
+    provider: Provider, more: dict[str, Any], claims: dict[str, Any], scope: Scope | None
+) -> None:
+    assert OidcTokens(provider.settings(**more)).identify(provider.token(**claims)).scope == scope
+
+
+@pytest.mark.parametrize(
+    ("claims", "words"),
+    [
+        ({"exp": 1}, "expired"),
+        ({"exp": None}, "exp"),
+        ({"nbf": 4e9}, "not yet valid"),
+        ({"iss": "https://evil.example"}, "issuer"),
+        ({"iss": None}, "iss"),
+        ({"aud": "another service"}, "Audience"),
+        ({"aud": None}, "aud"),
+    ],
+)
+def test_claims_that_are_not_for_us_are_refused(provider: Provider, claims: dict[str, Any], words: str) -> None:
+    with pytest.raises(UnknownError, match=words):
+        OidcTokens(provider.settings()).identify(provider.token(**claims))
+
+
+def test_signatures_of_others_are_refused(provider: Provider) -> None:
+    tokens = OidcTokens(provider.settings())
+    foreign = rsa.generate_private_key(65537, 2048)
+    public = provider.keys["one"].public_key()
+    for forged in (
+        provider.token(key=foreign),
+        provider.token(key=ec.generate_private_key(ec.SECP256R1()), algorithm="ES256"),
+        provider.token(key="the public key as a password, 32 bytes", algorithm="HS256"),
+        jwt.encode({"sub": "ann"}, "", algorithm="none"),
+        provider.token()[:-4] + "AAAA",
+        "a.b.c",
+        "..",
+    ):
+        with pytest.raises(UnknownError):
+            tokens.identify(forged)
+    assert public is not None
+
+
+def test_a_new_key_of_the_provider_is_found_and_made_up_ones_cost_it_one_question(provider: Provider) -> None:
+    now_s = 0.0
+    keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
+    assert keys.find("one")
+    provider.new_key("two")
+    for _ in range(50):
+        with pytest.raises(UnknownError, match="does not publish"):
+            keys.find("two")
+    assert provider.asked == ["/keys"]
+    now_s = RETRY_S + 0.1
+    assert keys.find("two")
+    assert provider.asked == ["/keys", "/keys"]
+
+
+def test_a_provider_that_is_away_is_told_and_its_known_keys_still_count(provider: Provider) -> None:
+    now_s = 0.0
+    nobody = SigningKeys("http://127.0.0.1:9", None, lambda: now_s)
+    with pytest.raises(UnknownError, match="does not answer"):
+        nobody.find("one")
+    keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
+    assert keys.find("one")
+    provider.keys.clear()
+    provider.answer = lambda _path: {"keys": "none"}  # type: ignore[method-assign, assignment]
+    now_s = 1e6
+    assert keys.find("one")
+
+
+@pytest.mark.parametrize("url", ["http://idp.example", "file:///etc/passwd", "idp.example"])
+def test_a_provider_that_others_could_speak_for_is_refused(url: str) -> None:
+    with pytest.raises(ValidationError, match="https://"):
+        OidcSettings.model_validate({"issuer": url, "audience": AUDIENCE})
