@@ -33,6 +33,7 @@ class FleetEngine:
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         self._tuning = tuning or Tuning()
+        self._numbers = self._tuning.numbers()
         self._anchors = np.zeros(0, ANCHOR)
         self._rows = np.zeros(0, ROW)
         self._fronts = np.zeros(0, FRONTEND)
@@ -75,7 +76,7 @@ class FleetEngine:
     def _believe(self, nodes: Array) -> Array:
         """BELIEF, one per node."""
         beliefs = np.zeros(len(nodes), BELIEF)
-        advance(self._rows, self._pool, nodes, self._anchors, self._tuning, self._work, beliefs)
+        advance(self._rows, self._pool, nodes, self._anchors, self._numbers, self._work, beliefs)
         return beliefs
 
     def state(self) -> dict[str, Array]:

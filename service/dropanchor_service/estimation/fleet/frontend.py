@@ -12,9 +12,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from .attitude import ATTITUDE, correct_tilt, level, spin, turn, yaw_of
+from .compiled import njit
 from .magnetometer import MAGNETOMETER, feel, north_of, spread_yaw
 from .node import ABSOLUTE_HEADING, NO_HEADING, RELATIVE_HEADING
 from .preintegration import GYRO_NOISE, GYRO_SCALE, HORIZON, PREINTEGRATION, accelerate, end_node, unwatched_turn, wrap

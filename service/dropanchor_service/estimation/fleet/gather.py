@@ -3,8 +3,8 @@
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .frontend import close_node, feed
 from .node import BEARING, NO_MEASUREMENT, RANGE
 from .platform import derive_node, hear, refer_to_platform, watch_start

@@ -8,8 +8,7 @@ whose error is white, and one that wanders for seconds, differ by much in what a
 import math
 from typing import Any
 
-from numba import njit
-
+from .compiled import njit
 from .layout import COMMON, MODELS, STEADY
 from .tuning import Tuning
 from .update import wrap

@@ -3,13 +3,11 @@
 import math
 from typing import Any
 
-import numpy as np
-from numba import njit
-
 from . import layout
 from .blocked import open_alternative, recover, unblock
+from .compiled import njit
 from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
-from .layout import COMMON, PHI, REF, STEADY, WORK, YAW, N, R, Work
+from .layout import COMMON, PHI, REF, STEADY, YAW, N, R, Work
 from .manage import best_of, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
 from .pool import load, mirror, release, store
@@ -21,8 +19,8 @@ from .update import bound_speed, predict_range, update_bearing, update_heading, 
 
 
 @njit(nogil=True)
-def _predict_all(work: Work, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
-    decay, growth, F, A = scratch
+def _predict_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
+    decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     _, slow, tau = error_of(row, node.heading_var)
     for kind in range(2):
         std, seconds = slow, tau
@@ -34,17 +32,16 @@ def _predict_all(work: Work, count: int, row: Any, node: Any, t: Tuning, scratch
             decay[REF] = 1.0
             growth[REF] = node.heading_var * node.dt_s / t.common_tau if node.heading_kind == ABSOLUTE_HEADING else 0.0
         for h in range(count):
-            if work.kind[h] == kind:
-                move(work.mean[h], node, decay, F)
-                transport(work.cov[h], F, decay, A)
-                diffuse(work.mean[h], work.cov[h], growth, node, t, work.blocked[h])
+            if work[h].kind == kind:
+                move(work[h].mean, node, decay, F)
+                transport(work[h].cov, F, decay, FP)
+                diffuse(work[h].mean, work[h].cov, growth, node, t, work[h].blocked)
 
 
 @njit(nogil=True)
-def _range_all(
-    work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, H: Any, PH: Any, out: Any, belief: Any
-) -> None:
+def _range_all(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, belief: Any) -> None:
     """Update every hypothesis; the belief gets what the best one saw."""
+    H, PH, out = scratch.H, scratch.PH, scratch.out
     anchor, primary = anchors[node.anchor], anchors[row.anchor]
     ox, oy = anchor.x - primary.x, anchor.y - primary.y
     dz = row.height - anchor.z
@@ -54,16 +51,16 @@ def _range_all(
     y, S, p_outlier = 0.0, 1.0, 0.0
     low = -row.v_max if row.reverse == 1 else -t.reverse_slack
     for h in range(count):
-        s, P = work.mean[h], work.cov[h]
+        s, P = work[h].mean, work[h].cov
         e = z - predict_range(s, ox, oy, dz, node.lag_s, H)
         variance = std * std + (dz * row.height_std / max(z, 0.1)) ** 2
         if node.anchor != row.anchor:
             variance += row.offset_std**2
         update_range(s, P, H, PH, e, variance, t, out)
-        work.log_weight[h] += t.temper * out[0]
+        work[h].log_weight += t.temper * out[0]
         if s[R] < 0.0:
             s[R] = 1e-3
-        work.log_weight[h] += bound_speed(s, P, PH, low, row.v_max)
+        work[h].log_weight += bound_speed(s, P, PH, low, row.v_max)
         if h == best:
             y, S, p_outlier = e, out[1], out[2]
     _judge_fit(row, y, S, p_outlier)
@@ -86,7 +83,7 @@ def _judge_fit(row: Any, y: float, S: float, p_outlier: float) -> None:
 
 
 @njit(nogil=True)
-def _judge_reference(work: Work, count: int, row: Any, node: Any, t: Tuning) -> None:
+def _judge_reference(work: Any, count: int, row: Any, node: Any, t: Tuning) -> None:
     """Let the readings say how their error behaves; a new model gives every hypothesis its slow error."""
     if row.hm_started == 0:
         reset_models(row, node.heading, node.heading_var, t)
@@ -99,28 +96,28 @@ def _judge_reference(work: Work, count: int, row: Any, node: Any, t: Tuning) -> 
         row.model = chosen
         if after > before:
             for h in range(count):
-                give_reference_error(work.cov[h], math.sqrt(after * after - before * before), False)
+                give_reference_error(work[h].cov, math.sqrt(after * after - before * before), False)
 
 
 @njit(nogil=True)
-def _refer(work: Work, count: int, row: Any, node: Any) -> None:
+def _refer(work: Any, count: int, row: Any, node: Any) -> None:
     """The first heading from a reference: turn a belief of arbitrary zero, or learn north from the given start."""
     row.model = COMMON
     std = math.sqrt(node.heading_var)
-    delta = wrap(node.heading - work.mean[best_of(work, count), YAW])
+    delta = wrap(node.heading - work[best_of(work, count)].mean[YAW])
     for h in range(count):
         if row.referred == 0:
-            work.mean[h, YAW] += delta
-            work.mean[h, PHI] += delta
-            turn_about(work.cov[h], std)
+            work[h].mean[YAW] += delta
+            work[h].mean[PHI] += delta
+            turn_about(work[h].cov, std)
         else:
-            give_reference_error(work.cov[h], std, False)
+            give_reference_error(work[h].cov, std, False)
     row.north = delta if row.referred == 1 else 0.0
     row.referred = 1
 
 
 @njit(nogil=True)
-def _heading_all(work: Work, count: int, row: Any, node: Any, t: Tuning, H: Any, PH: Any) -> None:
+def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
     if node.heading_kind == MEASURED_HEADING:
         if not told_of(row):
             _judge_reference(work, count, row, node, t)
@@ -128,12 +125,12 @@ def _heading_all(work: Work, count: int, row: Any, node: Any, t: Tuning, H: Any,
         _refer(work, count, row, node)
     white, _, _ = error_of(row, node.heading_var)
     for h in range(count):
-        if row.model != STEADY or work.kind[h] == 0:
-            update_heading(work.mean[h], work.cov[h], H, PH, node.heading - row.north, white)
+        if row.model != STEADY or work[h].kind == 0:
+            update_heading(work[h].mean, work[h].cov, scratch.H, scratch.PH, node.heading - row.north, white)
 
 
 @njit(nogil=True)
-def _manage(work: Work, count: int, row: Any, node: Any, t: Tuning) -> int:
+def _manage(work: Any, count: int, row: Any, node: Any, t: Tuning) -> int:
     """Normalise, prune, now and then merge, split and re-seed the second class; returns the count."""
     normalise(work, count)
     count = prune(work, count, t.prune)
@@ -152,19 +149,19 @@ def _manage(work: Work, count: int, row: Any, node: Any, t: Tuning) -> int:
 
 
 @njit(nogil=True)
-def _reseed(work: Work, count: int, row: Any, t: Tuning) -> int:
+def _reseed(work: Any, count: int, row: Any, t: Tuning) -> int:
     """Keep the possibility of a wrong heading reference alive while tracking."""
     if row.declared == 0 or count >= layout.KEEP:
         return count
     for h in range(count):
-        if work.kind[h] == 1:
+        if work[h].kind == 1:
             return count
     best = best_of(work, count)
     return count + second_class(work, best, count, row, t, False)
 
 
 @njit(nogil=True)
-def _begin(work: Work, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
+def _begin(work: Any, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
     """Collect what a start needs and make the first hypotheses; returns their count."""
     row.ring_s += node.dt_s
     if node.kind == RANGE and row.anchor < 0:
@@ -192,33 +189,31 @@ def _begin(work: Work, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
 
 
 @njit(nogil=True)
-def _finite(work: Work, count: int) -> bool:
+def _finite(work: Any, count: int) -> bool:
     """Every hypothesis is a number with a positive variance in every direction that can be checked cheaply."""
     for h in range(count):
-        if not math.isfinite(work.log_weight[h]):
+        if not math.isfinite(work[h].log_weight):
             return False
         for i in range(N):
-            if not (math.isfinite(work.mean[h, i]) and work.cov[h, i, i] > -1e-9 and work.cov[h, i, i] < 1e12):
+            if not (math.isfinite(work[h].mean[i]) and work[h].cov[i, i] > -1e-9 and work[h].cov[i, i] < 1e12):
                 return False
     return count > 0
 
 
 @njit(nogil=True)
-def _step(
-    work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, small: Any, belief: Any
-) -> int:
+def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, belief: Any) -> int:
     """One node on a running row; returns the count of hypotheses."""
-    H, PH, out = small
+    H, PH, out = scratch.H, scratch.PH, scratch.out
     _predict_all(work, count, row, node, t, scratch)
     if is_referred(node.heading_kind):
-        _heading_all(work, count, row, node, t, H, PH)
+        _heading_all(work, count, row, node, t, scratch)
     for h in range(count):
         if node.rest > 0:
-            work.log_weight[h] += update_rest(work.mean[h], work.cov[h], PH, node, t)
+            work[h].log_weight += update_rest(work[h].mean, work[h].cov, PH, node, t)
     row.since_range_s += node.dt_s
     recover(work, count, row, node, t)
     if node.kind == RANGE and row.anchor >= 0:
-        _range_all(work, count, row, node, anchors, t, H, PH, out, belief)
+        _range_all(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
         count = open_alternative(work, count, row, t)
         unblock(work, count, t)
@@ -226,8 +221,8 @@ def _step(
         anchor, primary = anchors[node.anchor], anchors[row.anchor]
         best = best_of(work, count)
         for h in range(count):
-            work.log_weight[h] += t.temper * update_bearing(
-                work.mean[h], work.cov[h], H, PH, anchor.x - primary.x, anchor.y - primary.y, node.z, node.z_std**2, out
+            work[h].log_weight += t.temper * update_bearing(
+                work[h].mean, work[h].cov, H, PH, anchor.x - primary.x, anchor.y - primary.y, node.z, node.z_std**2, out
             )
             if h == best:
                 _tell(belief, out[0], out[1], out[2])
@@ -235,7 +230,7 @@ def _step(
         return 0
     count = _manage(work, count, row, node, t)
     for h in range(count):
-        mirror(work.cov[h])
+        mirror(work[h].cov)
     return count
 
 
@@ -256,14 +251,12 @@ def _reset(row: Any, pool: Any) -> None:
 
 
 @njit(nogil=True, cache=True)
-def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Work, beliefs: Any) -> int:
+def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Work, beliefs: Any) -> int:
     """Run the nodes (of one row in order of time; a row's nodes may be apart) and write one belief per node.
 
     Returns how many times the pool was too small.
     """
-    scratch = (np.ones(N), np.zeros(N), np.zeros((4, N)), np.zeros((4, N)))
-    small = (np.zeros(N), np.zeros(N), np.zeros(3))
-    buffers = (np.zeros(WORK, np.bool_), np.zeros(WORK, np.bool_), np.zeros(5), np.zeros((3, 3)))
+    work, scratch, t = workspace.hypotheses, workspace.scratch[0], tuning[0]
     short = 0
     current = -1
     count = 0
@@ -279,7 +272,7 @@ def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Wor
         row.t_ns = node.t_ns
         belief = beliefs[k]
         if count > 0:
-            count = _step(work, count, row, node, anchors, t, scratch, small, belief)
+            count = _step(work, count, row, node, anchors, t, scratch, belief)
             if count == 0:
                 row.fault += 1
                 row.reason = 10
@@ -288,9 +281,9 @@ def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Wor
         else:
             count = _begin(work, row, node, anchors, t)
             for h in range(count):
-                mirror(work.cov[h])
+                mirror(work[h].cov)
         if count > 0:
-            publish(work, count, row, node, anchors, t, belief, buffers)
+            publish(work, count, row, node, anchors, t, belief, scratch)
         belief.state, belief.reason = row.state, row.reason
         belief.hypotheses = count
     if current >= 0 and not store(rows[current], pool, work, count):

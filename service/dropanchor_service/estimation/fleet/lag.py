@@ -8,8 +8,8 @@ import math
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .layout import V
 from .smoother import Track, smooth
 from .summary import course_of, planar

@@ -134,27 +134,50 @@ BELIEF: Final = np.dtype(
 )
 
 
-class Work(NamedTuple):
-    """The hypotheses of one row, unpacked: what the kernels work on."""
+HYPOTHESIS: Final = np.dtype(
+    [
+        ("log_weight", np.float64),
+        ("kind", np.int32),
+        ("blocked", np.int32),
+        ("clear", np.float64, (2,)),  # offset and its variance before the line of sight was blocked
+        ("mean", np.float64, (N,)),
+        ("cov", np.float64, (N, N)),
+        ("shift", np.float64, (N,)),  # scratch of merging and splitting
+        ("order", np.int32),  # index of the k-th heaviest
+        ("gone", np.bool_),
+        ("member", np.bool_),  # of the mode under consideration
+        ("taken", np.bool_),  # by a mode considered before
+    ],
+    align=True,
+)
 
-    mean: npt.NDArray[np.float64]  # (WORK, N)
-    cov: npt.NDArray[np.float64]  # (WORK, N, N)
-    log_weight: npt.NDArray[np.float64]
-    kind: npt.NDArray[np.int32]
-    blocked: npt.NDArray[np.int32]
-    clear: npt.NDArray[np.float64]  # (WORK, 2)
+SCRATCH: Final = np.dtype(
+    [
+        ("decay", np.float64, (N,)),
+        ("growth", np.float64, (N,)),
+        ("F", np.float64, (4, N)),
+        ("FP", np.float64, (4, N)),
+        ("H", np.float64, (N,)),
+        ("PH", np.float64, (N,)),
+        ("out", np.float64, (3,)),
+        ("mean", np.float64, (5,)),
+        ("cov", np.float64, (3, 3)),
+        ("part", np.float64, (3, 3)),
+        ("point", np.float64, (3,)),
+    ]
+)
+
+
+class Work(NamedTuple):
+    """What one thread works on. Records, because compiled code counts no references to parts of a record."""
+
+    hypotheses: npt.NDArray[np.void]  # HYPOTHESIS (WORK,): those of one row, unpacked
+    scratch: npt.NDArray[np.void]  # SCRATCH (1,)
 
 
 def make_work() -> Work:
-    """Scratch of one thread."""
-    return Work(
-        np.zeros((WORK, N)),
-        np.zeros((WORK, N, N)),
-        np.zeros(WORK),
-        np.zeros(WORK, np.int32),
-        np.zeros(WORK, np.int32),
-        np.zeros((WORK, 2)),
-    )
+    """For one thread."""
+    return Work(np.zeros(WORK, HYPOTHESIS), np.zeros(1, SCRATCH))
 
 
 def make_pool(capacity: int) -> npt.NDArray[np.void]:

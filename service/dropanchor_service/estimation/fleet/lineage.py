@@ -8,8 +8,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .layout import CRAB, MOUNT, PHI, YAW, N, R, V
 from .predict import move
 from .update import wrap

@@ -20,9 +20,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from .attitude import yaw_of
+from .compiled import njit
 
 N = 8
 BIAS, SCALE = 6, 7

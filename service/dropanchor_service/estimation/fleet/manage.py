@@ -3,69 +3,73 @@
 import math
 from typing import Any
 
-import numpy as np
-from numba import njit
-
-from .layout import MOUNT, PHI, WORK, YAW, N, R, V, Work
+from .compiled import njit
+from .layout import MOUNT, PHI, WORK, YAW, N, R, V
 from .update import wrap
 
 
 @njit(nogil=True)
-def copy_hypothesis(work: Work, source: int, target: int) -> None:
+def copy_hypothesis(work: Any, source: int, target: int) -> None:
     """target becomes a copy of source."""
     if source != target:
-        work.mean[target] = work.mean[source]
-        work.cov[target] = work.cov[source]
-        work.log_weight[target] = work.log_weight[source]
-        work.kind[target] = work.kind[source]
-        work.blocked[target] = work.blocked[source]
-        work.clear[target] = work.clear[source]
+        work[target] = work[source]
 
 
 @njit(nogil=True)
-def best_of(work: Work, count: int) -> int:
+def best_of(work: Any, count: int) -> int:
     """Index of the heaviest hypothesis; the first one of equals."""
     best = 0
     for h in range(1, count):
-        if work.log_weight[h] > work.log_weight[best]:
+        if work[h].log_weight > work[best].log_weight:
             best = h
     return best
 
 
 @njit(nogil=True)
-def normalise(work: Work, count: int) -> None:
+def normalise(work: Any, count: int) -> None:
     """Log weights to a sum of one."""
-    top = work.log_weight[best_of(work, count)]
+    top = work[best_of(work, count)].log_weight
     total = 0.0
     for h in range(count):
-        total += math.exp(work.log_weight[h] - top)
+        total += math.exp(work[h].log_weight - top)
     shift = top + math.log(total)
     for h in range(count):
-        work.log_weight[h] -= shift
+        work[h].log_weight -= shift
 
 
 @njit(nogil=True)
-def prune(work: Work, count: int, depth: float) -> int:
+def prune(work: Any, count: int, depth: float) -> int:
     """Drop what is lighter than the best by `depth`; returns the new count."""
-    floor = work.log_weight[best_of(work, count)] - depth
+    floor = work[best_of(work, count)].log_weight - depth
     kept = 0
     for h in range(count):
-        if work.log_weight[h] >= floor:
+        if work[h].log_weight >= floor:
             copy_hypothesis(work, h, kept)
             kept += 1
     return kept
 
 
 @njit(nogil=True)
-def limit(work: Work, count: int, most: int) -> int:
+def put_in_order(work: Any, count: int) -> None:
+    """Fill `order`: heaviest first, the first one of equals first."""
+    for h in range(count):
+        k = h
+        while k > 0 and work[work[k - 1].order].log_weight < work[h].log_weight:
+            work[k].order = work[k - 1].order
+            k -= 1
+        work[k].order = h
+
+
+@njit(nogil=True)
+def limit(work: Any, count: int, most: int) -> int:
     """Keep the `most` heaviest."""
     if count <= most:
         return count
-    ordered = np.sort(work.log_weight[:count])
-    floor = ordered[count - most]
+    put_in_order(work, count)
+    floor = work[work[most - 1].order].log_weight
     kept = 0
     for h in range(count):
-        if work.log_weight[h] >= floor and kept < most:
+        if work[h].log_weight >= floor and kept < most:
             copy_hypothesis(work, h, kept)
             kept += 1
     return kept
@@ -78,78 +82,83 @@ def angle_variance(P: Any) -> float:
 
 
 @njit(nogil=True)
-def _close(work: Work, a: int, b: int, distance: float) -> bool:
+def _close(work: Any, a: int, b: int, distance: float) -> bool:
     """Every one of r, v, phi and the angle within `distance` standard deviations of the heavier one."""
-    if work.kind[a] != work.kind[b] or work.blocked[a] != work.blocked[b]:
+    if work[a].kind != work[b].kind or work[a].blocked != work[b].blocked:
         return False
-    P = work.cov[a]
+    P = work[a].cov
     d2 = distance * distance
-    dr = work.mean[b, R] - work.mean[a, R]
-    dv = work.mean[b, V] - work.mean[a, V]
-    dphi = wrap(work.mean[b, PHI] - work.mean[a, PHI])
+    dr = work[b].mean[R] - work[a].mean[R]
+    dv = work[b].mean[V] - work[a].mean[V]
+    dphi = wrap(work[b].mean[PHI] - work[a].mean[PHI])
     if dr * dr > d2 * P[R, R] + 1e-4 or dv * dv > d2 * P[V, V] + 1e-4 or dphi * dphi > d2 * P[PHI, PHI] + 1e-6:
         return False
-    angle = wrap(work.mean[b, YAW] - work.mean[a, YAW]) + work.mean[b, MOUNT] - work.mean[a, MOUNT] - dphi
+    angle = wrap(work[b].mean[YAW] - work[a].mean[YAW]) + work[b].mean[MOUNT] - work[a].mean[MOUNT] - dphi
     return bool(angle * angle <= d2 * angle_variance(P) + 1e-6)
 
 
 @njit(nogil=True)
-def _absorb(work: Work, a: int, b: int) -> None:
+def _absorb(work: Any, a: int, b: int) -> None:
     """Moment matching of b into a."""
-    wa, wb = math.exp(work.log_weight[a]), math.exp(work.log_weight[b])
+    wa, wb = math.exp(work[a].log_weight), math.exp(work[b].log_weight)
     share = wb / (wa + wb)
-    d = work.mean[b] - work.mean[a]
+    d = work[a].shift
+    for i in range(N):
+        d[i] = work[b].mean[i] - work[a].mean[i]
     d[PHI] = wrap(d[PHI])
     d[YAW] = wrap(d[YAW])
     for i in range(N):
-        work.mean[a, i] += share * d[i]
+        work[a].mean[i] += share * d[i]
         for j in range(N):
-            mixed = (1.0 - share) * work.cov[a, i, j] + share * work.cov[b, i, j]
-            work.cov[a, i, j] = mixed + share * (1.0 - share) * d[i] * d[j]
-    work.log_weight[a] = math.log(wa + wb)
+            mixed = (1.0 - share) * work[a].cov[i, j] + share * work[b].cov[i, j]
+            work[a].cov[i, j] = mixed + share * (1.0 - share) * d[i] * d[j]
+    work[a].log_weight = math.log(wa + wb)
 
 
 @njit(nogil=True)
-def merge(work: Work, count: int, distance: float) -> int:
+def merge(work: Any, count: int, distance: float) -> int:
     """Merge close pairs into the heavier one, heaviest first; returns the new count. Weights must be normalised."""
-    order = np.argsort(-work.log_weight[:count], kind="mergesort")
-    gone = np.zeros(count, np.bool_)
+    put_in_order(work, count)
+    for h in range(count):
+        work[h].gone = False
     for ia in range(count):
-        a = order[ia]
-        if gone[a]:
+        a = work[ia].order
+        if work[a].gone:
             continue
         for ib in range(ia + 1, count):
-            b = order[ib]
-            if not gone[b] and _close(work, a, b, distance):
+            b = work[ib].order
+            if not work[b].gone and _close(work, a, b, distance):
                 _absorb(work, a, b)
-                gone[b] = True
+                work[b].gone = True
     kept = 0
     for h in range(count):
-        if not gone[h]:
+        if not work[h].gone:
             copy_hypothesis(work, h, kept)
             kept += 1
     return kept
 
 
 @njit(nogil=True)
-def split(work: Work, count: int, angle: float, depth: float) -> int:
+def split(work: Any, count: int, angle: float, depth: float) -> int:
     """Split what is wider than `angle` into three along that angle's column; returns the new count.
 
     Weights .2252/.5496/.2252, shifts +-1.0576 sigma, variance along the column times 0.451: first two moments kept.
     """
-    floor = work.log_weight[best_of(work, count)] - depth
+    floor = work[best_of(work, count)].log_weight - depth
     for h in range(count):
-        variance = angle_variance(work.cov[h])
-        if variance > angle * angle and work.log_weight[h] > floor and count + 2 <= WORK:
+        variance = angle_variance(work[h].cov)
+        if variance > angle * angle and work[h].log_weight > floor and count + 2 <= WORK:
             _split_one(work, h, count, variance)
             count += 2
     return count
 
 
 @njit(nogil=True)
-def _split_one(work: Work, h: int, count: int, variance: float) -> None:
-    P = work.cov[h]
-    column = P[:, YAW] + P[:, MOUNT] - P[:, PHI]
+def _split_one(work: Any, h: int, count: int, variance: float) -> None:
+    P = work[h].cov
+    column = work[h].shift
+    for i in range(N):
+        column[i] = P[i, YAW] + P[i, MOUNT] - P[i, PHI]
     for i in range(N):
         for j in range(N):
             P[i, j] -= 0.549 * column[i] * column[j] / variance
@@ -157,8 +166,8 @@ def _split_one(work: Work, h: int, count: int, variance: float) -> None:
     copy_hypothesis(work, h, count + 1)
     step = 1.0576 / math.sqrt(variance)
     for i in range(N):
-        work.mean[count, i] += step * column[i]
-        work.mean[count + 1, i] -= step * column[i]
-    work.log_weight[h] += math.log(0.5496)
-    work.log_weight[count] += math.log(0.2252)
-    work.log_weight[count + 1] += math.log(0.2252)
+        work[count].mean[i] += step * column[i]
+        work[count + 1].mean[i] -= step * column[i]
+    work[h].log_weight += math.log(0.5496)
+    work[count].log_weight += math.log(0.2252)
+    work[count + 1].log_weight += math.log(0.2252)

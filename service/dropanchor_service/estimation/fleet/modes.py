@@ -2,42 +2,43 @@
 
 from typing import Any
 
-import numpy as np
-from numba import njit
-
-from .layout import WORK, Work
+from .compiled import njit
+from .layout import Work
 from .manage import normalise
 from .pool import load
 from .summary import add_reference, cluster, moments
 
 
 @njit(nogil=True)
-def _heaviest(work: Work, count: int, taken: Any) -> int:
+def _heaviest(work: Any, count: int) -> int:
     head = -1
     for h in range(count):
-        if not taken[h] and (head < 0 or work.log_weight[h] > work.log_weight[head]):
+        if not work[h].taken and (head < 0 or work[h].log_weight > work[head].log_weight):
             head = h
     return head
 
 
 @njit(cache=True, nogil=True)
-def list_modes(row: Any, pool: Any, anchors: Any, work: Work, modes: Any) -> int:
+def list_modes(row: Any, pool: Any, anchors: Any, workspace: Work, modes: Any) -> int:
     """Fill modes (HYPOTHESIS of `batch`) with the clusters above 1 %; returns their number."""
     count = row.count
+    work, scratch = workspace.hypotheses, workspace.scratch[0]
+    mean, cov = scratch.mean, scratch.cov
     load(row, pool, work)
-    taken, members = np.zeros(WORK, np.bool_), np.zeros(WORK, np.bool_)
-    mean, cov = np.zeros(5), np.zeros((3, 3))
+    for h in range(count):
+        work[h].taken = False
     if count > 0:
         normalise(work, count)
     for n in range(len(modes)):
-        head = _heaviest(work, count, taken)
-        weight = cluster(work, count, head, taken, members) if head >= 0 else 0.0
+        head = _heaviest(work, count)
+        weight = cluster(work, count, head) if head >= 0 else 0.0
         if weight < 0.01:
             return n
-        moments(work, count, members, head, mean, cov)
+        moments(work, count, head, scratch)
         if row.start_known == 0:
             add_reference(cov, mean[0], mean[1], (row.reference_std if row.referred == 1 else 1.8) ** 2)
-        taken |= members
+        for h in range(count):
+            work[h].taken |= work[h].member
         mode, anchor = modes[n], anchors[row.anchor]
         mode.weight = min(weight, 1.0)
         mode.x, mode.y, mode.heading, mode.speed = mean[0] + anchor.x, mean[1] + anchor.y, mean[2], mean[3]

@@ -8,9 +8,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from .attitude import yaw_of
+from .compiled import njit
 from .node import DERIVED_HEADING, MEASURED_HEADING, NO_HEADING
 from .preintegration import wrap
 

@@ -2,49 +2,48 @@
 
 from typing import Any
 
-from numba import njit
-
-from .layout import KEEP, N, Work
+from .compiled import njit
+from .layout import KEEP, N
 
 
 @njit(nogil=True)
-def load(row: Any, pool: Any, work: Work) -> None:
+def load(row: Any, pool: Any, work: Any) -> None:
     """Unpack the row's hypotheses into work, in the order they were stored."""
     slot = row.head
     for h in range(row.count):
         stored = pool[slot]
-        work.log_weight[h] = stored.log_weight
-        work.kind[h] = stored.kind
-        work.blocked[h] = stored.blocked
-        work.clear[h, 0] = stored.clear_offset
-        work.clear[h, 1] = stored.clear_variance
+        work[h].log_weight = stored.log_weight
+        work[h].kind = stored.kind
+        work[h].blocked = stored.blocked
+        work[h].clear[0] = stored.clear_offset
+        work[h].clear[1] = stored.clear_variance
         k = 0
         for i in range(N):
-            work.mean[h, i] = stored.mean[i]
+            work[h].mean[i] = stored.mean[i]
             for j in range(i, N):
-                work.cov[h, i, j] = work.cov[h, j, i] = stored.cov[k]
+                work[h].cov[i, j] = work[h].cov[j, i] = stored.cov[k]
                 k += 1
         slot = stored.next
 
 
 @njit(nogil=True)
-def store(row: Any, pool: Any, work: Work, count: int) -> bool:
+def store(row: Any, pool: Any, work: Any, count: int) -> bool:
     """Pack work back, taking or returning slots; False when the pool ran dry and hypotheses were dropped."""
     count = min(count, KEEP)
     fits = _resize(row, pool, count)
     slot = row.head
     for h in range(row.count):
         stored = pool[slot]
-        stored.log_weight = work.log_weight[h]
-        stored.kind = work.kind[h]
-        stored.blocked = work.blocked[h]
-        stored.clear_offset = work.clear[h, 0]
-        stored.clear_variance = work.clear[h, 1]
+        stored.log_weight = work[h].log_weight
+        stored.kind = work[h].kind
+        stored.blocked = work[h].blocked
+        stored.clear_offset = work[h].clear[0]
+        stored.clear_variance = work[h].clear[1]
         k = 0
         for i in range(N):
-            stored.mean[i] = work.mean[h, i]
+            stored.mean[i] = work[h].mean[i]
             for j in range(i, N):
-                stored.cov[k] = work.cov[h, i, j]
+                stored.cov[k] = work[h].cov[i, j]
                 k += 1
         slot = stored.next
     return fits

@@ -11,8 +11,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .layout import ACC, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
 from .tuning import Tuning
 

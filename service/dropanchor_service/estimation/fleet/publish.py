@@ -3,19 +3,17 @@
 import math
 from typing import Any
 
-from numba import njit
-
 from . import layout
-from .layout import Work
+from .compiled import njit
 from .node import RANGE
 from .summary import add_reference, best_mode, forget_information, sigma_obs
 from .tuning import Tuning
 
 
 @njit(nogil=True)
-def publish(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning, belief: Any, buffers: Any) -> None:
-    members, taken, mean, cov = buffers
-    p_mode, relative, head = best_mode(work, count, row, members, taken, mean, cov, t)
+def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, belief: Any, scratch: Any) -> None:
+    p_mode, relative, head = best_mode(work, count, row, scratch, t)
+    mean, cov = scratch.mean, scratch.cov
     anchor = anchors[row.anchor]
     belief.x, belief.y = mean[0] + anchor.x, mean[1] + anchor.y
     belief.course, belief.speed, belief.yaw = mean[2], mean[3], mean[4]
@@ -40,7 +38,7 @@ def publish(work: Work, count: int, row: Any, node: Any, anchors: Any, t: Tuning
     belief.p_mode = min(p_mode, 1.0)
     belief.sigma_pos = math.sqrt(max(cov[0, 0] + cov[1, 1], 0.0))
     belief.hypotheses = count
-    _judge(row, node, p_mode, relative, belief.sigma_pos, math.sqrt(r2), work.blocked[head] == 1, t)
+    _judge(row, node, p_mode, relative, belief.sigma_pos, math.sqrt(r2), work[head].blocked == 1, t)
 
 
 @njit(nogil=True)

@@ -19,8 +19,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from .compiled import njit
 from .heading import error_of
 from .layout import COMMON, GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
 from .node import ABSOLUTE_HEADING, BEARING, RANGE

@@ -4,10 +4,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from .compiled import njit
 from .heading import error_of, told_of
-from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, STEADY, YAW, R, V, Work
+from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, STEADY, YAW, R, V
 from .manage import copy_hypothesis
 from .node import ABSOLUTE_HEADING, DERIVED_HEADING, NO_HEADING, RELATIVE_HEADING
 from .tuning import Tuning
@@ -15,8 +15,8 @@ from .update import wrap
 
 
 @njit(nogil=True)
-def _common(work: Work, h: int, row: Any, yaw: float, yaw_variance: float, t: Tuning) -> None:
-    s, P = work.mean[h], work.cov[h]
+def _common(work: Any, h: int, row: Any, yaw: float, yaw_variance: float, t: Tuning) -> None:
+    s, P = work[h].mean, work[h].cov
     s[:] = 0.0
     P[:] = 0.0
     s[YAW] = yaw
@@ -28,9 +28,9 @@ def _common(work: Work, h: int, row: Any, yaw: float, yaw_variance: float, t: Tu
     P[GYRO, GYRO] = row.gyro_std**2
     P[ACC, ACC] = t.acc_std**2
     P[OFFSET, OFFSET] = row.offset_std**2
-    work.log_weight[h] = 0.0
-    work.kind[h] = 0
-    work.blocked[h] = 0
+    work[h].log_weight = 0.0
+    work[h].kind = 0
+    work[h].blocked = 0
 
 
 @njit(nogil=True)
@@ -79,19 +79,19 @@ def choose_model(row: Any, node: Any, t: Tuning) -> None:
 
 
 @njit(nogil=True)
-def _aligned(work: Work, count: int, row: Any, t: Tuning) -> int:
+def _aligned(work: Any, count: int, row: Any, t: Tuning) -> int:
     """Copies of the hypotheses for a body axis along the course, where it mostly is; returns their number."""
     if row.mount_std <= t.aligned_std:
         return 0
     for h in range(count):
         copy_hypothesis(work, h, count + h)
-        work.cov[count + h, MOUNT, MOUNT] = t.aligned_std**2
-        work.log_weight[count + h] += t.aligned_log_prior
+        work[count + h].cov[MOUNT, MOUNT] = t.aligned_std**2
+        work[count + h].log_weight += t.aligned_log_prior
     return count
 
 
 @njit(nogil=True)
-def start_known(work: Work, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
+def start_known(work: Any, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     """Hypotheses at the given start, one per class, or a ring of headings where none is known; returns the count."""
     x, y = row.start_x - anchor.x, row.start_y - anchor.y
     r = max(math.hypot(x, y), 1e-3)
@@ -104,7 +104,7 @@ def start_known(work: Work, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
         yaw = row.start_heading if given else node.heading + cell * h
         variance = row.start_heading_std**2 if given else node.heading_var
         _common(work, h, row, yaw, variance if known else (cell / 2.0) ** 2, t)
-        s, P = work.mean[h], work.cov[h]
+        s, P = work[h].mean, work[h].cov
         s[R], s[PHI] = r, math.atan2(y, x)
         P[R, R] = row.start_std**2
         P[PHI, PHI] = (row.start_std / r) ** 2
@@ -113,31 +113,28 @@ def start_known(work: Work, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     if not is_referred(node.heading_kind):
         return ring + _aligned(work, ring, row, t)
     _, slow, _ = error_of(row, node.heading_var)
-    give_reference_error(work.cov[0], slow, not given)
+    give_reference_error(work[0].cov, slow, not given)
     return ring + second_class(work, 0, ring, row, t, not given)
 
 
 @njit(nogil=True)
-def second_class(work: Work, source: int, target: int, row: Any, t: Tuning, yaw_follows: bool) -> int:
+def second_class(work: Any, source: int, target: int, row: Any, t: Tuning, yaw_follows: bool) -> int:
     """A copy of `source` whose heading reference has a slow error of its own, or drifts; returns how many."""
     if told_of(row):
         return 0
-    work.mean[target] = work.mean[source]
-    work.cov[target] = work.cov[source]
-    work.blocked[target] = work.blocked[source]
-    work.clear[target] = work.clear[source]
-    work.kind[target] = 1
+    copy_hypothesis(work, source, target)
+    work[target].kind = 1
     if row.model == STEADY:
-        work.log_weight[target] = work.log_weight[source] + t.drift_log_prior
-        work.cov[target, GYRO, GYRO] = t.drift_std**2
+        work[target].log_weight += t.drift_log_prior
+        work[target].cov[GYRO, GYRO] = t.drift_std**2
     else:
-        work.log_weight[target] = work.log_weight[source] + t.second_class
-        give_reference_error(work.cov[target], t.second_std, yaw_follows)
+        work[target].log_weight += t.second_class
+        give_reference_error(work[target].cov, t.second_std, yaw_follows)
     return 1
 
 
 @njit(nogil=True)
-def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool, t: Tuning) -> int:
+def start_ring(work: Any, row: Any, horizontal: float, node: Any, at_rest: bool, t: Tuning) -> int:
     """Bearings x speeds with a standard deviation of half a cell; speeds forward unless reverse is allowed."""
     signs = 2 if row.reverse == 1 and not at_rest else 1
     speeds = 1 if at_rest else t.ring_speeds // signs  # within KEEP in every case
@@ -151,7 +148,7 @@ def start_ring(work: Work, row: Any, horizontal: float, node: Any, at_rest: bool
         for k in range(speeds):
             for g in range(signs):
                 _common(work, h, row, node.heading, variance, t)
-                s, P = work.mean[h], work.cov[h]
+                s, P = work[h].mean, work[h].cov
                 s[R], s[PHI] = horizontal, cell * i
                 P[R, R] = row.range_std**2 / 4.0 + row.offset_std**2
                 P[R, OFFSET] = P[OFFSET, R] = -(row.offset_std**2)

@@ -3,10 +3,8 @@
 import math
 from typing import Any
 
-import numpy as np
-from numba import njit
-
-from .layout import CRAB, MOUNT, PHI, YAW, R, V, Work
+from .compiled import njit
+from .layout import CRAB, MOUNT, PHI, YAW, R, V
 from .manage import angle_variance, best_of
 from .tuning import Tuning
 from .update import wrap
@@ -71,48 +69,47 @@ def relative_sigma(s: Any, P: Any) -> float:
 
 
 @njit(nogil=True)
-def cluster(work: Work, count: int, head: int, taken: Any, members: Any) -> float:
+def cluster(work: Any, count: int, head: int) -> float:
     """Mark the members of head's mode that are not taken; returns their weight. Weights must be normalised.
 
     A member lies within 1 m + 2 sigma (of the head) of the head.
     """
-    hx = work.mean[head, R] * math.cos(work.mean[head, PHI])
-    hy = work.mean[head, R] * math.sin(work.mean[head, PHI])
-    reach = 1.0 + 2.0 * relative_sigma(work.mean[head], work.cov[head])
+    hx = work[head].mean[R] * math.cos(work[head].mean[PHI])
+    hy = work[head].mean[R] * math.sin(work[head].mean[PHI])
+    reach = 1.0 + 2.0 * relative_sigma(work[head].mean, work[head].cov)
     weight = 0.0
     for h in range(count):
-        dx = work.mean[h, R] * math.cos(work.mean[h, PHI]) - hx
-        dy = work.mean[h, R] * math.sin(work.mean[h, PHI]) - hy
-        members[h] = not taken[h] and dx * dx + dy * dy <= reach * reach
-        if members[h]:
-            weight += math.exp(work.log_weight[h])
+        dx = work[h].mean[R] * math.cos(work[h].mean[PHI]) - hx
+        dy = work[h].mean[R] * math.sin(work[h].mean[PHI]) - hy
+        work[h].member = not work[h].taken and dx * dx + dy * dy <= reach * reach
+        if work[h].member:
+            weight += math.exp(work[h].log_weight)
     return weight
 
 
 @njit(nogil=True)
-def moments(work: Work, count: int, members: Any, head: int, mean: Any, cov: Any) -> float:
+def moments(work: Any, count: int, head: int, scratch: Any) -> float:
     """Mean (x, y, course, speed, yaw) and covariance (x, y, course) of the members; returns the mean relative sigma."""
+    mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
     total, sigma = 0.0, 0.0
     mean[:] = 0.0
     cov[:] = 0.0
-    course0, yaw0 = course_of(work.mean[head]), work.mean[head, YAW]
-    part = np.empty((3, 3))
-    point = np.empty(3)
+    course0, yaw0 = course_of(work[head].mean), work[head].mean[YAW]
     for h in range(count):
-        if not members[h]:
+        if not work[h].member:
             continue
-        w = math.exp(work.log_weight[h])
-        s = work.mean[h]
+        w = math.exp(work[h].log_weight)
+        s = work[h].mean
         point[0], point[1] = s[R] * math.cos(s[PHI]), s[R] * math.sin(s[PHI])
         point[2] = wrap(course_of(s) - course0)
-        planar(s, work.cov[h], part)
+        planar(s, work[h].cov, part)
         for i in range(3):
             mean[i] += w * point[i]
             for j in range(3):
                 cov[i, j] += w * (part[i, j] + point[i] * point[j])
         mean[3] += w * s[V]
         mean[4] += w * wrap(s[YAW] - yaw0)
-        sigma += w * relative_sigma(s, work.cov[h])
+        sigma += w * relative_sigma(s, work[h].cov)
         total += w
     for i in range(5):
         mean[i] /= total
@@ -162,7 +159,7 @@ def sigma_obs(J: Any) -> float:
 
 
 @njit(nogil=True)
-def stay(work: Work, count: int, x: float, y: float, loyalty: float) -> int:
+def stay(work: Any, count: int, x: float, y: float, loyalty: float) -> int:
     """The heaviest hypothesis, but one near (x, y) if it is not lighter by more than `loyalty`.
 
     Of two mirrored modes of equal weight the one that was published last stays, rather than both in turn.
@@ -170,25 +167,23 @@ def stay(work: Work, count: int, x: float, y: float, loyalty: float) -> int:
     head = best_of(work, count)
     near = -1
     for h in range(count):
-        dx = work.mean[h, R] * math.cos(work.mean[h, PHI]) - x
-        dy = work.mean[h, R] * math.sin(work.mean[h, PHI]) - y
-        close = dx * dx + dy * dy <= (1.0 + 2.0 * relative_sigma(work.mean[h], work.cov[h])) ** 2
-        if close and (near < 0 or work.log_weight[h] > work.log_weight[near]):
+        dx = work[h].mean[R] * math.cos(work[h].mean[PHI]) - x
+        dy = work[h].mean[R] * math.sin(work[h].mean[PHI]) - y
+        close = dx * dx + dy * dy <= (1.0 + 2.0 * relative_sigma(work[h].mean, work[h].cov)) ** 2
+        if close and (near < 0 or work[h].log_weight > work[near].log_weight):
             near = h
-    if near >= 0 and work.log_weight[near] > work.log_weight[head] - loyalty:
+    if near >= 0 and work[near].log_weight > work[head].log_weight - loyalty:
         return near
     return head
 
 
 @njit(nogil=True)
-def best_mode(
-    work: Work, count: int, row: Any, members: Any, taken: Any, mean: Any, cov: Any, t: Tuning
-) -> tuple[float, float, int]:
+def best_mode(work: Any, count: int, row: Any, scratch: Any, t: Tuning) -> tuple[float, float, int]:
     """(p_mode, relative sigma, head) of the mode that is published."""
     head = stay(work, count, row.last_x, row.last_y, t.loyalty)
     for h in range(count):
-        taken[h] = False
-    weight = cluster(work, count, head, taken, members)
-    sigma = moments(work, count, members, head, mean, cov)
-    row.last_x, row.last_y = mean[0], mean[1]
+        work[h].taken = False
+    weight = cluster(work, count, head)
+    sigma = moments(work, count, head, scratch)
+    row.last_x, row.last_y = scratch.mean[0], scratch.mean[1]
     return weight, sigma, head

@@ -3,13 +3,14 @@
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 
 from dropanchor_service.estimation.batch import Array
 
+from .compiled import njit
 from .engine import FleetEngine
 from .kernel import advance
 from .layout import BELIEF, N, Work
+from .manage import put_in_order
 from .node import NODE
 from .pool import load
 from .tuning import Tuning
@@ -60,26 +61,27 @@ class TracingEngine(FleetEngine):
 
     def _believe(self, nodes: Array) -> Array:
         beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
-        advance_traced(self._rows, self._pool, nodes, self._anchors, self._tuning, self._work, beliefs, traces)
+        advance_traced(self._rows, self._pool, nodes, self._anchors, self._numbers, self._work, beliefs, traces)
         self._steps.append((nodes, beliefs, traces))
         return beliefs
 
 
 @njit(nogil=True, cache=True)
 def advance_traced(
-    rows: Any, pool: Any, nodes: Any, anchors: Any, t: Tuning, work: Work, beliefs: Any, traces: Any
+    rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Work, beliefs: Any, traces: Any
 ) -> None:
     """`advance`, one node at a time, and a copy of the heaviest hypotheses after each."""
+    work = workspace.hypotheses
     for k in range(len(nodes)):
-        advance(rows, pool, nodes[k : k + 1], anchors, t, work, beliefs[k : k + 1])
+        advance(rows, pool, nodes[k : k + 1], anchors, tuning, workspace, beliefs[k : k + 1])
         row, trace = rows[nodes[k].row], traces[k]
         trace.model, trace.referred, trace.north = row.model, row.referred, row.north
         load(row, pool, work)
-        order = np.argsort(-work.log_weight[: row.count], kind="mergesort")
+        put_in_order(work, row.count)
         trace.count = min(row.count, KEPT)
         for j in range(trace.count):
-            h = order[j]
-            trace.log_weight[j] = work.log_weight[h]
-            trace.kind[j], trace.blocked[j] = work.kind[h], work.blocked[h]
-            trace.mean[j] = work.mean[h]
-            trace.cov[j] = work.cov[h]
+            h = work[j].order
+            trace.log_weight[j] = work[h].log_weight
+            trace.kind[j], trace.blocked[j] = work[h].kind, work[h].blocked
+            trace.mean[j] = work[h].mean
+            trace.cov[j] = work[h].cov

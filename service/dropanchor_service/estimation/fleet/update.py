@@ -3,8 +3,7 @@
 import math
 from typing import Any
 
-from numba import njit
-
+from .compiled import njit
 from .layout import CRAB, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
 from .tuning import Tuning
 
@@ -14,7 +13,7 @@ TWO_PI = 2.0 * math.pi
 @njit(nogil=True)
 def wrap(angle: float) -> float:
     """To [-pi, pi)."""
-    return float((angle + math.pi) % TWO_PI - math.pi)
+    return float(angle - TWO_PI * math.floor(angle / TWO_PI + 0.5))
 
 
 @njit(nogil=True)

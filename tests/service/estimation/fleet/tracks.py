@@ -74,7 +74,7 @@ ANCHORS = np.zeros(1, ANCHOR)
 def run(rows: Any, pool: Any, nodes: Any) -> Any:
     """BELIEF, one per node."""
     beliefs = np.zeros(len(nodes), BELIEF)
-    assert advance(rows, pool, nodes, ANCHORS, CALIBRATED, make_work(), beliefs) == 0
+    assert advance(rows, pool, nodes, ANCHORS, CALIBRATED.numbers(), make_work(), beliefs) == 0
     return beliefs
 
 
