@@ -74,13 +74,14 @@ class Access:
     def _while_good(self, identity: Identity, send: Send) -> Send:
         """A stream ends when its key is revoked or its token expires."""
         assert self._keeper is not None
-        keeper, ended = self._keeper, False
+        keeper, pieces, ended = self._keeper, 0, False
 
         async def sending(message: Message) -> None:
-            nonlocal ended
+            nonlocal pieces, ended
             if ended:
                 return  # the server tells the route that its client is gone
-            if message["type"] == "http.response.body" and not keeper.is_still_good(identity):
+            pieces += message["type"] == "http.response.body"
+            if pieces > 1 and not keeper.is_still_good(identity):
                 ended = True
                 message = {"type": "http.response.body", "body": b"", "more_body": False}
             await send(message)
