@@ -1,5 +1,8 @@
 /** The service: the stream of poses, and the site. Comes back by itself when the service does. */
 
+import { ask, KeyWantedError } from "./access.js";
+import { eventsOf } from "./events.js";
+
 /** Frames a second; fewer where each is large. */
 const HZ = 10;
 const HZ_OF_MANY = 4;
@@ -13,9 +16,7 @@ export const api = (path) => new URL(`api/v1/${path}`, document.baseURI);
 
 /** @param {URL} url @returns {Promise<any>} */
 export async function getJson(url) {
-  const answer = await fetch(url, { signal: AbortSignal.timeout(PROBE_TIMEOUT_MS), cache: "no-store" });
-  if (!answer.ok) throw new Error(`${url.pathname} answered ${answer.status}`);
-  return answer.json();
+  return (await ask(url, { signal: AbortSignal.timeout(PROBE_TIMEOUT_MS) })).json();
 }
 
 /**
@@ -23,14 +24,13 @@ export async function getJson(url) {
  * The site is asked for every few seconds: its anchors may have been moved, and a silent stream may be a dead one.
  */
 export class Connection extends EventTarget {
-  /** @type {"connecting" | "live" | "lost"} */
+  /** "locked": the service wants a key, or another one. @type {"connecting" | "live" | "lost" | "locked"} */
   status = "connecting";
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;
   /** For tests and the curious: frames so far, and what the last one cost. */
   stats = { frames: 0, ms: 0 };
-  /** @type {EventSource | null} */
-  #stream = null;
+  #stream = new AbortController();
   #attempt = 0;
   #max_hz = HZ;
   #timer = 0;
@@ -43,6 +43,7 @@ export class Connection extends EventTarget {
   /** Try again now. */
   retry() {
     this.#attempt = 0;
+    if (this.status === "locked") this.#become("connecting");
     this.#open();
   }
 
@@ -56,13 +57,23 @@ export class Connection extends EventTarget {
 
   #open() {
     clearTimeout(this.#timer);
-    this.#stream?.close();
-    const stream = new EventSource(api(`stream?max_hz=${this.#max_hz}`));
-    stream.addEventListener("open", () => this.#opened());
-    stream.addEventListener("snapshot", (event) => this.#received("snapshot", event));
-    stream.addEventListener("poses", (event) => this.#received("change", event));
-    stream.addEventListener("error", () => this.#failed());
-    this.#stream = stream;
+    this.#stream.abort();
+    this.#stream = new AbortController();
+    this.#follow(this.#stream.signal);
+  }
+
+  /** @param {AbortSignal} signal */
+  async #follow(signal) {
+    try {
+      const answer = await ask(api(`stream?max_hz=${this.#max_hz}`), { signal });
+      this.#opened();
+      for await (const { name, data } of eventsOf(answer)) {
+        this.#received(name === "snapshot" ? "snapshot" : "change", data);
+      }
+      this.#failed();
+    } catch (error) {
+      if (!signal.aborted) this.#failed(error);
+    }
   }
 
   #opened() {
@@ -70,30 +81,33 @@ export class Connection extends EventTarget {
     this.#become("live");
   }
 
-  /** @param {string} kind @param {MessageEvent} event */
-  #received(kind, event) {
+  /** @param {string} kind @param {string} data */
+  #received(kind, data) {
     const begun = performance.now();
-    this.dispatchEvent(new CustomEvent(kind, { detail: JSON.parse(event.data) }));
+    this.dispatchEvent(new CustomEvent(kind, { detail: JSON.parse(data) }));
     this.stats = { frames: this.stats.frames + 1, ms: performance.now() - begun };
   }
 
-  #failed() {
-    this.#stream?.close();
-    this.#become("lost");
+  /** @param {unknown} [why] */
+  #failed(why) {
+    this.#stream.abort();
     clearTimeout(this.#timer);
+    const locked = why instanceof KeyWantedError;
+    this.#become(locked ? "locked" : "lost");
+    if (locked) return;
     this.#timer = setTimeout(() => this.#open(), RETRY_MS[Math.min(this.#attempt++, RETRY_MS.length - 1)]);
   }
 
   async #probe() {
     try {
-      this.dispatchEvent(new CustomEvent("site", { detail: await getJson(api("site")) }));
-    } catch {
-      if (this.status === "live") this.#failed();
+      if (this.status !== "locked") this.dispatchEvent(new CustomEvent("site", { detail: await getJson(api("site")) }));
+    } catch (error) {
+      if (this.status === "live") this.#failed(error);
     }
     setTimeout(() => this.#probe(), PROBE_MS);
   }
 
-  /** @param {"connecting" | "live" | "lost"} status */
+  /** @param {"connecting" | "live" | "lost" | "locked"} status */
   #become(status) {
     if (status === this.status) return;
     if (status === "lost") this.lostAt = performance.now();

@@ -1,5 +1,6 @@
 /** Everything about the selected tag. */
 
+import { hasKey } from "./access.js";
 import { api, getJson } from "./connection.js";
 import { UNKNOWN, age, compassPoint, degrees, fixed, metres, percent, sigma, words } from "./format.js";
 import { AMBIGUOUS, STATES } from "./states.js";
@@ -72,7 +73,7 @@ export class Detail {
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
-    this.#part("json").hidden = !this.fleet.hasPose(row);
+    this.#part("json").hidden = hasKey() || !this.fleet.hasPose(row); // a link carries no key
   }
 
   /** @param {number} row */

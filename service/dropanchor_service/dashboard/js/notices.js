@@ -1,5 +1,6 @@
 /** What the page says about itself: connecting, connection lost, no tags yet. */
 
+import { hasKey, keepKey } from "./access.js";
 import { age } from "./format.js";
 
 /** @param {string} id */
@@ -13,6 +14,7 @@ export class Notices {
     byId("retry").addEventListener("click", () => connection.retry());
     for (const button of document.querySelectorAll("button[data-copies]")) installCopy(button);
     connection.addEventListener("status", () => this.update());
+    byId("locked").addEventListener("submit", (event) => this.#unlock(event));
     if (!["localhost", "127.0.0.1", "[::1]"].includes(location.hostname)) {
       byId("command").textContent += ` --connect tcp/${location.hostname}:7447`;
     }
@@ -21,12 +23,23 @@ export class Notices {
 
   update() {
     const { status, lostAt } = this.connection;
-    const label = { connecting: "Connecting", live: "Live", lost: "Disconnected" }[status];
+    const label = { connecting: "Connecting", live: "Live", lost: "Disconnected", locked: "Locked" }[status];
     byId("status").dataset.status = status;
     write(byId("status-text"), label);
     byId("lost").hidden = status !== "lost";
     write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
+    byId("locked").hidden = status !== "locked";
+    byId("refused").hidden = !hasKey();
     byId("empty").hidden = status !== "live" || this.connection.stats.frames === 0 || this.fleet.size > 0;
+  }
+
+  /** @param {Event} event */
+  #unlock(event) {
+    event.preventDefault();
+    const field = /** @type {HTMLInputElement} */ (byId("key"));
+    keepKey(field.value.trim());
+    field.value = "";
+    this.connection.retry();
   }
 }
 

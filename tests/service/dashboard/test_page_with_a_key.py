@@ -1,0 +1,44 @@
+"""The page of a service that wants to know who asks."""
+
+from pathlib import Path
+
+import pytest
+
+from api_house import make_house
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.security.api_keys import SOURCE, ApiKeys
+from dropanchor_service.security.identity import Doorkeeper, Scope
+from support.browser import running_chromium
+from support.http_server import running_server
+
+pytestmark = pytest.mark.browser
+
+
+def test_the_page_asks_for_a_key_keeps_it_and_shows_the_tags(tmp_path: Path) -> None:
+    now_s = 0.0
+    keys = ApiKeys(tmp_path, lambda: now_s)
+    secret = keys.add("dashboard", Scope.READ)
+    house = make_house()
+    house.move("cart")
+    app = house.app(DASHBOARD, keeper=Doorkeeper({SOURCE: keys}))
+    with running_server(app, house.stopping) as port, running_chromium() as browser:
+        page = browser.new_page()
+        page.goto(f"http://127.0.0.1:{port}/")
+        page.locator("#locked").wait_for()
+        assert page.locator("#status-text").inner_text() == "Locked"
+        assert not page.locator("#refused").is_visible()
+        page.locator("#key").fill("a wrong one")
+        page.keyboard.press("Enter")
+        page.locator("#refused").wait_for()
+        page.locator("#key").fill(secret)
+        page.keyboard.press("Enter")
+        page.locator("tr[data-tag='cart']").wait_for()
+        assert not page.locator("#locked").is_visible()
+        page.reload()
+        page.locator("tr[data-tag='cart']").wait_for()
+        assert secret not in page.content()
+        assert page.evaluate("document.cookie + JSON.stringify(localStorage)") == "{}"
+        keys.revoke("dashboard")
+        now_s = 2.0
+        page.locator("#locked").wait_for()
+        page.screenshot(path=tmp_path / "locked.png")
