@@ -26,7 +26,8 @@ class HttpThread:
         self._server.should_exit = True
 
     def join(self, timeout_s: float) -> None:
-        self._thread.join(timeout_s)
+        if self._thread.ident is not None:
+            self._thread.join(timeout_s)
         self._bound.close()
 
     @property

@@ -60,6 +60,7 @@ class IngestThread:
             if self._buffer.wait(IDLE_S) and self._buffer.depth < BACKLOG:
                 self._stop.wait(self._period_s)  # so that one call fuses many messages
             self._turn()
+        self._turn()  # what has come in before the end
 
     def _turn(self) -> None:
         self._turned_s = time.monotonic()

@@ -34,6 +34,7 @@ from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 from dropanchor_service.store.checkpoints import CheckpointFolder
 from dropanchor_service.store.tracks import Tracks
+from dropanchor_service.supervision import Supervision
 from dropanchor_service.taps import NO_TAPS, Taps
 from dropanchor_service.whole_state import WholeState
 from dropanchor_service.zenoh_answers import ZenohAnswers
@@ -60,6 +61,7 @@ class Service:
         self._keeper = doorkeeper_of(settings.security)
         self._stopping = Event()
         self._opened = ExitStack()
+        self._supervision = Supervision()
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.tags = TagTable()
@@ -95,6 +97,9 @@ class Service:
         with self._opened:
             bound = listen(self._settings.http.host, self._settings.http.port)
             self._opened.callback(bound.close)
+            self._opened.enter_context(self._supervision)
+            self._http = self._http_thread(bound)
+            self._opened.callback(self._http.join, HTTP_STOP_S)
             if self._tracks is not None:
                 self._opened.enter_context(self._tracks)
             if self._checkpoints is not None:
@@ -104,7 +109,9 @@ class Service:
             self._thread.start()
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._link)
-            self._open_http(bound)
+            self._http.start()
+            # Asked first, joined last: what is stuck there keeps nobody else from stopping.
+            self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
         if self._checkpoints is None:
@@ -130,7 +137,9 @@ class Service:
 
     def problems(self) -> Sequence[str]:
         """Why the service cannot do its work at this moment; empty when it can."""
-        return [problem for problem in (self._thread.problem, self._link.problem) if problem is not None]
+        found = (self._thread.problem, self._link.problem)
+        dead = [f"the thread {name} has died" for name in self._dead_threads()]
+        return [*dead, *(problem for problem in found if problem is not None)]
 
     def impairments(self) -> Sequence[str]:
         """What does not work although the service does its work."""
@@ -140,8 +149,19 @@ class Service:
 
     @property
     def has_died(self) -> bool:
-        """Whether a thread that must run does not."""
-        return not self._http.is_alive or not self._thread.is_alive
+        """Whether a thread that must run does not: only a new process can be trusted then."""
+        return bool(self._dead_threads())
+
+    @property
+    def makes_progress(self) -> bool:
+        """Whether samples are fused as they come in."""
+        return self._thread.problem is None
+
+    def _dead_threads(self) -> list[str]:
+        threads = {"http": self._http.is_alive, "ingest": self._thread.is_alive}
+        if self._checkpoints is not None:
+            threads["checkpoints"] = self._checkpoints.is_alive
+        return sorted({*self._supervision.dead, *(name for name, lives in threads.items() if not lives)})
 
     def _made_tracks(self) -> Tracks | None:
         folder, history = self._settings.data_dir, self._settings.history
@@ -161,8 +181,8 @@ class Service:
         return Checkpointer(state, kept, self.metrics, self._settings.checkpoint_s)
 
     def _write_last_checkpoint(self, checkpoints: Checkpointer) -> None:
-        if self._thread.is_alive:
-            _log.error("the ingest thread does not stop: there is no last checkpoint")
+        if self._thread.is_alive or "ingest" in self._supervision.dead:
+            _log.error("the ingest thread has not come to a proper end: there is no last checkpoint")
         else:
             checkpoints.stop()
 
@@ -183,7 +203,7 @@ class Service:
             ZenohPoses(session, self.answers, self.metrics),
         ]
 
-    def _open_http(self, bound: socket.socket) -> None:
+    def _http_thread(self, bound: socket.socket) -> HttpThread:
         app = create_app(
             self.answers,
             ready=lambda: (not (found := self.problems()), found),
@@ -195,10 +215,7 @@ class Service:
             buckets=Buckets(self._settings.http.requests_per_s, self._settings.http.burst),
         )
         self._address = bound.getsockname()
-        self._http = HttpThread(build_server(app, self._stopping, certificate=self._certificate), bound)
-        self._http.start()
-        self._opened.callback(self._http.join, HTTP_STOP_S)
-        self._opened.callback(self._http.ask_to_stop)
+        return HttpThread(build_server(app, self._stopping, certificate=self._certificate), bound)
 
 
 def _site_store(settings: Settings) -> SiteStore:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from typing import Protocol
 
 from dropanchor_service import logs
 from dropanchor_service.api.server import ListenError
@@ -9,6 +10,7 @@ from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.service import Service
 from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.signals import interrupts
+from dropanchor_service.systemd import Systemd
 from dropanchor_service.zenoh_session import ZenohError
 
 DESCRIPTION = """\
@@ -42,10 +44,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 1 when it died, 2 when it could not start."""
     logs.configure(arguments.log_level)
+    systemd = Systemd()
     try:
         with interrupts() as interrupt, Service(settings_of(arguments)) as service:
-            stopped = interrupt.wait(lambda: not service.has_died)
+            systemd.ready()
+            stopped = interrupt.wait(lambda: goes_on(service, systemd))
+            systemd.stopping()
     except (SettingsError, ListenError, ZenohError) as error:
         sys.stderr.write(f"dropanchor serve: {error}\n")
         return UNUSABLE
     return 0 if stopped else DIED
+
+
+class Supervised(Protocol):
+    @property
+    def makes_progress(self) -> bool: ...
+
+    @property
+    def has_died(self) -> bool: ...
+
+
+def goes_on(service: Supervised, systemd: Systemd) -> bool:
+    """Asked twice a second. A service that is stuck says nothing to systemd, which starts it again."""
+    if service.makes_progress:
+        systemd.progress()
+    return not service.has_died
