@@ -1,11 +1,18 @@
 """Messages between the threads that receive them and the one that fuses them."""
 
 from collections import Counter, deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from itertools import compress
 from threading import Event, Lock
 
-Received = tuple[str, bytes, str, int]
-"""Key, payload, encoding, UTC of arrival in ns."""
+import numpy as np
+
+from dropanchor_service.estimation.batch import Array
+
+Message = tuple[int, bytes, str, int]
+"""Row of the tag, payload, encoding, UTC of arrival in ns."""
+Stranger = tuple[str, bytes, str, int]
+"""The same of a key that has no row yet."""
 
 MESSAGE_OVERHEAD = 200  # bytes that a waiting message takes beside its payload
 STRANGERS = 1024  # messages of tags without a row that may wait
@@ -13,7 +20,7 @@ _KEPT_SHARE = 0.75  # of the capacity after shedding, so that shedding is rare
 
 
 class MessageBuffer:
-    """Bounded. When it is full, the keys that fill it most lose their oldest messages.
+    """Bounded. When it is full, the tags that fill it most lose their oldest messages.
 
     Keys that are not known wait apart, where only they push out each other: a flood of them harms no known tag.
     """
@@ -22,18 +29,19 @@ class MessageBuffer:
         self._capacity_bytes = capacity_bytes
         self._lock = Lock()
         self._filled = Event()
-        self._known: set[str] = set()
-        self._messages: list[Received] = []
+        self._rows: dict[str, int] = {}
+        self._messages: list[Message] = []
         self._bytes = 0
-        self._strangers: deque[Received] = deque(maxlen=STRANGERS)
-        self._shed: Counter[str] = Counter()
+        self._strangers: deque[Stranger] = deque(maxlen=STRANGERS)
+        self._shed: Counter[int] = Counter()
         self._strangers_shed = 0
 
     def append(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """From any thread; blocks for no longer than shedding takes."""
+        row = self._rows.get(key)
         with self._lock:
-            if key in self._known:
-                self._messages.append((key, payload, encoding, arrival_ns))
+            if row is not None:
+                self._messages.append((row, payload, encoding, arrival_ns))
                 self._bytes += len(payload) + MESSAGE_OVERHEAD
                 if self._bytes > self._capacity_bytes:
                     self._make_room()
@@ -43,29 +51,34 @@ class MessageBuffer:
         if not self._filled.is_set():
             self._filled.set()
 
-    def admit(self, keys: Iterable[str]) -> None:
-        """These keys are known from now on."""
-        with self._lock:
-            self._known.update(keys)
+    def admit(self, key: str, row: int) -> None:
+        """This key is known from now on."""
+        self._rows[key] = row
+
+    def row_of(self, key: str) -> int | None:
+        """None of a stranger."""
+        return self._rows.get(key)
 
     def wait(self, timeout_s: float) -> bool:
         """Until there is a message; False when there is none in time."""
         return self._filled.wait(timeout_s)
 
-    def drain(self, most: int) -> Sequence[Received]:
-        """The oldest messages, at most so many of known keys, then those of strangers."""
+    def drain(self, most: int) -> tuple[list[Message], list[Stranger]]:
+        """The oldest messages of known keys, at most so many, and those of strangers."""
         with self._lock:
-            taken = self._messages[:most]
-            del self._messages[:most]
-            self._bytes -= sum(len(message[1]) + MESSAGE_OVERHEAD for message in taken)
-            taken.extend(self._strangers)
-            self._strangers.clear()
-            if not self._messages:
+            if len(self._messages) <= most:
+                taken, self._messages, self._bytes = self._messages, [], 0
                 self._filled.clear()
-            return taken
+            else:
+                taken = self._messages[:most]
+                del self._messages[:most]
+                self._bytes -= sum(map(_size, taken))
+            strangers = list(self._strangers)
+            self._strangers.clear()
+            return taken, strangers
 
-    def take_shed(self) -> tuple[Counter[str], int]:
-        """Messages lost since the last call: by key, and of strangers."""
+    def take_shed(self) -> tuple[Counter[int], int]:
+        """Messages lost since the last call: by row, and of strangers."""
         with self._lock:
             shed = self._shed, self._strangers_shed
             self._shed, self._strangers_shed = Counter(), 0
@@ -76,35 +89,39 @@ class MessageBuffer:
         return len(self._messages) + len(self._strangers)
 
     def _make_room(self) -> None:
-        cap = _fair_cap(_bytes_by_key(self._messages), int(_KEPT_SHARE * self._capacity_bytes))
-        kept: list[Received] = []
-        used: Counter[str] = Counter()
-        for message in reversed(self._messages):
-            key = message[0]
-            used[key] += len(message[1]) + MESSAGE_OVERHEAD
-            if used[key] <= cap:
-                kept.append(message)
-            else:
-                self._shed[key] += 1
-        kept.reverse()
-        self._messages = kept
-        self._bytes = sum(_bytes_by_key(kept).values())
+        rows = np.array([message[0] for message in self._messages])
+        sizes = np.array([_size(message) for message in self._messages])
+        _, tags = np.unique(rows, return_inverse=True)
+        cap = _fair_cap(np.bincount(tags, sizes), int(_KEPT_SHARE * self._capacity_bytes))
+        kept = _newer_of_same(tags, sizes) <= cap
+        lost, counts = np.unique(rows[~kept], return_counts=True)
+        self._shed.update(dict(zip(lost.tolist(), counts.tolist(), strict=True)))
+        self._messages = list(compress(self._messages, kept.tolist()))
+        self._bytes = int(sizes[kept].sum())
 
 
-def _bytes_by_key(messages: Sequence[Received]) -> Counter[str]:
-    sizes: Counter[str] = Counter()
-    for key, payload, _, _ in messages:
-        sizes[key] += len(payload) + MESSAGE_OVERHEAD
-    return sizes
+def _size(message: Message) -> int:
+    return len(message[1]) + MESSAGE_OVERHEAD
 
 
-def _fair_cap(sizes: Counter[str], target: int) -> int:
+def _newer_of_same(tags: Array, sizes: Array) -> Array:
+    """The sum of the sizes of each message and of all newer ones of its tag."""
+    order = np.argsort(tags[::-1], kind="stable")
+    ordered, summed = tags[::-1][order], np.cumsum(sizes[::-1][order])
+    first = np.append(True, ordered[1:] != ordered[:-1])
+    before = (summed - sizes[::-1][order])[first]
+    sums = np.empty(len(tags), np.int64)
+    sums[order] = summed - before[np.cumsum(first) - 1]
+    return sums[::-1]
+
+
+def _fair_cap(sizes: Array, target: int) -> int:
     """The largest share c with sum(min(size, c)) <= target."""
     left = target
-    ascending = sorted(sizes.values())
+    ascending: Sequence[float] = np.sort(sizes).tolist()
     for index, size in enumerate(ascending):
         share = left // (len(ascending) - index)
         if size > share:
-            return share
-        left -= size
+            return int(share)
+        left -= int(size)
     return target

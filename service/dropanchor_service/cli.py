@@ -6,6 +6,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from dropanchor_service.kernel_cache import keep_compiled
+
 _COMMANDS = {
     "demo": "the service with simulated tags, to look at in a browser",
     "serve": "run the service",
@@ -44,6 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, brief in _COMMANDS.items():
         one = commands.add_parser(name, help=brief, formatter_class=argparse.RawDescriptionHelpFormatter)
         if words[:1] == [name]:
+            keep_compiled()  # before a command imports what is compiled
             command = import_module(f"dropanchor_service.commands.{name}")
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)

@@ -7,7 +7,8 @@ import numpy as np
 
 from dropanchor_schemas.site import Anchor, TagSettings
 from dropanchor_service.estimation.batch import ANCHOR, Array, Engine, HeadingSource, default_settings
-from dropanchor_service.kernels import keep_compiled, warm_up
+from dropanchor_service.kernel_cache import keep_compiled
+from dropanchor_service.kernels import warm_up
 from dropanchor_service.settings import Settings
 
 

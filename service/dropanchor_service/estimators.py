@@ -1,7 +1,7 @@
 """The engine, kept in step with the site and guarded: one row's fault stays its own."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,9 +48,11 @@ class Estimators:
         self._metrics = metrics
         self._version = 0
         self._anchors = anchor_columns([])
-        self._numbers: dict[int, int] = {}
+        self._numbers = np.zeros(0, np.int64)  # of the anchors, ascending, and their indices
+        self._indices = np.zeros(0, np.int32)
         self._configured: dict[int, _Configured] = {}
         self._settings = np.zeros(0, TAG_SETTINGS)  # what each row was configured with
+        self._has_configured = np.zeros(0, bool)  # by row
         self._faults: dict[int, _Faults] = {}
 
     @property
@@ -78,6 +80,8 @@ class Estimators:
             wanted = self._wanted(row)
             if tag_columns(wanted.tag, wanted.declination_rad).tobytes() == known.tobytes():
                 self._configured[row] = wanted
+        self._has_configured = np.zeros(len(settings), bool)
+        self._has_configured[list(self._configured)] = True
 
     def follow_site(self) -> bool:
         """Take over what changed in the site since the last call; True when something did.
@@ -92,17 +96,24 @@ class Estimators:
         self._anchors = anchors
         self._engine.set_anchors(anchors)
         indices = {anchor.number: self._site.anchor_index(anchor.number) for anchor in self._site.site.anchors}
-        self._numbers = {number: index for number, index in indices.items() if index is not None}
-        for row, known in list(self._configured.items()):
-            if moved or known != self._wanted(row):
+        known = sorted((number, index) for number, index in indices.items() if index is not None)
+        self._numbers = np.array([number for number, _ in known], np.int64)
+        self._indices = np.array([index for _, index in known], np.int32)
+        for row, configured in list(self._configured.items()):
+            if moved or configured != self._wanted(row):
                 self._configure(row)
         return True
 
     def anchor_indices(self, numbers: Array) -> Array:
         """The engine's index for each anchor number, -1 where the site has no such anchor."""
-        distinct, where = np.unique(numbers, return_inverse=True)
-        indices: Array = np.array([self._numbers.get(number, -1) for number in distinct.tolist()], np.int32)[where]
+        if not len(self._numbers):
+            return np.full(len(numbers), -1, np.int32)
+        place = np.minimum(np.searchsorted(self._numbers, numbers), len(self._numbers) - 1)
+        indices: Array = np.where(self._numbers[place] == numbers, self._indices[place], np.int32(-1))
         return indices
+
+    def any_quarantined(self, now_ns: int) -> bool:
+        return any(faults.until_ns > now_ns for faults in self._faults.values())
 
     def quarantined(self, rows: Array, now_ns: int) -> Array:
         """Which of the rows are left alone for a while, because their samples made the engine fail again and again."""
@@ -111,10 +122,17 @@ class Estimators:
 
     def process(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
         """The poses of all rows but those that fail, which start afresh."""
-        for row in _rows(samples).tolist():
-            if row not in self._configured:
-                self._configure(row)
+        for row in self._new_rows(samples):
+            self._configure(row)
         yield from self._bisected(samples, now_ns)
+
+    def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
+        rows = [column["row"] for column in _columns(samples)]
+        missing = max(int(column.max(initial=-1)) for column in rows) + 1 - len(self._has_configured)
+        if missing > 0:
+            spare = max(missing, len(self._has_configured))
+            self._has_configured = np.concatenate([self._has_configured, np.zeros(spare, bool)])
+        return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
 
     def _bisected(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
         try:
@@ -143,6 +161,7 @@ class Estimators:
     def _configure(self, row: int, start_known: bool = True) -> None:
         wanted = self._wanted(row)
         self._configured[row] = wanted
+        self._has_configured[row] = True
         # After a fault the tag is no longer where it started.
         tag = wanted.tag if start_known else wanted.tag.model_copy(update={"start": None})
         self._engine.configure(row, tag_columns(tag, wanted.declination_rad))

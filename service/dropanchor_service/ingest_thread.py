@@ -11,6 +11,7 @@ from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
 
 IDLE_S = 0.25
+HOLDING_S = 0.02  # of waiting while a held message may become due
 BACKLOG = 1000  # messages beyond which there is no waiting for more
 SILENT_S = 5.0  # without a turn the thread counts as stuck
 
@@ -57,7 +58,7 @@ class IngestThread:
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            if self._buffer.wait(IDLE_S) and self._buffer.depth < BACKLOG:
+            if self._buffer.wait(HOLDING_S if self._ingest.holds else IDLE_S) and self._buffer.depth < BACKLOG:
                 self._stop.wait(self._period_s)  # so that one call fuses many messages
             self._turn()
         self._turn()  # what has come in before the end

@@ -1,48 +1,31 @@
-"""Compiled kernels: where they are kept, and compiling them before they are needed.
+"""Compiling what is compiled before it is needed."""
 
-numba judges its cache by the file of the outermost kernel alone: after an update of a file which that kernel calls
-into, it would go on running the old code. So the cache's folder is named after all the sources.
-"""
-
-import hashlib
 import logging
 import os
-import tempfile
 import time
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
+from dropanchor_schemas.wire import (
+    ENCODING_PACKED,
+    BearingSample,
+    Frame,
+    HeadingSample,
+    ImuSample,
+    RangeSample,
+    encode_packed,
+)
+from dropanchor_service.decode import read_forms, read_samples
 from dropanchor_service.estimation.batch import ANCHOR, HEADING, IMU, RANGE, Engine, SampleBatch, default_settings
+from dropanchor_service.kernel_cache import VARIABLE
+from dropanchor_service.passes.values import shift_times
+from dropanchor_service.publishers import Publishers
+from dropanchor_service.screening import screen
 
-VARIABLE = "NUMBA_CACHE_DIR"
 SLOW_S = 2.0
 
 _log = logging.getLogger(__name__)
-
-
-def sources_digest() -> str:
-    """Of all that the kernels, and the meaning of their rows, are made of."""
-    sources = sorted((Path(__file__).parent / "estimation").rglob("*.py"))
-    return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-
-
-def keep_compiled() -> None:
-    """Choose the cache's folder, unless the environment has. It takes effect if numba is not imported yet."""
-    if VARIABLE in os.environ:
-        return
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = home / "dropanchor" / f"kernels-{sources_digest()}"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        writable = os.access(folder, os.W_OK)
-    except OSError:
-        writable = False
-    if not writable:
-        # Only a folder that nobody else can have filled: what is read from a cache is run.
-        folder = Path(tempfile.mkdtemp(prefix="dropanchor-kernels-"))
-        _log.warning("%s is not writable: the estimator is compiled at every start; set %s", home, VARIABLE)
-    os.environ[VARIABLE] = str(folder)
 
 
 def warm_up(engine: Engine) -> None:
@@ -70,3 +53,24 @@ def _moving_off(rows: int) -> SampleBatch:
         columns["row"], columns["t_ns"], columns["std"] = row[::10], t_ns[::10], np.nan
     ranges["range"] = 10.0 + 0.15 * (t_ns[::10] * 1e-9) ** 2
     return SampleBatch(imu=imu, ranges=ranges, headings=headings)
+
+
+def warm_up_passes() -> None:
+    """Compile what every message goes through: two of a publisher, with a gap between."""
+    frame = Frame(
+        [ImuSample(1, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0))],
+        [RangeSample(1, 7, 1.0)],
+        [HeadingSample(1, 0.0)],
+        [BearingSample(1, 7, 0.0)],
+        boot_id=1,
+        boot_clock=True,
+    )
+    payloads = [encode_packed(replace(frame, sequence=number)) for number in (0, 2)]
+    read = read_forms(payloads, [ENCODING_PACKED] * len(payloads))
+    publishers, arrivals = Publishers(), np.zeros(len(payloads), np.int64)
+    sequenced = publishers.sequence(read.forms, np.zeros(len(payloads), np.int32), arrivals, 0)
+    decoded, _ = screen(read_samples(read, sequenced.due))
+    samples = [(decoded.imu["row"], decoded.imu["t_ns"]), (decoded.ranges["message"], decoded.ranges["t_ns"])]
+    offsets = publishers.utc_offsets(read.forms, sequenced, arrivals, samples)
+    for messages, t_ns in samples:
+        shift_times(t_ns, messages, offsets)

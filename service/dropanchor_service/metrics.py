@@ -34,6 +34,11 @@ class Metrics:
             "Messages that a publisher numbered and nobody has any more.",
             registry=self.registry,
         )
+        self.given_up = Counter(
+            "dropanchor_given_up_messages",
+            "Messages that were waited for behind a gap in their publisher's numbers, and did not come in time.",
+            registry=self.registry,
+        )
         self.faults = Counter("dropanchor_faults", "Errors of our own, by place.", ["where"], registry=self.registry)
         self.estimator_seconds = Histogram(
             "dropanchor_estimator_seconds", "Time to fuse one batch.", buckets=_SECONDS, registry=self.registry

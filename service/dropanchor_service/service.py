@@ -27,6 +27,7 @@ from dropanchor_service.http_thread import HttpThread
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.ingest_thread import IngestThread
 from dropanchor_service.keeping_metrics import HistoryMetrics
+from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.metrics import FleetGauges, Metrics
 from dropanchor_service.settings import Settings
 from dropanchor_service.settings_sources import SettingsError
@@ -59,6 +60,7 @@ class Service:
         refuse_exposure(settings, self._credentials)
         self._certificate = certificate_of(settings.http, self._credentials)
         self._keeper = doorkeeper_of(settings.security)
+        warm_up_passes()
         self._stopping = Event()
         self._opened = ExitStack()
         self._supervision = Supervision()
@@ -81,6 +83,7 @@ class Service:
             self.metrics,
             self.clock,
             Taps(poses=self._tracks.offer) if self._tracks else NO_TAPS,
+            round(settings.ingest.reorder_ms * 1e6),
         )
         self._checkpoints = self._checkpointer(estimators)
         self._thread = IngestThread(

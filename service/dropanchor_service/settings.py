@@ -115,6 +115,9 @@ class IngestSettings(_Section):
     period_ms: Annotated[float, Field(gt=0, le=1000)] = Field(
         default=5.0, description="Samples are gathered for so long before they are fused together."
     )
+    reorder_ms: Annotated[float, Field(ge=0, le=10_000)] = Field(
+        default=250.0, description="A message waits at most so long for those that its publisher numbered before it."
+    )
     buffer_mib: Annotated[float, Field(gt=0, le=4096)] = Field(
         default=32.0, description="Messages that may wait; beyond it the oldest of the busiest tags are shed."
     )

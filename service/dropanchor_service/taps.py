@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from dropanchor_service.buffer import Received
 from dropanchor_service.estimation.batch import Array
 
 
@@ -15,11 +14,11 @@ def _nobody(*_: object) -> None:
 class Taps:
     """Called by the ingest thread, which cannot wait for them.
 
-    messages: with the rows of admitted messages, and the messages, one call per turn. poses: with POSE as the engine
+    messages: with the admitted messages of a turn: row, payload, encoding, arrival. poses: with POSE as the engine
     gave them, per row in order of time, after `messages` of the same turn.
     """
 
-    messages: Callable[[Sequence[int], Sequence[Received]], None] = _nobody
+    messages: Callable[[Sequence[tuple[int, bytes, str, int]]], None] = _nobody
     poses: Callable[[Array], None] = _nobody
 
 

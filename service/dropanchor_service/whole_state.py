@@ -3,7 +3,7 @@
 from dropanchor_schemas.site import Anchor
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.estimators import Estimators
-from dropanchor_service.kernels import sources_digest
+from dropanchor_service.kernel_cache import sources_digest
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.checkpoints import Snapshot, layout_of
 

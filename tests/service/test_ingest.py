@@ -17,8 +17,8 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_service import decode as decode_module
-from dropanchor_service import ingest as ingest_module
+from dropanchor_service import prepare
+from dropanchor_service.decode import Forms, read_forms
 from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
 from dropanchor_service.estimators import FAULTS_BEFORE_QUARANTINE
 from support.ingest import Bench
@@ -154,7 +154,7 @@ def test_no_more_tags_than_max_tags_are_registered() -> None:
 
 def test_a_message_that_comes_twice_is_fused_once() -> None:
     bench = Bench()
-    first, second = ranges(1.0, sequence=1, boot_id=5), ranges(2.0, sequence=2, boot_id=5)
+    first, second = ranges(1.0, sequence=0, boot_id=5), ranges(2.0, sequence=1, boot_id=5)
     bench.send("a", first, second, first)
     bench.send("a", second, first)
     assert sum(len(batch.ranges) for batch in bench.engine.batches) == 2
@@ -163,18 +163,17 @@ def test_a_message_that_comes_twice_is_fused_once() -> None:
 
 def test_two_publishers_of_one_tag_and_two_tags_count_on_their_own() -> None:
     bench = Bench()
-    bench.send("a", ranges(1.0, sequence=1, boot_id=5), ranges(1.0, sequence=1, boot_id=6))
-    bench.send("b", ranges(1.0, sequence=1, boot_id=5))
+    bench.send("a", ranges(1.0, sequence=0, boot_id=5), ranges(1.0, sequence=0, boot_id=6))
+    bench.send("b", ranges(1.0, sequence=0, boot_id=5))
+    assert sum(len(batch.ranges) for batch in bench.engine.batches) == 3
     assert bench.rejected() == {}
 
 
 def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
     bench = Bench()
     second = 1_000_000_000
-    for tag_s, arrival_s in ((1.0, 101.0), (2.0, 102.5), (3.0, 103.0)):
-        frame = Frame(
-            ranges=[RangeSample(int(tag_s * second), 7, 1.0)], boot_clock=True, boot_id=9, sequence=int(tag_s)
-        )
+    for number, tag_s, arrival_s in ((0, 1.0, 101.0), (1, 2.0, 102.5), (2, 3.0, 103.0)):
+        frame = Frame(ranges=[RangeSample(int(tag_s * second), 7, 1.0)], boot_clock=True, boot_id=9, sequence=number)
         bench.put("a", frame, at_ns=T + int(arrival_s * second))
     bench.ingest.turn()
     times = bench.engine.batches[0].ranges["t_ns"] - T
@@ -246,12 +245,12 @@ def test_a_row_that_fails_again_and_again_is_left_alone_and_counted() -> None:
 
 
 def test_a_payload_that_the_decoder_fails_on_costs_nothing_but_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(payloads: list[bytes], encodings: list[str]) -> decode_module.Decoded:
+    def fails(payloads: list[bytes], encodings: list[str]) -> Forms:
         if b"poison" in payloads:
             raise RuntimeError("a bug")
-        return decode_module.decode(payloads, encodings)
+        return read_forms(payloads, encodings)
 
-    monkeypatch.setattr(ingest_module, "decode", fails)
+    monkeypatch.setattr(prepare, "read_forms", fails)
     bench = Bench()
     bench.send("a", ranges(1.0), b"poison", ranges(2.0))
     assert bench.x_of("a") == [2.0]

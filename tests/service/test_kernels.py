@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_service.kernels import VARIABLE, keep_compiled
+from dropanchor_service.kernel_cache import VARIABLE, keep_compiled
 from support.service import environment
 
-PLACE = "import os; from dropanchor_service.kernels import *; keep_compiled(); print(os.environ[VARIABLE])"
+PLACE = "import os; from dropanchor_service.kernel_cache import *; keep_compiled(); print(os.environ[VARIABLE])"
 
 
 def place(**variables: str) -> str:

@@ -17,6 +17,7 @@ from dropanchor_service.clock import UtcClock
 from dropanchor_service.estimation.batch import POSE, Array, Engine, PoseBatch, SampleBatch, State
 from dropanchor_service.estimators import Estimators
 from dropanchor_service.ingest import Ingest
+from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.settings_sources import load_settings
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
@@ -54,11 +55,17 @@ class Bench:
     """What a service has between Zenoh and the store."""
 
     def __init__(
-        self, folder: Path | None = None, capacity: int = 10**8, engine: Engine | None = None, **options: Any
+        self,
+        folder: Path | None = None,
+        capacity: int = 10**8,
+        engine: Engine | None = None,
+        clock: UtcClock | None = None,
+        **options: Any,
     ) -> None:
+        warm_up_passes()
         settings = load_settings(options=options, environment={})
         self.engine = TransparentEngine()
-        self.clock = UtcClock()
+        self.clock = clock or UtcClock()
         self.metrics = Metrics()
         self.tags = TagTable()
         self.latest = LatestPoses()

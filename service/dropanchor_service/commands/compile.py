@@ -5,6 +5,7 @@ import argparse
 from dropanchor_service import logs
 from dropanchor_service.commands.options import add_log_option
 from dropanchor_service.engine import create_engine
+from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.settings import Settings
 
 DESCRIPTION = """\
@@ -26,4 +27,5 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
     create_engine(Settings(engine="fleet"))
+    warm_up_passes()
     return 0

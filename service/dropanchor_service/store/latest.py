@@ -7,8 +7,10 @@ import numpy as np
 
 from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from dropanchor_service.store.history import PoseHistory
-from dropanchor_service.store.rings import RowRings
+from dropanchor_service.store.records import put, take
+from dropanchor_service.store.rings import RowRings, rank_in_row
 
+MODES = 8  # hypotheses that are kept of a tag
 INNOVATIONS = 300  # of each tag: half a minute at ten ranges a second
 MOST_BYTES = 64 * 2**20  # of all of them
 
@@ -20,7 +22,8 @@ class LatestPoses:
         self._lock = Lock()
         self._poses = np.zeros(0, POSE)
         self._changed = np.zeros(0, np.int64)
-        self._hypotheses: dict[int, Array] = {}
+        self._hypotheses = np.zeros((0, MODES), HYPOTHESIS)
+        self._modes = np.zeros(0, np.int64)  # how many of them each row has
         self._history = PoseHistory()
         self._innovations = RowRings(INNOVATION, INNOVATIONS, MOST_BYTES)
         self._version = 0
@@ -36,15 +39,13 @@ class LatestPoses:
         if len(poses) == 0:
             return
         with self._lock:
-            self._grow(int(poses["row"].max()) + 1)
+            self._grow(max(int(poses["row"].max()), int(hypotheses["row"].max(initial=-1))) + 1)
             self._version += 1
-            # With repeated indices NumPy keeps the last assignment, which is the newest pose of the row.
-            self._poses[poses["row"]] = poses
+            put(self._poses, poses["row"], poses)  # repeated: the newest pose of the row stays
             self._changed[poses["row"]] = self._version
-            for row in np.unique(poses["row"]):
-                self._hypotheses.pop(int(row), None)
-            for row in np.unique(hypotheses["row"]):
-                self._hypotheses[int(row)] = hypotheses[hypotheses["row"] == row]
+            self._modes[poses["row"]] = 0
+            self._modes[hypotheses["row"]] = 0
+            self._keep_modes(hypotheses)
             self._history.write(poses)
             if innovations is not None:
                 self._innovations.write(innovations)
@@ -52,8 +53,8 @@ class LatestPoses:
     def state(self) -> dict[str, Array]:
         """Copies of the latest poses, and of the modes behind them."""
         with self._lock:
-            modes = [np.empty(0, HYPOTHESIS), *self._hypotheses.values()]
-            return {"poses": self._poses[self._changed > 0], "hypotheses": np.concatenate(modes)}
+            modes = take(self._hypotheses, np.arange(MODES) < self._modes[:, None])
+            return {"poses": take(self._poses, self._changed > 0), "hypotheses": modes}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over what `state` gave. Nobody has heard those tags since: none of them counts as tracking."""
@@ -71,12 +72,13 @@ class LatestPoses:
     def since(self, version: int = 0) -> tuple[int, Array]:
         """The version of this answer, and POSE of every row that changed after `version`."""
         with self._lock:
-            return self._version, self._poses[self._changed > version]
+            return self._version, take(self._poses, self._changed > version)
 
     def hypotheses(self, row: int) -> Array:
         """HYPOTHESIS behind the latest pose of the row; empty when it is not ambiguous."""
         with self._lock:
-            return self._hypotheses.get(row, np.empty(0, HYPOTHESIS))
+            known = row < len(self._modes)
+            return self._hypotheses[row, : self._modes[row]].copy() if known else np.empty(0, HYPOTHESIS)
 
     def history(self, row: int) -> Array:
         """POSE of the row over the last minute or less, thinned, in order of time."""
@@ -88,9 +90,19 @@ class LatestPoses:
         with self._lock:
             return self._innovations.of(row)
 
+    def _keep_modes(self, hypotheses: Array) -> None:
+        if not len(hypotheses):
+            return
+        rank = rank_in_row(hypotheses["row"])
+        kept, rank = take(hypotheses, rank < MODES), rank[rank < MODES]
+        put(self._hypotheses, (kept["row"], rank), kept)
+        np.maximum.at(self._modes, kept["row"], rank + 1)
+
     def _grow(self, rows: int) -> None:
         missing = rows - len(self._poses)
         if missing > 0:
             spare = max(missing, len(self._poses))
             self._poses = np.concatenate([self._poses, np.zeros(spare, POSE)])
             self._changed = np.concatenate([self._changed, np.zeros(spare, np.int64)])
+            self._hypotheses = np.concatenate([self._hypotheses, np.zeros((spare, MODES), HYPOTHESIS)])
+            self._modes = np.concatenate([self._modes, np.zeros(spare, np.int64)])

@@ -3,6 +3,7 @@
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array
+from dropanchor_service.store.records import put, take
 
 FEWEST = 2  # records of a row, however many rows there are
 
@@ -26,10 +27,9 @@ class RowRings:
             return
         rows = records["row"]
         self._grow(int(rows.max()) + 1)
-        place = (self._counts[rows] + _rank_in_row(rows)) % self._records.shape[1]
-        # With repeated indices NumPy keeps the last assignment, which is the newest record.
-        self._records[rows, place] = records
-        np.add.at(self._counts, rows, 1)
+        number = self._counts[rows] + rank_in_row(rows)
+        put(self._records, (rows, number % self._records.shape[1]), records)
+        self._counts[rows] = number + 1
 
     def of(self, row: int) -> Array:
         """A copy, oldest first."""
@@ -49,17 +49,23 @@ class RowRings:
         number = self._counts[:, None] - depth + np.arange(depth)
         row, column = np.nonzero(number >= 0)
         kept = number[row, column]
-        grown[row, kept % depth] = self._records[row, kept % self._records.shape[1]]
+        put(grown, (row, kept % depth), take(self._records, (row, kept % self._records.shape[1])))
         self._records = grown
         self._counts = np.concatenate([self._counts, np.zeros(capacity - len(self._counts), np.int64)])
 
 
-def _rank_in_row(rows: Array) -> Array:
+def rank_in_row(rows: Array) -> Array:
     """How many entries of the same row stand before each entry."""
+    if (rows[1:] >= rows[:-1]).all():
+        return _rank_in_run(rows)
     order = np.argsort(rows, kind="stable")
-    ordered = rows[order]
-    first = np.append(True, ordered[1:] != ordered[:-1])
-    starts = np.flatnonzero(first)
     ranks = np.empty(len(rows), np.int64)
-    ranks[order] = np.arange(len(rows)) - np.repeat(starts, np.diff(np.append(starts, len(rows))))
+    ranks[order] = _rank_in_run(rows[order])
+    return ranks
+
+
+def _rank_in_run(rows: Array) -> Array:
+    """The same for rows in ascending order."""
+    starts = np.flatnonzero(np.append(True, rows[1:] != rows[:-1]))
+    ranks: Array = np.arange(len(rows)) - np.repeat(starts, np.diff(starts, append=len(rows)))
     return ranks

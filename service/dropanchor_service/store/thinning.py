@@ -3,6 +3,7 @@
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array
+from dropanchor_service.store.records import take
 
 
 class SlotFirsts:
@@ -17,14 +18,14 @@ class SlotFirsts:
         missing = int(poses["row"].max()) + 1 - len(self._slot)
         if missing > 0:
             self._slot = np.concatenate([self._slot, np.full(max(missing, len(self._slot)), -1)])
-        ordered = poses[np.argsort(poses["row"], kind="stable")]
-        rows, slots = ordered["row"], ordered["t_ns"] // self._slot_ns
+        if (poses["row"][1:] < poses["row"][:-1]).any():
+            poses = take(poses, np.argsort(poses["row"], kind="stable"))
+        rows, slots = poses["row"], poses["t_ns"] // self._slot_ns
         before = np.append(-1, slots[:-1])
         begins = np.append(True, rows[1:] != rows[:-1])
         before[begins] = self._slot[rows[begins]]
         self._slot[rows] = slots
-        firsts: Array = ordered[slots != before]
-        return firsts
+        return take(poses, slots != before)
 
 
 class Thinning:

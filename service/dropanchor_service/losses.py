@@ -1,0 +1,52 @@
+"""What is not used, counted by cause: for its tag, and in the metrics."""
+
+import logging
+
+import numpy as np
+
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.logs import RareLog
+from dropanchor_service.metrics import Metrics
+from dropanchor_service.store import TagTable
+
+
+class Losses:
+    """Owned by one thread."""
+
+    def __init__(self, tags: TagTable, metrics: Metrics) -> None:
+        self._log = RareLog(logging.getLogger(__name__))
+        self._tags = tags
+        self._metrics = metrics
+
+    def reject(self, reason: Reason, rows: Array) -> None:
+        """A message or sample of each of `rows`."""
+        if len(rows):
+            self._tags.count_rejected(reason, rows)
+            self._metrics.rejected.labels(reason).inc(len(rows))
+
+    def reject_many(self, reason: Reason, row: int, count: int) -> None:
+        self.reject(reason, np.full(count, row))
+
+    def refuse(self, reason: Reason, key: str) -> None:
+        """A message of nobody who is known."""
+        self._metrics.rejected.labels(reason).inc()
+        self._log.warning(f"message refused ({reason})", key[:200])
+
+    def shed_strangers(self, count: int) -> None:
+        self._metrics.rejected.labels(Reason.SHED).inc(count)
+
+    def give_up(self, messages: int) -> None:
+        """Messages that were waited for and did not come."""
+        if messages:
+            self._metrics.given_up.inc(messages)
+
+    def tap_failed(self, error: Exception) -> None:
+        """An error of ours."""
+        self._metrics.faults.labels("tap").inc()
+        self._log.exception("tap", error)
+
+    def decoder_failed(self, error: Exception) -> None:
+        """An error of ours."""
+        self._metrics.faults.labels("decoder").inc()
+        self._log.exception("decoder", error)

@@ -1,0 +1,206 @@
+"""Numbered messages into the order of their publisher: which are due, which came twice, which wait for one before.
+
+A publisher that counts without a gap waits for nothing: its messages pass as they come (`pass_in_order`). Those behind
+a gap are held until the missing one has come or the window is over (`release`).
+"""
+
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+
+PER_TAG: Final = 4  # publishers that are remembered of a tag
+WINDOW: Final = 1024  # messages behind the newest in which a duplicate is recognised
+_LANES: Final = WINDOW // 64
+
+UNUSED: Final = 0
+HEARD: Final = 1  # nothing has passed yet
+RUNNING: Final = 2
+
+PASS: Final = 0
+HELD: Final = 1
+DUPLICATE: Final = 2
+REFUSED: Final = 3  # has no form
+
+PUBLISHER: Final = np.dtype(
+    [
+        ("boot_id", "u4"),
+        ("next", "u4"),  # the number that is expected; HEARD: the first that was heard
+        ("status", "u1"),
+        ("excused", "?"),  # what is missing next was shed here: nobody need wait for it
+        ("used_ns", "i8"),  # last arrival
+        ("least_ns", "i8"),  # least delay of this epoch, and of the one before; NONE_NS: not yet
+        ("previous_least_ns", "i8"),
+        ("epoch_end_ns", "i8"),
+        ("seen", "u8", _LANES),  # bit n % WINDOW: the message n has come
+    ],
+    align=True,
+)
+NONE_NS: Final = np.iinfo(np.int64).max
+EPOCH_NS: Final = 30_000_000_000
+
+
+@njit(nogil=True)
+def _ahead(sequence: int, expected: int) -> int:
+    """How far a number (u32, wraps) lies ahead of another."""
+    distance: int = (np.int64(sequence) - np.int64(expected)) & 0xFFFFFFFF  # type: ignore[assignment]
+    return distance - 2**32 if distance >= 2**31 else distance
+
+
+@njit(nogil=True)
+def _mark(publisher: Any, sequence: int, seen: bool) -> None:
+    lane, bit = (sequence % WINDOW) // 64, np.uint64(1) << np.uint64(sequence % 64)
+    if seen:
+        publisher.seen[lane] |= bit
+    else:
+        publisher.seen[lane] &= ~bit
+
+
+@njit(nogil=True)
+def _was_seen(publisher: Any, sequence: int) -> bool:
+    return bool((publisher.seen[(sequence % WINDOW) // 64] >> np.uint64(sequence % 64)) & np.uint64(1))
+
+
+@njit(nogil=True)
+def _begin(publisher: Any, sequence: int) -> None:
+    """Count from here."""
+    for lane in range(_LANES):
+        publisher.seen[lane] = 0
+    _mark(publisher, sequence, True)
+    publisher.next = np.uint32(sequence + 1)
+    publisher.status = RUNNING
+
+
+@njit(nogil=True)
+def _advance(publisher: Any, sequence: int) -> int:
+    """Pass one that is not behind; returns how many before it are missing."""
+    missing = _ahead(sequence, publisher.next)
+    if missing >= WINDOW:
+        _begin(publisher, sequence)
+        return missing
+    for k in range(missing):
+        _mark(publisher, publisher.next + np.uint32(k), False)
+    _mark(publisher, sequence, True)
+    publisher.next = np.uint32(sequence + 1)
+    return missing
+
+
+@njit(nogil=True)
+def _verdict(publisher: Any, sequence: int) -> int:
+    if publisher.status != RUNNING:
+        if sequence != 0:
+            return HELD  # it has begun before: what else comes of it may be older
+        _begin(publisher, sequence)
+        return PASS
+    ahead = _ahead(sequence, publisher.next)
+    if ahead > 0:
+        return HELD
+    if ahead == 0:
+        _advance(publisher, sequence)
+        return PASS
+    if -ahead > WINDOW:
+        _begin(publisher, sequence)  # it counts from the start again
+        return PASS
+    if _was_seen(publisher, sequence):
+        return DUPLICATE
+    _mark(publisher, sequence, True)
+    return PASS
+
+
+@njit(nogil=True)
+def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: int) -> int:
+    """Where the publisher is remembered; the one unheard for longest makes room for a new one."""
+    found = row * PER_TAG
+    for slot in range(row * PER_TAG, (row + 1) * PER_TAG):
+        publisher = publishers[slot]
+        if publisher.status != UNUSED and publisher.boot_id == boot_id:
+            publisher.used_ns = max(publisher.used_ns, arrival_ns)
+            return slot
+        if publisher.used_ns < publishers[found].used_ns:
+            found = slot
+    publisher = publishers[found]
+    publisher.boot_id, publisher.next, publisher.status = boot_id, sequence, HEARD
+    publisher.excused, publisher.used_ns, publisher.epoch_end_ns = False, arrival_ns, 0
+    publisher.least_ns = publisher.previous_least_ns = NONE_NS
+    return found
+
+
+@njit(cache=True, nogil=True)
+def pass_in_order(
+    forms: Any, rows: Any, arrivals: Any, publishers: Any, slots: Any, distances: Any, verdicts: Any
+) -> int:
+    """Judge each message as it comes: PASS, HELD, DUPLICATE or REFUSED. Returns how many are held.
+
+    forms: FORM. publishers: PUBLISHER, PER_TAG for each row. slots: where the publisher of each message is, -1 without
+    one. distances: how far each lies ahead of the number that is expected.
+    """
+    held = 0
+    for i in range(len(rows)):
+        form = forms[i]
+        slots[i], distances[i], verdicts[i] = -1, 0, PASS if form.accepted else REFUSED
+        if not form.accepted or not (form.numbered or form.boot_clock):
+            continue
+        slots[i] = _slot(publishers, rows[i], form.boot_id, form.sequence, arrivals[i])
+        if not form.numbered:
+            continue
+        publisher = publishers[slots[i]]
+        distances[i] = _ahead(form.sequence, publisher.next)
+        verdicts[i] = _verdict(publisher, form.sequence)
+        held += verdicts[i] == HELD
+    return held
+
+
+@njit(nogil=True)
+def _force(publisher: Any, sequence: int) -> int:
+    """Pass this one although some before it are missing; returns how many."""
+    if publisher.status != RUNNING:
+        _begin(publisher, sequence)
+        return 0
+    return _advance(publisher, sequence)
+
+
+@njit(cache=True, nogil=True)
+def release(ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any, due_ns: int, verdicts: Any) -> int:
+    """Judge the held messages again, now in the order of their numbers: all up to one that has waited long enough
+    pass, and so do those that follow without a gap. Returns how many are given up as missing.
+
+    ordered: the held messages by publisher, then number. due_ns: what arrived until then has waited long enough.
+    """
+    missing = 0
+    begin = 0
+    while begin < len(ordered):
+        slot, end, forced = slots[ordered[begin]], begin, begin
+        publisher = publishers[slot]
+        while end < len(ordered) and slots[ordered[end]] == slot:
+            end += 1
+            if publisher.excused or arrivals[ordered[end - 1]] <= due_ns:
+                forced = end
+        for k in range(begin, end):
+            i = ordered[k]
+            verdicts[i] = _verdict(publisher, forms[i].sequence)
+            if verdicts[i] == HELD and k < forced:
+                absent = _force(publisher, forms[i].sequence)
+                missing += 0 if publisher.excused else absent
+                verdicts[i] = PASS
+        if forced > begin:
+            publisher.excused = False
+        begin = end
+    return missing
+
+
+@njit(cache=True, nogil=True)
+def utc_offsets(forms: Any, slots: Any, newest: Any, arrivals: Any, chosen: Any, publishers: Any, offsets: Any) -> None:
+    """UTC minus the publisher's clock, ns, for messages whose clock counts from the start of the tag; else 0.
+
+    It is the least difference seen between a message's newest sample and its arrival: the message with the least delay
+    tells most. The least of the last 30 to 60 s follows a drifting crystal. newest: ns, negative without a sample.
+    """
+    for i in chosen:
+        if not forms[i].boot_clock or newest[i] < 0:
+            continue
+        publisher = publishers[slots[i]]
+        if arrivals[i] >= publisher.epoch_end_ns:
+            publisher.previous_least_ns, publisher.least_ns = publisher.least_ns, NONE_NS
+            publisher.epoch_end_ns = arrivals[i] + EPOCH_NS
+        publisher.least_ns = min(publisher.least_ns, arrivals[i] - newest[i])
+        offsets[i] = min(publisher.least_ns, publisher.previous_least_ns)

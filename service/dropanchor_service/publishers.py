@@ -1,0 +1,94 @@
+"""What is known of each publisher of a tag: which of its messages have come, in which order, and its clock."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.passes import sequences
+from dropanchor_service.passes.sequences import PER_TAG, PUBLISHER, WINDOW
+from dropanchor_service.passes.values import newest_times
+
+
+@dataclass(frozen=True)
+class Sequenced:
+    """Indices of messages. due: to be fused now, in this order; held: to be put in again, before newer ones, until
+    they are due. missing: messages that are given up. slots: the publisher of each message, -1 without one."""
+
+    due: Array
+    held: Array
+    duplicates: Array
+    missing: int
+    slots: Array
+
+
+class Publishers:
+    """The last few publishers of every tag; memory is bounded whatever boot ids a tag makes up.
+
+    `columns` is all there is to know: a checkpoint is a copy of it. One that was restored expects the number after the
+    last that passed, so what is fetched from caches meanwhile fills the gap, as long as the window that `sequence` is
+    called with is wide enough to wait for it.
+    """
+
+    def __init__(self) -> None:
+        self._columns = np.zeros(0, PUBLISHER)
+
+    @property
+    def columns(self) -> Array:
+        """PUBLISHER, PER_TAG for each row of a tag."""
+        return self._columns
+
+    @columns.setter
+    def columns(self, columns: Array) -> None:
+        self._columns = columns.copy()
+
+    def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int) -> Sequenced:
+        """Put messages (FORM, row of their tag, ns of arrival; earlier arrivals first) into their publishers' order.
+        Nobody waits any longer for what is missing before a message that arrived until `due_ns`."""
+        self._grow(rows)
+        n = len(rows)
+        slots, distances, verdicts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
+        held = sequences.pass_in_order(forms, rows, arrivals, self._columns, slots, distances, verdicts)
+        due = np.flatnonzero(verdicts == sequences.PASS)
+        missing = 0
+        if held:
+            behind = np.flatnonzero(verdicts == sequences.HELD)
+            ordered = behind[np.lexsort((distances[behind], slots[behind]))]
+            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_ns, verdicts)
+            due = np.concatenate([due, ordered[verdicts[ordered] == sequences.PASS]])
+        again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.HELD))
+        return Sequenced(due, waiting, again, missing, slots)
+
+    def has_passed(self, row: int, boot_id: int, sequence: int) -> bool:
+        """Whether this message of this tag was fused already, as far as that is remembered."""
+        for publisher in self._columns[row * PER_TAG : (row + 1) * PER_TAG]:
+            if publisher["status"] == sequences.RUNNING and publisher["boot_id"] == boot_id:
+                behind = (int(publisher["next"]) - sequence) % 2**32
+                lane, bit = sequence % WINDOW // 64, sequence % 64
+                return 0 < behind <= WINDOW and bool(int(publisher["seen"][lane]) >> bit & 1)
+        return False
+
+    def excuse(self, row: int) -> None:
+        """Messages of this row were shed before they got here: nobody need wait for them."""
+        self._columns["excused"][row * PER_TAG : (row + 1) * PER_TAG] = True
+
+    def utc_offsets(
+        self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]
+    ) -> Array:
+        """UTC minus the clock of each message's publisher, ns; empty when all have UTC.
+
+        samples: of each kind the index of the message and the time of every sample.
+        """
+        if not forms["boot_clock"].any():
+            return np.zeros(0, np.int64)
+        newest, offsets = np.full(len(forms), -1, np.int64), np.zeros(len(forms), np.int64)
+        for messages, t_ns in samples:
+            newest_times(t_ns, messages, newest)
+        sequences.utc_offsets(forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, offsets)
+        return offsets
+
+    def _grow(self, rows: Array) -> None:
+        missing = (int(rows.max(initial=-1)) + 1) * PER_TAG - len(self._columns)
+        if missing > 0:
+            spare = max(missing, len(self._columns))
+            self._columns = np.concatenate([self._columns, np.zeros(spare, PUBLISHER)])

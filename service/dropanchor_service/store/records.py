@@ -1,0 +1,22 @@
+"""Records picked and put by index as opaque bytes: NumPy copies structured ones field by field, 20 times slower."""
+
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import Array
+
+
+def take(records: Array, index: Any) -> Array:
+    """A copy of `records[index]`."""
+    taken: Array = _opaque(records)[index].view(records.dtype)
+    return taken
+
+
+def put(records: Array, index: Any, values: Array) -> None:
+    """`records[index] = values`, of the same type; with repeated indices the last one stays."""
+    _opaque(records)[index] = _opaque(values)
+
+
+def _opaque(records: Array) -> Array:
+    return records.view(np.dtype((np.void, records.dtype.itemsize)))
