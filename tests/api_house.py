@@ -17,6 +17,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.api import create_app
 from dropanchor_service.api.rates import Buckets
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
+from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Doorkeeper
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
@@ -34,6 +35,7 @@ class House:
     stopping: Event = field(default_factory=Event)
     not_ready: Sequence[str] = ()
     now_ns: int = T_NS
+    recorder: Recorder | None = None
 
     def move(self, *names: str, **fields: Any) -> None:
         poses = np.zeros(len(names), POSE)
@@ -63,6 +65,7 @@ class House:
             ready=lambda: (not self.not_ready, self.not_ready),
             registry=self.registry,
             stopping=self.stopping,
+            recorder=self.recorder,
             max_tags=max_tags,
             dashboard=dashboard,
             keeper=keeper,

@@ -26,7 +26,7 @@ from dropanchor_service.exposure import refuse_exposure
 from dropanchor_service.http_thread import HttpThread
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.ingest_thread import IngestThread
-from dropanchor_service.keeping_metrics import HistoryMetrics
+from dropanchor_service.keepers import Keepers
 from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.metrics import FleetGauges, Metrics
 from dropanchor_service.settings import Settings
@@ -34,9 +34,7 @@ from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 from dropanchor_service.store.checkpoints import CheckpointFolder
-from dropanchor_service.store.tracks import Tracks
 from dropanchor_service.supervision import Supervision
-from dropanchor_service.taps import NO_TAPS, Taps
 from dropanchor_service.whole_state import WholeState
 from dropanchor_service.zenoh_answers import ZenohAnswers
 from dropanchor_service.zenoh_intake import ZenohIntake
@@ -69,8 +67,8 @@ class Service:
         self.tags = TagTable()
         self.latest = LatestPoses()
         self.site = _site_store(settings)
-        self._tracks = self._made_tracks()
-        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._tracks)
+        self._keepers = Keepers(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
+        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._keepers.tracks)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20))
         estimators = Estimators(create_engine(settings), self.site, self.tags, self.metrics)
         self._ingest = Ingest(
@@ -82,8 +80,8 @@ class Service:
             self.latest,
             self.metrics,
             self.clock,
-            Taps(poses=self._tracks.offer) if self._tracks else NO_TAPS,
-            round(settings.ingest.reorder_ms * 1e6),
+            taps=self._keepers.taps,
+            reorder_ns=round(settings.ingest.reorder_ms * 1e6),
         )
         self._checkpoints = self._checkpointer(estimators)
         self._thread = IngestThread(
@@ -103,8 +101,7 @@ class Service:
             self._opened.enter_context(self._supervision)
             self._http = self._http_thread(bound)
             self._opened.callback(self._http.join, HTTP_STOP_S)
-            if self._tracks is not None:
-                self._opened.enter_context(self._tracks)
+            self._opened.enter_context(self._keepers)
             if self._checkpoints is not None:
                 self._checkpoints.load()
                 self._checkpoints.start()
@@ -146,9 +143,8 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """What does not work although the service does its work."""
-        parts = (None if self._tracks is None else self._tracks.writer, self._checkpoints)
-        problems = (part.problem for part in parts if part is not None)
-        return [problem for problem in problems if problem is not None]
+        found = [*self._keepers.problems(), self._checkpoints.problem if self._checkpoints else None]
+        return [problem for problem in found if problem is not None]
 
     @property
     def has_died(self) -> bool:
@@ -165,14 +161,6 @@ class Service:
         if self._checkpoints is not None:
             threads["checkpoints"] = self._checkpoints.is_alive
         return sorted({*self._supervision.dead, *(name for name, lives in threads.items() if not lives)})
-
-    def _made_tracks(self) -> Tracks | None:
-        folder, history = self._settings.data_dir, self._settings.history
-        if folder is None or not history.enabled:
-            return None
-        tracks = Tracks(folder, history.keeping(), self.tags, self.site, self.clock.now_ns)
-        self.metrics.watch(HistoryMetrics(tracks))
-        return tracks
 
     def _checkpointer(self, estimators: Estimators) -> Checkpointer | None:
         """None where nothing is kept."""
@@ -211,6 +199,7 @@ class Service:
             self.answers,
             ready=lambda: (not (found := self.problems()), found),
             impaired=self.impairments,
+            recorder=self._keepers.recorder,
             registry=self.metrics.registry,
             stopping=self._stopping,
             max_tags=self._settings.max_tags,

@@ -12,6 +12,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
+from dropanchor_service.recording.folder import Limits
 from dropanchor_service.store.tracks import Keeping
 
 
@@ -147,6 +148,30 @@ class HistorySettings(_Section):
         )
 
 
+class RecordingSettings(_Section):
+    """What is recorded in `data_dir`/recordings, and for how long."""
+
+    enabled: bool = Field(default=False, description="Record from the start; else when REST asks for it.")
+    tags: tuple[TagId, ...] = Field(default=(), description="Only these tags, when it records from the start.")
+    pose_period_s: Annotated[float, Field(gt=0, le=3600)] = Field(
+        default=0.2, description="At most one pose of a tag in so long; samples are recorded all."
+    )
+    file_mib: Annotated[float, Field(ge=0.01)] = Field(default=256.0, description="A file that is larger is finished.")
+    file_minutes: Annotated[float, Field(gt=0)] = Field(default=60.0, description="So is one that is older.")
+    keep_files: Annotated[int, Field(ge=1)] = 10_000
+    keep_days: Annotated[float, Field(gt=0, le=36_500)] = 30.0
+    most_mib: Annotated[float, Field(ge=1)] = Field(default=16_384.0, description="The oldest files make room.")
+
+    def limits(self) -> Limits:
+        return Limits(
+            file_bytes=int(self.file_mib * 2**20),
+            file_ns=round(self.file_minutes * 60e9),
+            keep_files=self.keep_files,
+            keep_ns=round(self.keep_days * 86_400e9),
+            most_bytes=int(self.most_mib * 2**20),
+        )
+
+
 class PaperSettings(_Section):
     """Parameters of the engine `paper`; names, units and sources stand in `estimation/paper_parameters.py`."""
 
@@ -202,6 +227,7 @@ class Settings(_Section):
     security: SecuritySettings = SecuritySettings()
     ingest: IngestSettings = IngestSettings()
     history: HistorySettings = HistorySettings()
+    recording: RecordingSettings = RecordingSettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}
     paper: PaperSettings = PaperSettings()

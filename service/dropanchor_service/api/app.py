@@ -17,10 +17,12 @@ from dropanchor_service.api.health import Impaired, Ready, health_router, metric
 from dropanchor_service.api.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.poses import poses_router
 from dropanchor_service.api.rates import Buckets
+from dropanchor_service.api.recordings import recordings_router
 from dropanchor_service.api.site import site_router
 from dropanchor_service.api.stream import stream_router
 from dropanchor_service.api.tags import tags_router
 from dropanchor_service.api.track import track_router
+from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Doorkeeper
 from dropanchor_service.store.answers import Answers
 
@@ -36,14 +38,15 @@ def create_app(
     registry: CollectorRegistry,
     stopping: Event,
     impaired: Impaired = list,
+    recorder: Recorder | None = None,
     max_tags: int = 20_000,
     dashboard: Path | None = DASHBOARD,
     keeper: Doorkeeper | None = None,
     buckets: Buckets | None = None,
 ) -> FastAPI:
     """ready: whether the service can do its work, and why not. impaired: what else does not work. stopping: when set,
-    streams end. dashboard: the folder of the page, None for no page. keeper: who knows who asks; None: everybody may do
-    everything. buckets: how often one client may ask."""
+    streams end. recorder: None where nothing can be recorded. dashboard: the folder of the page, None for no page.
+    keeper: who knows who asks; None: everybody may do everything. buckets: how often one client may ask."""
     app = FastAPI(
         title="Dropanchor",
         version="1",
@@ -63,6 +66,7 @@ def create_app(
         track_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),
+        recordings_router(recorder),
         health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
@@ -103,6 +107,7 @@ _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What was heard from the tags, and what an operator knows about them."},
     {"name": "site", "description": "The frame, its place on the Earth, and the anchors."},
+    {"name": "recordings", "description": "Raw samples and poses in MCAP files."},
     {"name": "health", "description": "For supervisors and Prometheus."},
 ]
 

@@ -123,3 +123,15 @@ TRACK: dict[str, Any] = {
     ],
     "next": None,
 }
+NO_RECORDING: dict[str, Any] = {"recording": False, "since_ns": None, "tags": None, "file": None}
+RECORDING: dict[str, Any] = {"recording": True, "since_ns": 1_800_000_000_000_000_000, "tags": None, "file": None}
+RECORDINGS: dict[str, Any] = NO_RECORDING | {
+    "files": [
+        {
+            "name": "yard-20270115T080000-000000Z.mcap",
+            "bytes": 1_048_576,
+            "changed_ns": 1_800_000_060_000_000_000,
+            "finished": True,
+        }
+    ]
+}

@@ -14,8 +14,8 @@ from dropanchor_service.api.errors import Kind, ProblemError
 from dropanchor_service.store.answers import to_json
 
 
-def json_response(answer: Any, media_type: str = "application/json") -> Response:
-    return Response(to_json(answer), media_type=media_type, headers={"cache-control": "no-store"})
+def json_response(answer: Any, media_type: str = "application/json", status: int = 200) -> Response:
+    return Response(to_json(answer), status, media_type=media_type, headers={"cache-control": "no-store"})
 
 
 def refuse_query(request: Request) -> None:
@@ -25,9 +25,9 @@ def refuse_query(request: Request) -> None:
         raise ProblemError(Kind.INVALID_REQUEST, f"query.{name[:64]}: is not known; no query parameter is taken here")
 
 
-def shown(example: Any) -> dict[int | str, dict[str, Any]]:
+def shown(example: Any, status: int = 200) -> dict[int | str, dict[str, Any]]:
     """How a route declares what it answers."""
-    return {200: {"content": {"application/json": {"example": example}}}}
+    return {status: {"content": {"application/json": {"example": example}}}}
 
 
 NO_QUERY = Depends(refuse_query)

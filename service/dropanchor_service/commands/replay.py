@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from tqdm import tqdm
 
 from dropanchor_schemas.site import StartPose, TagSettings
+from dropanchor_service.commands.replay_mcap import files_of, replay_files
 from dropanchor_service.engine import create_engine, tag_columns
 from dropanchor_service.estimation.batch import Engine, State
 from dropanchor_service.evaluation.accuracy import Accuracy, accuracy, share_of_time
@@ -32,12 +33,15 @@ DESCRIPTION = """\
 Runs the same engine as the service on a recording, as fast as it can, and reports the error where the recording
 brings the truth. A recording is a folder with range.csv and anchors.csv, and imu.csv, heading.csv and truth.csv where
 there are any (plain or gzipped). x and y are in the coordinates of anchors.csv.
+Or it is a file that the service has recorded, or a folder of them (MCAP): then all tags run as they did, with the site
+and the settings of the recording; --engine, --config and --out are what can be chosen.
 """
 EPILOG = """\
 examples:
   dropanchor replay recordings/yard --anchor 7 --start=10,0,1.57
   dropanchor replay recordings/yard --anchor 7 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
   dropanchor replay recordings/yard --anchor 7 --start=10,0 --smooth --out track.csv
+  dropanchor replay yard-20270115T080000-000000Z.mcap --out poses.csv
   dropanchor-tag simulate --out recordings/yard      makes a recording with truth to try it on
 """
 LAG_S, MAX_LAG_S = 2.0, 60.0
@@ -46,7 +50,7 @@ COLUMNS = ("t_s", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("recording", type=Path, metavar="RECORDING", help="folder of the recording")
+    add("recording", type=Path, metavar="RECORDING", help="folder of the recording, or MCAP file")
     add(
         "--anchor",
         action="append",
@@ -101,6 +105,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when it ran to the end, 2 when recording or options cannot be used, 130 on Ctrl-C."""
     try:
+        files = files_of(arguments.recording)
+        if files:
+            _refuse_what_the_files_know(arguments)
+            return replay_files(arguments, files)
         recording = read_recording(arguments.recording)
         anchors = arguments.anchor or _only_anchor(recording)
         samples = samples_of(recording, anchors)
@@ -112,6 +120,15 @@ def run(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print("stopped", file=sys.stderr)
         return 130
+
+
+def _refuse_what_the_files_know(arguments: argparse.Namespace) -> None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    defaults = parser.parse_args([str(arguments.recording)])
+    for name, default in vars(defaults).items():
+        if name not in ("engine", "out", "config", "no_plot") and getattr(arguments, name) != default:
+            raise SettingsError(f"--{name.replace('_', '-')}: an MCAP recording knows that by itself")
 
 
 def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples) -> Track:

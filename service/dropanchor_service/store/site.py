@@ -50,6 +50,11 @@ class SiteStore:
         return self._document.site
 
     @property
+    def document(self) -> SiteDocument:
+        """Site and tags of one moment."""
+        return self._document
+
+    @property
     def tags(self) -> dict[str, TagSettings]:
         return self._document.tags
 

@@ -3,14 +3,13 @@
 import resource
 import time
 from pathlib import Path
-from typing import Any
 
-import pytest
 import zenoh
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.track import Track
 from dropanchor_schemas.wire import ENCODING_PACKED, encode_packed
+from dropanchor_service.recording.reading import RecordingReader
 from support.service import Running, running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
 
@@ -44,24 +43,29 @@ def test_a_track_outlives_the_service_and_so_does_the_pose_at_a_time(tmp_path: P
         assert str(middle) in replies[0].payload.to_string()
 
 
-@pytest.mark.parametrize("what", ["history"])
-def test_on_a_full_disk_the_service_stays_says_so_and_goes_on_when_there_is_room(tmp_path: Path, what: str) -> None:
-    options = ["--config", str(settings_file(tmp_path, ["a"])), "--data-dir", str(tmp_path)]
+def test_on_a_full_disk_the_service_stays_says_so_and_goes_on_when_there_is_room(tmp_path: Path) -> None:
+    config = settings_file(tmp_path, ["a"], "[recording]\nenabled = true")
+    options = ["--config", str(config), "--data-dir", str(tmp_path)]
     with running_service(*options) as service, connected_session(service.zenoh) as session:
         wait_until(lambda: service.metric("dropanchor_history_bytes") > 0)
         allow_files(service, 4096)
         full_ns = time.time_ns()
         drive(session, full_ns)
-        wait_until(lambda: service.metric(f"dropanchor_{what}_failing") == 1, 20.0)
-        ready: dict[str, Any] = service.get("/api/v1/health/ready")
-        assert any(what in problem for problem in ready["impaired"])
-        assert service.metric(f"dropanchor_{what}_errors_total") >= 1
+        failing = [f"dropanchor_{what}_failing" for what in ("history", "recording")]
+        wait_until(lambda: all(service.metric(name) == 1 for name in failing), 20.0)
+        for what in ("history", "recording"):
+            assert any(what in problem for problem in service.get("/api/v1/health/ready")["impaired"])
+            assert service.metric(f"dropanchor_{what}_errors_total") >= 1
         assert service.get("/api/v1/tags/a/pose")["t_ns"] > full_ns - S
         allow_files(service, resource.RLIM_INFINITY)
         wait_until(lambda: service.get("/api/v1/health/ready")["impaired"] == [], 20.0)
         assert len(track(service, full_ns).poses) >= 8
-        assert service.metric(f"dropanchor_{what}_dropped_total") == 0
+        for what in ("history", "recording"):
+            assert service.metric(f"dropanchor_{what}_dropped_total") == 0
         assert service.stop() == 0
+    (recorded,) = (tmp_path / "recordings").iterdir()
+    payloads = [message[1] for turn in RecordingReader(recorded).turns() for message in turn.messages]
+    assert payloads == [encode_packed(straight_north(100, full_ns))]
 
 
 def allow_files(service: Running, most_bytes: int) -> None:

@@ -1,0 +1,137 @@
+"""`dropanchor replay` of MCAP recordings: all tags, through the same ingest and engine as live."""
+
+import argparse
+import csv
+import math
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.recording.offline import OfflineService, settings_of
+from dropanchor_service.recording.reading import RecordingReader, Turn
+from dropanchor_service.settings_sources import load_settings
+from dropanchor_tag_client.recording import RecordingError
+
+COLUMNS = ("tag", "t_ns", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
+SAME_M = 1e-9
+MOST_WAITING = 100_000  # poses that wait for what was recorded of them
+
+
+def files_of(path: Path) -> list[Path]:
+    """A file, or the files of a folder in order of time; empty when it is something else."""
+    if path.is_file():
+        return [path]
+    return sorted(path.glob("*.mcap")) if path.is_dir() else []
+
+
+def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
+    """0 when it ran to the end. Raises RecordingError, SettingsError, OSError."""
+    readers = [RecordingReader(file) for file in files]
+    turns = (turn for reader in readers for turn in reader.turns())
+    first = next(turns, None)
+    if first is None or first.site is None:
+        raise RecordingError(f"{files[0]} holds nothing")
+    service = OfflineService(
+        settings_of(readers[0].about, load_settings(arguments.config), arguments.engine), first.site
+    )
+    outcome = Outcome()
+    with ExitStack() as stack:
+        write = None
+        if arguments.out:
+            writer = csv.writer(stack.enter_context(arguments.out.open("w", newline="")))
+            writer.writerow(COLUMNS)
+            write = writer.writerows
+        for turn, poses in service.poses_of(tqdm(_again(first, turns), unit=" turns", unit_scale=True)):
+            tags = [service.tags.at(row).name for row in poses["row"].tolist()]
+            outcome.add(turn, tags, poses)
+            if write is not None:
+                write(_rows(tags, poses))
+    for line in [*outcome.lines(), *_losses(service, readers)]:
+        print(line)
+    if arguments.out:
+        print(f"{sum(outcome.poses.values())} poses: {arguments.out}")
+    return 0
+
+
+@dataclass
+class Outcome:
+    """What came out, beside what had come out when it was recorded."""
+
+    poses: Counter[str] = field(default_factory=Counter)
+    states: dict[str, Counter[str]] = field(default_factory=dict)
+    compared: int = 0
+    equal: int = 0
+    worst_m: float = 0.0
+    _places: dict[tuple[str, int], tuple[float, float]] = field(default_factory=dict)
+    _estimates: list[tuple[str, int, float, float]] = field(default_factory=list)
+
+    def add(self, turn: Turn, tags: Sequence[str], poses: Array) -> None:
+        """Poses may come out a turn earlier or later than they did, so both wait for each other."""
+        for tag, t_ns, x, y, state in zip(
+            tags, *(poses[name].tolist() for name in ("t_ns", "x", "y", "state")), strict=True
+        ):
+            self.poses[tag] += 1
+            self.states.setdefault(tag, Counter())[State(state).name.lower()] += 1
+            self._places[tag, t_ns] = (x, y)
+        for tag, estimate in turn.estimates:
+            x, y = (estimate.get(name, math.nan) for name in ("x", "y"))
+            self._estimates.append((tag, estimate["t_ns"], x, y))
+        if len(self._places) > MOST_WAITING:
+            self._compare()
+
+    def lines(self) -> Iterator[str]:
+        self._compare()
+        for tag, count in sorted(self.poses.items()):
+            shares = ", ".join(f"{state} {n / count:.1%}" for state, n in self.states[tag].most_common())
+            yield f"{tag}: {count} poses, {shares}"
+        if self.compared:
+            yield (
+                f"recorded poses: {self.compared} compared, {self.equal} the same within a nanometre, "
+                f"worst difference {self.worst_m:.3g} m"
+            )
+
+    def _compare(self) -> None:
+        left = []
+        for tag, t_ns, x, y in self._estimates:
+            place = self._places.get((tag, t_ns))
+            if place is None:
+                left.append((tag, t_ns, x, y))
+                continue
+            self.compared += 1
+            both_unknown = math.isnan(x) and math.isnan(place[0])
+            off_m = 0.0 if both_unknown else math.hypot(place[0] - x, place[1] - y)
+            self.equal += off_m <= SAME_M
+            self.worst_m = max(self.worst_m, math.inf if math.isnan(off_m) else off_m)
+        self._estimates = left[-MOST_WAITING:]
+        self._places.clear()
+
+
+def _again(first: Turn, rest: Iterator[Turn]) -> Iterator[Turn]:
+    yield first
+    yield from rest
+
+
+def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:
+    cov = poses["cov"]
+    numbers = [poses[name].tolist() for name in ("x", "y", "heading", "speed")]
+    numbers += [column.tolist() for column in (cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1], poses["p_mode"])]
+    for tag, t_ns, state, *values in zip(tags, poses["t_ns"].tolist(), poses["state"].tolist(), *numbers, strict=True):
+        yield [tag, t_ns, *(f"{value:.6f}" for value in values), State(state).name.lower()]
+
+
+def _losses(service: OfflineService, readers: Sequence[RecordingReader]) -> Iterator[str]:
+    counts = {reason: int(service.metrics.rejected.labels(reason)._value.get()) for reason in Reason}
+    refused = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
+    if refused:
+        yield f"not used: {refused}"
+    for reader in readers:
+        if reader.torn is not None:
+            print(f"{reader.path} ends before its end ({reader.torn}): the rest of it is lost", file=sys.stderr)

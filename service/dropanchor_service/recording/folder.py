@@ -1,0 +1,78 @@
+"""The folder with the recordings: what is in it, and what has to go."""
+
+import os
+import re
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from mcap.writer import MCAP0_MAGIC
+
+SUFFIX = ".mcap"
+_NAME = re.compile(r"[A-Za-z0-9._%-]{1,250}\.mcap")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a file is full, and what is kept: every limit holds."""
+
+    file_bytes: int
+    file_ns: int
+    keep_files: int
+    keep_ns: int
+    most_bytes: int
+
+
+@dataclass(frozen=True)
+class RecordedFile:
+    """finished: it has its index; one that is being written, or was when the service was killed, has none."""
+
+    name: str
+    size: int
+    changed_ns: int
+    finished: bool
+
+
+def new_name(prefix: str, t_ns: int) -> str:
+    """Names sort by time."""
+    return f"{prefix}-{datetime.fromtimestamp(t_ns // 10**9, UTC):%Y%m%dT%H%M%S}-{t_ns % 10**9 // 10**3:06d}Z{SUFFIX}"
+
+
+def path_of(folder: Path, name: str) -> Path | None:
+    """The file of this name, None when there is none; no name leads out of the folder."""
+    path = folder / name
+    return path if _NAME.fullmatch(name) and path.is_file() else None
+
+
+def files_in(folder: Path) -> list[RecordedFile]:
+    """The oldest first."""
+    found = [file for path in folder.glob(f"*{SUFFIX}") if (file := _file(path)) is not None]
+    return sorted(found, key=lambda file: (file.changed_ns, file.name))
+
+
+def prune(folder: Path, limits: Limits, open_name: str | None) -> None:
+    """Delete the oldest until the limits hold, but not the one that is open. Raises OSError."""
+    for name in _superfluous(files_in(folder), limits, open_name):
+        (folder / name).unlink(missing_ok=True)
+
+
+def _superfluous(files: list[RecordedFile], limits: Limits, open_name: str | None) -> Iterator[str]:
+    total, oldest_ns = sum(file.size for file in files), time.time_ns() - limits.keep_ns
+    for place, file in enumerate(files):
+        too_many = len(files) - place > limits.keep_files
+        if file.name != open_name and (too_many or total > limits.most_bytes or file.changed_ns < oldest_ns):
+            total -= file.size
+            yield file.name
+
+
+def _file(path: Path) -> RecordedFile | None:
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.seek(-min(size, len(MCAP0_MAGIC)), os.SEEK_END)
+            finished = size > 2 * len(MCAP0_MAGIC) and file.read() == MCAP0_MAGIC
+            return RecordedFile(path.name, size, os.fstat(file.fileno()).st_mtime_ns, finished)
+    except FileNotFoundError:  # pruned meanwhile
+        return None

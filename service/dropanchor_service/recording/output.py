@@ -1,0 +1,155 @@
+"""The side of the recorder that writes: what was put down goes into files, one after the other."""
+
+import time
+from base64 import b64encode
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.recording.folder import Limits
+from dropanchor_service.recording.mcap_file import McapFile, TooManyChannelsError
+from dropanchor_service.recording.messages import pose_messages, site_messages, topic_of
+from dropanchor_service.recording.schemas import PACKED_SAMPLES, SAMPLES
+from dropanchor_service.store.site import SiteDocument, SiteStore
+from dropanchor_service.store.tags import TagTable
+
+PRUNE_S = 10.0
+PACKED, JSON = "samples_packed", "samples"  # the last part of a topic of samples, by their encoding
+
+Messages = Sequence[tuple[int, bytes, str, int]]
+"""Row, payload, encoding, arrival."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The messages of one turn of the ingest."""
+
+    turn_ns: int
+    messages: Messages
+
+
+@dataclass(frozen=True)
+class Poses:
+    """What came out of it."""
+
+    turn_ns: int
+    poses: Array
+
+
+@dataclass(frozen=True)
+class SiteChange:
+    """The site from this turn on."""
+
+    turn_ns: int
+    document: SiteDocument
+
+
+@dataclass(frozen=True)
+class End:
+    """The recording was stopped."""
+
+
+Item = Samples | Poses | SiteChange | End
+
+
+class Output:
+    """Owned by the thread that writes."""
+
+    def __init__(
+        self,
+        new_file: Callable[[int], McapFile],
+        prune: Callable[[str | None], None],
+        limits: Limits,
+        tags: TagTable,
+        site: SiteStore,
+    ) -> None:
+        """prune: deletes old files, but not the one of that name."""
+        self._new_file = new_file
+        self._prune = prune
+        self._limits = limits
+        self._tags = tags
+        self._site = site
+        self._file: McapFile | None = None
+        self._document = SiteDocument(site=site.site, tags=site.tags)
+        self._taken = 0
+        self._pruned_s = 0.0
+        self.written = 0
+        self.left_out = 0  # messages beyond what a file can name
+
+    @property
+    def open_name(self) -> str | None:
+        file = self._file
+        return None if file is None else file.path.name
+
+    def write(self, items: Sequence[Item]) -> None:
+        """Raises OSError, and may then be called again with the same items and more: none is written twice."""
+        if self._file is not None and self._is_full(self._file):
+            self._finish()
+        for item in items[self._taken :]:
+            self._take(item)
+            self._taken += 1
+        if self._file is not None:
+            self._file.drain()
+        self._taken = 0
+        if time.monotonic() - self._pruned_s > PRUNE_S:
+            self._pruned_s = time.monotonic()
+            self._prune(self.open_name)
+
+    def _take(self, item: Item) -> None:
+        match item:
+            case End():
+                self._finish()
+            case SiteChange(turn_ns, document):
+                self._document = document
+                if self._file is not None:
+                    self._add_site(self._file, turn_ns)
+            case Samples(turn_ns, messages):
+                self._add_samples(self._file_at(turn_ns), turn_ns, messages)
+            case Poses(turn_ns, poses):
+                self._add_poses(self._file_at(turn_ns), turn_ns, poses)
+
+    def _file_at(self, turn_ns: int) -> McapFile:
+        if self._file is None:
+            self._file = self._new_file(turn_ns)
+            self._add_site(self._file, turn_ns)
+        return self._file
+
+    def _is_full(self, file: McapFile) -> bool:
+        return file.size > self._limits.file_bytes or time.monotonic_ns() - file.opened_ns > self._limits.file_ns
+
+    def _finish(self) -> None:
+        if self._file is not None:
+            self._file.finish()
+            self._file = None
+
+    def _add_site(self, file: McapFile, turn_ns: int) -> None:
+        for topic, schema, message in site_messages(self._document, turn_ns):
+            file.add(topic, schema, turn_ns, turn_ns, message)
+
+    def _add_samples(self, file: McapFile, turn_ns: int, messages: Messages) -> None:
+        for row, payload, encoding, arrival_ns in messages:
+            tag = self._tags.at(row).name
+            try:
+                if encoding.startswith(ENCODING_PACKED):
+                    message = b'{"data":"' + b64encode(payload) + b'"}'
+                    file.add(topic_of(tag, PACKED), PACKED_SAMPLES, turn_ns, arrival_ns, message)
+                elif encoding.startswith(ENCODING_JSON):  # any other was refused by the decoder
+                    file.add(topic_of(tag, JSON), SAMPLES, turn_ns, arrival_ns, payload)
+                self.written += 1
+            except TooManyChannelsError:
+                self.left_out += 1
+
+    def _add_poses(self, file: McapFile, turn_ns: int, poses: Array) -> None:
+        anchors = [anchor.id for anchor in self._site.anchors_by_index()]
+        for pose in poses:
+            index = int(pose["anchor"])
+            anchor = anchors[index] if 0 <= index < len(anchors) else None
+            try:
+                for topic, schema, message in pose_messages(
+                    pose, self._tags.at(pose["row"]).name, anchor, self._document
+                ):
+                    file.add(topic, schema, turn_ns, int(pose["t_ns"]), message)
+                self.written += 1
+            except TooManyChannelsError:
+                self.left_out += 1

@@ -1,0 +1,65 @@
+"""A service that records; its files replayed give what it gave."""
+
+import csv
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+
+from dropanchor_schemas import keys
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, encode_json, encode_packed
+from dropanchor_service.cli import main
+from dropanchor_service.engine import create_engine
+from dropanchor_service.settings_sources import load_settings
+from support.service import running_service, settings_file, straight_north
+from support.zenoh_router import connected_session, wait_until
+
+S = 1_000_000_000
+
+
+@pytest.mark.parametrize("engine", ["paper", "fleet"])
+def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], engine: str
+) -> None:
+    config = settings_file(
+        tmp_path, ["a", "b"], f'engine = "{engine}"\n[recording]\nenabled = true\npose_period_s = 0.01'
+    )
+    options = ["--config", str(config), "--data-dir", str(tmp_path)]
+    create_engine(load_settings(config, environment={}))  # what has to be compiled is, before the service must answer
+    end_ns = time.time_ns()
+    with running_service(*options) as service, connected_session(service.zenoh) as session:
+        for step in range(10):
+            frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
+            session.put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
+            session.put(keys.samples_key("default", "b"), encode_json(frame), encoding=ENCODING_JSON)
+        wait_until(lambda: service.metric("dropanchor_poses_total") >= 380, 60.0)
+        live = service.get("/api/v1/poses")["poses"]
+        httpx.put(f"{service.url}/api/v1/tags/a/settings", json={}).raise_for_status()
+        wait_until(lambda: service.metric("dropanchor_recording_messages_total") >= 400, 20.0)
+        time.sleep(1.5)  # the chunk is on its way to the disk
+        service.process.kill()
+        service.process.wait(10.0)
+    assert main(["replay", str(tmp_path / "recordings"), "--out", str(tmp_path / "poses.csv")]) == 0
+    said = capsys.readouterr()
+    assert "ends before its end" in said.err
+    words = said.out.split("recorded poses: ")[1].split()
+    assert words[0] == words[2]
+    assert int(words[0]) >= 380
+    with (tmp_path / "poses.csv").open(newline="") as file:
+        rows = {(row["tag"], int(row["t_ns"])): row for row in csv.DictReader(file)}
+    for pose in live:
+        row = rows[pose["tag"], pose["t_ns"]]
+        assert row["state"] == pose["state"] or pose["state"] in ("coasting", "lost")
+        if pose["x"] is not None:
+            assert (float(row["x"]), float(row["y"])) == pytest.approx((pose["x"], pose["y"]), abs=1e-6)
+
+
+def test_what_an_mcap_recording_knows_by_itself_cannot_be_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "x.mcap").write_bytes(b"no recording")
+    assert main(["replay", str(tmp_path / "x.mcap"), "--start=1,2"]) == 2
+    assert "--start" in capsys.readouterr().err
+    assert main(["replay", str(tmp_path / "x.mcap")]) == 2
+    assert "not a recording" in capsys.readouterr().err

@@ -1,0 +1,62 @@
+"""Recordings over REST."""
+
+from pathlib import Path
+
+import pytest
+
+from api_house import T_NS, House, ask, kind_of, make_house
+from dropanchor_schemas.recordings import RecordingList, RecordingState
+from dropanchor_schemas.wire import ENCODING_PACKED
+from dropanchor_service.recording.folder import Limits
+from dropanchor_service.recording.recorder import Recorder
+
+LIMITS = Limits(2**30, 10**18, 1000, 10**18, 2**40)
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> House:
+    house = make_house()
+    answers = house.answers
+    answers.tags.register("a")
+    house.recorder = Recorder(tmp_path, LIMITS, 1, answers.tags, answers.site, answers.now_ns, {})
+    return house
+
+
+def test_a_recording_is_started_stopped_listed_and_fetched(house: House) -> None:
+    app, recorder = house.app(), house.recorder
+    assert recorder is not None
+    started = ask(app, "POST", "/api/v1/recordings", json={"tags": ["a"]})
+    assert started.status_code == 201
+    assert RecordingState.model_validate(started.json()) == RecordingState(recording=True, since_ns=T_NS, tags=["a"])
+    assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "records-already"
+    recorder.messages([(0, b"payload", ENCODING_PACKED, T_NS)])
+    recorder.writer.turn()
+    listed = RecordingList.model_validate(ask(app, "GET", "/api/v1/recordings").json())
+    assert listed.file == listed.files[0].name
+    assert not listed.files[0].finished
+    assert ask(app, "POST", "/api/v1/recordings/stop").json()["recording"] is False
+    recorder.writer.turn()
+    assert kind_of(ask(app, "POST", "/api/v1/recordings/stop")) == "records-nothing"
+    file = RecordingList.model_validate(ask(app, "GET", "/api/v1/recordings").json()).files[0]
+    fetched = ask(app, "GET", f"/api/v1/recordings/{file.name}")
+    assert file.finished
+    assert fetched.content == (recorder.folder / file.name).read_bytes()
+    assert fetched.headers["content-disposition"] == f'attachment; filename="{file.name}"'
+
+
+@pytest.mark.parametrize("name", ["x.mcap", "..%2Fsite.json", "%2Fetc%2Fpasswd", "..", "x"])
+def test_only_recordings_can_be_fetched(house: House, name: str, tmp_path: Path) -> None:
+    (tmp_path / "site.json").write_text("{}")
+    assert ask(house.app(), "GET", f"/api/v1/recordings/{name}").status_code == 404
+
+
+def test_without_a_folder_nothing_can_be_recorded() -> None:
+    app = make_house().app()
+    for method, path in (("GET", ""), ("POST", "/stop"), ("GET", "/x.mcap")):
+        assert kind_of(ask(app, method, f"/api/v1/recordings{path}")) == "no-recorder"
+    assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "no-recorder"
+
+
+def test_a_folder_that_cannot_be_made_is_said_at_once(house: House, tmp_path: Path) -> None:
+    (tmp_path / "recordings").write_text("in the way")
+    assert kind_of(ask(house.app(), "POST", "/api/v1/recordings", json={})) == "not-saved"

@@ -1,0 +1,231 @@
+"""Recordings: what comes in and out goes into files that viewers open, a kill cannot harm and a replay repeats."""
+
+import json
+import resource
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+from mcap.reader import make_reader
+
+from dropanchor_schemas.site import Anchor, Georeference, Site, TagSettings
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
+from dropanchor_service.estimation.batch import POSE, State
+from dropanchor_service.recording.folder import Limits, files_in, prune
+from dropanchor_service.recording.reading import RecordingReader, Turn
+from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.recording.schemas import all_schemas
+from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_tag_client.recording import RecordingError
+
+S = 1_000_000_000
+T_NS = 1_800_000_000 * S
+LARGE = Limits(2**30, 3600 * S, 1000, 10**18, 2**40)
+SITE = Site(anchors=[Anchor(id="7", x=1.0, z=2.5)], georeference=Georeference(lat=52.5, lon=13.4))
+
+
+class Desk:
+    """A recorder whose thread does not run: `write` does its work."""
+
+    def __init__(self, folder: Path, limits: Limits = LARGE) -> None:
+        self.now_ns = T_NS
+        self.tags = TagTable()
+        self.site = SiteStore(SITE, {"a": TagSettings(height_m=1.5)})
+        self.recorder = Recorder(folder, limits, S // 5, self.tags, self.site, lambda: self.now_ns, {"engine": "paper"})
+        for name in ("a", "b/ü"):
+            self.tags.register(name)
+
+    def hear(self, count: int = 1, row: int = 0, size: int = 40) -> None:
+        for _ in range(count):
+            self.now_ns += S // 10
+            payload = b"%d" % self.now_ns + b"x" * size
+            self.recorder.messages([(row, payload, ENCODING_PACKED, self.now_ns - 7)])
+
+    def move(self, **fields: Any) -> None:
+        pose = np.zeros(1, POSE)
+        pose["t_ns"], pose["state"] = self.now_ns, State.TRACKING
+        pose["cov"] = np.diag([0.04, 0.01, 0.001])
+        for name, value in fields.items():
+            pose[name] = value
+        self.recorder.poses(pose)
+
+    def write(self) -> bool:
+        return self.recorder.writer.turn()
+
+    def paths(self) -> list[Path]:
+        return [self.recorder.folder / file.name for file in self.recorder.files()]
+
+    def turns(self) -> list[Turn]:
+        return [turn for path in self.paths() for turn in RecordingReader(path).turns()]
+
+    def payloads(self) -> list[bytes]:
+        return [message[1] for turn in self.turns() for message in turn.messages]
+
+
+def test_what_comes_in_is_read_back_with_its_turn_its_arrival_and_the_site(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    assert desk.recorder.start()
+    assert not desk.recorder.start()
+    desk.now_ns += 1
+    desk.recorder.messages(
+        [(1, b"packed", ENCODING_PACKED, T_NS), (0, b"{}", ENCODING_JSON + ";v1", T_NS - 5), (0, b"?", "text/plain", 1)]
+    )
+    desk.site.set_anchor(Anchor(id="8"))
+    desk.hear()
+    assert desk.recorder.stop()
+    assert desk.write()
+    first, second = desk.turns()
+    assert first.site == desk.site.document.model_copy(update={"site": SITE})
+    assert first.messages == [("b/ü", b"packed", ENCODING_PACKED, T_NS), ("a", b"{}", ENCODING_JSON, T_NS - 5)]
+    assert second.site == desk.site.document
+    assert (first.t_ns, second.t_ns) == (T_NS + 1, desk.now_ns)
+
+
+def test_only_the_chosen_tags_and_only_while_it_runs(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.hear()
+    desk.recorder.start(["b/ü", "nobody"])
+    desk.hear(row=0)
+    desk.hear(row=1)
+    desk.move(row=0)
+    desk.recorder.stop()
+    desk.hear(row=1)
+    desk.write()
+    assert [message[0] for turn in desk.turns() for message in turn.messages] == ["b/ü"]
+    assert not any(turn.estimates for turn in desk.turns())
+
+
+def test_poses_are_messages_that_viewers_know_valid_by_their_schemas(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.recorder.start()
+    desk.hear()
+    desk.move(x=3.0, y=4.0, heading=np.pi / 2, anchor=0, range=5.0)
+    desk.now_ns += S
+    desk.move(x=np.nan, y=np.nan, cov=np.nan, state=State.AMBIGUOUS, anchor=-1)
+    desk.recorder.stop()
+    desk.write()
+    found: dict[str, list[Any]] = {}
+    with desk.paths()[0].open("rb") as file:
+        reader = make_reader(file)
+        assert reader.get_header().profile == "dropanchor"
+        for schema, channel, message in reader.iter_messages():
+            if schema is not None:
+                assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+                Draft202012Validator(json.loads(schema.data)).validate(json.loads(message.data))
+                found.setdefault(schema.name, []).append(json.loads(message.data))
+    pose = found["foxglove.PoseInFrame"]
+    assert pose[0]["pose"]["position"] == {"x": 3.0, "y": 4.0, "z": 1.5}
+    assert pose[0]["pose"]["orientation"]["z"] == pytest.approx(0.5**0.5)
+    assert (len(pose), len(found["foxglove.LocationFix"]), len(found["dropanchor.Estimate"])) == (1, 1, 2)
+    assert found["foxglove.LocationFix"][0]["position_covariance"] == [0.04, 0, 0, 0, 0.01, 0, 0, 0, 0]
+    assert found["foxglove.FrameTransform"][0]["translation"] == {"x": 1.0, "y": 0.0, "z": 2.5}
+    assert found["dropanchor.Estimate"][0]["anchor"] == "7"
+    assert "x" not in found["dropanchor.Estimate"][1]
+    assert len(found["dropanchor.PackedSamples"]) == 1
+
+
+def is_plain(schema: Any) -> bool:
+    """What Foxglove's and Lichtblick's readers of JSON Schema understand; for anything else they refuse the topic."""
+    if schema["type"] == "object":
+        return all(map(is_plain, schema["properties"].values()))
+    if schema["type"] == "array":
+        return schema["items"]["type"] != "array" and is_plain(schema["items"])
+    return schema["type"] in ("boolean", "string", "number", "integer")
+
+
+def test_viewers_understand_every_schema() -> None:
+    assert all(map(is_plain, all_schemas().values()))
+
+
+def test_a_file_that_ends_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.recorder.start()
+    ends = []
+    for _ in range(4):
+        desk.hear(5)
+        desk.write()
+        ends.append(desk.paths()[0].stat().st_size)
+    everything = desk.payloads()
+    assert len(everything) == 20
+    whole = desk.paths()[0].read_bytes()
+    torn = tmp_path / "torn.mcap"
+    for length in range(len(whole)):
+        torn.write_bytes(whole[:length])
+        reader = RecordingReader(torn)
+        try:
+            read = [message[1] for turn in reader.turns() for message in turn.messages]
+        except RecordingError:
+            assert length < 100  # not even the header
+            continue
+        at_least = 5 * sum(end <= length for end in ends)
+        assert read == everything[: len(read)]
+        assert len(read) >= at_least
+        assert reader.torn is not None
+
+
+def test_files_follow_each_other_and_each_can_be_replayed_alone(tmp_path: Path) -> None:
+    desk = Desk(tmp_path, Limits(2000, 3600 * S, 1000, 10**18, 2**40))
+    desk.recorder.start()
+    for _ in range(6):
+        desk.hear(40, size=200)
+        desk.write()
+    desk.recorder.stop()
+    desk.write()
+    assert len(desk.paths()) >= 3
+    assert all(file.finished for file in desk.recorder.files())
+    assert len(desk.payloads()) == 240
+    for path in desk.paths():
+        assert next(RecordingReader(path).turns()).site == desk.site.document
+
+
+@pytest.mark.parametrize(
+    ("limits", "left"),
+    [(Limits(1, 1, 2, 10**18, 2**40), "de"), (Limits(1, 1, 99, 10**18, 2500), "de"), (Limits(1, 1, 99, 0, 2**40), "")],
+)
+def test_the_oldest_files_go_by_count_size_and_age_but_never_the_open_one(
+    tmp_path: Path, limits: Limits, left: str
+) -> None:
+    for name in "abcde":
+        (tmp_path / f"{name}.mcap").write_bytes(b"x" * 1000)
+    prune(tmp_path, limits, "a.mcap" if left else None)
+    kept = "".join(file.name[0] for file in files_in(tmp_path))
+    assert kept in {left, "a" + left, "a" + left[1:]}
+    assert not left or "a" in kept
+
+
+@pytest.fixture
+def no_room() -> Iterator[Any]:
+    """Files of this process cannot grow beyond so many bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_full_disk_loses_nothing_that_still_waits_and_leaves_a_whole_file(tmp_path: Path, no_room: Any) -> None:
+    desk = Desk(tmp_path)
+    desk.recorder.start()
+    desk.hear(10)
+    assert desk.write()
+    size = desk.paths()[0].stat().st_size
+    no_room(size + 100)
+    for _ in range(3):
+        desk.hear(10, size=500)
+        assert not desk.write()
+    assert "recording cannot be written" in (desk.recorder.writer.problem or "")
+    assert desk.paths()[0].stat().st_size == size
+    no_room(resource.RLIM_INFINITY)
+    desk.recorder.stop()
+    assert desk.write()
+    assert desk.recorder.writer.problem is None
+    assert len(desk.payloads()) == len(set(desk.payloads())) == 40
+    assert desk.recorder.files()[0].finished
+
+
+def test_what_is_no_recording_of_ours_is_refused(tmp_path: Path) -> None:
+    for content in (b"", b"RIFF", b"\x89MCAP0\r\n" + b"\0" * 100):
+        (tmp_path / "x.mcap").write_bytes(content)
+        with pytest.raises(RecordingError, match="not a recording"):
+            list(RecordingReader(tmp_path / "x.mcap").turns())
