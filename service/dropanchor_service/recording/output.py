@@ -72,6 +72,7 @@ class Output:
         self._site = site
         self._file: McapFile | None = None
         self._document = SiteDocument(site=site.site, tags=site.tags)
+        self._topics: dict[tuple[int, str], str] = {}
         self._taken = 0
         self._pruned_s = 0.0
         self.written = 0
@@ -129,16 +130,21 @@ class Output:
 
     def _add_samples(self, file: McapFile, turn_ns: int, messages: Messages) -> None:
         for row, payload, encoding, arrival_ns in messages:
-            tag = self._tags.at(row).name
             try:
                 if encoding.startswith(ENCODING_PACKED):
                     message = b'{"data":"' + b64encode(payload) + b'"}'
-                    file.add(topic_of(tag, PACKED), PACKED_SAMPLES, turn_ns, arrival_ns, message)
+                    file.add(self._topic(row, PACKED), PACKED_SAMPLES, turn_ns, arrival_ns, message)
                 elif encoding.startswith(ENCODING_JSON):  # any other was refused by the decoder
-                    file.add(topic_of(tag, JSON), SAMPLES, turn_ns, arrival_ns, payload)
+                    file.add(self._topic(row, JSON), SAMPLES, turn_ns, arrival_ns, payload)
                 self.written += 1
             except TooManyChannelsError:
                 self.left_out += 1
+
+    def _topic(self, row: int, leaf: str) -> str:
+        topic = self._topics.get((row, leaf))
+        if topic is None:
+            topic = self._topics[row, leaf] = topic_of(self._tags.at(row).name, leaf)
+        return topic
 
     def _add_poses(self, file: McapFile, turn_ns: int, poses: Array) -> None:
         anchors = [anchor.id for anchor in self._site.anchors_by_index()]
