@@ -16,6 +16,7 @@ _COMMANDS = {
     "tag": "give tags their certificates, or take them away",
     "compile": "compile the estimator ahead of the first start",
     "key": "API keys of the REST interface",
+    "record": "record what a service hears, and fetch the files",
     "replay": "run an engine on a recording, offline",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }

@@ -1,0 +1,113 @@
+"""`dropanchor record`: recordings of a service that runs, over its REST interface."""
+
+import argparse
+import json
+import os
+import shutil
+import ssl
+import sys
+from http.client import HTTPException, HTTPResponse
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError, URLError
+from urllib.parse import quote
+from urllib.request import Request, urlopen
+
+KEY_VARIABLE = "DROPANCHOR_API_KEY"
+DESCRIPTION = f"""\
+Starts and stops the recording of raw samples and poses by a service that runs with a `data_dir`, lists the files and
+fetches them. They are MCAP: Foxglove and Lichtblick open them, `dropanchor replay` runs them again. Where the service
+wants an API key it is taken from ${KEY_VARIABLE}.
+"""
+EPILOG = """\
+examples:
+  dropanchor record start
+  dropanchor record start forklift-7 forklift-8
+  dropanchor record stop
+  dropanchor record list
+  dropanchor record fetch yard-20270115T080000-000000Z.mcap
+"""
+UNUSABLE = 2
+TIMEOUT_S = 30.0
+
+
+class RefusedError(Exception):
+    """The service does not do it, or does not answer; the message says why."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    start = actions.add_parser("start", help="record from now on")
+    start.add_argument("tags", metavar="TAG", nargs="*", help="only these (all)")
+    stop = actions.add_parser("stop", help="record no longer")
+    listed = actions.add_parser("list", help="what is recorded, and the files")
+    fetch = actions.add_parser("fetch", help="get a file")
+    fetch.add_argument("name", metavar="NAME")
+    fetch.add_argument("--out", type=Path, metavar="FILE", help="where to write it (NAME in this folder)")
+    for action in (start, stop, listed, fetch):
+        action.add_argument("--url", default="http://127.0.0.1:8080", help="of the service (%(default)s)")
+        action.add_argument("--ca", type=Path, metavar="FILE", help="certificate to know it by, with https")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """0, or 2 when nothing could be done."""
+    try:
+        {"start": _start, "stop": _stop, "list": _list, "fetch": _fetch}[arguments.action](arguments)
+    except (RefusedError, OSError) as error:
+        sys.stderr.write(f"dropanchor record: {error}\n")
+        return UNUSABLE
+    return 0
+
+
+def _start(arguments: argparse.Namespace) -> None:
+    state = _asked(arguments, "POST", "", {"tags": arguments.tags or None})
+    print(f"recording {'all tags' if state['tags'] is None else ', '.join(state['tags'])}")
+
+
+def _stop(arguments: argparse.Namespace) -> None:
+    state = _asked(arguments, "POST", "/stop")
+    print(f"stopped{'' if state['file'] is None else ': ' + state['file']}")
+
+
+def _list(arguments: argparse.Namespace) -> None:
+    found = _asked(arguments, "GET", "")
+    for file in found["files"]:
+        print(f"{file['name']}  {file['bytes'] / 2**20:.1f} MiB{'' if file['finished'] else '  not finished'}")
+    print("recording" if found["recording"] else "not recording")
+
+
+def _fetch(arguments: argparse.Namespace) -> None:
+    target = arguments.out or Path(Path(arguments.name).name)
+    with _opened(arguments, "GET", f"/{quote(arguments.name, safe='')}") as answer, target.open("wb") as file:
+        shutil.copyfileobj(answer, file)
+    print(target)
+
+
+def _asked(arguments: argparse.Namespace, method: str, path: str, body: Any = None) -> Any:
+    with _opened(arguments, method, path, body) as answer:
+        return json.load(answer)
+
+
+def _opened(arguments: argparse.Namespace, method: str, path: str, body: Any = None) -> HTTPResponse:
+    headers = {"content-type": "application/json"}
+    if os.environ.get(KEY_VARIABLE):
+        headers["authorization"] = f"Bearer {os.environ[KEY_VARIABLE]}"
+    data = None if body is None else json.dumps(body).encode()
+    url = f"{arguments.url.rstrip('/')}/api/v1/recordings{path}"
+    trusted = ssl.create_default_context(cafile=arguments.ca) if url.startswith("https:") else None
+    try:
+        request = Request(url, data, headers, method=method)
+        answer: HTTPResponse = urlopen(request, timeout=TIMEOUT_S, context=trusted)
+    except HTTPError as error:
+        with error:
+            raise RefusedError(_reason(error)) from error
+    except (URLError, HTTPException, ValueError) as error:
+        raise RefusedError(f"{arguments.url} does not answer: {getattr(error, 'reason', error)}") from error
+    return answer
+
+
+def _reason(error: HTTPError) -> str:
+    try:
+        return str(json.load(error)["detail"])
+    except (ValueError, KeyError, TypeError):
+        return f"{error.code} {error.reason}"
