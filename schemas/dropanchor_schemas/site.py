@@ -2,7 +2,8 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
+from pydantic.config import JsonDict
 
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_schemas.wire import anchor_number
@@ -13,9 +14,35 @@ def _has_a_key(identifier: str) -> str:
     return identifier
 
 
-Id = Annotated[str, Field(min_length=1, max_length=64), AfterValidator(_has_a_key)]
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
+ID_SCHEMA: JsonDict = {"format": "dropanchor-id", "minLength": 1, "maxLength": 64}
+"""JSON Schema of an id: printable characters only, which no portable pattern can say."""
+
+Id = Annotated[str, Field(min_length=1, max_length=64, json_schema_extra=ID_SCHEMA), AfterValidator(_has_a_key)]
+
+
+class Typed(str):
+    """Text in which a number may stand, such as that of an environment variable. In JSON and TOML none does."""
+
+
+def _of_its_own_type(value: object) -> object:
+    if isinstance(value, str) and not isinstance(value, Typed):
+        raise ValueError("a number was expected, not a text")
+    if isinstance(value, bool):
+        raise ValueError("a number was expected, not true or false")
+    return value
+
+
+def _true_or_false(value: object) -> object:
+    if not isinstance(value, bool | Typed):
+        raise ValueError("true or false was expected")
+    return value
+
+
+_Own = BeforeValidator(_of_its_own_type)  # after the limits: what stands before them hides them from JSON Schema
+Number = Annotated[FiniteFloat, _Own]
+Truth = Annotated[bool, BeforeValidator(_true_or_false)]
+Positive = Annotated[FiniteFloat, Field(gt=0), _Own]
+NotNegative = Annotated[FiniteFloat, Field(ge=0), _Own]
 
 
 class _Settings(BaseModel):
@@ -26,9 +53,9 @@ class Anchor(_Settings):
     """A dropped UWB anchor. Position in the site frame, m."""
 
     id: Id = Field(description="As the tags send it: a number in decimal, or a text.")
-    x: FiniteFloat = 0.0
-    y: FiniteFloat = 0.0
-    z: FiniteFloat = Field(default=0.0, description="Height above the plane from which tag heights are counted.")
+    x: Number = 0.0
+    y: Number = 0.0
+    z: Number = Field(default=0.0, description="Height above the plane from which tag heights are counted.")
 
     @property
     def number(self) -> int:
@@ -39,31 +66,31 @@ class Anchor(_Settings):
 class Georeference(_Settings):
     """Where the origin of the site frame lies on the Earth (WGS 84)."""
 
-    lat: Annotated[FiniteFloat, Field(ge=-90, le=90)]
-    lon: Annotated[FiniteFloat, Field(ge=-180, le=180)]
-    rotation_rad: FiniteFloat = Field(default=0.0, description="Direction of the x axis, counter-clockwise from east.")
+    lat: Annotated[FiniteFloat, Field(ge=-90, le=90), _Own]
+    lon: Annotated[FiniteFloat, Field(ge=-180, le=180), _Own]
+    rotation_rad: Number = Field(default=0.0, description="Direction of the x axis, counter-clockwise from east.")
 
 
 class StartPose(_Settings):
     """Where a tag is when it is first heard."""
 
-    x: FiniteFloat
-    y: FiniteFloat
-    heading_rad: FiniteFloat | None = Field(default=None, description="Leave out when the IMU has a magnetometer.")
+    x: Number
+    y: Number
+    heading_rad: Number | None = Field(default=None, description="Leave out when the IMU has a magnetometer.")
     std_m: Positive = Field(default=0.1, description="Standard deviation of x and of y.")
 
 
 class TagSettings(_Settings):
     """What an operator knows about a tag: measured range = range_scale · distance + range_bias_m."""
 
-    height_m: FiniteFloat = Field(default=0.0, description="Height of the tag's antenna, on the anchors' z axis.")
+    height_m: Number = Field(default=0.0, description="Height of the tag's antenna, on the anchors' z axis.")
     range_std_m: Positive | None = Field(default=None, description="Of one range; null: the engine's default.")
-    range_bias_m: FiniteFloat = 0.0
+    range_bias_m: Number = 0.0
     range_bias_std_m: NotNegative | None = Field(
         default=None, description="How well that is known; 0: exactly, null: not calibrated, the engine's default."
     )
     range_scale: Positive = 1.0
-    mount_angle_rad: FiniteFloat | None = Field(
+    mount_angle_rad: Number | None = Field(
         default=None, description="Direction of travel minus body x axis, counter-clockwise; null: not known."
     )
     mount_angle_std_rad: NotNegative | None = Field(
@@ -74,7 +101,7 @@ class TagSettings(_Settings):
         description="Of the direction of travel about body x axis plus mounting angle: slip of what drives, sway of "
         "what is carried; 0: none, null: the engine's default.",
     )
-    reverse_allowed: bool = Field(default=False, description="Whether the tag may move backwards.")
+    reverse_allowed: Truth = Field(default=False, description="Whether the tag may move backwards.")
     heading_source: Literal["auto", "imu", "platform"] = Field(
         default="auto", description="auto: the IMU where it is sent, else the platform's heading."
     )
@@ -91,7 +118,7 @@ class Site(_Settings):
 
     id: Id = "default"
     name: str = ""
-    declination_rad: FiniteFloat = Field(default=0.0, description="True minus magnetic north, positive east.")
+    declination_rad: Number = Field(default=0.0, description="True minus magnetic north, positive east.")
     georeference: Georeference | None = None
     anchors: list[Anchor] = []
 

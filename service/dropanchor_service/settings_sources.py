@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from dropanchor_schemas.site import Typed
 from dropanchor_service.settings import Settings
 
 ENVIRONMENT_PREFIX = "DROPANCHOR_"
@@ -73,7 +74,7 @@ def _from_environment(environment: Mapping[str, str]) -> dict[str, Any]:
 
 def _value(variable: str, text: str) -> Any:
     if not text.lstrip().startswith(("[", "{")):
-        return text
+        return Typed(text)
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:

@@ -69,6 +69,14 @@ def test_lists_in_the_environment_are_json_or_have_commas() -> None:
         assert settings.zenoh.connect == ("tcp/a:1", "tcp/b:2")
 
 
+def test_a_text_is_a_number_in_the_environment_alone(tmp_path: Path) -> None:
+    environment = {"DROPANCHOR_SITE__DECLINATION_RAD": "0.05", "DROPANCHOR_SITE__ID": "7", "DROPANCHOR_INSECURE": "1"}
+    settings = load_settings(environment=environment)
+    assert (settings.site.declination_rad, settings.site.id, settings.insecure) == (0.05, "7", True)
+    with pytest.raises(SettingsError, match=r"site\.declination_rad: a number was expected, not a text"):
+        load_settings(write(tmp_path, '[site]\ndeclination_rad = "0.05"'), environment={})
+
+
 def test_variables_of_others_with_our_prefix_are_left_alone() -> None:
     assert load_settings(environment={"DROPANCHOR_DATA": "/somewhere"}) == load_settings(environment={})
 
@@ -83,7 +91,7 @@ def test_variables_of_others_with_our_prefix_are_left_alone() -> None:
         ('unknown_tags = "maybe"', ["unknown_tags", "'accept' or 'refuse'"]),
         ("max_tags = 0", ["max_tags", "greater than or equal to 1"]),
         ('[zenoh]\nlisten = "7447"', ["zenoh.listen.0", "tcp/127.0.0.1:7447"]),
-        ('[[site.anchors]]\nid = "7"\nx = "left"', ["site.anchors.0.x", "valid number"]),
+        ('[[site.anchors]]\nid = "7"\nx = "left"', ["site.anchors.0.x", "a number was expected"]),
         ('[[site.anchors]]\nid = "7"\n[[site.anchors]]\nid = "7"', ["site", "share one number"]),
         ("[tags.a]\nrange_scale = 0", ["tags.a.range_scale", "greater than 0"]),
         ("[tags.a.start]\nx = 1.0", ["tags.a.start.y", "required"]),

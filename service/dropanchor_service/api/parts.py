@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_service.api.errors import Kind, ProblemError
 from dropanchor_service.store.answers import to_json
 
@@ -45,11 +46,19 @@ def id_of(escaped: str) -> str:
     return identifier
 
 
-def _tag_id(tag: Annotated[str, Path(description="The tag's id, percent-escaped.", examples=["tag-1"])]) -> str:
+def _tag_id(
+    tag: Annotated[
+        str, Path(description="The tag's id, percent-escaped.", examples=["tag-1"], json_schema_extra=ID_SCHEMA)
+    ],
+) -> str:
     return id_of(tag)
 
 
-def _anchor_id(anchor: Annotated[str, Path(description="The anchor's id, percent-escaped.", examples=["17"])]) -> str:
+def _anchor_id(
+    anchor: Annotated[
+        str, Path(description="The anchor's id, percent-escaped.", examples=["17"], json_schema_extra=ID_SCHEMA)
+    ],
+) -> str:
     return id_of(anchor)
 
 
@@ -64,12 +73,15 @@ def _split(values: list[str]) -> list[str]:
     return names
 
 
+Ids = Annotated[str, Field(min_length=1, json_schema_extra={"format": "dropanchor-ids"})]
+
+
 class TagFilter(BaseModel):
     """The query of a route that can be asked for some tags only."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    tags: Annotated[list[str], AfterValidator(_split)] = Field(
+    tags: Annotated[list[Ids], AfterValidator(_split)] = Field(
         default=[],
         description="Only these tags: separated by commas, or the parameter repeated. A tag that is not known is left "
         "out. Without it: all tags.",

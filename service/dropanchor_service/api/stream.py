@@ -137,4 +137,4 @@ def _event(name: str, frame: Answer) -> bytes:
 
 def _event_stream() -> dict[int | str, dict[str, Any]]:
     example = (_event("snapshot", examples.POSE_FRAME) + b": alive\n\n").decode()
-    return {200: {"content": {MEDIA_TYPE: {"schema": {"type": "string"}, "example": example}}}}
+    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}

@@ -1,0 +1,73 @@
+"""The interface does what its OpenAPI document says, whatever is sent: schemathesis asks."""
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, given, seed, settings
+from hypothesis import strategies as st
+from hypothesis.errors import Unsatisfiable
+from schemathesis.checks import load_all_checks
+from schemathesis.core.result import Ok
+from schemathesis.schemas import APIOperation
+from schemathesis.specs.openapi.checks import positive_data_acceptance
+
+from api_house import make_house
+from dropanchor_schemas.site import Anchor, Georeference, Site
+
+Operation = APIOperation[Any, Any, Any, Any]
+
+EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
+"""Good requests per operation, and as many bad ones; the seed is fixed, so that every run asks the same."""
+
+BEYOND_THE_SCHEMA = {"get_track": [positive_data_acceptance], "put_site": [positive_data_acceptance]}
+"""What no schema can say, and words do: `from` and `to` are at most 31 days apart, each anchor stands there once."""
+
+IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
+IDS = IDS.filter(str.isprintable)
+schemathesis.openapi.format("dropanchor-id", IDS)
+schemathesis.openapi.format(
+    "dropanchor-ids", st.lists(IDS.filter(lambda one: "," not in one), min_size=1).map(",".join)
+)
+
+
+def operations() -> Iterator[Operation]:
+    house = make_house(Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4)))
+    house.move("tag-1", "a")
+    house.stopping.set()  # a stream ends after its first event
+    load_all_checks()
+    document = schemathesis.openapi.from_asgi("/api/v1/openapi.json", house.app())
+    for found in document.get_all_operations():
+        assert isinstance(found, Ok)
+        yield found.ok()
+
+
+OPERATIONS = {operation.definition.raw["operationId"]: operation for operation in operations()}
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_every_answer_is_one_that_the_document_promises(name: str) -> None:
+    excluded = BEYOND_THE_SCHEMA.get(name, [])
+    asked = sum(_asked(OPERATIONS[name], mode, excluded) for mode in schemathesis.GenerationMode)
+    assert asked > 0
+
+
+def _asked(operation: Operation, mode: schemathesis.GenerationMode, excluded: list[Any]) -> int:
+    """How many requests of this kind there were: where nothing is sent, nothing can be bad."""
+    count = 0
+
+    @seed(20)
+    @settings(max_examples=EXAMPLES, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+    @given(case=operation.as_strategy(generation_mode=mode))
+    def ask(case: schemathesis.Case[Any]) -> None:
+        nonlocal count
+        count += 1
+        case.call_and_validate(excluded_checks=excluded)
+
+    try:
+        ask()
+    except Unsatisfiable:
+        assert mode is schemathesis.GenerationMode.NEGATIVE
+    return count
