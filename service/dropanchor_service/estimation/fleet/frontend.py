@@ -35,11 +35,14 @@ FRONTEND = np.dtype(
         ("turned", "f8"),  # rad since start, net
         ("drift_var", "f8"),  # rad^2, of yaw since start
         ("drift_cov", "f8"),  # rad^2/s, of yaw with the gyroscope's bias
+        ("last", "f8", 6),  # acc and gyro of the last sample
+        ("same", "f8"),  # s for which it has been the same
     ],
     align=True,
 )
 
 GAP = 0.5  # s: a longer silence is not integrated over
+FROZEN = 0.25  # s of samples that are equal to the last bit: no sensor is so quiet, its driver repeats itself
 BIAS_LEFT = 1e-3  # rad/s, sd of the bias in motion after any rest
 BIAS_TAU = 100.0  # s
 ABSOLUTE_BELOW, RELATIVE_ABOVE = 0.2, 0.4  # rad^2, variance of north
@@ -81,6 +84,7 @@ def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
     p.yaw_rate = 0.0
     p.yaw_end = 0.0
     p.silent = 0.0
+    p.blind = 0.0
     p.deaf = 0.0
     f.magnetometer.elapsed = 0.0
     f.magnetometer.count = 0.0
@@ -97,11 +101,22 @@ def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
 @njit(cache=True, nogil=True)
 def lose_turn(f: Any, gap: float) -> None:
     """Nobody watched for `gap` s: yaw is uncertain by what it may have turned."""
-    f.preintegration.silent += gap
+    f.preintegration.silent += max(0.0, gap - f.preintegration.blind)
     f.standstill.quiet = 0.0
     if f.magnetometer.unit > 0.0:
         spread_yaw(f.magnetometer, unwatched_turn(gap))
     f.drift_var += unwatched_turn(gap)
+
+
+@njit(cache=True, nogil=True)
+def is_frozen(f: Any, dt: float, acc: Any, gyro: Any) -> bool:
+    """Whether the IMU repeats its last sample, which must not pass for a tag at rest."""
+    same = True
+    for i in range(3):
+        same = same and gyro[i] == f.last[3 + i] and (acc[i] == f.last[i] or math.isnan(acc[i]))
+        f.last[i], f.last[3 + i] = acc[i], gyro[i]
+    f.same = f.same + dt if same else 0.0
+    return f.same > FROZEN  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
@@ -115,12 +130,15 @@ def feed(f: Any, t_ns: int, acc: Any, gyro: Any, mag: Any) -> None:
     dt = (t_ns - f.t_imu) * 1e-9
     if dt <= 0.0:
         return
+    if is_frozen(f, dt, acc, gyro):
+        return
     f.t_imu = t_ns
     a, s, p = f.attitude, f.standstill, f.preintegration
     if dt > GAP:
         lose_turn(f, dt)
         a.gyro[:] = gyro
         dt = 0.0
+    p.blind = 0.0
     heard = math.isfinite(acc[0] + acc[1] + acc[2])
     if heard:
         observe(s, dt, acc, gyro, a.bias)
@@ -171,6 +189,7 @@ def know_nothing(dt: float, node: Any) -> None:
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.rest = 0
+    node.unheard_s = dt
 
 
 @njit(cache=True, nogil=True)

@@ -6,8 +6,9 @@ from typing import Any
 from . import layout
 from .blocked import open_alternative, recover, unblock
 from .compiled import njit
+from .gap import begins_again, place_again, repeats, watch_gap
 from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
-from .layout import COMMON, PHI, REF, STEADY, YAW, N, R, Work
+from .layout import COMMON, PHI, REF, STEADY, YAW, N, R, V, Work
 from .manage import best_of, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
 from .pool import load, mirror, release, store
@@ -175,7 +176,7 @@ def _begin(work: Any, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
         row.reason = 0
         return 0
     anchor = anchors[row.anchor]
-    if row.start_known == 1:
+    if row.start_known == 1 or row.again == 1:
         return start_known(work, row, anchor, node, t)
     if node.kind == RANGE and node.anchor == row.anchor:
         row.ring[row.ring_count % layout.RING_RANGES] = node.z / row.range_scale - row.offset
@@ -212,7 +213,8 @@ def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, s
             work[h].log_weight += update_rest(work[h].mean, work[h].cov, PH, node, t)
     row.since_range_s += node.dt_s
     recover(work, count, row, node, t)
-    if node.kind == RANGE and row.anchor >= 0:
+    stuck = repeats(row, node, work[best_of(work, count)].mean[V])
+    if node.kind == RANGE and row.anchor >= 0 and not stuck:
         _range_all(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
         count = open_alternative(work, count, row, t)
@@ -250,6 +252,29 @@ def _reset(row: Any, pool: Any) -> None:
     row.since_nlos_s = 0.0
 
 
+@njit(nogil=True)
+def _continue(
+    work: Any, count: int, row: Any, pool: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, belief: Any
+) -> int:
+    """One node on any row, which starts or begins again where it must; returns the count of hypotheses."""
+    if count > 0:
+        watch_gap(work, count, row, node)
+        if not begins_again(row, node):
+            count = _step(work, count, row, node, anchors, t, scratch, belief)
+            if count == 0:
+                row.fault += 1
+                row.reason = 10
+                row.start_known = row.again = 0  # it is not there any more
+                _reset(row, pool)
+            return count
+        place_again(row, anchors[row.anchor])
+        _reset(row, pool)
+    count = _begin(work, row, node, anchors, t)
+    for h in range(count):
+        mirror(work[h].cov)
+    return count
+
+
 @njit(nogil=True, cache=True)
 def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Work, beliefs: Any) -> int:
     """Run the nodes (of one row in order of time; a row's nodes may be apart) and write one belief per node.
@@ -271,17 +296,7 @@ def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspa
         row = rows[current]
         row.t_ns = node.t_ns
         belief = beliefs[k]
-        if count > 0:
-            count = _step(work, count, row, node, anchors, t, scratch, belief)
-            if count == 0:
-                row.fault += 1
-                row.reason = 10
-                row.start_known = 0  # it is not there any more
-                _reset(row, pool)
-        else:
-            count = _begin(work, row, node, anchors, t)
-            for h in range(count):
-                mirror(work[h].cov)
+        count = _continue(work, count, row, pool, node, anchors, t, scratch, belief)
         if count > 0:
             publish(work, count, row, node, anchors, t, belief, scratch)
         belief.state, belief.reason = row.state, row.reason

@@ -95,6 +95,15 @@ ROW: Final = np.dtype(
         ("hm_started", np.uint8),
         ("referred", np.uint8),  # 1: the yaw of the hypotheses is in the site frame
         ("information", np.float64, (3, 3)),
+        ("unwatched_s", np.float64),  # s of motion that no sensor watched, and where the tag was before
+        ("gap_x", np.float64),  # m, from the anchor
+        ("gap_y", np.float64),
+        ("gap_var", np.float64),  # m^2
+        ("gap_speed", np.float64),
+        ("again", np.uint8),  # 1: the start is where the tag was before such a gap
+        ("last_z", np.float64),  # the last range, and for how long it has been the same
+        ("same_count", np.int32),
+        ("same_s", np.float64),
     ]
 )
 

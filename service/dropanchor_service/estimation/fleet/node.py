@@ -36,6 +36,7 @@ NODE: Final = np.dtype(
         ("anchor", np.int32),  # index into the anchor table
         ("z", np.float64),  # m (slant range) or rad (azimuth of the tag seen from the anchor)
         ("z_std", np.float64),  # m or rad; NaN: the tag's setting
+        ("unheard_s", np.float64),  # of the interval, without IMU and without the platform's heading
         ("lag_s", np.float64),  # the measurement is that much older than the end of the interval (it came late)
     ]
 )

@@ -61,6 +61,7 @@ def derive_node(p: Any, t_ns: int, node: Any) -> None:
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, 0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
+    node.unheard_s = 0.0
     if p.heard == 0:
         return
     ahead = (t_ns - p.t_heading) * 1e-9
@@ -68,6 +69,7 @@ def derive_node(p: Any, t_ns: int, node: Any) -> None:
     node.dt_s = max((t_ns - p.t_node) * 1e-9, 0.0)
     node.dyaw = wrap(heading - p.node_heading)
     node.dyaw_var = NOISE * node.dt_s + 1e-7 + (0.5 * max(ahead - 2.0 * EXTRAPOLATE, 0.0)) ** 2
+    node.unheard_s = node.dt_s if ahead > 2.0 * EXTRAPOLATE else 0.0
     std = p.std if math.isfinite(p.std) else 0.02
     node.heading, node.heading_var, node.heading_kind = heading, std * std, DERIVED_HEADING
     p.t_node, p.node_heading = t_ns, heading
@@ -100,5 +102,6 @@ def refer_to_platform(p: Any, front: Any, node: Any) -> None:
     node.heading = wrap(front.preintegration.yaw_end + p.lead)
     node.heading_var = std * std / p.readings
     node.heading_kind = MEASURED_HEADING
+    node.unheard_s = 0.0
     p.readings = 0
     p.lead = 0.0

@@ -23,6 +23,7 @@ PREINTEGRATION = np.dtype(
         ("yaw_end", "f8"),  # rad, where the last node ended
         ("V_end", "f8", 2),
         ("silent", "f8"),  # s without usable IMU since the last node
+        ("blind", "f8"),  # s since the last IMU sample that earlier nodes have already counted as silent
         ("deaf", "f8"),  # s without usable accelerometer since the last node
     ]
 )
@@ -31,7 +32,7 @@ G0 = 9.80665  # m/s^2
 HORIZON = 0.1  # s
 GYRO_NOISE = 4e-6  # rad^2/s: 0.02 rad/s white at 100 Hz
 GYRO_SCALE = 7e-3  # of the turn
-TURN_UNKNOWN = 0.5  # rad/s, sd of the rate of a tag whose IMU is silent
+TURN_UNKNOWN = 1.0  # rad/s, sd of the rate of a tag whose IMU is silent
 ACC_FLOOR = 2e-4  # (m/s)^2/s
 ACC_ROUGH = 0.03  # s: what of the roughness leaks into the integral, measured on recordings
 ROUGH_TAU = 3.0  # s
@@ -48,6 +49,12 @@ def wrap(angle: float) -> float:
 def unwatched_turn(s: float) -> float:
     """Variance, rad^2, of the turn in s seconds that no gyroscope watched; the rate lasts about a second."""
     return TURN_UNKNOWN * TURN_UNKNOWN * s * max(s, 1.0)
+
+
+@njit(cache=True, nogil=True)
+def unwatched_speed(s: float) -> float:
+    """Variance, (m/s)^2, of the change of speed in s seconds that no accelerometer watched."""
+    return ACC_UNKNOWN * ACC_UNKNOWN * s * max(s, 1.0)
 
 
 @njit(cache=True, nogil=True)
@@ -75,9 +82,12 @@ def end_node(p: Any, yaw: float, ahead: float, dt: float, node: Any) -> float:
     c, s = math.cos(p.yaw_end), math.sin(p.yaw_end)
     node.dv_forward = c * dx + s * dy
     node.dv_left = c * dy - s * dx
-    unheard = p.silent + max(0.0, ahead - HORIZON)
+    beyond = max(0.0, ahead - HORIZON)
+    unheard = p.silent + max(0.0, beyond - p.blind)
+    p.blind = max(p.blind, beyond)
+    node.unheard_s = unheard
     node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unwatched_turn(unheard)
-    node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + (ACC_UNKNOWN * unheard) ** 2
+    node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + unwatched_speed(unheard)
     p.yaw_end = wrap(end)
     p.V_end[0], p.V_end[1] = vx, vy
     p.silent = 0.0

@@ -9,6 +9,8 @@ from .node import RANGE
 from .summary import add_reference, best_mode, forget_information, sigma_obs
 from .tuning import Tuning
 
+UNRANGED = 3.0  # s without a range after which a place has to be resolved anew
+
 
 @njit(nogil=True)
 def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, belief: Any, scratch: Any) -> None:
@@ -38,27 +40,37 @@ def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning,
     belief.p_mode = min(p_mode, 1.0)
     belief.sigma_pos = math.sqrt(max(cov[0, 0] + cov[1, 1], 0.0))
     belief.hypotheses = count
-    _judge(row, node, p_mode, relative, belief.sigma_pos, math.sqrt(r2), work[head].blocked == 1, t)
+    _declare(row, node, p_mode, relative, math.sqrt(r2), t)
+    _judge(row, belief.sigma_pos, math.sqrt(r2), work[head].blocked == 1)
 
 
 @njit(nogil=True)
-def _judge(
-    row: Any, node: Any, p_mode: float, relative: float, sigma: float, r: float, blocked: bool, t: Tuning
-) -> None:
-    """State and reason."""
+def _declare(row: Any, node: Any, p_mode: float, relative: float, r: float, t: Tuning) -> None:
+    """Whether one place has explained everything for long enough."""
     resolved = p_mode > t.resolved and relative < max(1.5, 0.05 * r)
     row.good_s = row.good_s + node.dt_s if resolved else 0.0
     row.bad_s = 0.0 if p_mode > 0.9 else row.bad_s + node.dt_s
-    if row.good_s >= t.resolved_s or (row.start_known == 1 and row.declared == 0 and resolved):
+    if row.good_s >= t.resolved_s or (row.start_known == 1 and row.again == 0 and row.declared == 0 and resolved):
         row.declared = 1
     if row.bad_s > 1.0:
         row.declared = 0
+    if row.since_range_s > UNRANGED:  # what follows must fit for a while before it is believed
+        row.declared, row.again = 0, 1
+
+
+@njit(nogil=True)
+def _judge(row: Any, sigma: float, r: float, blocked: bool) -> None:
+    """State and reason."""
     if row.since_range_s > 30.0:
         row.state, row.reason = layout.LOST, 5
+    elif row.unwatched_s > 10.0:
+        row.state, row.reason = layout.LOST, 6
+    elif row.unwatched_s > 0.5:
+        row.state, row.reason = layout.DEGRADED, 6
+    elif row.since_range_s > 1.5 and (row.declared == 1 or row.state == layout.COASTING):
+        row.state, row.reason = layout.COASTING, 5
     elif row.declared == 0:
         row.state, row.reason = layout.AMBIGUOUS, 3
-    elif row.since_range_s > 1.5:
-        row.state, row.reason = layout.COASTING, 5
     elif sigma > max(3.0, 0.35 * r):
         row.state, row.reason = layout.AMBIGUOUS, 9
     elif row.misfit > 0.5 or blocked:

@@ -101,7 +101,7 @@ def start_known(work: Any, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     cell = 2.0 * math.pi / ring
     choose_model(row, node, t)
     for h in range(ring):
-        yaw = row.start_heading if given else node.heading + cell * h
+        yaw = row.start_heading if given else node.heading - row.north + cell * h
         variance = row.start_heading_std**2 if given else node.heading_var
         _common(work, h, row, yaw, variance if known else (cell / 2.0) ** 2, t)
         s, P = work[h].mean, work[h].cov

@@ -156,6 +156,7 @@ def test_a_bearing_settles_where_a_standing_tag_is() -> None:
         np.repeat(c[:1], k) for c, k in ((still.imu, n * STEP), (still.ranges, n), (still.headings, n))
     )
     imu["t_ns"] = np.arange(n * STEP) * 10_000_000
+    imu["acc"] += 0.01 * np.random.default_rng(1).standard_normal((n * STEP, 3))  # or it would count as frozen
     ranges["t_ns"] = headings["t_ns"] = np.arange(n) * 100_000_000
     ranges["range"] = 10.0
     assert fleet.process(SampleBatch(imu, ranges, headings)).poses["state"][-1] == State.AMBIGUOUS

@@ -1,0 +1,116 @@
+"""A wrong pose is never shown as a good one: whatever fails, no pose that says `tracking` is off by more than 5 σ."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.evaluation.simulated import Known, run_engine
+from dropanchor_tag_client.simulator.perturbations import perturbed
+from dropanchor_tag_client.simulator.sensors import SensorModels
+from dropanchor_tag_client.simulator.simulation import Simulation, simulate
+
+SEEDS = range(7000, 7008)
+FROM_S, UNTIL_S = 20.0, 28.0  # while the fault lasts
+LIMIT = 5.0
+Fault = Callable[[Simulation], Simulation]
+
+
+def faulty(t_s: Array) -> Array:
+    during: Array = (t_s >= FROM_S) & (t_s < UNTIL_S)
+    return during
+
+
+def imu_off(run: Simulation) -> Simulation:
+    return replace(run, imu=run.imu._replace(**_kept(run.imu._asdict(), ~faulty(run.imu.t_s))))
+
+
+def ranges_off(run: Simulation) -> Simulation:
+    return replace(run, ranges=run.ranges.where(~faulty(run.ranges.t_s)))
+
+
+def everything_off(run: Simulation) -> Simulation:
+    return imu_off(ranges_off(run))
+
+
+def spikes(run: Simulation) -> Simulation:
+    """Every tenth range 50 m too long."""
+    wrong = faulty(run.ranges.t_s) & (np.arange(len(run.ranges.t_s)) % 10 == 0)
+    return _ranging(run, run.ranges.range_m + 50.0 * wrong)
+
+
+def frozen_range(run: Simulation) -> Simulation:
+    """The radio repeats its last range."""
+    during = faulty(run.ranges.t_s)
+    first = int(np.argmax(during))
+    return _ranging(run, np.where(during, run.ranges.range_m[first - 1], run.ranges.range_m))
+
+
+def behind_a_wall(run: Simulation) -> Simulation:
+    """Every range 3 m too long."""
+    return _ranging(run, run.ranges.range_m + 3.0 * faulty(run.ranges.t_s))
+
+
+def magnet(run: Simulation) -> Simulation:
+    """A magnet of 40 µT, as strong as the field, is put on the tag and taken off again."""
+    return replace(run, imu=run.imu._replace(mag=run.imu.mag + np.outer(faulty(run.imu.t_s), (0.0, 40.0, 0.0))))
+
+
+def frozen_imu(run: Simulation) -> Simulation:
+    """The IMU repeats its last sample."""
+    during = faulty(run.imu.t_s)
+    first = int(np.argmax(during))
+    columns = {
+        name: np.where(during if values.ndim == 1 else during[:, None], values[first - 1], values)
+        for name, values in run.imu._asdict().items()
+        if name != "t_s"
+    }
+    return replace(run, imu=run.imu._replace(**columns))
+
+
+def as_it_is(run: Simulation) -> Simulation:
+    return run
+
+
+FAULTS = (as_it_is, imu_off, ranges_off, everything_off, spikes, frozen_range, behind_a_wall, magnet, frozen_imu)
+
+
+@pytest.mark.parametrize("start_known", [True, False], ids=["known start", "unknown start"])
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+def test_no_tracking_pose_is_off_by_more_than_five_sigma(fault: Fault, start_known: bool) -> None:
+    runs = [fault(simulate("M5", seed)) for seed in SEEDS]
+    tracks = run_engine(FleetEngine(), runs, Known("raw", start_known)).tracks
+    worst = [worst_tracking(track.poses, simulate("M5", run.seed)) for track, run in zip(tracks, runs, strict=True)]
+    assert max(worst) <= LIMIT
+
+
+@pytest.mark.parametrize("name", ["late15", "nlosburst", "magdist", "gdrift"])
+def test_nor_when_it_is_switched_on_midway_or_disturbed(name: str) -> None:
+    runs = [simulate("M5", seed, perturbed(SensorModels(), name)) for seed in SEEDS]
+    tracks = run_engine(FleetEngine(), runs, Known("raw", start=False)).tracks
+    worst = [worst_tracking(track.poses, simulate("M5", run.seed)) for track, run in zip(tracks, runs, strict=True)]
+    assert max(worst) <= LIMIT
+
+
+def worst_tracking(poses: Array, true: Simulation) -> float:
+    """The largest error of a `tracking` pose in standard deviations of its own covariance, 0 without one."""
+    own = poses[poses["state"] == State.TRACKING]
+    if len(own) == 0:
+        return 0.0
+    t_s = own["t_ns"] * 1e-9
+    dx = own["x"] - np.interp(t_s, true.truth.t_s, true.truth.x)
+    dy = own["y"] - np.interp(t_s, true.truth.t_s, true.truth.y)
+    error = np.stack([dx, dy], axis=1)
+    squared = np.einsum("ni,nij,nj->n", error, np.linalg.inv(own["cov"][:, :2, :2]), error)
+    return float(np.sqrt(squared.max()))
+
+
+def _ranging(run: Simulation, range_m: Array) -> Simulation:
+    return replace(run, ranges=run.ranges._replace(range_m=range_m))
+
+
+def _kept(columns: dict[str, Array], kept: Array) -> dict[str, Array]:
+    return {name: values[kept] for name, values in columns.items()}
