@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.admission import Admission
 from dropanchor_service.buffer import Message, MessageBuffer, Stranger
@@ -41,6 +42,8 @@ class Ingest:
         self.preparation = Preparation(site, estimators, self._losses, reorder_ns)
         self._buffer = buffer
         self._admission = admission
+        self._site = site
+        self._known_tags = 0  # rows whose keys the buffer knows
         self._estimators = estimators
         self._tags = tags
         self._latest = latest
@@ -64,6 +67,7 @@ class Ingest:
             self._admission.register_listed()
         while self._announced:
             self._admission.by_name(self._announced.popleft())
+        self._know_new_tags()
         self._count_shed()
         known, strangers = self._buffer.drain(MESSAGES_PER_TURN)
         known += self._admitted(strangers)
@@ -73,6 +77,12 @@ class Ingest:
             self._tags.count_messages(np.array([message[0] for message in known], np.int32), known[-1][3])
         if known or self.holds:
             self._fuse(known)
+
+    def _know_new_tags(self) -> None:
+        """Messages of tags that have a row already do not wait among those of strangers."""
+        for tag in self._tags.all()[self._known_tags :] if len(self._tags) > self._known_tags else ():
+            self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
+            self._known_tags = tag.row + 1
 
     def _admitted(self, strangers: Sequence[Stranger]) -> Iterator[Message]:
         for key, payload, encoding, arrival_ns in strangers:

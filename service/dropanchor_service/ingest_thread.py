@@ -57,6 +57,7 @@ class IngestThread:
         return f"the ingest thread has been stuck for {silent_s:.0f} s" if silent_s > SILENT_S else None
 
     def _run(self) -> None:
+        self._turn()  # tags that are known are admitted before anything comes in
         while not self._stop.is_set():
             if self._buffer.wait(HOLDING_S if self._ingest.holds else IDLE_S) and self._buffer.depth < BACKLOG:
                 self._stop.wait(self._period_s)  # so that one call fuses many messages

@@ -18,6 +18,7 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_service import prepare
+from dropanchor_service.buffer import STRANGERS
 from dropanchor_service.decode import Forms, read_forms
 from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
 from dropanchor_service.estimators import FAULTS_BEFORE_QUARANTINE
@@ -267,6 +268,18 @@ def test_a_flood_of_unknown_tags_is_bounded_and_known_tags_are_unharmed() -> Non
     assert len(bench.tags) == 10
     rejected = bench.rejected()
     assert rejected["shed"] + rejected["tags_full"] == 20_000 - 9
+
+
+def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
+    names = [f"listed-{number}" for number in range(STRANGERS + 500)]
+    bench = Bench(tags={name: {} for name in names})
+    bench.ingest.turn()
+    for name in names:
+        bench.put(name, ranges(1.0))
+    while bench.buffer.depth:
+        bench.ingest.turn()
+    assert bench.rejected() == {}
+    assert bench.x_of(names) == [1.0] * len(names)
 
 
 def test_shed_messages_are_counted_for_their_tag() -> None:
