@@ -8,11 +8,10 @@ import zenoh
 
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.folder import SecurityFolder
-from dropanchor_service.security.router import LINK, router_transport
+from dropanchor_service.security.router import LINK, QUIET, router_transport
 from dropanchor_service.settings import ZenohSettings
 
 ATTEMPT_S = 1.0
-_QUIET = {"scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}}}
 
 
 class ZenohError(Exception):
@@ -37,11 +36,11 @@ def listening_at(settings: ZenohSettings, credentials: SecurityFolder | None) ->
 def configuration(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> dict[str, Any]:
     """The Zenoh configuration of these endpoints, unless a file gives one."""
     if settings.connect:
-        return _client(settings, credentials) | _QUIET
+        return _client(settings, credentials) | QUIET
     listen = listening_at(settings, credentials)
     if credentials is not None:
         return credentials.router_configuration(listen)
-    return {"mode": "router", "listen": {"endpoints": list(listen)}, "transport": router_transport()} | _QUIET
+    return {"mode": "router", "listen": {"endpoints": list(listen)}, "transport": router_transport()} | QUIET
 
 
 def _client(settings: ZenohSettings, credentials: SecurityFolder | None) -> dict[str, Any]:

@@ -37,7 +37,8 @@ def configuration(mode: str, endpoints: list[str], extra: dict[str, Any] | None 
     role = {"listen": {"endpoints": endpoints}} if mode == "router" else {"connect": connect}
     quiet = {"scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}}}
     transport = {"shared_memory": {"enabled": False}, **(extra or {})}
-    return json.dumps({"mode": mode, **role, **quiet, "transport": transport})
+    unstamped = {"timestamping": {"enabled": False}}
+    return json.dumps({"mode": mode, **role, **quiet, **unstamped, "transport": transport})
 
 
 @contextmanager

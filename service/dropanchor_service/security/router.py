@@ -7,6 +7,13 @@ from dropanchor_service.security.access_control import access_control, low_pass_
 
 LINK: dict[str, Any] = {"tx": {"lease": 4000, "keep_alive": 4}, "rx": {"max_message_size": 2**20}}
 
+QUIET: dict[str, Any] = {
+    "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+    # Routers stamp messages by default, one after another for each session. A subscriber with recovery takes those of
+    # plain publishers whose stamps are out of order for repeated ones, and drops them without a word.
+    "timestamping": {"enabled": False},
+}
+
 
 def router_transport(tls: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """What not to leave at its default, for every router of ours."""
@@ -32,8 +39,7 @@ def router_configuration(
     return {
         "mode": "router",
         "listen": {"endpoints": list(listen)},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "transport": router_transport(tls),
         "access_control": access_control(site, tags),
         "low_pass_filter": low_pass_filter(site),
-    }
+    } | QUIET
