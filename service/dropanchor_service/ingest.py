@@ -104,10 +104,12 @@ class Ingest:
 
     def _fuse(self, messages: list[Message]) -> None:
         now_ns = self._clock.now_ns()
-        prepared = self.preparation.samples_of(messages, now_ns)
-        if prepared is None:
-            return
-        samples = self._outside_quarantine(prepared, now_ns)
+        for samples in self.preparation.batches_of(messages, now_ns):
+            self._fuse_batch(self._outside_quarantine(samples, now_ns), now_ns)
+        if messages:
+            self._metrics.delay_seconds.observe((self._clock.now_ns() - messages[0][3]) * 1e-9)
+
+    def _fuse_batch(self, samples: SampleBatch, now_ns: int) -> None:
         for kind, column in _by_kind(samples):
             if len(column):
                 self._tags.count_samples(kind, column["row"])
@@ -118,8 +120,6 @@ class Ingest:
         for poses in self._estimators.process(samples, now_ns):
             self._store(poses)
         self._metrics.estimator_seconds.observe(time.perf_counter() - started)
-        if messages:
-            self._metrics.delay_seconds.observe((self._clock.now_ns() - messages[0][3]) * 1e-9)
 
     def _outside_quarantine(self, samples: SampleBatch, now_ns: int) -> SampleBatch:
         if not self._estimators.any_quarantined(now_ns):

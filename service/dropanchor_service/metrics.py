@@ -49,6 +49,11 @@ class Metrics:
             buckets=_SECONDS,
             registry=self.registry,
         )
+        self.caught_up = Counter(
+            "dropanchor_caught_up_messages",
+            "Messages that went on after the caches of their tag had been asked.",
+            registry=self.registry,
+        )
         self.checkpoints = Counter("dropanchor_checkpoints", "Checkpoints.", ["outcome"], registry=self.registry)
         self.checkpoint_age = Gauge(
             "dropanchor_checkpoint_age_seconds",

@@ -1,6 +1,6 @@
 """From messages of admitted tags to samples that an engine can take: decode, put in order, screen, map clocks."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from dropanchor_service.passes.values import shift_times
 from dropanchor_service.publishers import Publishers
 from dropanchor_service.screening import Rejected, keep, screen, within_time
 from dropanchor_service.store import SiteStore
+from dropanchor_service.store.rings import rank_in_row
 
 HELD_BYTES = 2**26
 
@@ -40,12 +41,13 @@ class Preparation:
         """Messages that wait for one before them."""
         return len(self._held)
 
-    def samples_of(self, fresh: list[Message], now_ns: int) -> SampleBatch | None:
-        """Those of the fresh messages and of ones held before that are due; None when none is."""
+    def batches_of(self, fresh: list[Message], now_ns: int) -> Iterator[SampleBatch]:
+        """Those of the fresh messages and of ones held before that are due, at most one of each tag in a batch: what
+        becomes of a message does not depend on which others of its tag came in with it."""
         due_ns = now_ns if self._held.is_full else now_ns - self.window_ns
         messages = [*self._held.wake(fresh, due_ns), *fresh] if self.holds else fresh
         if not messages:
-            return None
+            return
         rows, payloads, encodings, arrivals = zip(*messages, strict=True)
         read = self._forms(payloads, encodings)
         of_row, arrived = np.array(rows, np.int32), np.array(arrivals, np.int64)
@@ -55,9 +57,10 @@ class Preparation:
         self._losses.give_up(sequenced.missing)
         self._held.hold([messages[index] for index in sequenced.held.tolist()])
         self._losses.reject(Reason.DUPLICATE, of_row[sequenced.duplicates])
-        decoded, rejected = screen(read_samples(read, sequenced.due))
-        offsets = self.publishers.utc_offsets(read.forms, sequenced, arrived, _times(decoded))
-        return self._batch(_in_utc(decoded, offsets, rejected), rejected, of_row)
+        for due in _one_of_each(sequenced.due, of_row):
+            decoded, rejected = screen(read_samples(read, due))
+            offsets = self.publishers.utc_offsets(read.forms, replace(sequenced, due=due), arrived, _times(decoded))
+            yield self._batch(_in_utc(decoded, offsets, rejected), rejected, of_row)
 
     def _forms(self, payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
         """A payload that the decoder fails on, which is an error of ours, costs nothing but itself."""
@@ -107,6 +110,12 @@ def _if_readable(payload: bytes, encoding: str) -> bytes:
     except Exception:
         return b""
     return payload
+
+
+def _one_of_each(due: Array, of_row: Array) -> list[Array]:
+    """The indices `due` in parts that have no row twice, each row's in their order."""
+    ranks = rank_in_row(of_row[due])
+    return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]
 
 
 def _in_utc(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Decoded:

@@ -60,12 +60,13 @@ class Publishers:
         return Sequenced(due, waiting, again, missing, slots)
 
     def has_passed(self, row: int, boot_id: int, sequence: int) -> bool:
-        """Whether this message of this tag was fused already, as far as that is remembered."""
+        """Whether this message of this tag was fused already, or is older than what is remembered."""
         for publisher in self._columns[row * PER_TAG : (row + 1) * PER_TAG]:
             if publisher["status"] == sequences.RUNNING and publisher["boot_id"] == boot_id:
                 behind = (int(publisher["next"]) - sequence) % 2**32
                 lane, bit = sequence % WINDOW // 64, sequence % 64
-                return 0 < behind <= WINDOW and bool(int(publisher["seen"][lane]) >> bit & 1)
+                seen = bool(int(publisher["seen"][lane]) >> bit & 1)
+                return 0 < behind < 2**31 and (seen or behind > WINDOW)
         return False
 
     def excuse(self, row: int) -> None:

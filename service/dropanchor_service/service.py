@@ -167,7 +167,7 @@ class Service:
         folder = self._settings.data_dir
         if folder is None or not estimators.keeps_state:
             return None
-        state = WholeState(self.site, self.tags, self.latest, estimators)
+        state = WholeState(self.site, self.tags, self.latest, estimators, self._ingest.preparation.publishers)
         kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
         return Checkpointer(state, kept, self.metrics, self._settings.checkpoint_s)
 
@@ -189,6 +189,7 @@ class Service:
                 self.metrics,
                 self.clock,
                 self._settings.max_tags,
+                self._ingest.preparation.publishers,
             ),
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),

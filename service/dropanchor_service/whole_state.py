@@ -4,6 +4,7 @@ from dropanchor_schemas.site import Anchor
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.estimators import Estimators
 from dropanchor_service.kernel_cache import sources_digest
+from dropanchor_service.publishers import Publishers
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.checkpoints import Snapshot, layout_of
 
@@ -11,11 +12,14 @@ from dropanchor_service.store.checkpoints import Snapshot, layout_of
 class WholeState:
     """Owned by the ingest thread while it runs."""
 
-    def __init__(self, site: SiteStore, tags: TagTable, latest: LatestPoses, estimators: Estimators) -> None:
+    def __init__(
+        self, site: SiteStore, tags: TagTable, latest: LatestPoses, estimators: Estimators, publishers: Publishers
+    ) -> None:
         self._site = site
         self._tags = tags
         self._latest = latest
         self._estimators = estimators
+        self._publishers = publishers
         self.template = self.snapshot()
         self.layout = layout_of(self.template, meaning=sources_digest())
 
@@ -26,7 +30,7 @@ class WholeState:
 
     def snapshot(self) -> Snapshot:
         """Copies: what comes in later does not change them."""
-        arrays = {"counts": self._tags.copy_counts()}
+        arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns.copy()}
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
         arrays |= {f"engine.{name}": array for name, array in self._estimators.state().items()}
         anchors = [anchor.model_dump() for anchor in self._site.anchors_by_index()]
@@ -37,6 +41,7 @@ class WholeState:
         """Take over a snapshot of this layout, before anything has come in."""
         self._site.remember([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
         self._tags.restore(snapshot.document["tags"], snapshot.arrays["counts"])
+        self._publishers.columns = snapshot.arrays["publishers"]
         self._latest.restore(_part(snapshot, "latest"))
         self._estimators.restore(_part(snapshot, "engine"))
 

@@ -13,7 +13,9 @@ from dropanchor_service.clock import UtcClock
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
+from dropanchor_service.publishers import Publishers
 from dropanchor_service.store import TagTable
+from dropanchor_service.zenoh_caches import ZenohCaches
 
 
 class ZenohIntake:
@@ -29,16 +31,17 @@ class ZenohIntake:
         metrics: Metrics,
         clock: UtcClock,
         max_tags: int,
+        publishers: Publishers,
     ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._session = session
         self._site = site
-        self._buffer = buffer
         self._ingest = ingest
         self._tags = tags
         self._metrics = metrics
         self._clock = clock
         self._max_tokens = 2 * max_tags
+        self._caches = ZenohCaches(session, site, buffer, tags, publishers, metrics, clock)
         self._declared: list[Any] = []
 
     def __enter__(self) -> Self:
@@ -55,16 +58,19 @@ class ZenohIntake:
             history=True,
         )
         self._declared = [misses, samples, tokens]
+        self._caches.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        self._caches.__exit__(kind, error, traceback)
         for declared in self._declared:
             declared.undeclare()
 
     def _on_samples(self, message: zenoh.Sample) -> None:
-        self._buffer.append(str(message.key_expr), bytes(message.payload), str(message.encoding), self._clock.now_ns())
+        now_ns = self._clock.now_ns()
+        self._caches.catch_up.hear(str(message.key_expr), bytes(message.payload), str(message.encoding), now_ns)
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)
@@ -80,3 +86,4 @@ class ZenohIntake:
         elif self._tags.online_names < self._max_tokens:
             self._tags.set_online(name, True)
             self._ingest.announce(name)
+            self._caches.catch_up.appear(keys.samples_key(self._site, name))

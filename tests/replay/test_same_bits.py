@@ -8,7 +8,6 @@ from numpy.lib.recfunctions import repack_fields
 from dropanchor_service.estimation.batch import PoseBatch, SampleBatch, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.store.checkpoints import CheckpointFolder
-from dropanchor_service.whole_state import WholeState
 from dropanchor_tag_client.simulator.live import start_poses, tag_name
 from support.ingest import Bench
 from support.traffic import Message, traffic
@@ -44,7 +43,7 @@ class Run:
         }
         self.engine = Recorded()
         self.bench = Bench(engine=self.engine, folder=folder, tags=starts)
-        self.state = WholeState(self.bench.site, self.bench.tags, self.bench.latest, self.bench.estimators)
+        self.state = self.bench.whole_state()
         self.checkpoints = CheckpointFolder(folder / "checkpoints", self.state.layout, self.state.template)
 
     def take(self, message: Message) -> list[bytes]:

@@ -15,7 +15,6 @@ from dropanchor_service.checkpointer import Checkpointer
 from dropanchor_service.estimation.batch import Array, State
 from dropanchor_service.ingest_thread import IngestThread
 from dropanchor_service.store.checkpoints import CheckpointFolder
-from dropanchor_service.whole_state import WholeState
 from support.ingest import Bench, TransparentEngine
 from support.zenoh_router import wait_until
 
@@ -43,7 +42,7 @@ class Kept:
         self.engine = KeepingEngine()
         self.bench = Bench(engine=self.engine, folder=folder)
         self.bench.estimators.follow_site()
-        state = WholeState(self.bench.site, self.bench.tags, self.bench.latest, self.bench.estimators)
+        state = self.bench.whole_state()
         kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
         self.checkpoints = Checkpointer(state, kept, self.bench.metrics, period_s=0.01)
         self.thread = IngestThread(

@@ -21,6 +21,7 @@ from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.settings_sources import load_settings
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.whole_state import WholeState
 
 
 @dataclass
@@ -82,6 +83,9 @@ class Bench:
             self.metrics,
             self.clock,
         )
+
+    def whole_state(self) -> WholeState:
+        return WholeState(self.site, self.tags, self.latest, self.estimators, self.ingest.preparation.publishers)
 
     def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
         data = encode_packed(payload) if isinstance(payload, Frame) else payload

@@ -1,0 +1,93 @@
+"""A service that is killed again and again while its tags publish loses nothing, and ends where an uninterrupted one
+would.
+
+DROPANCHOR_KILLS, _KILLED_TAGS and _KILLED_STEP_S (from one message of a tag to the next) make more of it,
+DROPANCHOR_KILL_SEED another one.
+"""
+
+import logging
+import os
+import random
+import signal
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from support.live_tags import LiveTags, distance
+from support.service import Running, running_service
+from support.zenoh_router import free_endpoint, start_router_process, wait_until
+
+KILLS = int(os.environ.get("DROPANCHOR_KILLS", "2"))
+TAGS = int(os.environ.get("DROPANCHOR_KILLED_TAGS", "3"))
+SEED = int(os.environ.get("DROPANCHOR_KILL_SEED", "1"))
+DOWN_S = 2.0
+UP_S = 3.0  # at most, from being current to the next kill
+STEP_S = float(os.environ.get("DROPANCHOR_KILLED_STEP_S", "0.1"))
+
+_log = logging.getLogger(__name__)
+
+
+def samples_of(service: Running) -> dict[str, dict[str, int]]:
+    return {status["tag"]: status["samples"] for status in service.get("/api/v1/tags")["tags"]}
+
+
+def is_current(service: Running) -> bool:
+    """Whether no tag's pose is older than half a second."""
+    poses = service.get("/api/v1/poses")["poses"]
+    return len(poses) == TAGS and max(pose["age_s"] for pose in poses) < 0.5
+
+
+@pytest.mark.parametrize("router", ["outside", "inside"])
+def test_a_service_that_is_killed_loses_nothing_and_ends_where_an_uninterrupted_one_would(
+    tmp_path: Path, router: str
+) -> None:
+    endpoint = free_endpoint()
+    with ExitStack() as opened:
+        if router == "outside":
+            opened.enter_context(router_process(endpoint))
+        tags = LiveTags(endpoint, TAGS, SEED, cache_messages=2000, step_s=STEP_S)
+        config = tags.write_settings(tmp_path)
+        where = "--zenoh-connect" if router == "outside" else "--zenoh-listen"
+        options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), where, endpoint)
+        dice = random.Random(SEED)
+        for life in range(KILLS):
+            with running_service(*options) as service:
+                if life == 0:
+                    opened.enter_context(tags)
+                wait_until_current(service)
+                time.sleep(dice.uniform(0.0, UP_S))
+                service.stop(signal.SIGKILL)
+            time.sleep(DOWN_S)
+        with running_service(*options) as service:
+            wait_until_current(service)
+            tags.finish()
+            wait_until(lambda: samples_of(service) == tags.samples, 30.0)
+            answers = {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"]}
+            assert service.metric('dropanchor_rejected_total{reason="duplicate"}') == 0
+            assert service.metric('dropanchor_rejected_total{reason="late"}') == 0
+    expected = tags.expected(config)
+    assert expected.keys() == answers.keys()
+    apart = {tag: distance(pose, answers[tag]) for tag, pose in expected.items()}
+    _log.info("samples %s, apart %.2g m at most", sum(map(Counter.total, tags.samples.values())), max(apart.values()))
+    assert {tag: int(pose["t_ns"]) for tag, pose in expected.items()} == {t: a["t_ns"] for t, a in answers.items()}
+    assert max(apart.values()) < 1e-3
+
+
+def wait_until_current(service: Running) -> None:
+    started_s = time.monotonic()
+    wait_until(lambda: is_current(service), 60.0)
+    _log.info("current %.2f s after it was ready", time.monotonic() - started_s)
+
+
+@contextmanager
+def router_process(endpoint: str) -> Iterator[None]:
+    router = start_router_process(endpoint)
+    try:
+        yield
+    finally:
+        router.kill()
+        router.communicate()

@@ -1,0 +1,108 @@
+"""Simulated tags that publish in real time, whatever happens to whom they publish to, and what should come of it."""
+
+import json
+import time
+from collections import Counter, defaultdict
+from contextlib import ExitStack
+from pathlib import Path
+from threading import Event, Thread
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from dropanchor_schemas.wire import Frame
+from dropanchor_service.engine import create_engine
+from dropanchor_service.settings_sources import load_settings
+from dropanchor_tag_client import TagClient
+from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_poses, tag_name
+from dropanchor_tag_client.simulator.sensors import preset
+from support.ingest import Bench
+
+
+class LiveTags:
+    """Tags of the yard with known starts, published from when it is opened until `finish`.
+
+    samples: published so far, by tag and kind.
+    """
+
+    def __init__(self, endpoint: str, tags: int, seed: int, cache_messages: int = 600, step_s: float = 0.1) -> None:
+        self._endpoint = endpoint
+        self._step_s = step_s
+        self._stop = Event()
+        self._cache_messages = cache_messages
+        self._seed = seed
+        self._tags = tags
+        self._sent: list[Delivery] = []
+        self._clients = ExitStack()
+        self._thread = Thread(target=self._run, daemon=True)
+        self.samples: dict[str, Counter[str]] = defaultdict(Counter)
+
+    def write_settings(self, folder: Path) -> Path:
+        """A settings file that knows the anchor and where each tag starts."""
+        lines = ['engine = "fleet"', "[[site.anchors]]", 'id = "0"']
+        for index, pose in enumerate(start_poses(self._tags, self._seed)):
+            start = f"{{ x = {pose.x}, y = {pose.y}, heading_rad = {pose.heading_rad} }}"
+            lines += [f"[tags.{json.dumps(tag_name(index))}]", f"start = {start}"]
+        file = folder / "live.toml"
+        file.write_text("\n".join(lines) + "\n")
+        return file
+
+    def __enter__(self) -> Self:
+        self._opened = [
+            self._clients.enter_context(
+                TagClient(
+                    tag_name(index),
+                    connect=self._endpoint,
+                    cache_messages=self._cache_messages,
+                    batch_s=None,
+                    connect_timeout_s=30.0,
+                )
+            )
+            for index in range(self._tags)
+        ]
+        self._t0_ns = time.time_ns() // 1000 * 1000 + 200_000_000
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.finish()
+        self._clients.close()
+
+    def finish(self) -> None:
+        """No more samples; the tags stay there."""
+        self._stop.set()
+        self._thread.join()
+
+    def expected(self, config: Path) -> dict[str, Any]:
+        """POSE by tag, after all that was published, of a run that nothing interrupted."""
+        settings = load_settings(config, environment={})
+        bench = Bench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
+        for delivery in self._sent:
+            bench.send(tag_name(delivery.tag), Frame(imu=delivery.imu, ranges=delivery.ranges))
+        found = {tag.name: bench.latest.row(tag.row) for tag in bench.tags.all()}
+        return {name: pose for name, pose in found.items() if pose is not None}
+
+    def _run(self) -> None:
+        every = deliveries(self._tags, "yard", self._seed, preset("calibrated"), self._t0_ns, self._step_s)
+        while not self._stop.is_set():
+            delivery = next(every)  # one message each
+            self._stop.wait(max(0.0, self._t0_ns * 1e-9 + delivery.due_s - time.time()))
+            self._publish(delivery)
+
+    def _publish(self, delivery: Delivery) -> None:
+        client = self._opened[delivery.tag]
+        for imu in delivery.imu:
+            client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns)
+        for heard in delivery.ranges:
+            client.publish_range(heard.anchor, heard.range_m, t_ns=heard.t_ns, std_m=heard.std_m)
+        client.flush()
+        self._sent.append(delivery)
+        self.samples[tag_name(delivery.tag)].update(imu=len(delivery.imu), range=len(delivery.ranges))
+
+
+def distance(pose: Any, answer: dict[str, Any]) -> float:
+    """m, between POSE (0-d) and a pose as REST gives it."""
+    return float(np.hypot(pose["x"] - answer["x"], pose["y"] - answer["y"]))
