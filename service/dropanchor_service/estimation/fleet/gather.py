@@ -77,11 +77,11 @@ def _take(event: Any, front: Any, platform: Any, row: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def gather(events: Any, fronts: Any, platforms: Any, rows: Any, nodes: Any) -> int:
-    """Fill nodes (at least as many as events) and return their number."""
+def gather(events: Any, order: Any, fronts: Any, platforms: Any, rows: Any, nodes: Any) -> int:
+    """Fill nodes (at least as many as order) from the events in this order and return their number."""
     n = 0
-    for k in range(len(events)):
-        event = events[k]
+    for k in range(len(order)):
+        event = events[order[k]]
         row, front, platform = rows[event.row], fronts[event.row], platforms[event.row]
         node = nodes[n]
         if event.kind >= RANGE_EVENT:

@@ -279,18 +279,19 @@ def _continue(
 def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Work, beliefs: Any) -> int:
     """Run the nodes (of one row in order of time; a row's nodes may be apart) and write one belief per node.
 
-    Returns how many times the pool was too small.
+    Returns how many are left, because the pool has no room for another row.
     """
     work, scratch, t = workspace.hypotheses, workspace.scratch[0], tuning[0]
-    short = 0
     current = -1
     count = 0
     for k in range(len(nodes)):
         node = nodes[k]
         if node.row != current:
-            if current >= 0 and not store(rows[current], pool, work, count):
-                short += 1
+            if current >= 0:
+                store(rows[current], pool, work, count)
             current = node.row
+            if pool[0].free + rows[current].count < layout.KEEP:
+                return len(nodes) - k
             load(rows[current], pool, work)
             count = rows[current].count
         row = rows[current]
@@ -301,6 +302,6 @@ def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspa
             publish(work, count, row, node, anchors, t, belief, scratch)
         belief.state, belief.reason = row.state, row.reason
         belief.hypotheses = count
-    if current >= 0 and not store(rows[current], pool, work, count):
-        short += 1
-    return short
+    if current >= 0:
+        store(rows[current], pool, work, count)
+    return 0

@@ -112,6 +112,7 @@ SLOT: Final = np.dtype(
         ("next", np.int32),
         ("kind", np.int32),  # 0: heading reference exact, 1: it has an error of its own
         ("blocked", np.int32),  # 1: the range is now longer than the line of sight
+        ("free", np.int32),  # in slot 0: how many slots are free
         ("log_weight", np.float64),
         ("clear_offset", np.float64),  # offset before the line of sight was blocked
         ("clear_variance", np.float64),
@@ -194,4 +195,18 @@ def make_pool(capacity: int) -> npt.NDArray[np.void]:
     pool = np.zeros(capacity, SLOT)
     pool["next"] = np.arange(1, capacity + 1)
     pool["next"][-1] = -1
+    pool["free"][0] = capacity - 1
     return pool
+
+
+def with_room(pool: npt.NDArray[np.void], slots: int) -> npt.NDArray[np.void]:
+    """The pool, or a larger one with the same hypotheses, that has this many free slots."""
+    have, free = len(pool), int(pool["free"][0])
+    if free >= slots:
+        return pool
+    grown = make_pool(max(have + slots, 2 * have))
+    added = len(grown) - have
+    grown["next"][-1] = pool["next"][0]
+    grown[1:have] = pool[1:]
+    grown["next"][0], grown["free"][0] = have, free + added
+    return grown

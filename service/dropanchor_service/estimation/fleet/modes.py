@@ -18,7 +18,7 @@ def _heaviest(work: Any, count: int) -> int:
     return head
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def list_modes(row: Any, pool: Any, anchors: Any, workspace: Work, modes: Any) -> int:
     """Fill modes (HYPOTHESIS of `batch`) with the clusters above 1 %; returns their number."""
     count = row.count

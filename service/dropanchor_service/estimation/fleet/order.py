@@ -1,109 +1,121 @@
 """Samples of all kinds into one order of row and time; measurements wait until their row's IMU has caught up."""
 
 from collections import Counter
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array, SampleBatch
 
-from .gather import BEARING_EVENT, EVENT, HEADING_EVENT, IMU_EVENT, RANGE_EVENT
+from .arrange import CLOCK, NONE, REASONS, UNTOUCHED, Batch, Held, arrange, drop_held, hold
+from .gather import EVENT
 
-HOLD: Final = 250_000_000  # ns: the window in which late samples are put in order
-TOLERANCE: Final = 40_000_000  # ns that the IMU may lag behind a measurement
-SILENT: Final = 1_000_000_000  # ns without an IMU sample: nobody waits for it any more
 NEVER: Final = np.iinfo(np.int64).min // 2
+
+
+class Due(NamedTuple):
+    """events: EVENT; order: indices into it, by row, then time, then kind, then arrival. Valid until the next batch."""
+
+    events: Array
+    order: Array
 
 
 class Order:
     """What is waiting, and how far each row has come."""
 
     def __init__(self) -> None:
-        self._waiting = np.zeros(0, EVENT)
-        self._imu = np.zeros(0, np.int64)  # ns, newest inertial sample of each row
-        self._newest = np.zeros(0, np.int64)  # ns, newest sample of each row
+        self._rows = 0
+        self._clocks = _clocks(0)
+        self._held = _held(64)
+        self._batch = _batch(64)
+
+    def reach(self, rows: int) -> None:
+        """Make room for this many rows."""
+        self._rows = max(self._rows, rows)
+        missing = rows - len(self._clocks)
+        if missing > 0:
+            self._clocks = np.concatenate([self._clocks, _clocks(max(missing, len(self._clocks)))])
 
     def forget(self, row: int) -> None:
         """Start `row` afresh."""
-        self._reach(row + 1)
-        self._imu[row] = self._newest[row] = NEVER
-        self._waiting = self._waiting[self._waiting["row"] != row]
+        self.reach(row + 1)
+        drop_held(self._clocks[row], self._held)
+        self._clocks[row] = _clocks(1)[0]
 
     def state(self) -> dict[str, Array]:
-        return {"waiting": self._waiting.copy(), "imu": self._imu.copy(), "newest": self._newest.copy()}
+        waiting = [self._waiting(row) for row in np.flatnonzero(self._clocks["waiting"] != NONE).tolist()]
+        return {
+            "waiting": np.concatenate([np.zeros(0, EVENT), *waiting]),
+            "imu": self._clocks["imu"][: self._rows].copy(),
+            "newest": self._clocks["newest"][: self._rows].copy(),
+        }
 
     def restore(self, state: dict[str, Array]) -> None:
-        self._waiting, self._imu, self._newest = state["waiting"], state["imu"], state["newest"]
+        self._held, self._batch = _held(64), _batch(64)
+        self._rows = len(state["imu"])
+        self._clocks = _clocks(self._rows)
+        self._clocks["imu"], self._clocks["newest"] = state["imu"], state["newest"]
+        self._make_room(0, len(state["waiting"]))
+        for event in state["waiting"]:
+            hold(self._clocks[event["row"]], self._held, event)
 
-    def due(self, samples: SampleBatch, anchors: int, rejected: Counter[str]) -> Array:
-        """EVENT by row, then time, then kind, then arrival; counts what is not usable in `rejected`."""
-        fresh = _usable(_events(samples), anchors, rejected)
-        if len(fresh):
-            self._reach(int(fresh["row"].max()) + 1)
-        fresh = self._in_time(fresh, rejected)
-        inertial = fresh["kind"] == IMU_EVENT
-        np.maximum.at(self._imu, fresh["row"][inertial], fresh["t_ns"][inertial])
-        np.maximum.at(self._newest, fresh["row"], fresh["t_ns"])
-        events = np.concatenate([self._waiting, fresh])
-        ready = self._ready(events)
-        self._waiting = events[~ready]
-        events = events[ready]
-        return np.asarray(events[np.lexsort((events["kind"], events["t_ns"], events["row"]))])
+    def due(self, samples: SampleBatch, anchors: int, rejected: Counter[str]) -> Due:
+        """What can be fused now; counts what is not usable in `rejected`."""
+        columns = (samples.imu, samples.headings, samples.ranges, samples.bearings)
+        for column in columns:
+            if len(column) and not 0 <= column["row"].min() <= column["row"].max() < self._rows:
+                raise IndexError("samples of a row that is not configured")
+        count = sum(map(len, columns))
+        self._make_room(count, count - len(samples.imu))
+        ordered = arrange(*columns, anchors, self._clocks, self._held, self._batch)
+        for reason, index in REASONS.items():
+            if self._batch.counts[index]:
+                rejected[reason] += int(self._batch.counts[index])
+        return Due(self._batch.events, self._batch.order[:ordered])
 
-    def _ready(self, events: Array) -> Any:
-        imu, newest, t = self._imu[events["row"]], self._newest[events["row"]], events["t_ns"]
-        waited = newest - t >= HOLD
-        silent = newest - imu > SILENT
-        return (events["kind"] == IMU_EVENT) | (imu >= t - TOLERANCE) | waited | silent
+    def _make_room(self, samples: int, measurements: int) -> None:
+        held = self._held.counts[0]
+        if held + measurements >= len(self._held.events):
+            self._held = _enlarged(self._held, 2 * (held + measurements))
+        if samples + held > len(self._batch.events):
+            self._batch = _batch(2 * (samples + held))
 
-    def _in_time(self, events: Array, rejected: Counter[str]) -> Array:
-        """Inertial samples and headings cannot be used behind the newest one, measurements behind the window."""
-        rows = events["row"]
-        inertial = events["kind"] == IMU_EVENT
-        late = np.where(inertial, events["t_ns"] < self._imu[rows], events["t_ns"] < self._newest[rows] - HOLD)
-        if late.any():
-            rejected["late"] += int(late.sum())
-        return np.asarray(events[~late])
-
-    def _reach(self, rows: int) -> None:
-        missing = rows - len(self._imu)
-        if missing > 0:
-            never = np.full(missing, NEVER, np.int64)
-            self._imu = np.concatenate([self._imu, never])
-            self._newest = np.concatenate([self._newest, never])
+    def _waiting(self, row: int) -> Array:
+        slots, slot = [], self._clocks[row]["waiting"]
+        while slot != NONE:
+            slots.append(slot)
+            slot = self._held.following[slot]
+        return self._held.events[slots]
 
 
-def _events(samples: SampleBatch) -> Array:
-    """All samples as EVENT, in order of arrival within their kind."""
-    kinds = (
-        (IMU_EVENT, samples.imu, ()),
-        (HEADING_EVENT, samples.headings, ("heading", "std")),
-        (RANGE_EVENT, samples.ranges, ("range", "std")),
-        (BEARING_EVENT, samples.bearings, ("bearing", "std")),
-    )
-    parts = []
-    for kind, columns, names in kinds:
-        part = np.zeros(len(columns), EVENT)
-        part["row"], part["t_ns"], part["kind"] = columns["row"], columns["t_ns"], kind
-        for i, name in enumerate(names):
-            part["value"][:, i] = columns[name]
-        if kind >= RANGE_EVENT:
-            part["anchor"] = columns["anchor"]
-        if kind == IMU_EVENT:
-            part["value"][:, 0:3], part["value"][:, 3:6] = columns["acc"], columns["gyro"]
-            part["value"][:, 6:9] = columns["mag"]
-        parts.append(part)
-    return np.concatenate(parts)
+def _clocks(rows: int) -> Array:
+    """CLOCK of rows that have heard nothing."""
+    clocks = np.zeros(rows, CLOCK)
+    clocks["imu"] = clocks["newest"] = NEVER
+    clocks["first"] = UNTOUCHED
+    clocks["last"] = clocks["waiting"] = clocks["waiting_last"] = NONE
+    return clocks
 
 
-def _usable(events: Array, anchors: int, rejected: Counter[str]) -> Array:
-    """Values are screened before; this keeps the rows safe all the same."""
-    measures = events["kind"] >= RANGE_EVENT
-    unknown = measures & ((events["anchor"] < 0) | (events["anchor"] >= anchors))
-    first = np.where(events["kind"] == IMU_EVENT, events["value"][:, 3:6].sum(axis=1), events["value"][:, 0])
-    broken = ~np.isfinite(first) & ~unknown
-    broken |= (events["kind"] == BEARING_EVENT) & ~(events["value"][:, 1] > 0.0) & ~unknown
-    for reason, bad in (("anchor_unknown", unknown), ("not_finite", broken)):
-        if bad.any():
-            rejected[reason] += int(bad.sum())
-    return events[~(unknown | broken)]
+def _held(slots: int) -> Held:
+    following = np.arange(1, slots + 1, dtype=np.int32)
+    following[-1] = NONE
+    return Held(np.zeros(slots, EVENT), following, np.zeros(1, np.int64))
+
+
+def _enlarged(held: Held, slots: int) -> Held:
+    """The same slots in use, and more of them free."""
+    grown, have = _held(slots), len(held.events)
+    grown.events[:have] = held.events
+    grown.following[:have] = held.following
+    tail = 0
+    while grown.following[tail] != NONE:
+        tail = int(grown.following[tail])
+    grown.following[tail] = have
+    grown.counts[:] = held.counts
+    return grown
+
+
+def _batch(samples: int) -> Batch:
+    following, order, spare, touched = np.zeros((4, samples), np.int32)
+    return Batch(np.zeros(samples, EVENT), following, order, spare, touched, np.zeros(5, np.int64))

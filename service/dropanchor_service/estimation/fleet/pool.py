@@ -27,10 +27,9 @@ def load(row: Any, pool: Any, work: Any) -> None:
 
 
 @njit(nogil=True)
-def store(row: Any, pool: Any, work: Any, count: int) -> bool:
-    """Pack work back, taking or returning slots; False when the pool ran dry and hypotheses were dropped."""
-    count = min(count, KEEP)
-    fits = _resize(row, pool, count)
+def store(row: Any, pool: Any, work: Any, count: int) -> None:
+    """Pack work back, taking or returning slots: KEEP at most."""
+    _resize(row, pool, min(count, KEEP))
     slot = row.head
     for h in range(row.count):
         stored = pool[slot]
@@ -46,7 +45,6 @@ def store(row: Any, pool: Any, work: Any, count: int) -> bool:
                 stored.cov[k] = work[h].cov[i, j]
                 k += 1
         slot = stored.next
-    return fits
 
 
 @njit(nogil=True)
@@ -57,26 +55,25 @@ def mirror(P: Any) -> None:
             P[i, j] = P[j, i]
 
 
-@njit(nogil=True)
+@njit(nogil=True, cache=True)
 def release(row: Any, pool: Any) -> None:
     """Give all slots of the row back."""
     _resize(row, pool, 0)
 
 
 @njit(nogil=True)
-def _resize(row: Any, pool: Any, count: int) -> bool:
+def _resize(row: Any, pool: Any, count: int) -> None:
     while row.count > count:
         slot = row.head
         row.head = pool[slot].next
         pool[slot].next = pool[0].next
         pool[0].next = slot
+        pool[0].free += 1
         row.count -= 1
     while row.count < count:
         slot = pool[0].next
-        if slot < 0:
-            return False
         pool[0].next = pool[slot].next
+        pool[0].free -= 1
         pool[slot].next = row.head
         row.head = slot
         row.count += 1
-    return True

@@ -6,12 +6,12 @@ import numpy as np
 
 from dropanchor_service.estimation.batch import Array, State, StateReason
 
-from .engine import poses_of
 from .heading import error_of
 from .lag import describe_all, smooth_lagged
 from .layout import COMMON, PHI, REF, STEADY, YAW, V
 from .lineage import trace_back
 from .node import ABSOLUTE_HEADING, RANGE
+from .outputs import poses_of
 from .smoother import Track, make_track, smooth
 from .summary import add_reference
 from .trace import TracingEngine

@@ -9,7 +9,7 @@ from dropanchor_service.estimation.batch import Array
 from .compiled import njit
 from .engine import FleetEngine
 from .kernel import advance
-from .layout import BELIEF, N, Work
+from .layout import BELIEF, KEEP, N, Work, with_room
 from .manage import put_in_order
 from .node import NODE
 from .pool import load
@@ -61,6 +61,7 @@ class TracingEngine(FleetEngine):
 
     def _believe(self, nodes: Array) -> Array:
         beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
+        self._pool = with_room(self._pool, KEEP * len(np.unique(nodes["row"])))
         advance_traced(self._rows, self._pool, nodes, self._anchors, self._numbers, self._work, beliefs, traces)
         self._steps.append((nodes, beliefs, traces))
         return beliefs

@@ -203,3 +203,43 @@ def test_the_last_innovations_can_be_explained() -> None:
     assert (told["S"] > 0).all()
     assert np.abs(told["innovation"] / np.sqrt(told["S"])).mean() < 2.0
     assert ((told["p_outlier"] >= 0) & (told["p_outlier"] <= 1)).all()
+
+
+def test_samples_of_one_batch_may_come_in_any_order() -> None:
+    batch, _ = samples(2006)
+    rng = np.random.default_rng(1)
+    shuffled = SampleBatch(*(c[rng.permutation(len(c))] for c in (batch.imu, batch.ranges, batch.headings)))
+    assert engine().process(shuffled).poses.tobytes() == engine().process(batch).poses.tobytes()
+
+
+def test_many_unknown_starts_at_once_have_room_for_their_hypotheses() -> None:
+    alone, _ = samples(2007)
+    alone = cut(alone, 0, 3_000_000_000)
+    rows = 40
+    many = SampleBatch(*(np.tile(c, rows) for c in (alone.imu, alone.ranges, alone.headings)))
+    for column in (many.imu, many.ranges, many.headings):
+        column["row"] = np.repeat(np.arange(rows), len(column) // rows)
+    expected, found = engine(known=False).process(alone), engine(rows, known=False).process(many)
+    for row in (0, 17, rows - 1):
+        own = found.poses[found.poses["row"] == row].copy()
+        own["row"] = 0
+        assert own.tobytes() == expected.poses.tobytes()
+        assert (found.hypotheses["row"] == row).sum() == len(expected.hypotheses) > 1
+
+
+def test_samples_of_a_row_that_is_not_configured_are_an_error() -> None:
+    batch, _ = samples(2008, row=1)
+    with pytest.raises(IndexError, match="not configured"):
+        engine(1).process(batch)
+
+
+def test_what_waits_is_part_of_the_state() -> None:
+    batch, _ = samples(2009)
+    fleet, restored = engine(3), FleetEngine(CALIBRATED)
+    ahead = SampleBatch(batch.imu[:1000], batch.ranges[:110], batch.headings[:110])
+    fleet.process(ahead)
+    assert len(fleet.state()["waiting"]) > 0
+    restored.set_anchors(np.zeros(1, ANCHOR))
+    restored.restore(fleet.state())
+    rest = SampleBatch(batch.imu[1000:], batch.ranges[110:], batch.headings[110:])
+    assert restored.process(rest).poses.tobytes() == fleet.process(rest).poses.tobytes()

@@ -1,0 +1,110 @@
+"""What leaves the engine: poses, innovations and modes, written out of nodes and beliefs in compiled code."""
+
+from typing import Any, Final
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
+
+from .compiled import njit
+from .layout import AMBIGUOUS, Work
+from .modes import list_modes
+from .node import RANGE
+
+MODES: Final = 8
+REFUSED: Final = 0.5  # probability of an outlier above which a measurement hardly moved the belief
+OF_RANGE, OF_BEARING = int(MeasurementKind.RANGE), int(MeasurementKind.BEARING)
+
+
+def poses_of(nodes: Array, beliefs: Array) -> Array:
+    """POSE of every node (NODE) that ended with a range, from its BELIEF."""
+    poses = np.zeros(len(nodes), POSE)
+    return poses[: _write_poses(nodes, beliefs, poses)]
+
+
+def innovations_of(nodes: Array, beliefs: Array, rows: Array) -> Array:
+    """INNOVATION of the nodes whose measurement met a running belief, in the units of the measurement.
+
+    The belief compares ranges z / scale; here z = predicted + innovation holds for what was measured.
+    """
+    records = np.zeros(len(nodes), INNOVATION)
+    return records[: _write_innovations(nodes, beliefs, rows, records)]
+
+
+def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, work: Work) -> Array:
+    """HYPOTHESIS, the modes of each row whose last node left it ambiguous. A row's nodes are together."""
+    modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
+    return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, work, modes)]
+
+
+@njit(cache=True, nogil=True)
+def _write_poses(nodes: Any, beliefs: Any, poses: Any) -> int:
+    n = 0
+    for k in range(len(nodes)):
+        node, belief = nodes[k], beliefs[k]
+        if node.kind != RANGE:
+            continue
+        pose = poses[n]
+        n += 1
+        pose.row, pose.t_ns, pose.anchor, pose.range = node.row, node.t_ns, node.anchor, node.z
+        pose.state, pose.reason, pose.yaw_rate = belief.state, belief.reason, belief.yaw_rate
+        known = belief.hypotheses > 0
+        pose.x = belief.x if known else np.nan
+        pose.y = belief.y if known else np.nan
+        pose.heading = belief.course if known else np.nan
+        pose.speed = belief.speed if known else np.nan
+        pose.p_mode = belief.p_mode if known else np.nan
+        pose.sigma_pos = belief.sigma_pos if known else np.nan
+        pose.sigma_obs = belief.sigma_obs if known else np.nan
+        for i in range(3):
+            for j in range(3):
+                pose.cov[i, j] = belief.cov[i, j] if known else np.nan
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _write_innovations(nodes: Any, beliefs: Any, rows: Any, records: Any) -> int:
+    n = 0
+    for k in range(len(nodes)):
+        node, belief = nodes[k], beliefs[k]
+        if not belief.innovation_variance > 0.0:
+            continue
+        record = records[n]
+        n += 1
+        unit = rows[node.row].range_scale if node.kind == RANGE else 1.0
+        record.row, record.t_ns, record.anchor = node.row, node.t_ns, node.anchor
+        record.kind = OF_RANGE if node.kind == RANGE else OF_BEARING
+        record.measured = node.z
+        record.innovation = belief.innovation * unit
+        record.predicted = node.z - record.innovation
+        record.S = belief.innovation_variance * unit**2
+        record.p_outlier = belief.p_outlier
+        record.fused = belief.p_outlier < REFUSED
+    return n
+
+
+@njit(nogil=True)
+def _left_ambiguous(nodes: Any, beliefs: Any, k: int) -> bool:
+    last = k + 1 == len(nodes) or nodes[k + 1].row != nodes[k].row
+    return bool(last and beliefs[k].state == AMBIGUOUS)
+
+
+@njit(cache=True, nogil=True)
+def _count_ambiguous(nodes: Any, beliefs: Any) -> int:
+    count = 0
+    for k in range(len(nodes)):
+        count += _left_ambiguous(nodes, beliefs, k)
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _write_modes(nodes: Any, beliefs: Any, rows: Any, pool: Any, anchors: Any, work: Work, modes: Any) -> int:
+    n = 0
+    for k in range(len(nodes)):
+        if _left_ambiguous(nodes, beliefs, k):
+            row = nodes[k].row
+            found = list_modes(rows[row], pool, anchors, work, modes[n : n + MODES])
+            for mode in range(n, n + found):
+                modes[mode].row = row
+            n += found
+    return n
