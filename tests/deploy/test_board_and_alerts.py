@@ -33,9 +33,10 @@ def expressions() -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def exposed() -> dict[str, dict[str, set[str]]]:
+def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set[str]]]:
     """Of a running service: metric → label → the values seen."""
-    with running_service("--engine", "paper") as service:
+    folder = tmp_path_factory.mktemp("data")
+    with running_service("--engine", "paper", "--data-dir", str(folder)) as service:
         text = httpx.get(f"{service.url}/metrics").text
     found: dict[str, dict[str, set[str]]] = {}
     for family in text_string_to_metric_families(text):

@@ -2,6 +2,8 @@
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -16,6 +18,10 @@ from schemathesis.specs.openapi.checks import positive_data_acceptance
 
 from api_house import make_house
 from dropanchor_schemas.site import Anchor, Georeference, Site
+from dropanchor_schemas.wire import ENCODING_PACKED
+from dropanchor_service.recording.folder import Limits
+from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.store.tracks import Keeping
 
 Operation = APIOperation[Any, Any, Any, Any]
 
@@ -33,9 +39,19 @@ schemathesis.openapi.format(
 )
 
 
+FOLDER = TemporaryDirectory(prefix="dropanchor-contract-")  # for as long as the module is there
+
+
 def operations() -> Iterator[Operation]:
-    house = make_house(Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4)))
+    site, folder = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4)), Path(FOLDER.name)
+    house = make_house(site, folder, Keeping(1, 0.0, 0, 10**18, 2**40))
+    limits = Limits(2**30, 10**18, 1000, 10**18, 2**40)
+    house.recorder = Recorder(folder, limits, 1, house.answers.tags, house.answers.site, house.answers.now_ns, {})
+    house.recorder.start()
     house.move("tag-1", "a")
+    house.keep()
+    house.recorder.messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
+    house.recorder.writer.turn()
     house.stopping.set()  # a stream ends after its first event
     load_all_checks()
     document = schemathesis.openapi.from_asgi("/api/v1/openapi.json", house.app())

@@ -115,3 +115,18 @@ def test_a_writer_that_was_killed_in_the_middle_loses_only_what_was_not_committe
     assert len(times(TrackReader(torn / "h.sqlite"), "a")) == 100
     writer._connection.execute("ROLLBACK")
     writer.close()
+
+
+def test_a_reader_that_takes_its_time_blocks_no_writer(tmp_path: Path) -> None:
+    path = tmp_path / "h.sqlite"
+    writer = TrackWriter(path)
+    writer.insert(poses(*range(100)), ["a"] * 100, [None] * 100)
+    slow = sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)
+    rows = slow.execute("SELECT t_ns FROM poses")
+    assert rows.fetchone() is not None
+    writer.insert(poses(*range(100, 200)), ["a"] * 100, [None] * 100)
+    assert writer.prune(T_NS + 50 * SECOND, LONG) == 1
+    assert len(rows.fetchall()) == 99  # what there was when it began
+    slow.close()
+    assert len(times(TrackReader(path), "a")) == 190
+    writer.close()
