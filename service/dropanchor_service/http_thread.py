@@ -4,8 +4,20 @@ import asyncio
 import socket
 import threading
 import time
+from typing import Any
 
 import uvicorn
+
+
+HANDSHAKE_S = 10.0
+
+
+class _Loop(asyncio.SelectorEventLoop):
+    """Cuts clients that do not get on with TLS. asyncio gives them a minute, and uvicorn has no setting for it."""
+
+    async def create_server(self, *args: Any, **options: Any) -> asyncio.Server:  # type: ignore[override]
+        handshake = {"ssl_handshake_timeout": HANDSHAKE_S} if options.get("ssl") else {}
+        return await super().create_server(*args, **options, **handshake)
 
 
 class HttpThread:
@@ -35,4 +47,5 @@ class HttpThread:
         return self._thread.is_alive()
 
     def _run(self) -> None:
-        asyncio.run(self._server.serve(sockets=[self._bound]))
+        with asyncio.Runner(loop_factory=_Loop) as runner:
+            runner.run(self._server.serve(sockets=[self._bound]))

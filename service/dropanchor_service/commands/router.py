@@ -4,7 +4,7 @@ import argparse
 import logging
 import sys
 
-from dropanchor_service import logs
+from dropanchor_service import logs, open_files
 from dropanchor_service.commands.options import add_log_option, add_security_options, router_settings
 from dropanchor_service.credentials import credentials_of
 from dropanchor_service.exposure import refuse_exposure
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 2 when it could not start."""
     logs.configure(arguments.log_level)
+    open_files.allow_all()
     try:
         settings = router_settings(arguments)
         credentials = credentials_of(settings)

@@ -4,7 +4,7 @@ import argparse
 import sys
 from typing import Protocol
 
-from dropanchor_service import logs
+from dropanchor_service import logs, open_files
 from dropanchor_service.api.server import ListenError
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.service import Service
@@ -44,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 1 when it died, 2 when it could not start."""
     logs.configure(arguments.log_level)
+    open_files.allow_all()
     systemd = Systemd()
     try:
         with interrupts() as interrupt, Service(settings_of(arguments)) as service:

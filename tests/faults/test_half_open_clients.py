@@ -1,0 +1,104 @@
+"""Clients that connect and say nothing harm nobody: a real service, sockets on the loopback. What nobody reads of a
+stream is tried in `tests/service/api/test_server.py`."""
+
+import os
+import resource
+import socket
+import statistics
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import cycle
+from pathlib import Path
+
+import httpx
+
+from support.secured import secured_site
+from support.service import Running, running_service
+from support.zenoh_router import connected_session
+
+HTTP_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_HTTP", "200"))
+ZENOH_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_ZENOH", "100"))
+"""1,000 and 300 in the figures of the README, which `pytest -s` prints."""
+
+PATIENCE_S = 60.0
+
+
+@contextmanager
+def half_open(port: int, count: int, *said: bytes) -> Iterator[list[socket.socket]]:
+    with ExitStack() as opened:
+        clients = []
+        for _, words in zip(range(count), cycle(said), strict=False):
+            clients.append(opened.enter_context(socket.create_connection(("127.0.0.1", port), PATIENCE_S)))
+            clients[-1].sendall(words)
+        yield clients
+
+
+def http_port(service: Running) -> int:
+    return int(service.url.rpartition(":")[2])
+
+
+def timed_requests(service: Running, count: int) -> list[float]:
+    """How long each took, s; every one was answered."""
+    took = []
+    with httpx.Client(base_url=service.url, timeout=PATIENCE_S, trust_env=False) as client:
+        for _ in range(count):
+            begun = time.monotonic()
+            assert client.get("/api/v1/poses").status_code == 200
+            took.append(time.monotonic() - begun)
+    return took
+
+
+def print_times(name: str, seconds: list[float]) -> None:
+    p99 = statistics.quantiles(seconds, n=100)[98]
+    print(f"{name}: median {statistics.median(seconds) * 1e3:.1f} ms, p99 {p99 * 1e3:.1f} ms")  # noqa: T201
+
+
+def are_cut(clients: list[socket.socket]) -> bool:
+    try:
+        return all(client.recv(65536) == b"" for client in clients)
+    except ConnectionResetError:
+        return True
+
+
+def test_silent_http_sockets_keep_nobody_out_and_are_cut() -> None:
+    said = (b"", b"G", b"GET /api/v1/poses HTTP/1.1\r\nhost:")
+    with running_service() as service, half_open(http_port(service), HTTP_SOCKETS, *said) as clients:
+        print_times(f"REST beside {HTTP_SOCKETS} silent sockets", timed_requests(service, 300))
+        assert are_cut(clients)
+        assert service.stop() == 0
+
+
+def test_sockets_that_never_begin_tls_keep_nobody_out_and_are_cut(tmp_path: Path) -> None:
+    site = secured_site(tmp_path / "security")
+    arguments = ("--security", str(site.folder.path), "--zenoh-connect", site.endpoint)
+    with (
+        running_service(*arguments, ready=False, ca=site.folder.certificate("ca")) as service,
+        half_open(http_port(service), HTTP_SOCKETS, b"", b"\x16\x03") as clients,
+    ):
+        for _ in range(20):
+            assert service.ask("GET", "/api/v1/health/live").status_code == 200
+        assert are_cut(clients)
+
+
+def test_silent_zenoh_sockets_keep_no_tag_out() -> None:
+    with running_service() as service:
+        with half_open(int(service.zenoh.rpartition(":")[2]), ZENOH_SOCKETS, b"", b"\x00"):
+            opened = []
+            for _ in range(5):
+                begun = time.monotonic()
+                with connected_session(service.zenoh) as session:
+                    opened.append(time.monotonic() - begun)
+                    assert session.info.routers_zid()
+            print_times(f"Zenoh open beside {ZENOH_SOCKETS} silent sockets", opened)
+        assert service.stop() == 0
+
+
+def test_the_service_opens_as_many_sockets_as_the_system_allows_whatever_the_shell_says() -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(1024, hard), hard))
+    try:
+        with running_service() as service:
+            assert resource.prlimit(service.process.pid, resource.RLIMIT_NOFILE) == (hard, hard)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))

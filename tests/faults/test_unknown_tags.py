@@ -1,0 +1,74 @@
+"""A flood of tags that nobody knows takes no memory, and nothing from those that are known."""
+
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from dropanchor_schemas import keys
+from dropanchor_schemas.wire import ENCODING_PACKED, encode_packed
+from dropanchor_tag_client import TagClient
+from support.service import Running, running_service, settings_file, straight_north
+from support.zenoh_router import connected_session, wait_until
+
+UNKNOWN = int(os.environ.get("DROPANCHOR_UNKNOWN_TAGS_SENT", "5000"))
+"""100,000 in the figures of the README, which `pytest -s` prints."""
+
+NOTHING_LOST: dict[str, Any] = {
+    "encoding": ENCODING_PACKED,
+    "congestion_control": zenoh.CongestionControl.BLOCK,  # else the flood itself is thinned before it arrives
+}
+MIB = 2**20
+AT_MOST_MIB = 50.0
+
+
+def resident_mib(service: Running) -> float:
+    pages = int(Path(f"/proc/{service.process.pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / MIB
+
+
+def known_tag_sends(service: Running, client: TagClient, count: int = 20) -> int:
+    """How many of its samples were used so far."""
+    for sample in straight_north(count).ranges:
+        client.publish_range(7, sample.range_m, t_ns=sample.t_ns)
+        client.flush()
+    return int(service.get("/api/v1/tags/known")["messages"])
+
+
+@pytest.mark.parametrize(
+    ("policy", "reason", "registered"),
+    [('unknown_tags = "refuse"', "tag_unknown", 1), ('unknown_tags = "accept"\nmax_tags = 50', "tags_full", 50)],
+    ids=["refused", "full"],
+)
+def test_a_flood_of_unknown_tags_is_counted_and_costs_the_known_one_nothing(
+    tmp_path: Path, policy: str, reason: str, registered: int
+) -> None:
+    config = settings_file(tmp_path, ["known"], policy)
+    frame = encode_packed(straight_north(1))
+    with (
+        running_service("--config", str(config)) as service,
+        TagClient("known", connect=service.zenoh, connect_timeout_s=20) as known,
+        connected_session(service.zenoh) as stranger,
+    ):
+        wait_until(lambda: known_tag_sends(service, known) > 0)
+        sent_before, before_mib = known.sent.messages, resident_mib(service)
+        for number in range(UNKNOWN):
+            stranger.put(keys.samples_key("default", f"made-up-{number}"), frame, **NOTHING_LOST)
+            if number % (UNKNOWN // 20) == 0:
+                known_tag_sends(service, known, count=5)
+        refused = f'dropanchor_rejected_total{{reason="{reason}"}}'
+        shed = 'dropanchor_rejected_total{reason="shed"}'
+        wait_until(lambda: service.metric(refused) + service.metric(shed) >= UNKNOWN - registered, 60.0)
+        assert service.metric(refused) + service.metric(shed) == UNKNOWN - (registered - 1)
+        assert service.metric(refused) > 0
+        wait_until(lambda: service.get("/api/v1/tags/known")["messages"] == known.sent.messages)
+        assert known.sent.messages >= sent_before + 100
+        assert service.get("/api/v1/tags/known")["rejected"].get("shed", 0) == 0
+        assert service.metric("dropanchor_tags_registered") == registered
+        time.sleep(0.5)
+        more_mib = resident_mib(service) - before_mib
+        print(f"{UNKNOWN} unknown tags, {reason}: {more_mib:+.1f} MiB")  # noqa: T201
+        assert more_mib <= AT_MOST_MIB
