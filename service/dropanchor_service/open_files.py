@@ -1,4 +1,4 @@
-"""How many sockets and files the process may have open: as many as the system allows, not the 1,024 of a login shell."""
+"""How many sockets and files the process may open: as many as the system allows, not the 1,024 of a login shell."""
 
 import resource
 
