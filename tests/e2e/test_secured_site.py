@@ -1,16 +1,15 @@
 """A site with credentials from the first command to the pose: certificates, access control, keys, HTTPS."""
 
-import signal
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
 import pytest
 
 from dropanchor_service.cli import main
 from dropanchor_tag_client import TagClient, read_credentials
-from support.service import command, environment, running_service, straight_north
+from support.service import command, environment, running_router, running_service, straight_north
 from support.zenoh_router import free_port, wait_until
 
 
@@ -30,17 +29,8 @@ class Site:
         assert main([*words, "--security", str(self.path)]) == 0
         return self._capsys.readouterr().out.strip()
 
-    @contextmanager
-    def router(self) -> Iterator[None]:
-        words = command("router", "--security", str(self.path))
-        with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment()) as process:
-            try:
-                assert process.stderr is not None
-                assert "ready at" in process.stderr.readline()
-                yield
-            finally:
-                process.send_signal(signal.SIGTERM)
-                process.wait(10)
+    def router(self) -> AbstractContextManager[None]:
+        return running_router("--security", str(self.path))
 
     @contextmanager
     def tag(self, name: str) -> Iterator[TagClient]:

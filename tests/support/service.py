@@ -99,6 +99,20 @@ def running_service(
             process.stderr.close()
 
 
+@contextmanager
+def running_router(*arguments: str) -> Iterator[None]:
+    """`dropanchor router`, ended at the end."""
+    words = command("router", *arguments)
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment()) as process:
+        try:
+            assert process.stderr is not None
+            assert "ready at" in process.stderr.readline()
+            yield
+        finally:
+            process.send_signal(signal.SIGTERM)
+            process.wait(10)
+
+
 def _read(running: Running) -> None:
     assert running.process.stderr is not None
     for line in running.process.stderr:
