@@ -41,6 +41,11 @@ class Losses:
         if messages:
             self._metrics.given_up.inc(messages)
 
+    def clocks_jumped(self, times: int) -> None:
+        """Clocks of tags that were set, and whose samples go on without the jump."""
+        if times:
+            self._metrics.clock_jumps.inc(times)
+
     def tap_failed(self, error: Exception) -> None:
         """An error of ours."""
         self._metrics.faults.labels("tap").inc()

@@ -49,6 +49,9 @@ class Metrics:
             buckets=_SECONDS,
             registry=self.registry,
         )
+        self.clock_jumps = Counter(
+            "dropanchor_clock_jumps", "Clocks of tags that were set while they ran.", registry=self.registry
+        )
         self.caught_up = Counter(
             "dropanchor_caught_up_messages",
             "Messages that went on after the caches of their tag had been asked.",

@@ -59,7 +59,9 @@ class Preparation:
         self._losses.reject(Reason.DUPLICATE, of_row[sequenced.duplicates])
         for due in _one_of_each(sequenced.due, of_row):
             decoded, rejected = screen(read_samples(read, due))
-            offsets = self.publishers.utc_offsets(read.forms, replace(sequenced, due=due), arrived, _times(decoded))
+            in_part = replace(sequenced, due=due)
+            offsets, jumps = self.publishers.utc_offsets(read.forms, in_part, arrived, _times(decoded))
+            self._losses.clocks_jumped(jumps)
             yield self._batch(_in_utc(decoded, offsets, rejected), rejected, of_row)
 
     def _forms(self, payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array
-from dropanchor_service.passes import sequences
+from dropanchor_service.passes import clocks, sequences
 from dropanchor_service.passes.sequences import PER_TAG, PUBLISHER, WINDOW
 from dropanchor_service.passes.values import newest_times
 
@@ -75,18 +75,16 @@ class Publishers:
 
     def utc_offsets(
         self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]
-    ) -> Array:
-        """UTC minus the clock of each message's publisher, ns; empty when all have UTC.
+    ) -> tuple[Array, int]:
+        """UTC minus the clock of each message's publisher, ns, empty when all have UTC; and how many clocks jumped.
 
         samples: of each kind the index of the message and the time of every sample.
         """
-        if not forms["boot_clock"].any():
-            return np.zeros(0, np.int64)
         newest, offsets = np.full(len(forms), -1, np.int64), np.zeros(len(forms), np.int64)
         for messages, t_ns in samples:
             newest_times(t_ns, messages, newest)
-        sequences.utc_offsets(forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, offsets)
-        return offsets
+        jumps = clocks.utc_offsets(forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, offsets)
+        return offsets if offsets.any() else np.zeros(0, np.int64), jumps
 
     def _grow(self, rows: Array) -> None:
         missing = (int(rows.max(initial=-1)) + 1) * PER_TAG - len(self._columns)

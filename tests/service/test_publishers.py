@@ -150,7 +150,7 @@ def offset_of(publishers: Publishers, newest_ns: int, arrival_ns: int) -> int:
     arrivals = np.array([arrival_ns])
     sequenced = publishers.sequence(forms, np.zeros(1, np.int32), arrivals, 0)
     samples = [(np.zeros(1, np.int32), np.array([newest_ns]))]
-    return int(publishers.utc_offsets(forms, sequenced, arrivals, samples)[0])
+    return int(publishers.utc_offsets(forms, sequenced, arrivals, samples)[0][0])
 
 
 def test_a_boot_clock_is_mapped_by_the_message_with_the_least_delay() -> None:

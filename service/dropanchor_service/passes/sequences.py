@@ -32,12 +32,14 @@ PUBLISHER: Final = np.dtype(
         ("least_ns", "i8"),  # least delay of this epoch, and of the one before; NONE_NS: not yet
         ("previous_least_ns", "i8"),
         ("epoch_end_ns", "i8"),
+        ("newest_ns", "i8"),  # on its own clock, of its last message, and when that one arrived; 0: none yet
+        ("heard_ns", "i8"),
+        ("shift_ns", "i8"),  # what is added to a UTC that has jumped
         ("seen", "u8", _LANES),  # bit n % WINDOW: the message n has come
     ],
     align=True,
 )
 NONE_NS: Final = np.iinfo(np.int64).max
-EPOCH_NS: Final = 30_000_000_000
 
 
 @njit(nogil=True)
@@ -122,6 +124,7 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
     publisher.boot_id, publisher.next, publisher.status = boot_id, sequence, HEARD
     publisher.excused, publisher.used_ns, publisher.epoch_end_ns = False, arrival_ns, 0
     publisher.least_ns = publisher.previous_least_ns = NONE_NS
+    publisher.newest_ns = publisher.heard_ns = publisher.shift_ns = 0
     return found
 
 
@@ -138,7 +141,7 @@ def pass_in_order(
     for i in range(len(rows)):
         form = forms[i]
         slots[i], distances[i], verdicts[i] = -1, 0, PASS if form.accepted else REFUSED
-        if not form.accepted or not (form.numbered or form.boot_clock):
+        if not form.accepted:
             continue
         slots[i] = _slot(publishers, rows[i], form.boot_id, form.sequence, arrivals[i])
         if not form.numbered:
@@ -186,21 +189,3 @@ def release(ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any
             publisher.excused = False
         begin = end
     return missing
-
-
-@njit(cache=True, nogil=True)
-def utc_offsets(forms: Any, slots: Any, newest: Any, arrivals: Any, chosen: Any, publishers: Any, offsets: Any) -> None:
-    """UTC minus the publisher's clock, ns, for messages whose clock counts from the start of the tag; else 0.
-
-    It is the least difference seen between a message's newest sample and its arrival: the message with the least delay
-    tells most. The least of the last 30 to 60 s follows a drifting crystal. newest: ns, negative without a sample.
-    """
-    for i in chosen:
-        if not forms[i].boot_clock or newest[i] < 0:
-            continue
-        publisher = publishers[slots[i]]
-        if arrivals[i] >= publisher.epoch_end_ns:
-            publisher.previous_least_ns, publisher.least_ns = publisher.least_ns, NONE_NS
-            publisher.epoch_end_ns = arrivals[i] + EPOCH_NS
-        publisher.least_ns = min(publisher.least_ns, arrivals[i] - newest[i])
-        offsets[i] = min(publisher.least_ns, publisher.previous_least_ns)
