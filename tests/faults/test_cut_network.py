@@ -1,0 +1,72 @@
+"""A tag on another host, behind a link that is cut and that loses packets: no sample is lost."""
+
+import subprocess
+import sys
+import time
+
+from support.commands import environment
+from support.lossy_link import HERE, LossyLink, lossy_link
+from support.service import Running, running_service
+from support.zenoh_router import free_port, wait_until
+
+HZ = 20
+CUT_S = 8.0
+LOSSY_S = 5.0
+LOSS = 0.2
+
+# A sample in a message of its own, twenty times a second, until it is told to stop; then it stays for what was missed.
+TAG = f"""
+import sys, threading, time
+from dropanchor_tag_client import TagClient
+told = threading.Event()
+threading.Thread(target=lambda: (sys.stdin.readline(), told.set()), daemon=True).start()
+with TagClient("far", connect=sys.argv[1], batch_samples=1) as tag:
+    while not told.wait(1 / {HZ}):
+        tag.publish_range(7, 10.0 + 0.001 * tag.sent.samples)
+    print(tag.sent.samples, flush=True)
+    sys.stdin.readline()
+"""
+
+
+def used(service: Running) -> int:
+    """Samples of the tag that reached its estimator."""
+    found = [tag for tag in service.get("/api/v1/tags")["tags"] if tag["tag"] == "far"]
+    return int(found[0]["samples"].get("range", 0)) if found else 0
+
+
+def tell_to_stop(tag: subprocess.Popen[str]) -> None:
+    assert tag.stdin is not None
+    tag.stdin.write("\n")
+    tag.stdin.flush()
+
+
+def bad_times(service: Running, link: LossyLink) -> None:
+    """A cut, and then a link that loses a fifth of its packets."""
+    before = used(service)
+    link.loss = 1.0
+    time.sleep(CUT_S)
+    assert used(service) <= before + HZ, "the link was not cut"
+    link.loss = LOSS
+    time.sleep(LOSSY_S)
+
+
+def test_a_cut_of_eight_seconds_and_a_fifth_of_the_packets_lost_lose_no_sample() -> None:
+    endpoint = f"tcp/{HERE}:{free_port()}"
+    with lossy_link() as link, running_service("--insecure", "--zenoh-listen", endpoint) as service:
+        words = link.elsewhere(sys.executable, "-c", TAG, endpoint)
+        with subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()
+        ) as tag:
+            try:
+                wait_until(lambda: used(service) > HZ, 60.0)
+                bad_times(service, link)
+                tell_to_stop(tag)
+                assert tag.stdout is not None
+                sent = int(tag.stdout.readline())
+                wait_until(lambda: used(service) >= sent, 90.0)
+                assert used(service) == sent
+                assert service.metric("dropanchor_missed_messages_total") == 0
+                assert link.lost > 20
+                print(f"{sent} samples sent, {sent - used(service)} lost; {link.lost} packets lost")  # noqa: T201
+            finally:
+                tag.kill()

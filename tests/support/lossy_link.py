@@ -1,0 +1,87 @@
+"""Two hosts on this machine, a network namespace beside our own, and a link between them that loses packets.
+
+The link is this process: it carries the packets of two TUN devices, or does not. Kernels without `netem` can do it.
+"""
+
+import fcntl
+import os
+import random
+import select
+import struct
+import subprocess
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from threading import Event, Thread
+
+import pytest
+
+HERE, THERE = "198.51.100.1", "198.51.100.2"  # TEST-NET-2, RFC 5737
+_TUNSETIFF = 0x400454CA
+_TUN_WITHOUT_HEADER = 0x1001
+_MTU = 1500
+
+
+class LossyLink:
+    """loss: the share of packets that are lost from now on, each way. carried, lost: packets so far."""
+
+    def __init__(self, namespace: str) -> None:
+        self.namespace = namespace
+        self.loss = 0.0
+        self.carried = self.lost = 0
+
+    def elsewhere(self, *command: str) -> list[str]:
+        """The command, for the other host."""
+        return ["ip", "netns", "exec", self.namespace, *command]
+
+    def forward(self, devices: tuple[int, int], stop: Event) -> None:
+        chance = random.Random(15)
+        here, there = devices
+        while not stop.is_set():
+            for device in select.select(devices, [], [], 0.1)[0]:
+                packet = os.read(device, 2 * _MTU)
+                if chance.random() < self.loss:
+                    self.lost += 1
+                else:
+                    os.write(there if device == here else here, packet)
+                    self.carried += 1
+
+
+@contextmanager
+def lossy_link() -> Iterator[LossyLink]:
+    """Skips the test where no namespace can be made."""
+    if os.geteuid() != 0:
+        pytest.skip("network namespaces need root")
+    name = f"dropanchor-{os.getpid()}"
+    with ExitStack() as made:
+        try:
+            _ip("netns", "add", name)
+            made.callback(_ip, "netns", "del", name)
+            devices = _device(f"da{os.getpid()}"), _device(f"db{os.getpid()}")
+        except (OSError, subprocess.CalledProcessError) as error:
+            pytest.skip(f"no network namespace or TUN device can be made here: {error}")
+        for device in devices:
+            made.callback(os.close, device)
+        link, stop = LossyLink(name), Event()
+        _address(f"da{os.getpid()}", HERE, THERE, [])
+        _ip("link", "set", f"db{os.getpid()}", "netns", name)
+        _address(f"db{os.getpid()}", THERE, HERE, link.elsewhere())
+        thread = Thread(target=link.forward, args=(devices, stop))
+        thread.start()
+        made.callback(thread.join)
+        made.callback(stop.set)
+        yield link
+
+
+def _device(name: str) -> int:
+    device = os.open("/dev/net/tun", os.O_RDWR)
+    fcntl.ioctl(device, _TUNSETIFF, struct.pack("16sH22x", name.encode(), _TUN_WITHOUT_HEADER))
+    return device
+
+
+def _address(device: str, own: str, peer: str, where: list[str]) -> None:
+    subprocess.run([*where, "ip", "addr", "add", own, "peer", peer, "dev", device], check=True)
+    subprocess.run([*where, "ip", "link", "set", device, "up"], check=True)
+
+
+def _ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True, capture_output=True)
