@@ -18,6 +18,8 @@ from dropanchor_service.store.answers import Answer, Answers, to_json
 from dropanchor_service.store.at_time import NoPoseThenError
 from dropanchor_service.store.tags import Tag
 
+FROM_DISK = 100  # tags of one query
+
 Reply = tuple[str, bytes]
 """Key and JSON."""
 
@@ -80,10 +82,11 @@ class ZenohAnswers:
         return None if tag is None else self._answers.pose_of(tag)
 
     def _poses_at(self, tags: Sequence[Tag], at_ns: int) -> Iterator[Answer]:
-        """Of those tags that have a pose for that time."""
+        """Of those tags that have a pose for that time; the history on disk is asked for a few tags only, because other
+        queries wait meanwhile."""
         for tag in tags:
-            with suppress(QueryError):
-                pose = self._pose(tag.name, at_ns)
+            with suppress(NoPoseThenError):
+                pose = self._answers.pose_at(tag.name, at_ns, from_disk=len(tags) <= FROM_DISK)
                 if pose is not None:
                     yield pose
 

@@ -1,8 +1,10 @@
 """Recordings: what comes in and out goes into files that viewers open, a kill cannot harm and a replay repeats."""
 
 import json
+import os
 import resource
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -222,6 +224,35 @@ def test_a_full_disk_loses_nothing_that_still_waits_and_leaves_a_whole_file(tmp_
     assert desk.recorder.writer.problem is None
     assert len(desk.payloads()) == len(set(desk.payloads())) == 40
     assert desk.recorder.files()[0].finished
+
+
+@pytest.mark.parametrize("nth", range(1, 6))
+def test_a_write_that_fails_halfway_leaves_nothing_and_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nth: int
+) -> None:
+    desk, calls, write = Desk(tmp_path), count(1), os.write
+
+    def failing(fd: int, data: Any) -> int:
+        if next(calls) != nth:
+            return write(fd, data)
+        write(fd, data[: len(data) // 2])
+        raise OSError(5, "Input/output error")
+
+    desk.recorder.start()
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "write", failing)
+        outcomes = []
+        for _ in range(6):
+            desk.hear(5)
+            outcomes.append(desk.write())
+    assert outcomes.count(False) == 1
+    desk.recorder.stop()
+    assert desk.write()
+    (path,) = desk.paths()
+    reader = RecordingReader(path)
+    payloads = [message[1] for turn in reader.turns() for message in turn.messages]
+    assert len(payloads) == len(set(payloads)) == 30
+    assert reader.torn is None
 
 
 def test_what_is_no_recording_of_ours_is_refused(tmp_path: Path) -> None:

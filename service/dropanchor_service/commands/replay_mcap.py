@@ -5,9 +5,11 @@ import csv
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from tqdm import tqdm
 
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.recording.mcap_file import SESSION
 from dropanchor_service.recording.offline import OfflineService, settings_of
 from dropanchor_service.recording.reading import RecordingReader, Turn
 from dropanchor_service.settings_sources import load_settings
@@ -22,6 +25,7 @@ from dropanchor_tag_client.recording import RecordingError
 
 COLUMNS = ("tag", "t_ns", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
 SAME_M = 1e-9
+Write = Callable[[Iterable[list[Any]]], None]
 MOST_WAITING = 100_000  # poses that wait for what was recorded of them
 
 
@@ -34,31 +38,50 @@ def files_of(path: Path) -> list[Path]:
 
 def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
     """0 when it ran to the end. Raises RecordingError, SettingsError, OSError."""
-    readers = [RecordingReader(file) for file in files]
-    turns = (turn for reader in readers for turn in reader.turns())
-    first = next(turns, None)
-    if first is None or first.site is None:
-        raise RecordingError(f"{files[0]} holds nothing")
-    service = OfflineService(
-        settings_of(readers[0].about, load_settings(arguments.config), arguments.engine), first.site
-    )
-    outcome = Outcome()
     with ExitStack() as stack:
-        write = None
+        write: Write = _nowhere
         if arguments.out:
             writer = csv.writer(stack.enter_context(arguments.out.open("w", newline="")))
             writer.writerow(COLUMNS)
             write = writer.writerows
-        for turn, poses in service.poses_of(tqdm(_again(first, turns), unit=" turns", unit_scale=True)):
-            tags = [service.tags.at(row).name for row in poses["row"].tolist()]
-            outcome.add(turn, tags, poses)
-            if write is not None:
-                write(_rows(tags, poses))
+        for session, group in groupby(files, _session):
+            _replay_session(arguments, [RecordingReader(file) for file in group], session, write)
+    if arguments.out:
+        print(f"poses: {arguments.out}")
+    return 0
+
+
+def _nowhere(_: Iterable[list[Any]]) -> None:
+    pass
+
+
+def _session(file: Path) -> str:
+    """Of the recording that the file is a part of: another one begins with estimators of its own."""
+    reader = RecordingReader(file)
+    next(reader.turns(), None)
+    return reader.about.get(SESSION, file.name)
+
+
+def _replay_session(
+    arguments: argparse.Namespace, readers: Sequence[RecordingReader], session: str, write: Write
+) -> None:
+    turns = (turn for reader in readers for turn in reader.turns())
+    first = next(turns, None)
+    if first is None or first.site is None:
+        raise RecordingError(f"{readers[0].path} holds nothing")
+    settings = settings_of(readers[0].about, load_settings(arguments.config), arguments.engine)
+    service, outcome = OfflineService(settings, first.site), Outcome()
+    print(f"recorded {_utc(first.t_ns)}, {len(readers)} file(s), engine {settings.engine}")
+    for turn, poses in service.poses_of(tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc=session)):
+        tags = [service.tags.at(row).name for row in poses["row"].tolist()]
+        outcome.add(turn, tags, poses)
+        write(_rows(tags, poses))
     for line in [*outcome.lines(), *_losses(service, readers)]:
         print(line)
-    if arguments.out:
-        print(f"{sum(outcome.poses.values())} poses: {arguments.out}")
-    return 0
+
+
+def _utc(t_ns: int) -> str:
+    return f"{datetime.fromtimestamp(t_ns // 10**9, UTC):%Y-%m-%dT%H:%M:%SZ}"
 
 
 @dataclass
@@ -112,11 +135,6 @@ class Outcome:
             self.worst_m = max(self.worst_m, math.inf if math.isnan(off_m) else off_m)
         self._estimates = left[-MOST_WAITING:]
         self._places.clear()
-
-
-def _again(first: Turn, rest: Iterator[Turn]) -> Iterator[Turn]:
-    yield first
-    yield from rest
 
 
 def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:

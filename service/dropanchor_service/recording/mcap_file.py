@@ -13,6 +13,7 @@ from dropanchor_service.recording import schemas
 
 PROFILE = "dropanchor"
 METADATA = "dropanchor"
+SESSION = "session"  # in the metadata: the same in files that continue each other
 MOST_CHANNELS = 65_000  # their ids are u16
 
 

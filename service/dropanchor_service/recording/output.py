@@ -87,11 +87,17 @@ class Output:
         """Raises OSError, and may then be called again with the same items and more: none is written twice."""
         if self._file is not None and self._is_full(self._file):
             self._finish()
-        for item in items[self._taken :]:
-            self._take(item)
-            self._taken += 1
-        if self._file is not None:
-            self._file.drain()
+        try:
+            for item in items[self._taken :]:
+                self._take(item)
+                self._taken += 1
+            if self._file is not None:
+                self._file.drain()
+        except OSError:
+            raise
+        except Exception:  # a mistake of ours: these items do not come again
+            self._taken = 0
+            raise
         self._taken = 0
         if time.monotonic() - self._pruned_s > PRUNE_S:
             self._pruned_s = time.monotonic()

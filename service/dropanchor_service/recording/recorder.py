@@ -11,7 +11,7 @@ from dropanchor_service.background import BackgroundWriter
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.recording import folder as files
 from dropanchor_service.recording.folder import Limits, RecordedFile
-from dropanchor_service.recording.mcap_file import McapFile
+from dropanchor_service.recording.mcap_file import SESSION, McapFile
 from dropanchor_service.recording.output import End, Item, Messages, Output, Poses, Samples, SiteChange
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
@@ -58,6 +58,7 @@ class Recorder:
         self._about = about
         self._running: Running | None = None
         self._site_version = 0
+        self._session = ""
         self._thinning = Thinning(pose_period_ns)
         self._output = Output(self._new_file, self._prune, limits, tags, site)
         self.writer: BackgroundWriter[Item] = BackgroundWriter(
@@ -102,7 +103,9 @@ class Recorder:
             return False
         self._site_version = 0
         self._thinning = Thinning(self._pose_period_ns)
-        self._running = Running(self._now_ns(), None if tags is None else tuple(tags))
+        since_ns = self._now_ns()
+        self._session = str(since_ns)
+        self._running = Running(since_ns, None if tags is None else tuple(tags))
         return True
 
     def stop(self) -> bool:
@@ -140,7 +143,8 @@ class Recorder:
 
     def _new_file(self, t_ns: int) -> McapFile:
         self.folder.mkdir(parents=True, exist_ok=True)
-        return McapFile(self.folder / files.new_name(chunk_from_id(self._site.site.id), t_ns), self._about)
+        name = files.new_name(chunk_from_id(self._site.site.id), t_ns)
+        return McapFile(self.folder / name, {**self._about, SESSION: self._session})
 
     def _prune(self, open_name: str | None) -> None:
         files.prune(self.folder, self._limits, open_name)

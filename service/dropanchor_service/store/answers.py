@@ -53,20 +53,24 @@ class Answers:
         row = self.latest.row(tag.row)
         return None if row is None else self.poses_of(row[None], self.now_ns())[0]
 
-    def pose_at(self, name: str, t_ns: int) -> Answer | None:
-        """`Pose` of a tag at a time, None when there never was one. Raises NoPoseThenError. May read from disk."""
+    def pose_at(self, name: str, t_ns: int, from_disk: bool = True) -> Answer | None:
+        """`Pose` of a tag at a time, None when there never was one. Raises NoPoseThenError.
+
+        from_disk: look into the history too, which takes a millisecond.
+        """
+        tracks = self.tracks if from_disk else None
         tag = self.tags.find(name)
         latest = None if tag is None else self.latest.row(tag.row)
         now_ns = self.now_ns()
         try:
             pose = None if latest is None else self._pose_in_memory(latest, t_ns, now_ns)
         except BeforeMemoryError:
-            if self.tracks is None:
+            if tracks is None:
                 raise
             pose = None
-        if pose is None and self.tracks is not None:
+        if pose is None and tracks is not None:
             memory = np.empty(0, POSE) if tag is None or latest is None else self._memory(latest)
-            pose = pose_in_tracks(self.tracks, self.site, name, memory, t_ns)
+            pose = pose_in_tracks(tracks, self.site, name, memory, t_ns)
         if pose is None:
             return None
         return self._poses(pose[None], now_ns, then=True, names=[name])[0] | {"hypotheses": []}

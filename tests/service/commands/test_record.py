@@ -1,5 +1,6 @@
 """`dropanchor record` as a user calls it, against a real server."""
 
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from dropanchor_service.cli import main
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from support.http_server import running_server
-from support.zenoh_router import free_port
+from support.zenoh_router import free_port, wait_until
 
 
 @pytest.fixture
@@ -27,7 +28,13 @@ def house(tmp_path: Path) -> House:
 @pytest.fixture
 def url(house: House) -> Iterator[str]:
     with running_server(house.app(), house.stopping) as port:
+        wait_until(lambda: _listens(port))
         yield f"http://127.0.0.1:{port}"
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def test_a_recording_is_started_stopped_listed_and_fetched(
