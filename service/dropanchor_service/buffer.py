@@ -16,11 +16,18 @@ Stranger = tuple[str, bytes, str, int]
 
 MESSAGE_OVERHEAD = 200  # bytes that a waiting message takes beside its payload
 STRANGERS = 1024  # messages of tags without a row that may wait
-_KEPT_SHARE = 0.75  # of the capacity after shedding, so that shedding is rare
+_KEPT_SHARE = 0.75  # of what may wait after shedding, so that shedding is rare
+PATIENCE_NS = 1_000_000_000  # of falling behind, before it counts as overload
+MOST_WAIT_S = 0.5  # for a message in an overload
+_JUST_NS = 100_000_000
 
 
 class MessageBuffer:
     """Bounded. When it is full, the tags that fill it most lose their oldest messages.
+
+    So they do in an overload: when `drain` has not caught up for PATIENCE_NS, no more may wait than it takes in
+    MOST_WAIT_S. Messages that arrived before it fell behind, from a cache or while nobody drained, start that time
+    afresh: a burst is no overload.
 
     Keys that are not known wait apart, where only they push out each other: a flood of them harms no known tag.
     """
@@ -35,6 +42,8 @@ class MessageBuffer:
         self._strangers: deque[Stranger] = deque(maxlen=STRANGERS)
         self._shed: Counter[int] = Counter()
         self._strangers_shed = 0
+        self._behind_ns: int | None = None  # since when `drain` has left something
+        self._drained_bytes = 0  # since then
 
     def append(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """From any thread; blocks for no longer than shedding takes."""
@@ -44,7 +53,7 @@ class MessageBuffer:
                 self._messages.append((row, payload, encoding, arrival_ns))
                 self._bytes += len(payload) + MESSAGE_OVERHEAD
                 if self._bytes > self._capacity_bytes:
-                    self._make_room()
+                    self._shed_down_to(_KEPT_SHARE * self._capacity_bytes)
             else:
                 self._strangers_shed += len(self._strangers) == STRANGERS
                 self._strangers.append((key, payload, encoding, arrival_ns))
@@ -63,16 +72,19 @@ class MessageBuffer:
         """Until there is a message; False when there is none in time."""
         return self._filled.wait(timeout_s)
 
-    def drain(self, most: int) -> tuple[list[Message], list[Stranger]]:
-        """The oldest messages of known keys, at most so many, and those of strangers."""
+    def drain(self, most: int, now_ns: int = 0) -> tuple[list[Message], list[Stranger]]:
+        """The oldest messages of known keys, at most so many, and those of strangers. now_ns: UTC."""
         with self._lock:
             if len(self._messages) <= most:
                 taken, self._messages, self._bytes = self._messages, [], 0
                 self._filled.clear()
+                self._behind_ns = None
             else:
                 taken = self._messages[:most]
                 del self._messages[:most]
-                self._bytes -= sum(map(_size, taken))
+                size = sum(map(_size, taken))
+                self._bytes -= size
+                self._fall_behind(size, taken[0][3], now_ns)
             strangers = list(self._strangers)
             self._strangers.clear()
             return taken, strangers
@@ -88,11 +100,22 @@ class MessageBuffer:
     def depth(self) -> int:
         return len(self._messages) + len(self._strangers)
 
-    def _make_room(self) -> None:
+    def _fall_behind(self, taken_bytes: int, oldest_ns: int, now_ns: int) -> None:
+        if self._behind_ns is None or oldest_ns < self._behind_ns - _JUST_NS:
+            self._behind_ns, self._drained_bytes = now_ns, 0
+            return
+        self._drained_bytes += taken_bytes
+        behind_ns = now_ns - self._behind_ns
+        if behind_ns > PATIENCE_NS:
+            may_wait = MOST_WAIT_S * self._drained_bytes / (behind_ns * 1e-9)
+            if self._bytes > may_wait:
+                self._shed_down_to(_KEPT_SHARE * may_wait)
+
+    def _shed_down_to(self, target_bytes: float) -> None:
         rows = np.array([message[0] for message in self._messages])
         sizes = np.array([_size(message) for message in self._messages])
         _, tags = np.unique(rows, return_inverse=True)
-        cap = _fair_cap(np.bincount(tags, sizes), int(_KEPT_SHARE * self._capacity_bytes))
+        cap = _fair_cap(np.bincount(tags, sizes), int(target_bytes))
         kept = _newer_of_same(tags, sizes) <= cap
         lost, counts = np.unique(rows[~kept], return_counts=True)
         self._shed.update(dict(zip(lost.tolist(), counts.tolist(), strict=True)))

@@ -69,7 +69,7 @@ class Ingest:
             self._admission.by_name(self._announced.popleft())
         self._know_new_tags()
         self._count_shed()
-        known, strangers = self._buffer.drain(MESSAGES_PER_TURN)
+        known, strangers = self._buffer.drain(MESSAGES_PER_TURN, self._clock.now_ns())
         known += self._admitted(strangers)
         if known:
             self._tell(self._taps.messages, known)

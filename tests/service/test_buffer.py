@@ -4,7 +4,7 @@ import threading
 from collections import Counter
 from collections.abc import Iterable
 
-from dropanchor_service.buffer import MESSAGE_OVERHEAD, STRANGERS, MessageBuffer
+from dropanchor_service.buffer import MESSAGE_OVERHEAD, MOST_WAIT_S, STRANGERS, MessageBuffer
 
 PAYLOAD = b"x" * (1000 - MESSAGE_OVERHEAD)  # a message counts 1,000 bytes
 
@@ -58,6 +58,34 @@ def test_equally_busy_tags_lose_equally() -> None:
     kept = Counter(message[0] for message in buffer.drain(10**9)[0])
     assert sum(shed.values()) + sum(kept.values()) == 5000
     assert max(kept.values()) - min(kept.values()) <= 1
+
+
+def drained(buffer: MessageBuffer, seconds: float, arrivals_per_turn: int, from_ns: int = 0) -> int:
+    """A turn every 10 ms takes 100 messages while `arrivals_per_turn` come in; returns how many were shed."""
+    for turn in range(round(seconds * 100)):
+        now_ns = from_ns + turn * 10_000_000
+        for number in range(arrivals_per_turn):
+            buffer.append(str(number % 10), PAYLOAD, "e", now_ns)
+        buffer.drain(100, now_ns)
+    return sum(buffer.take_shed()[0].values())
+
+
+def test_in_an_overload_no_more_waits_than_is_taken_in_half_a_second_and_the_newest_is_kept() -> None:
+    buffer = MessageBuffer(10**9)
+    admit(buffer, map(str, range(10)))
+    assert drained(buffer, 0.9, 300) == 0
+    assert drained(buffer, 4.0, 300, from_ns=900_000_000) > 10_000
+    assert buffer.depth <= MOST_WAIT_S * 100 * 100 + 300
+    oldest = buffer.drain(1, 4_900_000_000)[0][0]
+    assert oldest[3] > 4_200_000_000
+
+
+def test_a_burst_and_what_was_cached_elsewhere_are_no_overload() -> None:
+    buffer = MessageBuffer(10**9)
+    admit(buffer, map(str, range(10)))
+    for number in range(20_000):
+        buffer.append(str(number % 10), PAYLOAD, "e", -10_000_000_000 + number)
+    assert drained(buffer, 4.0, 50) == 0
 
 
 def test_strangers_push_out_only_each_other() -> None:
