@@ -53,7 +53,7 @@ check: install
 	@$(BIN)/python -m dropanchor_service.api.export --check
 
 bench: install
-	@$(BIN)/python -m pytest tests/benchmarks -s $(PYTEST)
+	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis

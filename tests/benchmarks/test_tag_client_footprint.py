@@ -64,4 +64,4 @@ def test_the_footprint_of_a_tag_client_is_measured(record_property: Callable[[st
             figures[f"{encoding}_{name}"] = round(value, 1)
     for name, value in figures.items():
         record_property(name, value)
-        print(f"{name:28} {value}")  # noqa: T201
+        print(f"{name:28} {value}")

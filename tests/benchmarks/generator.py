@@ -1,0 +1,94 @@
+"""A program: a fleet that sends over real Zenoh sessions. It says "ready" when the service listens to each of them,
+reads when to start (UTC, ns), sends, and reports.
+
+Arguments: endpoint, first tag, number of tags, sessions, seconds, "block" or "drop" where the network is congested,
+and of how many tags one message each is to be sent first, slowly.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+
+import numpy as np
+import zenoh
+
+from benchmarks.motion import MESSAGE_S, STEP_NS, message, tracks
+from dropanchor_schemas.keys import all_tags, samples_key
+from dropanchor_schemas.wire import ENCODING_PACKED
+from support.zenoh_router import connected_session, wait_until
+
+SLOTS = 40  # a message period is sent in so many bursts, 5 ms apart
+REGISTERED_PER_S = 4000
+Put = Callable[[int, bytes], None]
+
+
+def main(endpoint: str, first: int, tags: int, sessions: int, duration_s: float, control: str, register: int) -> None:
+    motions = [track.bodies for track in tracks(duration_s + 2 * MESSAGE_S)]
+    names = [samples_key("default", f"sim-{first + index}") for index in range(max(tags, register))]
+    encoding = zenoh.Encoding(ENCODING_PACKED)
+    when_full = zenoh.CongestionControl.BLOCK if control == "block" else zenoh.CongestionControl.DROP
+    with ExitStack() as stack:
+        opened = [stack.enter_context(connected_session(endpoint)) for _ in range(sessions)]
+        for session in opened:
+            wait_for_listener(session)
+
+        def put(tag: int, payload: bytes) -> None:
+            opened[tag % sessions].put(names[tag], payload, encoding=encoding, congestion_control=when_full)
+
+        registered = register_all(put, motions, register)
+        print("ready", flush=True)
+        report = send(put, motions, first, tags, int(sys.stdin.readline()), round(duration_s / MESSAGE_S), registered)
+        sys.stdin.readline()  # sessions stay open until everything has been counted
+        print(json.dumps(report | {"registered": register}), flush=True)
+
+
+def wait_for_listener(session: zenoh.Session) -> None:
+    """What is put before the subscription has reached the session is lost."""
+    publisher = session.declare_publisher(all_tags("default", "samples"))
+
+    def is_heard() -> bool:
+        status = publisher.matching_status
+        return bool(getattr(status, "matching", status))
+
+    wait_until(is_heard, 60.0)
+    publisher.undeclare()
+
+
+def register_all(put: Put, motions: list[list[bytes]], count: int) -> bool:
+    for tag in range(count):
+        put(tag, message(motions[tag % len(motions)][0], 0, tag + 1, time.time_ns() // 1000 * 1000))
+        if tag % (REGISTERED_PER_S // 100) == 0:
+            time.sleep(0.01)
+    return count > 0
+
+
+def send(
+    put: Put, motions: list[list[bytes]], first: int, tags: int, start_ns: int, rounds: int, registered: bool
+) -> dict[str, float]:
+    """A message of every tag in every round, spread over it; numbered from 1 when one has been sent before."""
+    edges = np.linspace(0, tags, SLOTS + 1).astype(int).tolist()
+    late_ms = []
+    for number in range(rounds):
+        sequence = number + registered
+        for slot in range(SLOTS):
+            due_ns = start_ns + number * STEP_NS + slot * STEP_NS // SLOTS
+            while (left_ns := due_ns - time.time_ns()) > 0:
+                time.sleep(left_ns * 1e-9)
+            for tag in range(edges[slot], edges[slot + 1]):
+                motion = motions[(first + tag) % len(motions)]
+                put(tag, message(motion[sequence], sequence, first + tag + 1, due_ns))
+            late_ms.append((time.time_ns() - due_ns) * 1e-6)
+    steady = late_ms[len(late_ms) // 2 :]
+    return {
+        "messages": rounds * tags,
+        "late_p50_ms": float(np.percentile(steady, 50)),
+        "late_p99_ms": float(np.percentile(steady, 99)),
+        "cpu_s": time.process_time(),
+    }
+
+
+if __name__ == "__main__":
+    given = sys.argv[1:]
+    main(given[0], int(given[1]), int(given[2]), int(given[3]), float(given[4]), given[5], int(given[6]))

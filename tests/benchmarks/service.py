@@ -1,0 +1,63 @@
+"""The service under measurement, and its counters."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx
+
+from benchmarks import proc
+from benchmarks.motion import SAMPLES_PER_MESSAGE, tracks
+from support.service import Running
+
+MAX_TAGS = 200_000
+
+
+@dataclass(frozen=True)
+class Counters:
+    """What the service has counted so far. delays: upper bound of a bucket, s → how many batches were not slower."""
+
+    fused: float  # samples
+    shed: float  # messages
+    cpu_s: float
+    resident_bytes: int
+    delays: dict[float, float] = field(default_factory=dict)
+
+
+def counters(service: Running) -> Counters:
+    values = _values(httpx.get(f"{service.url}/metrics", timeout=30.0).text)
+    bucket = 'dropanchor_pose_delay_seconds_bucket{le="'
+    delays = {float(name[len(bucket) : -2]): value for name, value in values.items() if name.startswith(bucket)}
+    return Counters(
+        sum(values[f'dropanchor_samples_total{{kind="{kind}"}}'] for kind in ("imu", "range")),
+        values['dropanchor_rejected_total{reason="shed"}'],
+        proc.cpu_s(service.process.pid),
+        proc.resident_bytes(service.process.pid),
+        delays,
+    )
+
+
+def rejected(service: Running) -> dict[str, float]:
+    values = _values(httpx.get(f"{service.url}/metrics", timeout=30.0).text)
+    return {name: value for name, value in values.items() if name.startswith("dropanchor_rejected_total") and value}
+
+
+def _values(text: str) -> dict[str, float]:
+    lines = (line.rpartition(" ") for line in text.splitlines() if line and not line.startswith("#"))
+    return {name: float(value) for name, _, value in lines}
+
+
+def lost(sent_messages: int, since: Counters, until: Counters) -> int:
+    """Samples that were sent and not handed to the estimators."""
+    return sent_messages * SAMPLES_PER_MESSAGE - int(until.fused - since.fused)
+
+
+def settings_file(tags: int, folder: Path) -> Path:
+    """The anchor at the origin, and where every tag starts."""
+    starts = [track.start for track in tracks(1.0)]
+    tables = [
+        f"[tags.sim-{i}.start]\nx = {x!r}\ny = {y!r}\nheading_rad = {heading!r}"
+        for i, (x, y, heading) in ((i, starts[i % len(starts)]) for i in range(tags))
+    ]
+    file = folder / f"fleet-{tags}.toml"
+    file.write_text(f'max_tags = {MAX_TAGS}\n[[site.anchors]]\nid = "0"\n' + "\n".join(tables))
+    return file

@@ -1,0 +1,50 @@
+"""How many live tags one process carries, and what that costs beside what cannot be avoided and what others do."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import report
+from benchmarks.baselines import engine_cost, filterpy_cost
+from benchmarks.step import Figures, run_receiver, run_step
+
+STEPS = (250, 1000, 2000, 4000, 6000, 8000, 10_000, 12_000, 16_000)
+BROKEN_MS = 250.0
+
+pytestmark = pytest.mark.benchmark
+
+
+def breaks(figures: Figures) -> bool:
+    return figures.lost > 0 or not figures.percentile(99) < BROKEN_MS
+
+
+def test_the_fleet_is_stepped_up_until_latency_or_loss_breaks(tmp_path: Path) -> None:
+    run_step(20, tmp_path)  # the first start compiles
+    lines, held = [report.HEAD], list[Figures]()
+    for tags in STEPS:
+        figures = run_step(tags, tmp_path)
+        broken = breaks(figures)
+        lines.append(report.row(figures, " (broken)" if broken else ""))
+        print(lines[-1], flush=True)
+        if broken:
+            break
+        held.append(figures)
+    assert held, f"not even {STEPS[0]} tags are carried\n" + "\n".join(lines)
+    best = held[-1]
+    half = run_step(best.tags // 2, tmp_path)
+    lines += [report.row(half, " (half)"), report.row(run_step(best.tags // 2, tmp_path, embedded=True), " (embedded)")]
+    costs = {
+        "Zenoh alone: receive, copy, drop": run_receiver(best.tags),
+        "the engine `fleet` alone, no I/O": engine_cost("fleet", min(best.tags, 1000), 10),
+        "the engine `paper` alone, no I/O": engine_cost("paper", 5, 5),
+        "one filterpy EKF per tag, no I/O": filterpy_cost(50, 10),
+    }
+    loop = costs["one filterpy EKF per tag, no I/O"] / best.cpu_s_per_million
+    unavoidable = sum(list(costs.values())[:2]) / best.cpu_s_per_million
+    said = [
+        f"**{best.tags} tags are carried** with nothing lost, {best.tags / best.cpu:.0f} per core in use.",
+        f"One filterpy EKF per tag, without any I/O, costs {loop:.0f} times as much as the service end to end.",
+        f"{unavoidable:.0%} of the service's time is what cannot be avoided: receiving, and the bare engine.",
+        f"p99 of the latency at half of the tags: {half.percentile(99):.0f} ms.",
+    ]
+    report.record("capacity", "\n".join([*said, "", *lines, "", report.ratios(best.cpu_s_per_million, costs)]))

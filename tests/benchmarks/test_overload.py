@@ -1,0 +1,106 @@
+"""Three times what the service can carry, and what it does when that ends."""
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zenoh
+
+from benchmarks import proc, report
+from benchmarks.probe import age_ms
+from benchmarks.programs import generator, router
+from benchmarks.service import counters, settings_file
+from benchmarks.step import run_step
+from benchmarks.test_capacity import breaks
+from support.service import running_service
+from support.zenoh_router import connected_session, free_endpoint
+
+SIZES = (1000, 2000, 4000, 8000)
+OVERLOAD_S, BEFORE_S, AFTER_S = 8.0, 4.0, 6.0
+CURRENT_MS = 350.0  # of age: a message comes every 200 ms
+HEAD = (
+    "| tags carried | tags offered | pose age p50 / p99 / worst ms | shed messages | of the flood's "
+    "| resident MB before / most | current again after s |\n" + "|---" * 7 + "|"
+)
+
+pytestmark = pytest.mark.benchmark
+
+
+def carried(folder: Path) -> int:
+    """A number of tags that is carried, while twice as many are not."""
+    best = SIZES[0] // 2
+    for tags in SIZES:
+        if breaks(run_step(tags, folder)):
+            break
+        best = tags
+    return best
+
+
+def test_at_three_times_capacity_the_newest_is_kept_and_the_rest_is_counted(tmp_path: Path) -> None:
+    capacity = carried(tmp_path)
+    base, more = capacity // 2, 3 * capacity - capacity // 2
+    endpoint = free_endpoint()
+    arguments = (
+        "--config",
+        str(settings_file(base + more, tmp_path)),
+        "--engine",
+        "fleet",
+        "--zenoh-connect",
+        endpoint,
+    )
+    with router(endpoint), running_service(*arguments) as service, connected_session(endpoint) as asking:
+        steady = generator(endpoint, base, BEFORE_S + OVERLOAD_S + AFTER_S, control="drop")
+        flood = generator(endpoint, more, OVERLOAD_S, first=base, control="drop")
+        try:
+            start_ns = time.time_ns() + 300_000_000
+            steady.tell(start_ns)
+            time.sleep(BEFORE_S + 0.3)
+            before = counters(service)
+            flood.tell(time.time_ns() + 10_000_000)
+            during = _watched(asking, service.process.pid, base, OVERLOAD_S)
+            ended_s = time.monotonic()
+            report_of_flood = json.loads(flood.ask("end"))
+            ended_s = max(ended_s, time.monotonic())
+            recovered_s = _recovered_after(asking, base, ended_s)
+            after = counters(service)
+        finally:
+            steady.end()
+            flood.end()
+    ages, sizes = np.array(during).T
+    shed = after.shed - before.shed
+    cells = (
+        f"{capacity}",
+        f"{base + more}",
+        " / ".join(f"{age:.0f}" for age in (*np.percentile(ages, (50, 99)), ages.max())),
+        f"{shed:,.0f}",
+        f"{shed / report_of_flood['messages']:.0%}",
+        f"{before.resident_bytes / 1e6:.0f} / {sizes.max() / 1e6:.0f}",
+        f"{recovered_s:.1f}",
+    )
+    rows = [HEAD, "| " + " | ".join(cells) + " |"]
+    report.record("overload", "\n".join(rows))
+    assert after.shed > before.shed
+    assert recovered_s < 60.0
+
+
+def _watched(asking: zenoh.Session, pid: int, tags: int, duration_s: float) -> list[tuple[float, int]]:
+    """Age of the pose of one tag after another in ms, and resident bytes of the service."""
+    seen = []
+    rng = np.random.default_rng(0)
+    end_s = time.monotonic() + duration_s
+    while time.monotonic() < end_s:
+        seen.append((age_ms(asking, int(rng.integers(tags))), proc.resident_bytes(pid)))
+        time.sleep(0.02)
+    return seen
+
+
+def _recovered_after(asking: zenoh.Session, tags: int, ended_s: float) -> float:
+    """When twenty tags in a row are current."""
+    rng = np.random.default_rng(1)
+    current = 0
+    while current < 20 and time.monotonic() - ended_s < 60.0:
+        current = current + 1 if age_ms(asking, int(rng.integers(tags))) < CURRENT_MS else 0
+        time.sleep(0.01)
+    return time.monotonic() - ended_s
