@@ -1,5 +1,8 @@
 """What the settings say about credentials, as objects."""
 
+import logging
+from datetime import timedelta
+
 from dropanchor_service.api.server import Certificate
 from dropanchor_service.security import api_keys, oidc
 from dropanchor_service.security.access_control import SERVICE
@@ -9,14 +12,22 @@ from dropanchor_service.security.identity import Doorkeeper, Register
 from dropanchor_service.settings import HttpSettings, SecuritySettings, Settings
 from dropanchor_service.settings_sources import SettingsError
 
+SOON = timedelta(days=30)
+
+_log = logging.getLogger(__name__)
+
 
 def credentials_of(settings: Settings) -> SecurityFolder | None:
     """Raises SettingsError when there is a folder that cannot be used."""
-    folder = settings.security.folder
+    if settings.security.folder is None:
+        return None
     try:
-        return None if folder is None else SecurityFolder.open(folder)
+        folder = SecurityFolder.open(settings.security.folder)
     except SecurityError as error:
         raise SettingsError(f"security.folder: {error}") from error
+    for sentence in folder.expiring(SOON):
+        _log.warning("%s; dropanchor security renew and dropanchor tag add --renew make new ones", sentence)
+    return folder
 
 
 def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -> Certificate | None:

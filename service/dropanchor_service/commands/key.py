@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         keys = ApiKeys(SecurityFolder.open(arguments.security).path)
         {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](keys, arguments)
-    except (SecurityError, ApiKeyError) as error:
+    except (SecurityError, ApiKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor key: {error}\n")
         return UNUSABLE
     return 0

@@ -20,6 +20,7 @@ EPILOG = """\
 examples:
   dropanchor security init --host yard.example --host 192.168.1.10
   dropanchor security init --security /etc/dropanchor --site yard --host yard.example
+  dropanchor security renew
 """
 FOLDER = Path("security")
 DAYS = 730
@@ -46,6 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where the router listens (default: %(default)s)",
     )
     add_days_option(init)
+    renew = actions.add_parser(
+        "renew", help="new certificates of router, service and reader, before the old ones expire"
+    )
+    add_folder_option(renew)
+    renew.add_argument("--host", action="append", default=[], metavar="NAME", help="one more, as with init")
+    add_days_option(renew)
 
 
 def add_folder_option(parser: argparse.ArgumentParser) -> None:
@@ -63,23 +70,38 @@ def add_days_option(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0, or 2 when nothing was made."""
     try:
-        chunk_from_id(arguments.site)
-        hosts = _hosts(arguments.host)
-        table = Table(site=arguments.site, hosts=hosts, listen=(arguments.listen,))
-        SecurityFolder.make(arguments.security, table, arguments.days)
-    except (SecurityError, InvalidKeyError) as error:
+        {"init": _init, "renew": _renew}[arguments.action](arguments)
+    except (SecurityError, InvalidKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor security: {error}\n")
         return UNUSABLE
-    print(_next_steps(arguments.security, hosts, arguments.site))
     return 0
+
+
+def _init(arguments: argparse.Namespace) -> None:
+    chunk_from_id(arguments.site)
+    hosts = _hosts(arguments.host)
+    table = Table(site=arguments.site, hosts=hosts, listen=(arguments.listen,))
+    SecurityFolder.make(arguments.security, table, arguments.days)
+    print(_next_steps(arguments.security, hosts, arguments.site))
+
+
+def _renew(arguments: argparse.Namespace) -> None:
+    folder = SecurityFolder.open(arguments.security)
+    folder.renew(_checked(arguments.host), arguments.days)
+    print(f"Router, service and reader have new certificates for {', '.join(folder.table.hosts)}.")
+    print("In force after a restart of each. Tags keep theirs: dropanchor tag add NAME --renew")
 
 
 def _hosts(given: list[str]) -> tuple[str, ...]:
     """Those that were given first: a tag is told to connect to the first one."""
-    for host in given:
+    return tuple(dict.fromkeys([*_checked(given), socket.gethostname(), "localhost", "127.0.0.1", "::1"]))
+
+
+def _checked(hosts: list[str]) -> list[str]:
+    for host in hosts:
         if not (_is_address(host) or re.fullmatch(r"[A-Za-z0-9.-]+", host)):
             raise SecurityError(f"--host {host!r} is neither the name nor the address of a machine")
-    return tuple(dict.fromkeys([*given, socket.gethostname(), "localhost", "127.0.0.1", "::1"]))
+    return hosts
 
 
 def _is_address(host: str) -> bool:

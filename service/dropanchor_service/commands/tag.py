@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         folder = SecurityFolder.open(arguments.security)
         {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](folder, arguments)
-    except (SecurityError, InvalidKeyError) as error:
+    except (SecurityError, InvalidKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor tag: {error}\n")
         return UNUSABLE
     return 0

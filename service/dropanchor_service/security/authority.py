@@ -32,11 +32,16 @@ class Issued:
 
     @property
     def expires(self) -> datetime:
-        return x509.load_pem_x509_certificate(self.certificate).not_valid_after_utc
+        return expiry(self.certificate)
 
     @property
     def serial(self) -> str:
         return f"{x509.load_pem_x509_certificate(self.certificate).serial_number:x}"
+
+
+def expiry(certificate: bytes) -> datetime:
+    """Of a certificate in PEM. Raises ValueError."""
+    return x509.load_pem_x509_certificate(certificate).not_valid_after_utc
 
 
 class Authority:

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE
-from dropanchor_service.security.authority import Authority, Issued
+from dropanchor_service.security.authority import Authority, Issued, expiry
 from dropanchor_service.security.files import PRIVATE, PUBLIC, one_at_a_time, write_whole
 from dropanchor_service.security.router import router_configuration
 
@@ -80,13 +80,26 @@ class SecurityFolder:
             authority = Authority.make("Dropanchor site authority")
             folder = cls(path, table)
             folder._keep("ca", authority.issued)
-            for role in (ROUTER, SERVICE):
-                folder._keep(role, authority.server(role, table.hosts, days))
-            folder._keep(READER, authority.client(READER, days))
+            folder._issue_roles(authority, days)
             folder._save(table)
         except OSError as error:
             raise SecurityError(f"{path} cannot be written: {error.strerror}") from error
         return folder
+
+    def renew(self, hosts: Sequence[str], days: int) -> None:
+        """New certificates of router, service and reader, for these hosts too. Raises SecurityError."""
+        with self._changing():
+            authority = self._authority()
+            every_host = tuple(dict.fromkeys([*self.table.hosts, *hosts]))
+            self._save(self.table.model_copy(update={"hosts": every_host}))
+            self._issue_roles(authority, days)
+
+    def expiring(self, within: timedelta) -> list[str]:
+        """What expires soon, of the folder's own certificates and those of admitted tags, in words."""
+        soon = datetime.now(UTC) + within
+        ends = {f"the certificate {self.certificate(name)}": self._expires(name) for name in ("ca", *ROLES)}
+        ends |= {f"the certificate of tag {name!r}": self.table.tags[name].expires for name in self.table.admitted}
+        return [f"{what} expires on {end:%Y-%m-%d}" for what, end in ends.items() if end is not None and end < soon]
 
     def add_tag(self, name: str, days: int, renew: bool = False) -> Path:
         """The folder that goes to the tag. Raises SecurityError or InvalidKeyError."""
@@ -125,6 +138,18 @@ class SecurityFolder:
         """Zenoh's, with the access control of the tags that are in the table now."""
         files = {name: str(path.resolve()) for name, path in self._tls_files().items()}
         return router_configuration(self.table.site, self.table.admitted, listen or self.table.listen, files)
+
+    def _issue_roles(self, authority: Authority, days: int) -> None:
+        for role in (ROUTER, SERVICE):
+            self._keep(role, authority.server(role, self.table.hosts, days))
+        self._keep(READER, authority.client(READER, days))
+
+    def _expires(self, name: str) -> datetime | None:
+        """None where there is none: not every host needs all of them."""
+        try:
+            return expiry(self.certificate(name).read_bytes())
+        except (OSError, ValueError):
+            return None
 
     def _tls_files(self) -> dict[str, Path]:
         return {"ca": self.certificate("ca"), "certificate": self.certificate(ROUTER), "key": self.key(ROUTER)}

@@ -4,6 +4,7 @@ import json
 import stat
 import subprocess
 import sys
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,10 @@ from cryptography import x509
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from dropanchor_service.cli import main
+from dropanchor_service.credentials import credentials_of
 from dropanchor_service.security.access_control import ROLES
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_service.settings import SecuritySettings, Settings
 from dropanchor_tag_client import read_credentials
 from support.commands import environment
 from support.secured import secured_site
@@ -131,3 +134,34 @@ def test_tags_that_are_added_at_the_same_time_are_all_there(tmp_path: Path) -> N
 def test_a_host_that_is_none_is_refused(tmp_path: Path, host: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["security", "init", "--security", str(tmp_path / "s"), "--host", host]) == 2
     assert "neither the name nor the address" in capsys.readouterr().err
+
+
+def test_certificates_are_renewed_by_the_same_authority_and_for_one_more_host(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = secured_site(tmp_path / "security", "a").folder
+    before = folder.certificate("router").read_bytes()
+    assert folder.expiring(timedelta(days=29)) == []
+    soon = folder.expiring(timedelta(days=31))
+    assert [sentence.rpartition("/")[2].split()[0] for sentence in soon[:3]] == [
+        "service.pem",
+        "reader.pem",
+        "router.pem",
+    ]
+    assert soon[3].startswith("the certificate of tag 'a' expires on")
+    assert main(["security", "renew", "--security", str(folder.path), "--host", "new.example", "--days", "99"]) == 0
+    assert "new.example" in capsys.readouterr().out
+    renewed = x509.load_pem_x509_certificate(folder.certificate("router").read_bytes())
+    renewed.verify_directly_issued_by(x509.load_pem_x509_certificate(folder.certificate("ca").read_bytes()))
+    names = renewed.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert names.get_values_for_type(x509.DNSName) == ["localhost", "new.example"]
+    assert folder.certificate("router").read_bytes() != before
+    assert len(SecurityFolder.open(folder.path).expiring(timedelta(days=31))) == 1
+
+
+def test_the_service_says_at_its_start_what_expires_soon(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    folder = secured_site(tmp_path / "security", "a").folder
+    folder.renew([], days=3)
+    credentials_of(Settings(security=SecuritySettings(folder=folder.path)))
+    assert "service.pem expires on" in caplog.text
+    assert "dropanchor security renew" in caplog.text
