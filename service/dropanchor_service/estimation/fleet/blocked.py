@@ -11,33 +11,75 @@ from .compiled import njit
 from .layout import KEEP, OFFSET, PHI, N, R, V
 from .manage import best_of, copy_hypothesis
 from .tuning import Tuning
+from .update import update_component
 
 
 @njit(nogil=True)
 def open_alternative(work: Any, count: int, row: Any, t: Tuning) -> int:
-    """Open a hypothesis of a blocked line of sight when ranges jump up, of a clear one when they jump down again."""
-    if row.high_run < t.blocked_run and row.low_run < t.blocked_run:
+    """Alternatives of every likely hypothesis when ranges jump: up, the line of sight is blocked (or blocked by
+    more); down, it is clear again (or blocked by less). Returns the count."""
+    up = row.high_run >= t.blocked_run
+    if not up and row.low_run < t.blocked_run:
         return count
-    blocked = row.high_run >= t.blocked_run
     row.high_run = row.low_run = 0
-    source = best_of(work, count)
-    if count >= KEEP or (work[source].blocked == 0) != blocked:
-        return count
-    copy_hypothesis(work, source, count)
-    s, P = work[count].mean, work[count].cov
-    work[count].log_weight += t.blocked_log_prior
+    floor = work[best_of(work, count)].log_weight - t.blocked_depth
+    for h in range(count):
+        if work[h].log_weight < floor:
+            continue
+        if (up or work[h].blocked == 1) and count < KEEP:
+            _block(work, h, count, t)
+            count += 1
+        if not up and work[h].blocked == 1 and count < KEEP:
+            _clear(work, h, count, t)
+            count += 1
+    return count
+
+
+@njit(nogil=True)
+def _block(work: Any, source: int, target: int, t: Tuning) -> None:
+    copy_hypothesis(work, source, target)
+    new = work[target]
+    new.log_weight += t.blocked_log_prior
+    if new.blocked == 0:
+        new.clear[0], new.clear[1] = new.mean[OFFSET], new.cov[OFFSET, OFFSET]
+        new.blocked = 1
+    _forget_offset(new.cov)
+    new.mean[OFFSET] = new.clear[0] + t.outlier_mean
+    new.cov[OFFSET, OFFSET] = new.clear[1] + t.outlier_std**2
+
+
+@njit(nogil=True)
+def _clear(work: Any, source: int, target: int, t: Tuning) -> None:
+    copy_hypothesis(work, source, target)
+    new = work[target]
+    new.log_weight += t.blocked_log_prior
+    new.blocked = 0
+    _forget_offset(new.cov)
+    new.mean[OFFSET] = new.clear[0]
+    new.cov[OFFSET, OFFSET] = new.clear[1]
+
+
+@njit(nogil=True)
+def _forget_offset(P: Any) -> None:
     for i in range(N):
         P[OFFSET, i] = P[i, OFFSET] = 0.0
-    if blocked:
-        work[count].clear[0], work[count].clear[1] = s[OFFSET], work[source].cov[OFFSET, OFFSET]
-        s[OFFSET] += t.outlier_mean
-        P[OFFSET, OFFSET] = work[count].clear[1] + t.outlier_std**2
-        work[count].blocked = 1
-    else:
-        s[OFFSET] = work[count].clear[0]
-        P[OFFSET, OFFSET] = work[count].clear[1]
-        work[count].blocked = 0
-    return count + 1
+
+
+@njit(nogil=True)
+def expect_clear(work: Any, count: int, row: Any, dt: float, t: Tuning) -> int:
+    """Blocked lines of sight clear at a rate of 1/blocked_tau, whether a jump shows it or not; returns the count."""
+    row.since_clear_s += dt
+    offer = row.since_clear_s >= 1.0
+    if offer:
+        row.since_clear_s = 0.0
+    floor = work[best_of(work, count)].log_weight - t.blocked_depth
+    for h in range(count):
+        if work[h].blocked == 1:
+            if offer and work[h].log_weight > floor and count < KEEP:
+                _clear(work, h, count, t)
+                count += 1
+            work[h].log_weight -= dt / t.blocked_tau
+    return count
 
 
 @njit(nogil=True)
@@ -55,10 +97,13 @@ def recover(work: Any, count: int, row: Any, node: Any, t: Tuning) -> None:
 
 
 @njit(nogil=True)
-def unblock(work: Any, count: int, t: Tuning) -> None:
-    """A blocked hypothesis whose extra offset has gone is a clear one."""
+def unblock(work: Any, count: int, PH: Any, t: Tuning) -> None:
+    """A blocked hypothesis whose extra offset has gone is a clear one, with the offset of a clear line of sight."""
     for h in range(count):
         if work[h].blocked == 1:
             extra = work[h].mean[OFFSET] - work[h].clear[0]
-            if extra + 2.0 * math.sqrt(work[h].cov[OFFSET, OFFSET]) < t.blocked_min + 0.2 and extra < t.blocked_min:
+            sigma = math.sqrt(work[h].cov[OFFSET, OFFSET])
+            if extra + 2.0 * sigma < t.blocked_min + 0.2 and extra < min(t.blocked_min, 1.5 * sigma):
                 work[h].blocked = 0
+                variance = max(work[h].clear[1], 1e-6)
+                update_component(work[h].mean, work[h].cov, PH, OFFSET, work[h].clear[0], variance)

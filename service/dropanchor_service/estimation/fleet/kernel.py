@@ -4,17 +4,25 @@ import math
 from typing import Any
 
 from . import layout
-from .blocked import open_alternative, recover, unblock
+from .blocked import expect_clear, open_alternative, recover, unblock
 from .compiled import njit
 from .gap import begins_again, place_again, repeats, watch_gap
 from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
-from .layout import COMMON, PHI, REF, STEADY, YAW, N, R, V, Work
-from .manage import best_of, limit, merge, normalise, prune, split
+from .layout import COMMON, PHI, REF, STEADY, YAW, R, V, Work
+from .manage import best_of, finite, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
 from .pool import load, mirror, release, store
 from .predict import diffuse, fill_decay, move, transport
 from .publish import publish
-from .start import give_reference_error, is_referred, median, second_class, start_known, start_ring, turn_about
+from .start import (
+    give_reference_error,
+    is_referred,
+    median,
+    reseed,
+    start_known,
+    start_ring,
+    turn_about,
+)
 from .tuning import Tuning
 from .update import bound_speed, predict_range, update_bearing, update_heading, update_range, update_rest, wrap
 
@@ -131,7 +139,7 @@ def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
 
 
 @njit(nogil=True)
-def _manage(work: Any, count: int, row: Any, node: Any, t: Tuning) -> int:
+def _manage(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> int:
     """Normalise, prune, now and then merge, split and re-seed the second class; returns the count."""
     normalise(work, count)
     count = prune(work, count, t.prune)
@@ -145,20 +153,8 @@ def _manage(work: Any, count: int, row: Any, node: Any, t: Tuning) -> int:
         count = limit(work, count, t.keep_tracking if row.declared == 1 else layout.KEEP)
     if row.since_seed_s >= 2.0 and is_referred(node.heading_kind):
         row.since_seed_s = 0.0
-        count = _reseed(work, count, row, t)
+        count = reseed(work, count, row, node, PH, t)
     return count
-
-
-@njit(nogil=True)
-def _reseed(work: Any, count: int, row: Any, t: Tuning) -> int:
-    """Keep the possibility of a wrong heading reference alive while tracking."""
-    if row.declared == 0 or count >= layout.KEEP:
-        return count
-    for h in range(count):
-        if work[h].kind == 1:
-            return count
-    best = best_of(work, count)
-    return count + second_class(work, best, count, row, t, False)
 
 
 @njit(nogil=True)
@@ -190,18 +186,6 @@ def _begin(work: Any, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
 
 
 @njit(nogil=True)
-def _finite(work: Any, count: int) -> bool:
-    """Every hypothesis is a number with a positive variance in every direction that can be checked cheaply."""
-    for h in range(count):
-        if not math.isfinite(work[h].log_weight):
-            return False
-        for i in range(N):
-            if not (math.isfinite(work[h].mean[i]) and work[h].cov[i, i] > -1e-9 and work[h].cov[i, i] < 1e12):
-                return False
-    return count > 0
-
-
-@njit(nogil=True)
 def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, belief: Any) -> int:
     """One node on a running row; returns the count of hypotheses."""
     H, PH, out = scratch.H, scratch.PH, scratch.out
@@ -213,12 +197,13 @@ def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, s
             work[h].log_weight += update_rest(work[h].mean, work[h].cov, PH, node, t)
     row.since_range_s += node.dt_s
     recover(work, count, row, node, t)
+    count = expect_clear(work, count, row, node.dt_s, t)
     stuck = repeats(row, node, work[best_of(work, count)].mean[V])
     if node.kind == RANGE and row.anchor >= 0 and not stuck:
         _range_all(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
         count = open_alternative(work, count, row, t)
-        unblock(work, count, t)
+        unblock(work, count, PH, t)
     if node.kind == BEARING and row.anchor >= 0:
         anchor, primary = anchors[node.anchor], anchors[row.anchor]
         best = best_of(work, count)
@@ -228,9 +213,9 @@ def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, s
             )
             if h == best:
                 _tell(belief, out[0], out[1], out[2])
-    if not _finite(work, count):
+    if not finite(work, count):
         return 0
-    count = _manage(work, count, row, node, t)
+    count = _manage(work, count, row, node, PH, t)
     for h in range(count):
         mirror(work[h].cov)
     return count

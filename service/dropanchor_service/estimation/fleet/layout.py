@@ -78,7 +78,7 @@ ROW: Final = np.dtype(
         ("ring_rest", np.uint8),
         ("ring_s", np.float64),
         ("since_manage_s", np.float64),
-        ("since_split_s", np.float64),
+        ("since_clear_s", np.float64),  # since blocked hypotheses were last offered a clear line of sight
         ("since_range_s", np.float64),
         ("since_seed_s", np.float64),
         ("since_nlos_s", np.float64),

@@ -171,3 +171,15 @@ def _split_one(work: Any, h: int, count: int, variance: float) -> None:
     work[h].log_weight += math.log(0.5496)
     work[count].log_weight += math.log(0.2252)
     work[count + 1].log_weight += math.log(0.2252)
+
+
+@njit(nogil=True)
+def finite(work: Any, count: int) -> bool:
+    """Every hypothesis is a number with a positive variance in every direction that can be checked cheaply."""
+    for h in range(count):
+        if not math.isfinite(work[h].log_weight):
+            return False
+        for i in range(N):
+            if not (math.isfinite(work[h].mean[i]) and work[h].cov[i, i] > -1e-9 and work[h].cov[i, i] < 1e12):
+                return False
+    return count > 0

@@ -6,7 +6,7 @@ from typing import Any
 from . import layout
 from .compiled import njit
 from .node import RANGE
-from .summary import add_reference, best_mode, forget_information, sigma_obs
+from .summary import add_reference, best_mode, forget_information, sigma_obs, spread_over_all
 from .tuning import Tuning
 
 UNRANGED = 3.0  # s without a range after which a place has to be resolved anew
@@ -31,17 +31,31 @@ def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning,
         row.information[1, 0] = row.information[0, 1]
         row.information[1, 1] += s * s * weight
     belief.sigma_obs = sigma_obs(row.information)
-    if row.start_known == 0:
-        reference = row.reference_std if row.referred == 1 else 1.8  # nothing known: sd of a uniform angle
-        add_reference(cov, mean[0], mean[1], reference**2)
+    _refer(row, mean, cov)
+    _declare(row, node, p_mode, relative, math.sqrt(r2), t)
+    _judge(row, _sigma(cov), math.sqrt(r2), work[head].blocked == 1)
+    if row.declared == 0 or p_mode < 0.9:
+        spread_over_all(work, count, scratch)
+        _refer(row, mean, cov)
     for i in range(3):
         for j in range(3):
             belief.cov[i, j] = cov[i, j]
     belief.p_mode = min(p_mode, 1.0)
-    belief.sigma_pos = math.sqrt(max(cov[0, 0] + cov[1, 1], 0.0))
+    belief.sigma_pos = _sigma(cov)
     belief.hypotheses = count
-    _declare(row, node, p_mode, relative, math.sqrt(r2), t)
-    _judge(row, belief.sigma_pos, math.sqrt(r2), work[head].blocked == 1)
+
+
+@njit(nogil=True)
+def _refer(row: Any, mean: Any, cov: Any) -> None:
+    """A start that was found is known only as well as the heading reference."""
+    if row.start_known == 0:
+        reference = row.reference_std if row.referred == 1 else 1.8  # nothing known: sd of a uniform angle
+        add_reference(cov, mean[0], mean[1], reference**2)
+
+
+@njit(nogil=True)
+def _sigma(cov: Any) -> float:
+    return math.sqrt(max(cov[0, 0] + cov[1, 1], 0.0))
 
 
 @njit(nogil=True)

@@ -7,11 +7,11 @@ import numpy as np
 
 from .compiled import njit
 from .heading import error_of, told_of
-from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, STEADY, YAW, R, V
-from .manage import copy_hypothesis
+from .layout import ACC, COMMON, CRAB, GYRO, KEEP, MOUNT, OFFSET, PHI, REF, STEADY, YAW, N, R, V
+from .manage import best_of, copy_hypothesis
 from .node import ABSOLUTE_HEADING, DERIVED_HEADING, NO_HEADING, RELATIVE_HEADING
 from .tuning import Tuning
-from .update import wrap
+from .update import update_component, wrap
 
 
 @njit(nogil=True)
@@ -131,6 +131,43 @@ def second_class(work: Any, source: int, target: int, row: Any, t: Tuning, yaw_f
         work[target].log_weight += t.second_class
         give_reference_error(work[target].cov, t.second_std, yaw_follows)
     return 1
+
+
+@njit(nogil=True)
+def first_class(work: Any, source: int, target: int, PH: Any, t: Tuning) -> int:
+    """A copy of `source`, of the second class, with an exact heading reference after all; returns 1.
+
+    Its weight is the Savage-Dickey ratio: posterior over prior density of the reference's error at zero.
+    """
+    copy_hypothesis(work, source, target)
+    new = work[target]
+    new.kind = 0
+    error, variance = new.mean[REF], max(new.cov[REF, REF], 1e-9)
+    new.log_weight += 0.5 * math.log(t.second_std**2 / variance) - 0.5 * error * error / variance - t.second_class
+    update_component(new.mean, new.cov, PH, REF, 0.0, 1e-8)
+    for i in range(N):
+        new.cov[REF, i] = new.cov[i, REF] = 0.0
+    new.mean[REF] = 0.0
+    return 1
+
+
+@njit(nogil=True)
+def reseed(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> int:
+    """Keep both classes alive while tracking: a reference with an error of its own, and one without."""
+    if row.declared == 0 or count >= KEEP:
+        return count
+    wrong = 0
+    for h in range(count):
+        wrong += work[h].kind
+    best = best_of(work, count)
+    if wrong == 0:
+        added = second_class(work, best, count, row, t, False)
+        work[count].log_weight += t.second_again
+        return count + added
+    _, slow, _ = error_of(row, node.heading_var)
+    if wrong == count and slow == 0.0:
+        return count + first_class(work, best, count, PH, t)
+    return count
 
 
 @njit(nogil=True)

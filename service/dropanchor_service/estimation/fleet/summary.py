@@ -69,19 +69,21 @@ def relative_sigma(s: Any, P: Any) -> float:
 
 
 @njit(nogil=True)
-def cluster(work: Any, count: int, head: int) -> float:
-    """Mark the members of head's mode that are not taken; returns their weight. Weights must be normalised.
+def apart(a: Any, b: Any) -> bool:
+    """Whether two hypotheses are two places: further from each other than 1 m + 2 sigma of both."""
+    sa, sb = a.mean, b.mean
+    dx = sb[R] * math.cos(sb[PHI]) - sa[R] * math.cos(sa[PHI])
+    dy = sb[R] * math.sin(sb[PHI]) - sa[R] * math.sin(sa[PHI])
+    sigma2 = relative_sigma(sa, a.cov) ** 2 + relative_sigma(sb, b.cov) ** 2
+    return bool(dx * dx + dy * dy > (1.0 + 2.0 * math.sqrt(sigma2)) ** 2)
 
-    A member lies within 1 m + 2 sigma (of the head) of the head.
-    """
-    hx = work[head].mean[R] * math.cos(work[head].mean[PHI])
-    hy = work[head].mean[R] * math.sin(work[head].mean[PHI])
-    reach = 1.0 + 2.0 * relative_sigma(work[head].mean, work[head].cov)
+
+@njit(nogil=True)
+def cluster(work: Any, count: int, head: int) -> float:
+    """Mark the members of head's mode that are not taken; returns their weight. Weights must be normalised."""
     weight = 0.0
     for h in range(count):
-        dx = work[h].mean[R] * math.cos(work[h].mean[PHI]) - hx
-        dy = work[h].mean[R] * math.sin(work[h].mean[PHI]) - hy
-        work[h].member = not work[h].taken and dx * dx + dy * dy <= reach * reach
+        work[h].member = not work[h].taken and not apart(work[head], work[h])
         if work[h].member:
             weight += math.exp(work[h].log_weight)
     return weight
@@ -89,9 +91,9 @@ def cluster(work: Any, count: int, head: int) -> float:
 
 @njit(nogil=True)
 def moments(work: Any, count: int, head: int, scratch: Any) -> float:
-    """Mean (x, y, course, speed, yaw) and covariance (x, y, course) of the members; returns the mean relative sigma."""
+    """Mean (x, y, course, speed, yaw) and covariance (x, y, course) of the members; returns their relative sigma."""
     mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
-    total, sigma = 0.0, 0.0
+    total, sigma2 = 0.0, 0.0
     mean[:] = 0.0
     cov[:] = 0.0
     course0, yaw0 = course_of(work[head].mean), work[head].mean[YAW]
@@ -109,7 +111,7 @@ def moments(work: Any, count: int, head: int, scratch: Any) -> float:
                 cov[i, j] += w * (part[i, j] + point[i] * point[j])
         mean[3] += w * s[V]
         mean[4] += w * wrap(s[YAW] - yaw0)
-        sigma += w * relative_sigma(s, work[h].cov)
+        sigma2 += w * (relative_sigma(s, work[h].cov) ** 2 + _from_head(work[head].mean, s))
         total += w
     for i in range(5):
         mean[i] /= total
@@ -118,7 +120,31 @@ def moments(work: Any, count: int, head: int, scratch: Any) -> float:
             cov[i, j] = cov[i, j] / total - mean[i] * mean[j]
     mean[2] = wrap(mean[2] + course0)
     mean[4] = wrap(mean[4] + yaw0)
-    return sigma / total
+    return math.sqrt(sigma2 / total)
+
+
+@njit(nogil=True)
+def _from_head(head: Any, s: Any) -> float:
+    """Squared distance, m^2, but for a rotation of everything about the anchor."""
+    bearing = wrap(s[PHI] - head[PHI])
+    angle = wrap(s[YAW] + s[MOUNT] - head[YAW] - head[MOUNT] - bearing)
+    return float((s[R] - head[R]) ** 2 + head[R] ** 2 * min(bearing * bearing, angle * angle))
+
+
+@njit(nogil=True)
+def spread_over_all(work: Any, count: int, scratch: Any) -> None:
+    """scratch.cov becomes that of all hypotheses about scratch.mean: an ellipse that other modes lie in, too."""
+    mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
+    cov[:] = 0.0
+    for h in range(count):
+        w = math.exp(work[h].log_weight)
+        s = work[h].mean
+        point[0], point[1] = s[R] * math.cos(s[PHI]) - mean[0], s[R] * math.sin(s[PHI]) - mean[1]
+        point[2] = wrap(course_of(s) - mean[2])
+        planar(s, work[h].cov, part)
+        for i in range(3):
+            for j in range(3):
+                cov[i, j] += w * (part[i, j] + point[i] * point[j])
 
 
 @njit(nogil=True)

@@ -33,9 +33,12 @@ class Tuning(NamedTuple):
     outlier_std: float = 0.8  # m
     outlier_floor: float = 1e-4
     blocked_log_prior: float = -2.5
+    blocked_depth: float = 6.0  # log weight below the best at which a hypothesis gets no alternative
     blocked_min: float = 0.15  # m, less than that is a clear line of sight
+    blocked_tau: float = 2.0  # s
     blocked_run: int = 4
     second_class: float = -1.0  # log prior of an error of the heading reference of its own
+    second_again: float = -2.0  # on top of it, when it had been given up and is tried again
     second_std: float = 0.15  # rad
     second_tau: float = 60.0  # s
     common_tau: float = 10.0  # s in which the error of a magnetic heading changes by its own standard deviation
