@@ -1,0 +1,142 @@
+"""What estimation costs: the engines and a plain filterpy EKF per tag, in one run, without input and output.
+
+A tag sends 100 Hz of raw 9-axis IMU and 10 Hz of ranges in 5 messages a second, and starts at a known place. The plain
+filter is the least that one could do: one prediction, one heading and one range per range, and no attitude at all.
+"""
+
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import (
+    ANCHOR,
+    IMU,
+    RANGE,
+    Array,
+    Engine,
+    HeadingSource,
+    SampleBatch,
+    State,
+    default_settings,
+)
+from dropanchor_service.estimation.ekf import PoseFilter
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.paper import TUNED, PaperEngine
+from dropanchor_tag_client.simulator.sensors import preset
+from dropanchor_tag_client.simulator.simulation import Simulation, simulate
+
+RUNS, COPIES = 8, 50
+MESSAGE_S, SETTLED_S, END_S = 0.2, 10.0, 25.0
+IDLE = 10_000
+
+
+def imu_of(run: Simulation, row: int) -> Array:
+    columns = np.zeros(len(run.imu.t_s), IMU)
+    columns["row"], columns["t_ns"] = row, np.rint(run.imu.t_s * 1e9)
+    columns["acc"], columns["gyro"], columns["mag"] = run.imu.acc, run.imu.gyro, run.imu.mag
+    return columns
+
+
+def ranges_of(run: Simulation, row: int) -> Array:
+    columns = np.zeros(len(run.ranges.t_s), RANGE)
+    columns["row"], columns["t_ns"] = row, np.rint(run.ranges.t_s * 1e9)
+    columns["range"], columns["std"] = run.ranges.range_m, run.ranges.std_m
+    return columns
+
+
+def messages(columns: list[Array], k: int) -> Array:
+    """Message k of every tag, one tag after the other."""
+    start, end = round(k * MESSAGE_S * 1e9), round((k + 1) * MESSAGE_S * 1e9)
+    return np.concatenate([c[(c["t_ns"] >= start) & (c["t_ns"] < end)] for c in columns])
+
+
+def batches(runs: list[Simulation], copies: int) -> Iterator[SampleBatch]:
+    """One message of every tag after the other; tag k makes run k % len(runs)."""
+    tags = [(run, copy * len(runs) + k) for copy in range(copies) for k, run in enumerate(runs)]
+    imu, ranges = [imu_of(*tag) for tag in tags], [ranges_of(*tag) for tag in tags]
+    for k in range(round(END_S / MESSAGE_S)):
+        yield SampleBatch(imu=messages(imu, k), ranges=messages(ranges, k))
+
+
+def settings_of(run: Simulation) -> Array:
+    settings = default_settings()
+    settings["heading_source"], settings["mount_angle"] = HeadingSource.IMU, 0.0
+    settings["start_known"], settings["start_std"] = True, 0.1
+    settings["start_x"], settings["start_y"] = run.truth.x[0], run.truth.y[0]
+    settings["start_heading"] = run.truth.heading[0]
+    return settings
+
+
+def cost_of(engine: Engine, runs: list[Simulation], copies: int) -> tuple[float, float]:
+    """Microseconds of processor time per tag and second once settled, and the share of poses that are tracking."""
+    engine.set_anchors(np.zeros(1, ANCHOR))
+    for row in range(copies * len(runs)):
+        engine.configure(row, settings_of(runs[row % len(runs)]))
+    costs, tracking = [], []
+    for k, batch in enumerate(batches(runs, copies)):
+        began = time.process_time()
+        poses = engine.process(batch).poses
+        seconds = time.process_time() - began
+        assert len(poses) == len(batch.ranges)
+        if k * MESSAGE_S >= SETTLED_S:
+            costs.append(seconds * 1e6 / (copies * len(runs) * MESSAGE_S))
+            tracking.append(float((poses["state"] == State.TRACKING).mean()))
+    return statistics.median(costs), statistics.mean(tracking)
+
+
+def cost_of_plain_filters(runs: list[Simulation]) -> float:
+    """The same for one filterpy EKF per tag with the heading of the simulated scalar sensor."""
+    costs = []
+    for run in runs:
+        start = np.array([run.truth.x[0], run.truth.y[0], run.truth.course[0], 0.0, 0.0])
+        pose = PoseFilter(start, np.diag([0.01, 0.01, 0.01, 0.1, 0.1]), np.array([1e-4, 1e-4, 1e-4, 0.5, 0.5]))
+        headings = np.interp(run.ranges.t_s, run.scalars.t_s, np.unwrap(run.scalars.heading_rad)).tolist()
+        ranges = run.ranges.range_m.tolist()
+        settled = int(np.searchsorted(run.ranges.t_s, SETTLED_S))
+        began = time.process_time()
+        for heading, z in zip(headings[:settled], ranges[:settled], strict=True):
+            pose.advance(0.1)
+            pose.update_heading(heading, 0.0025)
+            pose.update_range(z, 0.04, (0.0, 0.0, 0.0), 1e3)
+        costs.append((time.process_time() - began) * 1e6 / SETTLED_S)
+        assert math.isfinite(float(pose.x[0]))
+    return statistics.median(costs)
+
+
+def bytes_per_tag(engine: FleetEngine, tags: int) -> float:
+    return sum(part.nbytes for part in engine.state().values()) / tags
+
+
+def idle_figures() -> dict[str, float]:
+    fleet, settings = FleetEngine(), default_settings()
+    began = time.process_time()
+    for row in range(IDLE):
+        fleet.configure(row, settings)
+    return {
+        "fleet_configure_us": (time.process_time() - began) * 1e6 / IDLE,
+        "fleet_bytes_per_idle_tag": bytes_per_tag(fleet, IDLE),
+    }
+
+
+def test_the_cost_of_the_engines_is_measured(record_property: Callable[[str, object], None]) -> None:
+    runs = [simulate("M5", seed, preset("calibrated", imu_hz=100.0)) for seed in range(4000, 4000 + RUNS)]
+    fleet = FleetEngine()
+    figures: dict[str, Any] = {}
+    figures["fleet_us_per_tag_s"], tracking = cost_of(fleet, runs, COPIES)
+    figures["paper_us_per_tag_s"], _ = cost_of(PaperEngine(TUNED), runs[:2], 1)
+    figures["plain_filterpy_us_per_tag_s"] = cost_of_plain_filters(runs)
+    for name in ("fleet", "paper", "plain_filterpy"):
+        figures[f"{name}_us_per_range"] = figures[f"{name}_us_per_tag_s"] / 10.0
+    for name in ("paper", "plain_filterpy"):
+        figures[f"{name}_over_fleet"] = figures[f"{name}_us_per_tag_s"] / figures["fleet_us_per_tag_s"]
+    figures["fleet_share_tracking"] = tracking
+    figures["fleet_bytes_per_tag_tracking"] = bytes_per_tag(fleet, RUNS * COPIES)
+    figures |= idle_figures()
+    assert tracking > 0.5
+    for name, value in figures.items():
+        record_property(name, round(value, 2))
+        print(f"{name:30} {value:10.2f}")  # noqa: T201
