@@ -139,4 +139,4 @@ def test_the_cost_of_the_engines_is_measured(record_property: Callable[[str, obj
     assert tracking > 0.5
     for name, value in figures.items():
         record_property(name, round(value, 2))
-        print(f"{name:30} {value:10.2f}")  # noqa: T201
+        print(f"{name:30} {value:10.2f}")
