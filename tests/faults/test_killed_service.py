@@ -11,15 +11,14 @@ import random
 import signal
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
-from support.live_tags import LiveTags, distance
+from support.live_tags import LiveTags, distance, is_current, samples_of
 from support.service import Running, running_service
-from support.zenoh_router import free_endpoint, start_router_process, wait_until
+from support.zenoh_router import free_endpoint, router_process, wait_until
 
 KILLS = int(os.environ.get("DROPANCHOR_KILLS", "2"))
 TAGS = int(os.environ.get("DROPANCHOR_KILLED_TAGS", "3"))
@@ -29,17 +28,6 @@ UP_S = 3.0  # at most, from being current to the next kill
 STEP_S = float(os.environ.get("DROPANCHOR_KILLED_STEP_S", "0.1"))
 
 _log = logging.getLogger(__name__)
-
-
-def samples_of(service: Running) -> dict[str, dict[str, int]]:
-    return {status["tag"]: status["samples"] for status in service.get("/api/v1/tags")["tags"]}
-
-
-def is_current(service: Running) -> bool:
-    """Whether no tag's pose is older than half a second."""
-    time.sleep(0.05)  # asking is work too
-    poses = service.get("/api/v1/poses")["poses"]
-    return len(poses) == TAGS and max(pose["age_s"] for pose in poses) < 0.5
 
 
 @pytest.mark.parametrize("router", ["outside", "inside"])
@@ -80,15 +68,5 @@ def test_a_service_that_is_killed_loses_nothing_and_ends_where_an_uninterrupted_
 
 def wait_until_current(service: Running) -> None:
     started_s = time.monotonic()
-    wait_until(lambda: is_current(service), 60.0)
+    wait_until(lambda: is_current(service, TAGS), 60.0)
     _log.info("current %.2f s after it was ready", time.monotonic() - started_s)
-
-
-@contextmanager
-def router_process(endpoint: str) -> Iterator[None]:
-    router = start_router_process(endpoint)
-    try:
-        yield
-    finally:
-        router.kill()
-        router.communicate()

@@ -18,6 +18,7 @@ from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_poses, tag_name
 from dropanchor_tag_client.simulator.sensors import preset
 from support.ingest import Bench
+from support.service import Running
 
 
 class LiveTags:
@@ -38,9 +39,9 @@ class LiveTags:
         self._thread = Thread(target=self._run, daemon=True)
         self.samples: dict[str, Counter[str]] = defaultdict(Counter)
 
-    def write_settings(self, folder: Path) -> Path:
-        """A settings file that knows the anchor and where each tag starts."""
-        lines = ['engine = "fleet"', "[[site.anchors]]", 'id = "0"']
+    def write_settings(self, folder: Path, *more: str) -> Path:
+        """A settings file that knows the anchor and where each tag starts; more: lines at its top."""
+        lines = ['engine = "fleet"', *more, "[[site.anchors]]", 'id = "0"']
         for index, pose in enumerate(start_poses(self._tags, self._seed)):
             start = f"{{ x = {pose.x}, y = {pose.y}, heading_rad = {pose.heading_rad} }}"
             lines += [f"[tags.{json.dumps(tag_name(index))}]", f"start = {start}"]
@@ -49,6 +50,10 @@ class LiveTags:
         return file
 
     def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def start(self) -> None:
         self._opened = [
             self._clients.enter_context(
                 TagClient(
@@ -63,11 +68,13 @@ class LiveTags:
         ]
         self._t0_ns = time.time_ns() // 1000 * 1000 + 200_000_000
         self._thread.start()
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        self.close()
+
+    def close(self) -> None:
         self.finish()
         self._clients.close()
 
@@ -106,3 +113,15 @@ class LiveTags:
 def distance(pose: Any, answer: dict[str, Any]) -> float:
     """m, between POSE (0-d) and a pose as REST gives it."""
     return float(np.hypot(pose["x"] - answer["x"], pose["y"] - answer["y"]))
+
+
+def samples_of(service: Running) -> dict[str, dict[str, int]]:
+    """Samples that reached the estimators, by tag and kind."""
+    return {status["tag"]: status["samples"] for status in service.get("/api/v1/tags")["tags"]}
+
+
+def is_current(service: Running, tags: int) -> bool:
+    """Whether so many tags have a pose, and none that is older than half a second."""
+    time.sleep(0.05)  # asking is work too
+    poses = service.get("/api/v1/poses")["poses"]
+    return len(poses) == tags and max(pose["age_s"] for pose in poses) < 0.5

@@ -65,6 +65,17 @@ def start_router_process(endpoint: str) -> subprocess.Popen[str]:
     return process
 
 
+@contextmanager
+def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
+    """A router in a process of its own, ended at the end."""
+    router = start_router_process(endpoint)
+    try:
+        yield router
+    finally:
+        router.kill()
+        router.communicate()
+
+
 def wait_until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
     """Returns when the condition holds; fails the test when it does not come true in time."""
     deadline = time.monotonic() + timeout_s

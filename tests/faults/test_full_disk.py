@@ -1,0 +1,54 @@
+"""A disk that takes nothing any more stops neither the poses nor the service, and is told."""
+
+import resource
+import signal
+from pathlib import Path
+
+import httpx
+
+from support.live_tags import LiveTags, is_current, samples_of
+from support.service import Running, running_service
+from support.zenoh_router import free_endpoint, router_process, wait_until
+
+TAGS, SEED = 2, 5
+
+
+def impaired(service: Running) -> str:
+    answer = httpx.get(f"{service.url}/api/v1/health/ready")
+    assert answer.status_code == 200
+    return "; ".join(answer.json()["impaired"])
+
+
+def set_file_limit(service: Running, size: int) -> None:
+    """What the service writes beyond it fails, as on a disk without room (setrlimit(2), EFBIG)."""
+    pid = service.process.pid
+    _, hard = resource.prlimit(pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(pid, resource.RLIMIT_FSIZE, (size, hard))
+
+
+def test_without_room_on_the_disk_poses_go_on_and_the_last_good_checkpoint_is_used(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    tags = LiveTags(endpoint, TAGS, SEED, cache_messages=6000)
+    config = tags.write_settings(tmp_path)
+    options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", endpoint)
+    failed, written = (f'dropanchor_checkpoints_total{{outcome="{outcome}"}}' for outcome in ("failed", "written"))
+    with router_process(endpoint), tags:
+        with running_service(*options) as service:
+            wait_until(lambda: is_current(service, TAGS) and service.metric(written) > 0, 60.0)
+            assert "checkpoint" not in impaired(service)
+            set_file_limit(service, 0)
+            wait_until(lambda: "the newest checkpoint is" in impaired(service), 60.0)
+            assert service.metric(failed) > 0
+            assert service.metric("dropanchor_checkpoint_age_seconds") > 1.0
+            wait_until(lambda: is_current(service, TAGS), 60.0)
+            set_file_limit(service, resource.RLIM_INFINITY)
+            wait_until(lambda: impaired(service) == "", 60.0)
+            set_file_limit(service, 0)
+            before = service.metric(failed)
+            wait_until(lambda: service.metric(failed) > before, 60.0)
+            service.stop(signal.SIGKILL)
+        with running_service(*options) as service:
+            assert any("going on from a checkpoint" in line for line in service.log)
+            wait_until(lambda: is_current(service, TAGS), 60.0)
+            tags.finish()
+            wait_until(lambda: samples_of(service) == tags.samples, 30.0)

@@ -1,0 +1,38 @@
+"""A router that is killed again and again while its tags publish costs no sample, and nobody has to lend a hand."""
+
+import logging
+import time
+from pathlib import Path
+
+from support.live_tags import LiveTags, distance, is_current, samples_of
+from support.service import running_service
+from support.zenoh_router import free_endpoint, router_process, wait_until
+
+TAGS, KILLS, SEED = 3, 3, 4
+DOWN_S = 1.5
+
+_log = logging.getLogger(__name__)
+
+
+def test_a_router_that_is_killed_costs_no_sample_and_poses_are_live_again(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    tags = LiveTags(endpoint, TAGS, SEED, cache_messages=6000)
+    config = tags.write_settings(tmp_path)
+    with running_service("--config", str(config), "--zenoh-connect", endpoint, ready=False) as service:
+        for life in range(KILLS + 1):
+            with router_process(endpoint):
+                back_s = time.monotonic()
+                if life == 0:
+                    tags.start()
+                wait_until(lambda: is_current(service, TAGS), 60.0)
+                _log.info("live %.2f s after the router was there", time.monotonic() - back_s)
+                if life == KILLS:
+                    tags.finish()
+                    wait_until(lambda: samples_of(service) == tags.samples, 30.0)
+                    answers = {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"]}
+                    assert service.metric("dropanchor_missed_messages_total") == 0
+                    tags.close()
+            time.sleep(DOWN_S)
+    apart = {tag: distance(pose, answers[tag]) for tag, pose in tags.expected(config).items()}
+    assert apart.keys() == answers.keys()
+    assert max(apart.values()) < 1e-3
