@@ -1,10 +1,12 @@
 """Poses: one, or many."""
 
+import asyncio
+from collections.abc import AsyncIterator, Iterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseList
@@ -61,12 +63,20 @@ def poses_router(answers: Answers) -> APIRouter:
     async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
         as_geojson = geojson.wanted(request, answers)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
-        poses = answers.pose_list(found if query.tags else None)
+        wanted = found if query.tags else None
         if as_geojson:
-            return _response(geojson.collection_of(poses), geojson.MEDIA_TYPE)
-        return _response(poses, geojson.JSON)
+            return _response(geojson.collection_of(answers.pose_list(wanted)), geojson.MEDIA_TYPE)
+        headers = {"cache-control": "no-store", "vary": "accept"}
+        return StreamingResponse(_in_turn(answers.pose_list_json(wanted)), media_type=geojson.JSON, headers=headers)
 
     return router
+
+
+async def _in_turn(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
+    """Other answers have their turn between two chunks."""
+    for chunk in chunks:
+        yield chunk
+        await asyncio.sleep(0)
 
 
 def _known(answers: Answers, name: str) -> Tag:

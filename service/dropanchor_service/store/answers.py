@@ -5,7 +5,7 @@ cost more than all the rest. Unknown floats are NaN in them, null in JSON.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from dropanchor_service.estimation.batch import POSE, Array, State
 from dropanchor_service.store.at_time import BeforeMemoryError, pose_at
 from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95, with_age
 from dropanchor_service.store.latest import LatestPoses
+from dropanchor_service.store.pose_json import list_json, poses_json
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
 from dropanchor_service.store.track_answers import pose_in_tracks
@@ -86,6 +87,18 @@ class Answers:
         """`PoseList` of these tags, or of all, as far as they have a pose."""
         now_ns = self.now_ns()
         return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
+
+    def pose_list_json(self, tags: Sequence[Tag] | None = None) -> Iterator[bytes]:
+        """The JSON of `pose_list`, in chunks and without an object per tag."""
+        now_ns = self.now_ns()
+        return list_json(now_ns, self.rows(tags), lambda poses: self._poses_json(poses, now_ns))
+
+    def _poses_json(self, poses: Array, now_ns: int) -> bytes:
+        columns = columns_of(poses, self.site, self.tags, now_ns)
+        hypotheses = [b"[]"] * len(poses)
+        for place in np.flatnonzero(columns.poses["state"] == State.AMBIGUOUS).tolist():
+            hypotheses[place] = to_json(self._hypotheses_of(int(poses["row"][place]), _AMBIGUOUS))
+        return poses_json(columns, hypotheses)
 
     def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
         """`Pose` for each of the POSE rows, which are the latest."""
