@@ -71,7 +71,7 @@ def test_a_replay_takes_the_time_of_its_speed_and_ends_at_the_present(
         assert main(["replay", str(folder), "--connect", router_endpoint, "--speed", speed]) == 0
         took, ended_ns = time.monotonic() - began, time.time_ns()
         wait_until(lambda: samples(heard) == 6)
-    assert length_s <= took < length_s + 2.0
+    assert length_s <= took < length_s + 15.0
     assert times(heard.frames)[-1] - times(heard.frames)[0] == pytest.approx(400_000_000, abs=2000)
     assert began_ns + length_s * 1e9 - 1e8 <= times(heard.frames)[-1] <= ended_ns
 
