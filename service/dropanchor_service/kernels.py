@@ -3,6 +3,8 @@
 import logging
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -23,24 +25,50 @@ from dropanchor_service.passes.values import shift_times
 from dropanchor_service.publishers import Publishers
 from dropanchor_service.screening import screen
 
-SLOW_S = 2.0
+SAY_EVERY_S = 5.0
 
 _log = logging.getLogger(__name__)
 
 
+@contextmanager
+def _said_while_compiling(what: str) -> Iterator[None]:
+    """A minute of silence looks like a fault, so it is said; at warning level, which nobody turns off."""
+    from numba.core.event import Event, Listener, install_listener
+
+    class Progress(Listener):
+        """Told of every function, of which there are hundreds."""
+
+        began: float | None = None
+        said = 0.0
+
+        def on_start(self, event: Event) -> None:  # noqa: ARG002
+            now = time.monotonic()
+            if self.began is None:
+                self.began = self.said = now
+                _log.warning("compiling %s, once after an update", what)
+            elif now - self.said >= SAY_EVERY_S:
+                self.said = now
+                _log.warning("compiling: %.0f s so far", now - self.began)
+
+        def on_end(self, event: Event) -> None: ...
+
+    progress = Progress()
+    with install_listener("numba:compile", progress):
+        yield
+    if progress.began is not None:
+        elapsed = time.monotonic() - progress.began
+        _log.warning("compiled in %.0f s; it is kept in %s", elapsed, os.environ.get(VARIABLE))
+
+
+@_said_while_compiling("the estimator, in about a minute")
 def warm_up(engine: Engine) -> None:
     """Compile what `engine`, which is thrown away, runs: a second of a tag that moves off, seen by every sensor."""
-    _log.info("loading the compiled estimator; the first time after an update it is compiled, in about a minute")
-    started = time.monotonic()
     engine.set_anchors(np.zeros(1, ANCHOR))
     unknown, known = default_settings(), default_settings()
     known["start_known"], known["start_x"], known["start_y"], known["start_heading"] = True, 10.0, 0.0, 0.0
     for row, settings in enumerate((unknown, known)):
         engine.configure(row, settings)
     engine.process(_moving_off(2))
-    elapsed = time.monotonic() - started
-    if elapsed > SLOW_S:
-        _log.info("compiled the estimator in %.0f s; it is kept in %s", elapsed, os.environ.get(VARIABLE, "its cache"))
 
 
 def _moving_off(rows: int) -> SampleBatch:
@@ -55,6 +83,7 @@ def _moving_off(rows: int) -> SampleBatch:
     return SampleBatch(imu=imu, ranges=ranges, headings=headings)
 
 
+@_said_while_compiling("the reader of messages")
 def warm_up_passes() -> None:
     """Compile what every message goes through: two of a publisher, with a gap between."""
     frame = Frame(

@@ -209,7 +209,9 @@ def _replaced(preset: Parameters, changes: Mapping[str, float]) -> Parameters:
 class Settings(_Section):
     """Everything that can be set. Built once, at the start, and passed down."""
 
-    engine: Literal["fleet", "paper"] = Field(default="paper", description="The estimator.")
+    engine: Literal["fleet", "paper"] = Field(
+        default="fleet", description="The estimator: ours, or Algorithm 1 as published."
+    )
     data_dir: Path | None = Field(
         default=None,
         description="Where changes made over REST, tracks and checkpoints are kept; without it a restart forgets all.",

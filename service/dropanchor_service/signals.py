@@ -15,6 +15,16 @@ class Interrupt:
 
     def __init__(self) -> None:
         self._event = threading.Event()
+        self._raises = False
+
+    @contextmanager
+    def at_once(self) -> Iterator[None]:
+        """While it is open a signal raises KeyboardInterrupt: for long work that leaves nothing behind."""
+        self._raises = True
+        try:
+            yield
+        finally:
+            self._raises = False
 
     def wait(self, goes_on: Callable[[], bool]) -> bool:
         """Until a signal comes; False when `goes_on` has become false before."""
@@ -27,6 +37,8 @@ class Interrupt:
         if self._event.is_set():
             os._exit(128 + number)
         self._event.set()
+        if self._raises:
+            raise KeyboardInterrupt
 
 
 @contextmanager

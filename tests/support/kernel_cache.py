@@ -6,7 +6,11 @@ running the old code. So the cache's place is named after the sources. Takes eff
 
 import hashlib
 import os
+import subprocess
+import sys
 from pathlib import Path
+
+from support.commands import environment
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,3 +23,8 @@ def use_cache_of_these_sources() -> None:
         b"".join(source.read_bytes() for source in [*sources, *sorted(ROOT.glob("tests/support/*.py"))])
     )
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / digest.hexdigest()[:16]))
+
+
+def compile_once() -> None:
+    """Fill the cache, for services that are started with a limit on the time they may take."""
+    subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)

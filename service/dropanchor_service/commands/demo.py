@@ -5,7 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service import logs
@@ -22,14 +22,17 @@ from dropanchor_tag_client.simulator.live import start_poses, tag_name
 
 DESCRIPTION = """\
 Starts the service and simulated tags that drive around one anchor, and prints where to look. The tags run in a
-process of their own and send raw ranges and IMU samples like real ones; their start poses are given to the service.
-Unless the settings say otherwise the engine `paper` runs with its tuned parameters: the published ones are made for
-sensors almost without noise. Ctrl-C ends both.
+process of their own and send raw ranges and IMU samples like real ones. What an operator could know of them is given
+to the service: where they start, and that their IMU looks ahead. With --unknown-start they have to be found. The first
+start after an update compiles the estimator, in about a minute. Ctrl-C ends both.
+With --engine paper its tuned parameters run unless the settings say otherwise: the published ones are made for sensors
+almost without noise.
 """
 EPILOG = """\
 examples:
   dropanchor demo
-  dropanchor demo --recording plaza2 --engine fleet
+  dropanchor demo --unknown-start
+  dropanchor demo --recording plaza2
   dropanchor demo --tags 20 --port 8081 --zenoh-listen tcp/127.0.0.1:7448
 """
 UNUSABLE = 2
@@ -46,6 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="a real tag instead: plaza1 or plaza2 (needs the extra `recordings`), or the folder of a recording",
     )
+    parser.add_argument(
+        "--unknown-start", action="store_true", help="do not say where the tags start: the engine fleet finds them"
+    )
     add_service_options(parser)
     parser.set_defaults(log_level="WARNING")
 
@@ -54,16 +60,16 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 1 when a part of it died, 2 when it could not start."""
     logs.configure(arguments.log_level)
     try:
-        with (
-            interrupts() as interrupt,
-            _cast(arguments) as cast,
-            Service(cast.settings) as service,
-            _tags(cast) as tags,
-        ):
-            sys.stdout.write(_where_to_look(service.url))
-            sys.stdout.flush()
-            # A recording that was played to its end (0) is no failure: the page stays.
-            stopped = interrupt.wait(lambda: tags.poll() in (None, 0) and not service.has_died)
+        with interrupts() as interrupt, _cast(arguments) as cast:
+            with interrupt.at_once():  # it may have to compile the estimator
+                made = Service(cast.settings)
+            with made as service, _tags(cast) as tags:
+                sys.stdout.write(_where_to_look(service.url))
+                sys.stdout.flush()
+                # A recording that was played to its end (0) is no failure: the page stays.
+                stopped = interrupt.wait(lambda: tags.poll() in (None, 0) and not service.has_died)
+    except KeyboardInterrupt:
+        return 0
     except (SettingsError, ListenError, ZenohError, RecordingError) as error:
         sys.stderr.write(f"dropanchor demo: {error}\n")
         return UNUSABLE
@@ -79,6 +85,10 @@ class Cast:
     settings: Settings
     tags: list[str]
 
+    def without_starts(self) -> "Cast":
+        tags = {name: tag.model_copy(update={"start": None}) for name, tag in self.settings.tags.items()}
+        return replace(self, settings=self.settings.model_copy(update={"tags": tags}))
+
 
 @contextmanager
 def _cast(arguments: argparse.Namespace) -> Iterator[Cast]:
@@ -87,21 +97,23 @@ def _cast(arguments: argparse.Namespace) -> Iterator[Cast]:
         settings = settings.model_copy(update={"paper": PaperSettings(preset="tuned")})
     if arguments.recording is None:
         simulate = ["simulate", "--tags", str(arguments.tags), "--seed", str(arguments.seed)]
-        yield Cast(_with_starts(settings, arguments.tags, arguments.seed), simulate)
+        given = _known(arguments.tags, arguments.seed)
+        cast = Cast(settings.model_copy(update={"tags": given | dict(settings.tags)}), simulate)
+        yield cast.without_starts() if arguments.unknown_start else cast
         return
     with recorded(arguments.recording) as tag:
-        yield Cast(tag.into(settings), ["replay", str(tag.folder), "--tag", tag.name])
+        cast = Cast(tag.into(settings), ["replay", str(tag.folder), "--tag", tag.name])
+        yield cast.without_starts() if arguments.unknown_start else cast
 
 
-def _with_starts(settings: Settings, count: int, seed: int) -> Settings:
-    """The engine `paper` cannot find out by itself where a tag starts, so it is told."""
-    starts = {
+def _known(count: int, seed: int) -> dict[str, TagSettings]:
+    """By tag: what an operator could know."""
+    return {
         tag_name(index): TagSettings(
-            start=StartPose(x=start.x, y=start.y, heading_rad=start.heading_rad, std_m=START_STD_M)
+            start=StartPose(x=start.x, y=start.y, heading_rad=start.heading_rad, std_m=START_STD_M), mount_angle_rad=0.0
         )
         for index, start in enumerate(start_poses(count, seed))
     }
-    return settings.model_copy(update={"tags": starts | dict(settings.tags)})
 
 
 @contextmanager

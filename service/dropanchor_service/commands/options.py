@@ -17,7 +17,7 @@ def add_service_options(parser: argparse.ArgumentParser) -> None:
         "--zenoh-listen", metavar="ENDPOINT", help="where our own Zenoh router listens (tcp/127.0.0.1:7447)"
     )
     zenoh.add_argument("--zenoh-connect", metavar="ENDPOINT", help="use the Zenoh router there, start none")
-    parser.add_argument("--engine", metavar="NAME", help="the estimator: paper (default) or fleet")
+    parser.add_argument("--engine", metavar="NAME", help="the estimator: fleet (default) or paper")
     parser.add_argument("--data-dir", metavar="FOLDER", help="keep changes made over REST here")
     add_security_options(parser)
     add_log_option(parser)

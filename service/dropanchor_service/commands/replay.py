@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ID",
         help="anchor whose ranges are used; the recording's only one if left out",
     )
-    add("--engine", metavar="NAME", help="estimator (default: that of the service)")
+    add("--engine", metavar="NAME", help="estimator: fleet (default) or paper")
     add(
         "--start",
         type=_start,

@@ -47,10 +47,15 @@ def run(arguments: argparse.Namespace) -> int:
     open_files.allow_all()
     systemd = Systemd()
     try:
-        with interrupts() as interrupt, Service(settings_of(arguments)) as service:
-            systemd.ready()
-            stopped = interrupt.wait(lambda: goes_on(service, systemd))
-            systemd.stopping()
+        with interrupts() as interrupt:
+            with interrupt.at_once():  # it may have to compile the estimator
+                made = Service(settings_of(arguments))
+            with made as service:
+                systemd.ready()
+                stopped = interrupt.wait(lambda: goes_on(service, systemd))
+                systemd.stopping()
+    except KeyboardInterrupt:
+        return 0
     except (SettingsError, ListenError, ZenohError) as error:
         sys.stderr.write(f"dropanchor serve: {error}\n")
         return UNUSABLE

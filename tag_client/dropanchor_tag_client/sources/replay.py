@@ -90,8 +90,9 @@ def replay(
 
 
 def timeline(recording: Recording, anchor: str | None = None) -> Iterator[Event]:
-    """Every sample of the recording in order of time, with what publishes it."""
-    return merge(_imu(recording), _ranges(recording, anchor), _headings(recording), key=itemgetter(0))
+    """Every sample of the recording in order of time, with what publishes it; headings before ranges of their time,
+    which may be the last of a message."""
+    return merge(_imu(recording), _headings(recording), _ranges(recording, anchor), key=itemgetter(0))
 
 
 def span(recording: Recording, anchor: str | None = None) -> tuple[float, float]:

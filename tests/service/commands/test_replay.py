@@ -2,6 +2,7 @@
 
 import argparse
 import csv
+import math
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,15 @@ def test_a_recording_with_a_known_start_is_tracked_and_reported(
     assert list(poses[0]) == list(replay.COLUMNS)
     assert len(poses) == 600
     assert poses[300]["state"] in {"tracking", "degraded", "coasting"}
+
+
+def test_without_an_engine_named_it_is_fleet_which_needs_no_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "poses.csv"
+    assert call(write_square(tmp_path, range_std_m=0.05), "--anchor", "A", "--no-plot", "--out", out) == 0
+    assert "fleet on" in capsys.readouterr().err
+    assert math.isfinite(float(rows(out)[-1]["x"]))
 
 
 def test_without_a_start_the_paper_says_that_it_cannot_know(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -58,7 +58,7 @@ def experiments(plan: Plan, workers: Workers, data: Path) -> list[Experiment]:
         _one("Fig. 3", fig3.run),
         _one("error propagation", lambda: error_propagation.run(plan.draws)),
         _one("Fig. 4", lambda: fig4.run(plan.fig4)),
-        Experiment("Table I", 8 * plan.table1, lambda step: table1.run(step, range(plan.table1))),
+        Experiment("Table I", table1.RUNS_PER_SEED * plan.table1, lambda step: table1.run(step, range(plan.table1))),
         Experiment("families", len(motions), lambda step: families.run(workers, step, seeds)),
         Experiment("unknown start", len(starts), lambda step: unknown_start.run(workers, step, seeds)),
         Experiment("robots", len(robots.tasks(of_robots)), lambda step: robots.run(workers, step, of_robots)),
