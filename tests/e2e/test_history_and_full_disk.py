@@ -26,7 +26,8 @@ def track(service: Running, end_ns: int) -> Track:
 
 
 def test_a_track_outlives_the_service_and_so_does_the_pose_at_a_time(tmp_path: Path) -> None:
-    end_ns, kept = time.time_ns(), ["--data-dir", str(tmp_path)]
+    end_ns = time.time_ns()
+    kept = ["--data-dir", str(tmp_path), "--engine", "paper"]  # it keeps no checkpoint: no tag is known afterwards
     configured = ["--config", str(settings_file(tmp_path, ["a"])), *kept]
     with running_service(*configured) as service, connected_session(service.zenoh) as session:
         drive(session, end_ns)
@@ -59,7 +60,7 @@ def test_on_a_full_disk_the_service_stays_says_so_and_goes_on_when_there_is_room
         assert service.get("/api/v1/tags/a/pose")["t_ns"] > full_ns - S
         allow_files(service, resource.RLIM_INFINITY)
         wait_until(lambda: service.get("/api/v1/health/ready")["impaired"] == [], 20.0)
-        assert len(track(service, full_ns).poses) >= 8
+        assert len(track(service, full_ns).poses) >= 5  # fewer where it is taken to stand
         for what in ("history", "recording"):
             assert service.metric(f"dropanchor_{what}_dropped_total") == 0
         assert service.stop() == 0
