@@ -4,6 +4,7 @@ numba looks only at the file of the outermost kernel: after a change in a file t
 running the old code. So the cache's place is named after the sources. Takes effect before numba is imported.
 """
 
+import functools
 import hashlib
 import os
 import subprocess
@@ -25,6 +26,7 @@ def use_cache_of_these_sources() -> None:
     os.environ.setdefault("NUMBA_CACHE_DIR", str(ROOT / ".numba_cache" / digest.hexdigest()[:16]))
 
 
+@functools.cache
 def compile_once() -> None:
     """Fill the cache, for services that are started with a limit on the time they may take."""
     subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)

@@ -18,6 +18,7 @@ from typing import Any
 import httpx
 
 from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
+from support.kernel_cache import compile_once
 from support.zenoh_router import free_endpoint, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -76,6 +77,7 @@ def running_service(
     ca: Path | None = None,
 ) -> Iterator[Running]:
     """`dropanchor serve` on free ports, ended at the end. ready: wait until it can do its work."""
+    compile_once()
     zenoh = endpoint or free_endpoint()
     listening = () if any("--zenoh" in argument for argument in arguments) else ("--zenoh-listen", zenoh)
     process = subprocess.Popen(
