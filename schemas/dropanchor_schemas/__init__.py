@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from dropanchor_schemas.pose import Ellipse, Hypothesis, Pose, PoseList, TrackingState
+    from dropanchor_schemas.pose import Ellipse, Hypothesis, Pose, PoseList, StateReason, TrackingState
     from dropanchor_schemas.samples import SamplesMessage, decode_json
     from dropanchor_schemas.site import Anchor, Georeference, Site, StartPose, TagSettings
 
@@ -17,6 +17,7 @@ _HOMES = {
     "Hypothesis": "pose",
     "Pose": "pose",
     "PoseList": "pose",
+    "StateReason": "pose",
     "TrackingState": "pose",
     "SamplesMessage": "samples",
     "decode_json": "samples",
@@ -37,6 +38,7 @@ __all__ = [
     "SamplesMessage",
     "Site",
     "StartPose",
+    "StateReason",
     "TagSettings",
     "TrackingState",
     "decode_json",

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import Hypothesis, TrackingState
+from dropanchor_schemas.pose import Hypothesis, StateReason, TrackingState
 from dropanchor_schemas.site import Anchor, TagSettings
 
 
@@ -18,7 +18,7 @@ class PoseFrame(_Answer):
     tags: list[str]
     online: list[bool]
     state: list[TrackingState]
-    reason: list[str]
+    reason: list[StateReason]
     hint: list[str]
     anchor: list[str | None]
     age_s: list[float]

@@ -16,6 +16,23 @@ class TrackingState(StrEnum):
     LOST = "lost"
 
 
+class StateReason(StrEnum):
+    """The machine reason of a state."""
+
+    NO_RANGE = "no_range"
+    NO_HEADING = "no_heading"
+    START_UNKNOWN = "start_unknown"
+    SEVERAL_MODES = "several_modes"
+    RESOLVED = "resolved"
+    RANGES_MISSING = "ranges_missing"
+    IMU_MISSING = "imu_missing"
+    RANGES_REJECTED = "ranges_rejected"
+    HEADING_DISTURBED = "heading_disturbed"
+    UNCERTAIN = "uncertain"
+    FAULT = "fault"
+    HEADING_UNSURE = "heading_unsure"
+
+
 class _Answer(BaseModel):
     model_config = ConfigDict(frozen=True)
 
@@ -46,7 +63,7 @@ class Pose(_Answer):
     t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")
     age_s: float = Field(description="Seconds from t_ns to the moment of the answer.")
     state: TrackingState
-    reason: str = Field(description="Machine-readable cause of the state.")
+    reason: StateReason = Field(description="Machine-readable cause of the state.")
     hint: str = Field(description="What a human can do about it; empty when nothing is needed.")
     x: float | None = Field(description="East, m; null while unknown.")
     y: float | None = Field(description="North, m; null while unknown.")

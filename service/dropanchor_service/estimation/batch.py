@@ -143,6 +143,7 @@ class StateReason(IntEnum):
     HEADING_DISTURBED = 8
     UNCERTAIN = 9  # the ellipse has grown too large
     FAULT = 10  # the row's numbers were not finite; it starts afresh
+    HEADING_UNSURE = 11  # only the direction from the anchor is: the heading may be wrong by a constant
 
 
 @dataclass(frozen=True)

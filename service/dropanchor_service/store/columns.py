@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.estimation.batch import Array, State, StateReason
 from dropanchor_service.store.geodesy import lat_lon
@@ -16,22 +17,24 @@ LOST_AFTER_S = 10.0
 CHI2_95_OF_2 = 5.991464547107979  # -2 ln 0.05: 95 % quantile of the chi-squared distribution, 2 degrees of freedom
 
 STATES = [TrackingState[state.name].value for state in State]
-REASONS = [reason.name.lower() for reason in StateReason]
+REASONS = [ReasonName[reason.name].value for reason in StateReason]
 
-_MOVE_HINT = "Move a few metres, not straight towards the anchor."
+_MOVE_HINT = "Walk a few metres, not straight towards the anchor or away from it."
 _HINTS = {
-    StateReason.NO_RANGE: "No range has come in: is the anchor on, and the tag within its reach?",
+    StateReason.NO_RANGE: "Too few ranges have come in: is the anchor on, and the tag within its reach?",
     StateReason.NO_HEADING: "No heading yet: the tag has to send IMU samples or a platform heading.",
-    StateReason.START_UNKNOWN: "Say where the tag starts: `start` in its settings.",
+    StateReason.START_UNKNOWN: "Say where the tag starts (`start` in its settings), or let the engine fleet find it.",
     StateReason.SEVERAL_MODES: _MOVE_HINT,
     StateReason.RESOLVED: "",
     StateReason.RANGES_MISSING: "No range comes in any more: is the anchor on, and the tag within its reach?",
-    StateReason.IMU_MISSING: "No IMU samples come in any more: check the tag.",
+    StateReason.IMU_MISSING: "No IMU samples came in for a while: check the tag, then walk a few metres.",
     StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
     "the site says it is?",
     StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move away from it.",
     StateReason.UNCERTAIN: _MOVE_HINT,
     StateReason.FAULT: "The estimate had to start afresh; if this repeats, check what the tag sends.",
+    StateReason.HEADING_UNSURE: "Where it is about the anchor is as good as its compass: say where the tag starts, "
+    "or add a second anchor.",
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
 

@@ -1,53 +1,22 @@
 """The page in a real browser on the real interface, over a store that the tests fill."""
 
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from threading import Event
-from typing import Any
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from api_house import House, make_house
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
-from support.browser import Watched, running_chromium, watched_page
+from service.dashboard.place import Place, live_house
+from support.browser import Watched, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
 
 TRACKING_BLUE = (0, 103, 184)
-
-
-@dataclass
-class Place:
-    house: House
-    url: str
-
-    def move(self, *names: str, **fields: Any) -> None:
-        self.house.move(*names, **({"t_ns": time.time_ns()} | fields))
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
-    with running_chromium() as browser:
-        yield browser
-
-
-def live_house() -> House:
-    house = make_house()
-    house.answers.now_ns = time.time_ns
-    return house
-
-
-@pytest.fixture
-def place() -> Iterator[Place]:
-    house = live_house()
-    with running_server(house.app(DASHBOARD), house.stopping) as port:
-        yield Place(house, f"http://127.0.0.1:{port}/")
 
 
 def colour_at(page: Watched, tag: str) -> tuple[int, ...]:
@@ -122,7 +91,7 @@ def test_an_ambiguous_tag_is_shown_as_every_place_where_it_may_be(chromium: Brow
         page.page.locator("tr[data-tag='cart']").click()
         texts = page.page.locator("#detail li").all_inner_texts()
         assert [text.split() for text in texts] == [["3.0,", "4.0", "m", "60", "%"], ["3.0,", "−4.0", "m", "40", "%"]]
-        page.page.locator("[data-part='hint']", has_text="Move a few metres").wait_for()
+        page.page.locator("[data-part='hint']", has_text="Walk a few metres").wait_for()
         assert colour_at(page, "cart") != TRACKING_BLUE
 
 

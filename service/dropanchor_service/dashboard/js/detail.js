@@ -1,31 +1,29 @@
 /** Everything about the selected tag. */
 
 import { hasKey } from "./access.js";
-import { api, getJson } from "./connection.js";
+import { api } from "./connection.js";
 import { UNKNOWN, age, compassPoint, degrees, fixed, metres, percent, sigma, words } from "./format.js";
 import { AMBIGUOUS, STATES } from "./states.js";
+import { Plots } from "./plots.js";
 import { symbol } from "./symbols.js";
 
 /** @typedef {import("./fleet.js").Fleet} Fleet */
 
-const ASK_MS = 1000;
-
 export class Detail {
-  /** What the stream does not carry; of the selected tag only. @type {any} */
-  #pose = null;
-  #asked = -Infinity;
-
   /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("./roster.js").Roster} roster
-   * @param {import("./choice.js").Choice} choice */
-  constructor(panel, fleet, roster, choice) {
+   * @param {import("./choice.js").Choice} choice @param {import("./evidence.js").Evidence} evidence */
+  constructor(panel, fleet, roster, choice, evidence) {
     this.panel = panel;
     this.fleet = fleet;
     this.roster = roster;
     this.choice = choice;
+    this.evidence = evidence;
+    this.plots = new Plots(this.#part("plots"));
     this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
     this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
     this.#part("close").addEventListener("click", () => choice.select(null));
     choice.addEventListener("change", () => this.update());
+    evidence.addEventListener("change", () => this.#explain());
     this.update();
   }
 
@@ -33,28 +31,29 @@ export class Detail {
     const row = this.fleet.row(this.choice.selected);
     this.panel.hidden = row < 0;
     if (row < 0) return;
-    if (this.fleet.hasPose(row)) this.#ask(this.fleet.names[row]);
+    if (this.fleet.hasPose(row)) this.evidence.ask(this.fleet.names[row]);
     this.#head(row);
     this.#numbers(row);
     this.#hypotheses(row);
+    if (!this.#explanation) this.#explain();
+  }
+
+  get #explanation() {
+    return this.evidence.of(this.choice.selected);
+  }
+
+  #explain() {
+    const row = this.fleet.row(this.choice.selected);
+    if (row < 0) return;
+    this.plots.update(this.#explanation);
+    const status = this.#explanation ?? this.roster.of(this.fleet.names[row]);
+    countsInto(this.#part("samples"), "Used", status?.samples);
+    countsInto(this.#part("rejected"), "Not used", status?.rejected);
   }
 
   /** @param {string} name */
   #part(name) {
     return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
-  }
-
-  /** @param {string} tag */
-  async #ask(tag) {
-    if (this.#pose?.tag !== tag) this.#pose = { tag };
-    else if (performance.now() - this.#asked < ASK_MS) return;
-    this.#asked = performance.now();
-    try {
-      const pose = await getJson(api(`tags/${encodeURIComponent(tag)}/pose`));
-      if (this.choice.selected === tag) this.#pose = pose;
-    } catch {
-      this.#pose = { tag };
-    }
   }
 
   /** @param {number} row */
@@ -68,7 +67,7 @@ export class Detail {
     const reason = this.fleet.value.reason[row];
     put(this.#part("meaning"), state.meaning);
     put(this.#part("reason"), reason ? words(reason) : "");
-    const hint = this.#pose?.reason === reason ? (this.#pose?.hint ?? "") : "";
+    const hint = this.fleet.value.hint[row] ?? "";
     put(this.#part("hint"), hint);
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
@@ -89,18 +88,15 @@ export class Detail {
       ellipse: `${fixed(number("semi_major_m"), 2)} × ${fixed(number("semi_minor_m"), 2)} m`,
       heading: Number.isNaN(heading) ? UNKNOWN : `${degrees(heading)} ${compassPoint(heading)}`,
       speed: `${fixed(number("speed_mps"), 2)} m/s`,
-      turn: turnRate(this.#pose?.yaw_rate_radps),
+      turn: turnRate(number("yaw_rate_radps")),
       range: metres(number("range_m")),
       anchor: anchor ?? UNKNOWN,
       mode: percent(number("p_mode")),
-      sight: this.#pose?.sigma_obs_m == null ? UNKNOWN : `± ${sigma(this.#pose.sigma_obs_m)} m`,
+      sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : `± ${sigma(number("sigma_obs_m"))} m`,
       age: age(this.fleet.age(row, performance.now())),
       online: this.fleet.online[row] ? "Online" : "Offline",
     };
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
-    const status = this.roster.of(this.fleet.names[row]);
-    put(this.#part("samples"), counts("Samples", status?.samples));
-    put(this.#part("rejected"), counts("Rejected", status?.rejected));
   }
 
   /** @param {number} row */
@@ -128,14 +124,17 @@ function hypothesisLine(ghost) {
   return line;
 }
 
-/** @param {string} title @param {Record<string, number> | undefined} byName */
-function counts(title, byName) {
-  const parts = Object.entries(byName ?? {}).map(([name, count]) => `${count.toLocaleString("en")} ${words(name)}`);
-  return parts.length ? `${title}: ${parts.join(", ")}` : "";
+/** @param {HTMLElement} list @param {string} title @param {Record<string, number> | undefined} byName */
+function countsInto(list, title, byName) {
+  const counts = Object.entries(byName ?? {}).sort((a, b) => b[1] - a[1]);
+  list.hidden = counts.length === 0;
+  const texts = list.hidden ? [] : [title, ...counts.map(([name, count]) => `${words(name)} ${count.toLocaleString("en")}`)];
+  if (list.textContent === texts.join("")) return;
+  list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
 }
 
-/** @param {number | null | undefined} radps */
-const turnRate = (radps) => (radps == null ? UNKNOWN : `${fixed((radps * 180) / Math.PI, 0)} °/s`);
+/** @param {number} radps */
+const turnRate = (radps) => (Number.isNaN(radps) ? UNKNOWN : `${fixed((radps * 180) / Math.PI, 0)} °/s`);
 
 /** @param {HTMLElement} element @param {string} text */
 function put(element, text) {

@@ -4,6 +4,7 @@ import { Choice } from "./choice.js";
 import { StateChips } from "./chips.js";
 import { Connection } from "./connection.js";
 import { Detail } from "./detail.js";
+import { Evidence } from "./evidence.js";
 import { Fleet } from "./fleet.js";
 import { fixed } from "./format.js";
 import { listen } from "./gestures.js";
@@ -25,9 +26,10 @@ const trails = new Trails();
 const roster = new Roster(fleet);
 const choice = new Choice();
 const connection = new Connection();
-const map = new LiveMap(byId("map"), fleet, trails, roster, choice);
+const evidence = new Evidence();
+const map = new LiveMap(byId("map"), fleet, trails, roster, choice, evidence);
 const chips = new StateChips(byId("chips"), fleet, choice);
-const detail = new Detail(byId("detail"), fleet, roster, choice);
+const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -40,6 +42,13 @@ function select(tag) {
   byId("detail").scrollIntoView({ block: "nearest" });
   announce(tag);
 }
+
+/** The panel has grown by the plots: keep the line of the tag in sight, once. */
+let grownFor = /** @type {string | null} */ (null);
+evidence.addEventListener("change", () => {
+  if (choice.selected !== null && choice.selected !== grownFor) table.reveal(choice.selected);
+  grownFor = choice.selected;
+});
 
 /** For those who hear the page. @param {string} tag */
 function announce(tag) {

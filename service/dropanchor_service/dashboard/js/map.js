@@ -1,6 +1,7 @@
 /** The live map: one canvas that is drawn again only when something changed. */
 
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
+import { drawEvidence } from "./draw_evidence.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
 import { drawLabels, drawMarkers, drawSelection } from "./draw_tags.js";
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
@@ -35,17 +36,19 @@ export class LiveMap extends EventTarget {
 
   /** @param {HTMLCanvasElement} canvas @param {import("./fleet.js").Fleet} fleet
    * @param {import("./trails.js").Trails} trails @param {import("./roster.js").Roster} roster
-   * @param {import("./choice.js").Choice} choice */
-  constructor(canvas, fleet, trails, roster, choice) {
+   * @param {import("./choice.js").Choice} choice @param {import("./evidence.js").Evidence} evidence */
+  constructor(canvas, fleet, trails, roster, choice, evidence) {
     super();
     this.canvas = canvas;
     this.fleet = fleet;
     this.trails = trails;
     this.roster = roster;
     this.choice = choice;
+    this.evidence = evidence;
     this.#ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     new ResizeObserver(() => this.#resize()).observe(canvas);
     choice.addEventListener("change", () => this.redraw());
+    evidence.addEventListener("change", () => this.redraw());
   }
 
   /** @param {readonly import("./draw_site.js").Anchor[]} anchors */
@@ -198,6 +201,7 @@ export class LiveMap extends EventTarget {
     drawRangeRings(scene, shown);
     if (density) drawDensity(scene);
     else drawEllipses(scene);
+    drawEvidence(scene, this.evidence.of(this.choice.selected));
     drawTrails(scene);
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, shown);

@@ -33,7 +33,7 @@ def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning,
     belief.sigma_obs = sigma_obs(row.information)
     _refer(row, mean, cov)
     _declare(row, node, p_mode, relative, math.sqrt(r2), t)
-    _judge(row, _sigma(cov), math.sqrt(r2), work[head].blocked == 1)
+    _judge(row, relative, _sigma(cov), math.sqrt(r2), work[head].blocked == 1)
     if row.declared == 0 or p_mode < 0.9:
         spread_over_all(work, count, scratch)
         _refer(row, mean, cov)
@@ -73,7 +73,7 @@ def _declare(row: Any, node: Any, p_mode: float, relative: float, r: float, t: T
 
 
 @njit(nogil=True)
-def _judge(row: Any, sigma: float, r: float, blocked: bool) -> None:
+def _judge(row: Any, relative: float, sigma: float, r: float, blocked: bool) -> None:
     """State and reason."""
     if row.since_range_s > 30.0:
         row.state, row.reason = layout.LOST, 5
@@ -86,7 +86,8 @@ def _judge(row: Any, sigma: float, r: float, blocked: bool) -> None:
     elif row.declared == 0:
         row.state, row.reason = layout.AMBIGUOUS, 3
     elif sigma > max(3.0, 0.35 * r):
-        row.state, row.reason = layout.AMBIGUOUS, 9
+        # what is left of sigma without the rotation about the anchor tells which of the two it is
+        row.state, row.reason = layout.AMBIGUOUS, 11 if relative < max(1.5, 0.05 * r) else 9
     elif row.misfit > 0.5 or blocked:
         row.state, row.reason = layout.DEGRADED, 7
     else:

@@ -1,0 +1,24 @@
+"""A browser, and a service to look at."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser
+
+from dropanchor_service.api.app import DASHBOARD
+from service.dashboard.place import Place, live_house
+from support.browser import running_chromium
+from support.http_server import running_server
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    with running_chromium() as browser:
+        yield browser
+
+
+@pytest.fixture
+def place() -> Iterator[Place]:
+    house = live_house()
+    with running_server(house.app(DASHBOARD), house.stopping) as port:
+        yield Place(house, f"http://127.0.0.1:{port}/")
