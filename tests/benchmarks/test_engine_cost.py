@@ -7,11 +7,12 @@ filter is the least that one could do: one prediction, one heading and one range
 import math
 import statistics
 import time
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
+import pytest
 
+from benchmarks import report
 from dropanchor_service.estimation.batch import (
     ANCHOR,
     IMU,
@@ -28,6 +29,8 @@ from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper import TUNED, PaperEngine
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
+
+pytestmark = pytest.mark.benchmark
 
 RUNS, COPIES = 8, 50
 MESSAGE_S, SETTLED_S, END_S = 0.2, 10.0, 25.0
@@ -111,32 +114,33 @@ def bytes_per_tag(engine: FleetEngine, tags: int) -> float:
     return sum(part.nbytes for part in engine.state().values()) / tags
 
 
-def idle_figures() -> dict[str, float]:
+def idle_figures() -> tuple[float, float]:
+    """Microseconds to configure a tag, and bytes of one that has sent nothing."""
     fleet, settings = FleetEngine(), default_settings()
     began = time.process_time()
     for row in range(IDLE):
         fleet.configure(row, settings)
-    return {
-        "fleet_configure_us": (time.process_time() - began) * 1e6 / IDLE,
-        "fleet_bytes_per_idle_tag": bytes_per_tag(fleet, IDLE),
-    }
+    return (time.process_time() - began) * 1e6 / IDLE, bytes_per_tag(fleet, IDLE)
 
 
-def test_the_cost_of_the_engines_is_measured(record_property: Callable[[str, object], None]) -> None:
+def table(costs: dict[str, float]) -> str:
+    lines = ["| | µs per tag and second | µs per range | ÷ `fleet` |", "|---|---|---|---|"]
+    for name, cost in costs.items():
+        lines.append(f"| {name} | {cost:.0f} | {cost / 10.0:.1f} | {cost / costs['`fleet`']:.1f} |")
+    return "\n".join(lines)
+
+
+def test_the_cost_of_the_engines_is_measured() -> None:
     runs = [simulate("M5", seed, preset("calibrated", imu_hz=100.0)) for seed in range(4000, 4000 + RUNS)]
     fleet = FleetEngine()
-    figures: dict[str, Any] = {}
-    figures["fleet_us_per_tag_s"], tracking = cost_of(fleet, runs, COPIES)
-    figures["paper_us_per_tag_s"], _ = cost_of(PaperEngine(TUNED), runs[:2], 1)
-    figures["plain_filterpy_us_per_tag_s"] = cost_of_plain_filters(runs)
-    for name in ("fleet", "paper", "plain_filterpy"):
-        figures[f"{name}_us_per_range"] = figures[f"{name}_us_per_tag_s"] / 10.0
-    for name in ("paper", "plain_filterpy"):
-        figures[f"{name}_over_fleet"] = figures[f"{name}_us_per_tag_s"] / figures["fleet_us_per_tag_s"]
-    figures["fleet_share_tracking"] = tracking
-    figures["fleet_bytes_per_tag_tracking"] = bytes_per_tag(fleet, RUNS * COPIES)
-    figures |= idle_figures()
+    cost, tracking = cost_of(fleet, runs, COPIES)
+    costs = {"`fleet`": cost, "plain filterpy EKF per tag": cost_of_plain_filters(runs)}
+    costs["`paper`"], _ = cost_of(PaperEngine(TUNED), runs[:2], 1)
+    configuring, idle = idle_figures()
     assert tracking > 0.5
-    for name, value in figures.items():
-        record_property(name, round(value, 2))
-        print(f"{name:30} {value:10.2f}")
+    report.record(
+        "engines",
+        f"{table(costs)}\n\n{RUNS * COPIES} tags in `fleet`, {100 * tracking:.0f} % of their poses tracking, "
+        f"{bytes_per_tag(fleet, RUNS * COPIES) / 1e3:.1f} kB each with the slack of the pool; a tag that has sent "
+        f"nothing: {idle / 1e3:.1f} kB, configured in {configuring:.0f} µs.",
+    )
