@@ -10,6 +10,7 @@ from dropanchor_service.store.checkpoints import CheckpointFolder, Snapshot
 from dropanchor_service.whole_state import WholeState
 
 OLD_S = 5.0  # beyond it the age of the newest checkpoint is a problem
+REST = 3  # times as long as it took to write the last one: a slow disk gets more time to itself
 _TURN_S = 1.0  # for the ingest thread to come round
 
 _log = logging.getLogger(__name__)
@@ -31,6 +32,7 @@ class Checkpointer:
         self._messages = -1  # in the newest checkpoint
         self._current_s = time.monotonic()  # when the newest checkpoint, or what was loaded, was all there was
         self._error: str | None = None
+        self._took_s = 0.0
         self._thread = threading.Thread(target=self._run, name="checkpoints", daemon=True)
         metrics.checkpoint_age.set_function(lambda: self.age_s)
 
@@ -87,7 +89,7 @@ class Checkpointer:
         self._taken.set()
 
     def _run(self) -> None:
-        while not self._stop.wait(self._period_s):
+        while not self._stop.wait(max(self._period_s, REST * self._took_s)):
             self._taken.clear()
             self._wanted.set()
             if self._taken.wait(_TURN_S):
@@ -97,6 +99,7 @@ class Checkpointer:
         snapshot, self._snapshot = self._snapshot, None
         if snapshot is None:
             return
+        began_s = time.monotonic()
         try:
             size = self._folder.write(snapshot)
         except Exception as error:
@@ -104,6 +107,8 @@ class Checkpointer:
             self._metrics.checkpoints.labels("failed").inc()
             self._log.exception("checkpoint", error)
             return
+        finally:
+            self._took_s = time.monotonic() - began_s
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)
