@@ -101,6 +101,9 @@ class TagSettings(_Settings):
         description="Of the direction of travel about body x axis plus mounting angle: slip of what drives, sway of "
         "what is carried; 0: none, null: the engine's default.",
     )
+    speed_max_mps: Positive | None = Field(
+        default=None, description="It never moves faster; null: not told, the engine's default."
+    )
     reverse_allowed: Truth = Field(default=False, description="Whether the tag may move backwards.")
     heading_source: Literal["auto", "imu", "platform"] = Field(
         default="auto", description="auto: the IMU where it is sent, else the platform's heading."

@@ -43,6 +43,7 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["mount_angle"] = _or_nan(tag.mount_angle_rad)
     columns["mount_angle_std"] = _or_nan(tag.mount_angle_std_rad)
     columns["slip_std"] = _or_nan(tag.slip_std_rad)
+    columns["speed_max"] = _or_nan(tag.speed_max_mps)
     columns["reverse_allowed"] = tag.reverse_allowed
     columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
     columns["heading_std"] = _or_nan(tag.heading_std_rad)

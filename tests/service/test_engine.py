@@ -17,7 +17,7 @@ def test_settings_of_a_tag_become_columns_and_what_is_not_known_nan() -> None:
     assert columns["heading_source"] == HeadingSource.PLATFORM
     assert columns["declination"] == 0.1
     assert [columns[name].item() for name in ("start_known", "start_x", "start_y")] == [True, 1.0, 2.0]
-    told = ("range_std", "range_bias_std", "mount_angle", "mount_angle_std", "slip_std", "heading_std")
+    told = ("range_std", "range_bias_std", "mount_angle", "mount_angle_std", "slip_std", "heading_std", "speed_max")
     assert all(math.isnan(columns[name]) for name in told)
     assert math.isnan(columns["start_heading"])
 

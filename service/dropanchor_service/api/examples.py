@@ -84,6 +84,7 @@ TAG_SETTINGS: dict[str, Any] = {
     "mount_angle_rad": 0.0,
     "mount_angle_std_rad": None,
     "slip_std_rad": None,
+    "speed_max_mps": None,
     "reverse_allowed": False,
     "heading_source": "auto",
     "heading_std_rad": None,

@@ -80,6 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known.add_argument("--mount-angle-std", type=float, metavar="RAD", help="how well that is known; 0: exactly")
     known.add_argument("--slip-std", type=float, metavar="RAD", help="of the direction of travel about that; 0: none")
     known.add_argument("--heading-std", type=float, metavar="RAD", help="of a platform's heading that does not drift")
+    known.add_argument("--speed-max", type=float, metavar="M/S", help="it never moves faster")
     known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
     smoothing = parser.add_argument_group("smoothing (engine fleet): each pose is estimated from later samples too")
     smoothing.add_argument("--smooth", action="store_true", help="from all samples of the recording")
@@ -166,6 +167,7 @@ def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
             mount_angle_rad=arguments.mount_angle,
             mount_angle_std_rad=arguments.mount_angle_std,
             slip_std_rad=arguments.slip_std,
+            speed_max_mps=arguments.speed_max,
             reverse_allowed=arguments.reverse,
             heading_source=arguments.heading,
             heading_std_rad=arguments.heading_std,

@@ -30,6 +30,7 @@ TAG_SETTINGS = np.dtype(
         ("mount_angle", "f8"),  # NaN: not known
         ("mount_angle_std", "f8"),  # rad, NaN: the engine's default
         ("slip_std", "f8"),  # of the course about body axis and mounting angle, NaN: the engine's default
+        ("speed_max", "f8"),  # m/s, NaN: the engine's default
         ("reverse_allowed", "?"),
         ("heading_source", "u1"),
         ("heading_std", "f8"),  # rad, of a platform's heading that does not drift; NaN: not known
@@ -48,6 +49,7 @@ UNKNOWN = (
     "mount_angle",
     "mount_angle_std",
     "slip_std",
+    "speed_max",
     "heading_std",
     "start_x",
     "start_y",

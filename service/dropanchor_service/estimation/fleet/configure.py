@@ -15,8 +15,9 @@ START_HEADING_STD = 0.05  # rad
 REFERENCE_STD = 0.1  # rad, constant error of a heading reference
 V_MAX = 10.0  # m/s
 MOUNT_KNOWN_STD, MOUNT_UNKNOWN_STD = 0.02, 0.5  # rad
-CRAB_KNOWN_STD, CRAB_UNKNOWN_STD = 0.05, 0.2  # rad, slip of what drives, and sway of what is carried
-GYRO_STD = 0.003  # rad/s, what is left of the gyroscope's bias after the front-end
+CRAB_KNOWN_STD, CRAB_UNKNOWN_STD = 0.05, 0.1  # rad, slip of what drives, and sway of what is carried
+CRAB_KNOWN_TAU, CRAB_UNKNOWN_TAU = 1.0, 3.0  # s
+GYRO_STD = 0.001  # rad/s, what is left of the gyroscope's bias after the front-end, at least
 
 
 def configured(settings: Any, tuning: Tuning) -> Any:
@@ -32,6 +33,7 @@ def configured(settings: Any, tuning: Tuning) -> Any:
     slip = settings["slip_std"]
     row["slip_known"] = math.isfinite(slip)
     row["crab_std"] = slip if row["slip_known"] else (CRAB_KNOWN_STD if told else CRAB_UNKNOWN_STD)
+    row["crab_tau"] = CRAB_KNOWN_TAU if told else CRAB_UNKNOWN_TAU
     row["range_std"] = _or_default(settings["range_std"], RANGE_STD)
     row["offset"] = settings["range_bias"]
     bias_std = settings["range_bias_std"]
@@ -42,7 +44,7 @@ def configured(settings: Any, tuning: Tuning) -> Any:
     row["start_speed_std"] = 0.3
     row["reference_std"] = REFERENCE_STD
     row["gyro_std"] = GYRO_STD
-    row["v_max"] = V_MAX
+    row["v_max"] = _or_default(settings["speed_max"], V_MAX)
     row["reverse"] = settings["reverse_allowed"]
     row["head"] = -1
     row["anchor"] = -1

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from .attitude import ATTITUDE, correct_tilt, level, spin, turn, yaw_of
+from .attitude import ATTITUDE, correct_tilt, level, spin, turn, up_in_body, yaw_of
 from .compiled import njit
 from .magnetometer import MAGNETOMETER, feel, north_of, spread_yaw
 from .node import ABSOLUTE_HEADING, NO_HEADING, RELATIVE_HEADING
@@ -30,6 +30,7 @@ FRONTEND = np.dtype(
         ("declination", "f8"),  # rad, of magnetic north, positive east
         ("t_imu", "i8"),  # ns, of the last IMU sample
         ("t_node", "i8"),  # ns, end of the last node
+        ("bias_end", "f8"),  # rad/s, the gyroscope's bias about the vertical when the last node ended
         ("running", "u1"),  # 0: no sample yet
         ("absolute", "u1"),  # 1: the heading is referred to north
         ("turned", "f8"),  # rad since start, net
@@ -74,6 +75,7 @@ def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
     a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
     a.gyro[:] = gyro
     a.bias[:] = 0.0
+    f.bias_end = 0.0
     a.age = 0.0
     a.gravity = 9.80665
     start_standstill(s, acc, gyro)
@@ -186,10 +188,21 @@ def know_nothing(dt: float, node: Any) -> None:
     """A node before the first IMU sample."""
     node.dt_s = dt
     node.dyaw, node.dyaw_var = 0.0, unwatched_turn(dt)
+    node.gyro_var, node.gyro_step = 0.0, 0.0
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.rest = 0
     node.unheard_s = dt
+
+
+@njit(cache=True, nogil=True)
+def tell_bias(f: Any, node: Any) -> None:
+    """What is known of the gyroscope's bias about the vertical, and what was learned of it in this node."""
+    x, y, z = up_in_body(f.attitude.q)
+    bias = x * f.attitude.bias[0] + y * f.attitude.bias[1] + z * f.attitude.bias[2]
+    node.gyro_var = f.standstill.bias_var
+    node.gyro_step = bias - f.bias_end if at_rest(f.standstill) else 0.0
+    f.bias_end = bias
 
 
 @njit(cache=True, nogil=True)
@@ -208,5 +221,6 @@ def close_node(f: Any, t_ns: int, node: Any) -> None:
     psi = end_node(f.preintegration, yaw_of(f.attitude.q), ahead, dt, node)
     gather_drift(f, dt, node.dyaw)
     node.dt_s = dt
+    tell_bias(f, node)
     refer_heading(f, psi, ahead, node)
     node.rest = at_rest(f.standstill) and ahead < GAP

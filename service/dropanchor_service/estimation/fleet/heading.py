@@ -21,7 +21,7 @@ def model_of(m: int, variance: float) -> tuple[float, float, float]:
     Model COMMON: nearly all of the variance is one slow error. Model STEADY: a platform's own, good to 0.03 rad.
     """
     if m == COMMON:
-        return 0.01 * variance + 1e-5, math.sqrt(variance), 60.0
+        return 0.01 * variance + 1e-5, math.sqrt(variance), 30.0
     if m == STEADY:
         return 4e-4, 0.03, 60.0
     if m == 1:

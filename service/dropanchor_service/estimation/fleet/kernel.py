@@ -8,16 +8,18 @@ from .blocked import expect_clear, open_alternative, recover, unblock
 from .compiled import njit
 from .gap import begins_again, place_again, repeats, watch_gap
 from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
-from .layout import COMMON, PHI, REF, STEADY, YAW, R, V, Work
+from .layout import COMMON, PHI, STEADY, YAW, R, V, Work
 from .manage import best_of, finite, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
 from .pool import load, mirror, release, store
 from .predict import diffuse, fill_decay, move, transport
 from .publish import publish
 from .start import (
+    counts_from,
     give_reference_error,
     is_referred,
     median,
+    recount_yaw,
     reseed,
     start_known,
     start_ring,
@@ -37,9 +39,6 @@ def _predict_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
             std = math.sqrt(slow * slow + t.second_std**2)
             seconds = max(t.second_tau, tau)
         fill_decay(decay, growth, node, row, t, std, seconds)
-        if row.model == COMMON:  # a constant that the front-end is still learning
-            decay[REF] = 1.0
-            growth[REF] = node.heading_var * node.dt_s / t.common_tau if node.heading_kind == ABSOLUTE_HEADING else 0.0
         for h in range(count):
             if work[h].kind == kind:
                 move(work[h].mean, node, decay, F)
@@ -109,20 +108,29 @@ def _judge_reference(work: Any, count: int, row: Any, node: Any, t: Tuning) -> N
 
 
 @njit(nogil=True)
-def _refer(work: Any, count: int, row: Any, node: Any) -> None:
-    """The first heading from a reference: turn a belief of arbitrary zero, or learn north from the given start."""
+def _refer(work: Any, count: int, row: Any, node: Any) -> bool:
+    """The first heading from a reference: turn a belief of arbitrary zero, or count yaw from the reference.
+
+    With a given start nobody knows the reference's own zero, so it is taken to agree with the yaw of now, and the error
+    of that yaw, which stays from now on, becomes one of the mounting angle. That is done when the reference has become
+    better than the yaw. Returns whether it was done.
+    """
+    best = work[best_of(work, count)]
+    if row.referred == 1 and node.heading_var > best.cov[YAW, YAW]:
+        return False
     row.model = COMMON
     std = math.sqrt(node.heading_var)
-    delta = wrap(node.heading - work[best_of(work, count)].mean[YAW])
+    delta = wrap(node.heading - best.mean[YAW])
     for h in range(count):
         if row.referred == 0:
             work[h].mean[YAW] += delta
             work[h].mean[PHI] += delta
             turn_about(work[h].cov, std)
         else:
-            give_reference_error(work[h].cov, std, False)
+            recount_yaw(work[h].cov, node.heading_var)
     row.north = delta if row.referred == 1 else 0.0
     row.referred = 1
+    return True
 
 
 @njit(nogil=True)
@@ -130,8 +138,8 @@ def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
     if node.heading_kind == MEASURED_HEADING:
         if not told_of(row):
             _judge_reference(work, count, row, node, t)
-    elif node.heading_kind == ABSOLUTE_HEADING and row.model != COMMON:
-        _refer(work, count, row, node)
+    elif node.heading_kind == ABSOLUTE_HEADING and row.model != COMMON and not _refer(work, count, row, node):
+        return
     white, _, _ = error_of(row, node.heading_var)
     for h in range(count):
         if row.model != STEADY or work[h].kind == 0:
@@ -151,7 +159,7 @@ def _manage(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> i
             count = merge(work, count, t.merge_distance)
         count = split(work, count, t.split_angle, 6.0)
         count = limit(work, count, t.keep_tracking if row.declared == 1 else layout.KEEP)
-    if row.since_seed_s >= 2.0 and is_referred(node.heading_kind):
+    if row.since_seed_s >= 2.0 and counts_from(row, node):
         row.since_seed_s = 0.0
         count = reseed(work, count, row, node, PH, t)
     return count

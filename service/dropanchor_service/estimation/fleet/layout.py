@@ -37,6 +37,7 @@ SETTINGS: Final = [
     ("mount", np.float64),
     ("mount_std", np.float64),
     ("crab_std", np.float64),
+    ("crab_tau", np.float64),  # s
     ("slip_known", np.uint8),  # 1: crab_std was told
     ("height", np.float64),  # m, tag antenna above the site's zero
     ("height_std", np.float64),

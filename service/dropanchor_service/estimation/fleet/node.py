@@ -25,6 +25,8 @@ NODE: Final = np.dtype(
         ("dt_s", np.float64),
         ("dyaw", np.float64),  # rad, body yaw increment about the vertical, bias-corrected
         ("dyaw_var", np.float64),  # rad^2
+        ("gyro_var", np.float64),  # (rad/s)^2, of the bias that dyaw was corrected for; 0: not known
+        ("gyro_step", np.float64),  # rad/s, by which that bias about the vertical changed in the interval
         ("dv_forward", np.float64),  # m/s, gravity removed, in the body-yaw frame at the start of the interval
         ("dv_left", np.float64),  # m/s
         ("dv_var", np.float64),  # (m/s)^2, inf without an accelerometer

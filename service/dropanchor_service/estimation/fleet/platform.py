@@ -60,6 +60,7 @@ def derive_node(p: Any, t_ns: int, node: Any) -> None:
     """The node from the platform alone: no acceleration, yaw by its own increments."""
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, 0
+    node.gyro_var, node.gyro_step = 0.0, 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.unheard_s = 0.0
     if p.heard == 0:

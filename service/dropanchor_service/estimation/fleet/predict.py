@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from .compiled import njit
-from .layout import ACC, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
+from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
+from .node import ABSOLUTE_HEADING, RELATIVE_HEADING
 from .tuning import Tuning
 
 
@@ -55,6 +56,7 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     s[V] += f
     for i in range(4, N):
         s[i] *= decay[i]
+    s[GYRO] -= node.gyro_step
 
 
 @njit(nogil=True, inline="never")
@@ -92,19 +94,24 @@ def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning, ref_std:
     dt = node.dt_s
     decay[:] = 1.0
     growth[:] = 0.0
-    decay[CRAB] = math.exp(-dt / t.crab_tau)
+    decay[CRAB] = math.exp(-dt / row.crab_tau)
     decay[ACC] = math.exp(-dt / t.acc_tau)
     decay[REF] = math.exp(-dt / ref_tau)
     growth[YAW] = node.dyaw_var
+    rough = 0.0
     if math.isfinite(node.dv_var):
         growth[V] = node.dv_var + t.q_speed * dt
+        rough = node.dv_var / dt if dt > 0.0 else 0.0
     else:
         growth[V] = t.q_speed_blind * dt
     growth[MOUNT] = t.q_mount * dt if row.mount_std > 0.0 else 0.0
     growth[CRAB] = row.crab_std**2 * (1.0 - decay[CRAB] ** 2)
-    growth[GYRO] = t.q_gyro * dt
-    growth[ACC] = t.acc_std**2 * (1.0 - decay[ACC] ** 2)
+    own = node.heading_kind == ABSOLUTE_HEADING or node.heading_kind == RELATIVE_HEADING
+    growth[GYRO] = (t.q_gyro_own if own else t.q_gyro) * dt
+    growth[ACC] = (t.acc_std**2 + t.acc_rough * rough) * (1.0 - decay[ACC] ** 2)
     growth[REF] = ref_std**2 * (1.0 - decay[REF] ** 2)
+    if row.model == COMMON and node.heading_kind != ABSOLUTE_HEADING:
+        decay[REF], growth[REF] = 1.0, 0.0
     growth[OFFSET] = t.q_offset * dt if row.offset_std > 0.0 else 0.0
 
 

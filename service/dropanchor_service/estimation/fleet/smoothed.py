@@ -13,6 +13,7 @@ from .lineage import trace_back
 from .node import ABSOLUTE_HEADING, RANGE
 from .outputs import poses_of
 from .smoother import Track, make_track, smooth
+from .start import recount_yaw
 from .summary import add_reference
 from .trace import TracingEngine
 from .tuning import Tuning
@@ -80,8 +81,14 @@ def _reference_variance(nodes: Array, traces: Array, now: Array, kind: int, t: T
 
 
 def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_variance: float) -> None:
-    """The hypothesis that began the lineage; with an unknown start bearing, speed and yaw are those found, loosely."""
+    """The hypothesis that began the lineage; with an unknown start bearing, speed and yaw are those found, loosely.
+
+    With a given start and a magnetometer that yaw counts from later on, it counts from there all the time.
+    """
     mean, cov, found = traces["mean"][0, origin].copy(), traces["cov"][0, origin].copy(), track.reference[0]
+    if now["start_known"] == 1 and now["model"] == COMMON and traces["model"][0] != COMMON:
+        recount_yaw(cov, UNKNOWN_ANGLE**2)
+        cov[REF, :] = cov[:, REF] = 0.0
     cov[REF, REF] = max(cov[REF, REF], reference_variance)
     if now["start_known"] == 0:
         mean[[PHI, V, YAW]] = found[[PHI, V, YAW]]

@@ -22,12 +22,12 @@ import numpy.typing as npt
 
 from .compiled import njit
 from .heading import error_of
-from .layout import COMMON, GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
-from .node import ABSOLUTE_HEADING, BEARING, RANGE
+from .layout import GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
+from .node import BEARING, RANGE
 from .predict import diffuse, fill_decay, move, transport
-from .start import is_referred
+from .start import counts_from
 from .tuning import Tuning
-from .update import correct, gaussian, predict_range, project, wrap
+from .update import correct, gaussian, predict_range, project, rest_variance, wrap
 
 MEASUREMENTS: Final = 5  # of one node: heading, speed and gyro at rest, bound of the speed, range or bearing
 BOUND_STD: Final = 0.05  # m/s, softness of the bounds on the speed
@@ -85,9 +85,6 @@ def noise_of(node: Any, row: Any, kind: int, t: Tuning, decay: Any, growth: Any)
         std = math.sqrt(std * std + t.second_std**2)
         seconds = max(t.second_tau, seconds)
     fill_decay(decay, growth, node, row, t, std, seconds)
-    if row.model == COMMON:
-        decay[REF] = 1.0
-        growth[REF] = node.heading_var * node.dt_s / t.common_tau if node.heading_kind == ABSOLUTE_HEADING else 0.0
 
 
 @njit(nogil=True)
@@ -135,15 +132,18 @@ def _component(track: Track, k: int, index: int, z: float, variance: float, H: A
 def _inertial(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, H: Any) -> None:
     """Heading, standstill, and the bounds on the speed."""
     s = track.reference[k]
-    usable = row.model == COMMON if node.heading_kind == ABSOLUTE_HEADING else is_referred(node.heading_kind)
-    if usable and (row.model != STEADY or kind == 0):
+    if counts_from(row, node) and (row.model != STEADY or kind == 0):
         white, _, _ = error_of(row, node.heading_var)
         H[:] = 0.0
         H[YAW] = H[REF] = 1.0
         _measure(track, k, H, wrap(node.heading - row.north - s[YAW] - s[REF]), white)
     if node.rest == 1:
         _component(track, k, V, 0.0, t.rest_std**2, H)
-    if node.rest > 0 and node.dt_s > 0.0:
+    if node.rest == 1 and node.gyro_var > 0.0:
+        prior = track.cov[k, GYRO, GYRO]
+        if prior > 1.001 * node.gyro_var:
+            _component(track, k, GYRO, 0.0, rest_variance(prior, node), H)
+    elif node.rest > 0 and node.dt_s > 0.0:
         variance = node.dyaw_var / node.dt_s**2 + t.rest_rate_std**2
         _component(track, k, GYRO, node.dyaw / node.dt_s, variance, H)
     low = -row.v_max if row.reverse == 1 else -t.reverse_slack

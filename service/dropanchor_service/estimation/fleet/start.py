@@ -15,7 +15,7 @@ from .update import update_component, wrap
 
 
 @njit(nogil=True)
-def _common(work: Any, h: int, row: Any, yaw: float, yaw_variance: float, t: Tuning) -> None:
+def _common(work: Any, h: int, row: Any, node: Any, yaw: float, yaw_variance: float, t: Tuning) -> None:
     s, P = work[h].mean, work[h].cov
     s[:] = 0.0
     P[:] = 0.0
@@ -25,7 +25,7 @@ def _common(work: Any, h: int, row: Any, yaw: float, yaw_variance: float, t: Tun
     P[YAW, YAW] = yaw_variance
     P[MOUNT, MOUNT] = row.mount_std**2
     P[CRAB, CRAB] = row.crab_std**2
-    P[GYRO, GYRO] = row.gyro_std**2
+    P[GYRO, GYRO] = max(row.gyro_std**2, node.gyro_var)
     P[ACC, ACC] = t.acc_std**2
     P[OFFSET, OFFSET] = row.offset_std**2
     work[h].log_weight = 0.0
@@ -57,9 +57,35 @@ def turn_about(P: Any, std: float) -> None:
 
 
 @njit(nogil=True)
+def recount_yaw(P: Any, variance: float) -> None:
+    """Count yaw from a reference that agrees with it now: its error is the reference's, what it was is the mount's.
+
+    mount' = mount + yaw - yaw', so the course is what it was.
+    """
+    for i in range(N):
+        P[MOUNT, i] += P[YAW, i]
+    for i in range(N):
+        P[i, MOUNT] += P[i, YAW]
+    for i in range(N):
+        P[YAW, i] = P[i, YAW] = P[REF, i] = P[i, REF] = 0.0
+    P[YAW, YAW] = P[REF, REF] = variance
+    P[YAW, REF] = P[REF, YAW] = -variance
+    for i in range(N):
+        P[MOUNT, i] -= P[YAW, i]
+    for i in range(N):
+        P[i, MOUNT] -= P[i, YAW]
+
+
+@njit(nogil=True)
 def is_referred(kind: int) -> bool:
     """The heading is in the site frame."""
     return kind != NO_HEADING and kind != RELATIVE_HEADING
+
+
+@njit(nogil=True)
+def counts_from(row: Any, node: Any) -> bool:
+    """The yaw of the hypotheses counts from the node's heading."""
+    return is_referred(node.heading_kind) and (node.heading_kind != ABSOLUTE_HEADING or row.model == COMMON)
 
 
 @njit(nogil=True)
@@ -74,6 +100,7 @@ def choose_model(row: Any, node: Any, t: Tuning) -> None:
     if node.heading_kind == DERIVED_HEADING:
         row.model = STEADY
         row.mount_std = min(row.mount_std, t.platform_mount_std)
+        row.crab_tau = t.platform_crab_tau
         if row.slip_known == 0:
             row.crab_std = t.platform_crab_std
 
@@ -103,7 +130,7 @@ def start_known(work: Any, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     for h in range(ring):
         yaw = row.start_heading if given else node.heading - row.north + cell * h
         variance = row.start_heading_std**2 if given else node.heading_var
-        _common(work, h, row, yaw, variance if known else (cell / 2.0) ** 2, t)
+        _common(work, h, row, node, yaw, variance if known else (cell / 2.0) ** 2, t)
         s, P = work[h].mean, work[h].cov
         s[R], s[PHI] = r, math.atan2(y, x)
         P[R, R] = row.start_std**2
@@ -184,7 +211,7 @@ def start_ring(work: Any, row: Any, horizontal: float, node: Any, at_rest: bool,
     for i in range(t.ring_bearings):
         for k in range(speeds):
             for g in range(signs):
-                _common(work, h, row, node.heading, variance, t)
+                _common(work, h, row, node, node.heading, variance, t)
                 s, P = work[h].mean, work[h].cov
                 s[R], s[PHI] = horizontal, cell * i
                 P[R, R] = row.range_std**2 / 4.0 + row.offset_std**2

@@ -15,14 +15,16 @@ class Tuning(NamedTuple):
     q_mount: float = 1e-6  # rad^2/s
     platform_mount_std: float = 0.02  # rad
     platform_crab_std: float = 0.15  # rad, of a heading with no IMU beside it: lag of the readings, slip
+    platform_crab_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
     aligned_log_prior: float = 3.0
-    crab_tau: float = 1.0  # s
     gyro_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0
     q_gyro: float = 1e-6  # (rad/s)^2/s
+    q_gyro_own: float = 1e-8  # the same, of a front-end that learned the bias at rest and has no platform's heading
     acc_std: float = 0.12  # m/s^2
+    acc_rough: float = 0.7  # s: what the roughness of the motion adds to its variance, per dv_var / dt
     acc_tau: float = 5.0  # s
     offset_std: float = 0.15  # m, of a tag and anchor pair that nobody calibrated: antenna delays
     q_offset: float = 1e-5  # m^2/s
@@ -41,7 +43,6 @@ class Tuning(NamedTuple):
     second_again: float = -2.0  # on top of it, when it had been given up and is tried again
     second_std: float = 0.15  # rad
     second_tau: float = 60.0  # s
-    common_tau: float = 10.0  # s in which the error of a magnetic heading changes by its own standard deviation
     split_angle: float = 0.08  # rad
     merge_distance: float = 0.5
     keep_tracking: int = 32

@@ -135,10 +135,23 @@ def update_component(s: Any, P: Any, PH: Any, index: int, z: float, variance: fl
 
 
 @njit(nogil=True)
+def rest_variance(prior: float, node: Any) -> float:
+    """Of a measurement that leaves gyro_var of a larger prior."""
+    return float(prior * node.gyro_var / (prior - node.gyro_var))
+
+
+@njit(nogil=True)
 def update_rest(s: Any, P: Any, PH: Any, node: Any, t: Tuning) -> float:
-    """Standstill: the speed is zero, and what the gyro says is its bias; returns the log likelihood of the latter."""
+    """Standstill: the speed is zero, and what the gyro says is its bias; returns the log likelihood of the latter.
+
+    An IMU's front-end has taken its bias out already: of what is left nothing is learned but that variance.
+    """
     if node.rest == 1:
         update_component(s, P, PH, V, 0.0, t.rest_std**2)
+    if node.gyro_var > 0.0:
+        if P[GYRO, GYRO] > 1.001 * node.gyro_var:
+            update_component(s, P, PH, GYRO, 0.0, rest_variance(P[GYRO, GYRO], node))
+        return 0.0
     if node.dt_s <= 0.0:
         return 0.0
     rate = node.dyaw / node.dt_s

@@ -11,6 +11,7 @@ from dropanchor_service.estimation.fleet.configure import (
     CRAB_UNKNOWN_STD,
     MOUNT_KNOWN_STD,
     MOUNT_UNKNOWN_STD,
+    V_MAX,
     configured,
 )
 from dropanchor_service.estimation.fleet.heading import error_of
@@ -48,6 +49,11 @@ def test_a_platforms_slip_is_the_default_only_where_it_is_not_told(told: float |
     choose_model(rows[0], node[0], Tuning())
     assert rows[0]["model"] == STEADY
     assert rows[0]["crab_std"] == kept
+
+
+def test_a_tag_is_no_faster_than_the_operator_says() -> None:
+    assert row_of(TagSettings())["v_max"] == V_MAX
+    assert row_of(TagSettings(speed_max_mps=1.5))["v_max"] == 1.5
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,8 @@ def least_squares(nodes: Any, t: Tuning) -> tuple[Any, Any]:
     n, dt = len(nodes), float(nodes["dt_s"][0])
     decay = math.exp(-dt / t.acc_tau)
     A = np.array([[1.0, dt, -dt * dt / 2, 0.0], [0.0, 1.0, -dt, 0.0], [0.0, 0.0, decay, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    q = [t.q_position * dt, 4e-4 + t.q_speed * dt, t.acc_std**2 * (1 - decay**2), t.q_offset * dt]
+    acc_var = t.acc_std**2 + t.acc_rough * 4e-4 / dt
+    q = [t.q_position * dt, 4e-4 + t.q_speed * dt, acc_var * (1 - decay**2), t.q_offset * dt]
     rows, values = [], []
 
     def add(block: Any, at: int, value: Any, sd: Any) -> None:
