@@ -39,13 +39,15 @@ class Known:
     """What an operator knows of the tags of an experiment.
 
     start: whether the true start is given (with the heading where it is raw samples that must find it). heading_std:
-    of the scalar heading, rad.
+    of the scalar heading, rad. calibrated: the operator says what is true of a simulated tag, that its ranges have no
+    bias and that it travels exactly as its mounting angle says.
     """
 
     feed: Feed = "level"
     start: bool = True
     heading_std: float = np.nan
     reverse: bool = False
+    calibrated: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,8 @@ def _settings(simulation: Simulation, known: Known) -> Array:
     settings["mount_angle"] = truth.course[0] - truth.heading[0]
     settings["reverse_allowed"] = known.reverse
     settings["heading_source"] = HeadingSource.IMU if known.feed == "raw" else HeadingSource.PLATFORM
+    if known.calibrated:
+        settings["range_bias_std"] = settings["mount_angle_std"] = settings["slip_std"] = 0.0
     settings["range_std"] = simulation.ranges.std_m[0]
     if known.start:
         settings["start_known"], settings["start_std"] = True, START_STD

@@ -86,6 +86,8 @@ def test_a_declaration_is_timed_and_judged_where_it_was_made(line: Simulation) -
     assert late.first_wrong == 0.0
     assert late.rmse == pytest.approx(0.1)
     assert late.coverage == 1.0
+    assert late.coverage_all == pytest.approx(0.5, abs=0.02)
+    assert late.resolved_s == pytest.approx(20.0, abs=0.11)
 
 
 def test_who_never_declares_is_neither_wrong_nor_late(line: Simulation) -> None:
@@ -95,3 +97,11 @@ def test_who_never_declares_is_neither_wrong_nor_late(line: Simulation) -> None:
     assert row.never == 1.0
     assert np.isnan([row.declared_median, row.first_wrong, row.coverage]).all()
     assert row.right_at_end == 0.0
+    assert (row.above_2m, row.resolved_median) == (1.0, np.inf)
+
+
+def test_a_place_that_was_always_right_is_resolved_from_the_first_pose_on(line: Simulation) -> None:
+    track = beside(line, np.array([0.2, 0.2]), std=1.0)
+    one = unknown_start.score(line, track)
+    assert one.resolved_s == 0.0
+    assert one.nees == pytest.approx(0.08)

@@ -50,18 +50,24 @@ class OfEngine:
 
     create: Callable[[], Engine]
     feed: Feed
+    calibrated: bool = False
 
     @property
     def information(self) -> Information | None:
         return WITH_ACCELEROMETER if self.feed == "level" else None
 
     def run(self, simulations: Sequence[Simulation], known: Known) -> Timed:
-        return run_engine(self.create(), simulations, replace(known, feed=self.feed))
+        return run_engine(self.create(), simulations, replace(known, feed=self.feed, calibrated=self.calibrated))
 
 
 def engines() -> dict[str, OfEngine]:
-    """The engines of the product beside the paper's: with the scalar sensors, and with raw 9-axis samples."""
-    return {"fleet": OfEngine(FleetEngine, "level"), "fleet, raw 9-axis": OfEngine(FleetEngine, "raw")}
+    """The engine of the product beside the paper's: with the scalar sensors, of a tag of which nothing is told and of a
+    calibrated one; and with raw 9-axis samples."""
+    return {
+        "fleet": OfEngine(FleetEngine, "level"),
+        "fleet, calibrated": OfEngine(FleetEngine, "level", calibrated=True),
+        "fleet, raw 9-axis": OfEngine(FleetEngine, "raw"),
+    }
 
 
 def contestants(noise: tuning.Noise) -> dict[str, Contestant]:
