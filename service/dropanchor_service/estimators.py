@@ -120,6 +120,12 @@ class Estimators:
         shut = [row for row, faults in self._faults.items() if faults.until_ns > now_ns]
         return np.isin(rows, shut) if shut else np.zeros(len(rows), bool)
 
+    def make_ready(self, row: int) -> None:
+        """Configure a row before anything is heard of it, so that nobody waits for that then."""
+        if row not in self._configured:
+            self._reach(row + 1)
+            self._configure(row)
+
     def process(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
         """The poses of all rows but those that fail, which start afresh."""
         for row in self._new_rows(samples):
@@ -128,11 +134,14 @@ class Estimators:
 
     def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
         rows = [column["row"] for column in _columns(samples)]
-        missing = max(int(column.max(initial=-1)) for column in rows) + 1 - len(self._has_configured)
+        self._reach(max(int(column.max(initial=-1)) for column in rows) + 1)
+        return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
+
+    def _reach(self, rows: int) -> None:
+        missing = rows - len(self._has_configured)
         if missing > 0:
             spare = max(missing, len(self._has_configured))
             self._has_configured = np.concatenate([self._has_configured, np.zeros(spare, bool)])
-        return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
 
     def _bisected(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
         try:

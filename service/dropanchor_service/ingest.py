@@ -79,9 +79,10 @@ class Ingest:
             self._fuse(known)
 
     def _know_new_tags(self) -> None:
-        """Messages of tags that have a row already do not wait among those of strangers."""
+        """Messages of tags that have a row already wait neither among those of strangers nor for their estimator."""
         for tag in self._tags.all()[self._known_tags :] if len(self._tags) > self._known_tags else ():
             self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
+            self._estimators.make_ready(tag.row)
             self._known_tags = tag.row + 1
 
     def _admitted(self, strangers: Sequence[Stranger]) -> Iterator[Message]:

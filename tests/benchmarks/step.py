@@ -91,7 +91,7 @@ def run_receiver(tags: int, duration_s: float = 6.0) -> float:
         return (proc.cpu_s(receiver.process.pid) - before) / (int(messages) * SAMPLES_PER_MESSAGE * 1e-6)
 
 
-def when_quiet(read: Callable[[], Counters], timeout_s: float = 20.0, quiet_s: float = QUIET_S) -> Counters:
+def when_quiet(read: Callable[[], Counters], timeout_s: float = 60.0, quiet_s: float = QUIET_S) -> Counters:
     """The counters once no sample has been fused for a while."""
     last = read()
 
