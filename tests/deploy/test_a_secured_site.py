@@ -78,7 +78,7 @@ def test_two_tags_publish_and_whoever_has_the_key_sees_them(site: tuple[Running,
             text_input="".join(f'{{"anchor": 1, "range_m": {12.0 + index}}}\n' for _ in range(20)),
         )
         assert published.returncode == 0, published.stderr
-    wait_until(lambda: tags_heard(service, keys["dashboard"]) == set(TAGS), 20.0)
+    wait_until(lambda: tags_heard(service, keys["dashboard"]) == set(TAGS))
     assert ask(service, "/api/v1/poses").status_code == 401
 
 

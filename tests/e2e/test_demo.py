@@ -53,7 +53,7 @@ def poses(url: str) -> dict[str, dict[str, Any]]:
 
 def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_of_it_at_once() -> None:
     with running_demo("--tags", "3") as (process, url):
-        wait_until(lambda: len(poses(url)) == 3, 20.0)
+        wait_until(lambda: len(poses(url)) == 3)
         before = poses(url)
         wait_until(
             lambda: all(

@@ -53,13 +53,13 @@ def test_on_a_full_disk_the_service_stays_says_so_and_goes_on_when_there_is_room
         full_ns = time.time_ns()
         drive(session, full_ns)
         failing = [f"dropanchor_{what}_failing" for what in ("history", "recording")]
-        wait_until(lambda: all(service.metric(name) == 1 for name in failing), 20.0)
+        wait_until(lambda: all(service.metric(name) == 1 for name in failing))
         for what in ("history", "recording"):
             assert any(what in problem for problem in service.get("/api/v1/health/ready")["impaired"])
             assert service.metric(f"dropanchor_{what}_errors_total") >= 1
         assert service.get("/api/v1/tags/a/pose")["t_ns"] > full_ns - S
         allow_files(service, resource.RLIM_INFINITY)
-        wait_until(lambda: service.get("/api/v1/health/ready")["impaired"] == [], 20.0)
+        wait_until(lambda: service.get("/api/v1/health/ready")["impaired"] == [])
         assert len(track(service, full_ns).poses) >= 5  # fewer where it is taken to stand
         for what in ("history", "recording"):
             assert service.metric(f"dropanchor_{what}_dropped_total") == 0

@@ -24,7 +24,7 @@ def test_nothing_is_lost_or_doubled_while_the_router_is_away() -> None:
                     router = start_router_process(endpoint)
                 time.sleep(0.01)
             client.flush()
-            wait_until(lambda: service.get("/api/v1/tags/a")["samples"] == {"range": published}, 10.0)
+            wait_until(lambda: service.get("/api/v1/tags/a")["samples"] == {"range": published})
             assert service.metric("dropanchor_missed_messages_total") == 0
             assert service.get("/api/v1/tags/a")["online"]
     finally:

@@ -63,7 +63,7 @@ def live(recording: Path, anchor: str, config: Path, last_ns: int) -> dict[int, 
         arguments += ["--t0-ns", str(T0_NS), "--connect", service.zenoh]
         tag = [sys.executable, "-m", "dropanchor_tag_client", *arguments]
         subprocess.run(tag, check=True, env=environment(), timeout=120, capture_output=True)
-        wait_until(lambda: last_ns in seen, 20.0)
+        wait_until(lambda: last_ns in seen)
     return seen
 
 

@@ -39,7 +39,7 @@ class Watched:
         tags: list[dict[str, Any]] = self.page.evaluate("dropanchor.tags()")
         return {tag["tag"]: tag for tag in tags}
 
-    def wait_for(self, condition: str, timeout_s: float = 15) -> None:
+    def wait_for(self, condition: str, timeout_s: float = 40) -> None:
         """Until a JavaScript expression is true. Asked from outside: the page's own policy forbids evaluation in it."""
         end_s = time.monotonic() + timeout_s
         while not self.page.evaluate(condition):

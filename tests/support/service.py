@@ -52,7 +52,7 @@ class Running:
         found = re.search(rf"^{re.escape(sample)} (\S+)$", text, re.MULTILINE)
         return float(found[1]) if found else 0.0
 
-    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 10.0) -> int:
+    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 30.0) -> int:
         self.process.send_signal(how)
         return self.process.wait(timeout_s)
 
@@ -90,7 +90,7 @@ def running_service(
         wait_until(lambda: running.url or process.poll() is not None, 240.0)  # the first start of the fleet compiles it
         assert running.url, "".join(running.log)
         if ready:
-            wait_until(lambda: running.ask("GET", "/api/v1/health/ready").status_code == 200, 10.0)
+            wait_until(lambda: running.ask("GET", "/api/v1/health/ready").status_code == 200)
         yield running
     finally:
         if process.poll() is None:

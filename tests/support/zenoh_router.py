@@ -76,7 +76,7 @@ def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
         router.communicate()
 
 
-def wait_until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
+def wait_until(condition: Callable[[], object], timeout_s: float = 40.0) -> None:
     """Returns when the condition holds; fails the test when it does not come true in time."""
     deadline = time.monotonic() + timeout_s
     while not condition():

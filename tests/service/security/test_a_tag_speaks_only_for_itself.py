@@ -76,7 +76,7 @@ class World:
             self.service.put(POSE_OF_B, mark)
             return self.samples.has(own, mark) and self.samples.has(OF_B) and self.poses.has(POSE_OF_B, mark)
 
-        wait_until(passed, 20.0)
+        wait_until(passed)
 
 
 def _answers(payload: bytes) -> Callable[[zenoh.Query], None]:
@@ -186,7 +186,7 @@ def test_a_revoked_tag_and_one_without_certificate_are_shut_out(tmp_path: Path) 
                 b.put(OF_B, b"admitted")
                 return ears.has(OF_B)
 
-            wait_until(passed, 20.0)
+            wait_until(passed)
             passed()
             wait_until(lambda: len(ears.heard) >= 2)
             assert {key for _, key, _ in ears.heard} == {OF_B}
