@@ -22,7 +22,7 @@ class Tuning(NamedTuple):
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0
     q_gyro: float = 1e-6  # (rad/s)^2/s
-    q_gyro_own: float = 1e-8  # the same, of a front-end that learned the bias at rest and has no platform's heading
+    q_gyro_own: float = 1e-6  # the same, where no platform measures the heading
     acc_std: float = 0.12  # m/s^2
     acc_rough: float = 0.7  # s: what the roughness of the motion adds to its variance, per dv_var / dt
     acc_tau: float = 5.0  # s
