@@ -149,9 +149,10 @@ class Ingest:
     def _count_shed(self) -> None:
         by_row, strangers = self._buffer.take_shed()
         self._losses.shed_strangers(strangers)
-        for row, count in by_row.items():
-            self._losses.reject_many(Reason.SHED, row, count)
-            self.preparation.publishers.excuse(row)
+        if by_row:
+            rows = np.fromiter(by_row, np.int64, len(by_row))
+            self._losses.reject(Reason.SHED, np.repeat(rows, np.fromiter(by_row.values(), np.int64, len(by_row))))
+            self.preparation.publishers.excuse(rows)
 
 
 def _by_kind(samples: SampleBatch) -> tuple[tuple[str, Array], ...]:

@@ -2,8 +2,6 @@
 
 import logging
 
-import numpy as np
-
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.logs import RareLog
@@ -24,9 +22,6 @@ class Losses:
         if len(rows):
             self._tags.count_rejected(reason, rows)
             self._metrics.rejected.labels(reason).inc(len(rows))
-
-    def reject_many(self, reason: Reason, row: int, count: int) -> None:
-        self.reject(reason, np.full(count, row))
 
     def refuse(self, reason: Reason, key: str) -> None:
         """A message of nobody who is known."""

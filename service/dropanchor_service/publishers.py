@@ -69,9 +69,10 @@ class Publishers:
                 return 0 < behind < 2**31 and (seen or behind > WINDOW)
         return False
 
-    def excuse(self, row: int) -> None:
-        """Messages of this row were shed before they got here: nobody need wait for them."""
-        self._columns["excused"][row * PER_TAG : (row + 1) * PER_TAG] = True
+    def excuse(self, rows: Array) -> None:
+        """Messages of these rows were shed before they got here: nobody need wait for them."""
+        known = rows[(rows + 1) * PER_TAG <= len(self._columns)]
+        self._columns["excused"].reshape(-1, PER_TAG)[known] = True
 
     def utc_offsets(
         self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]

@@ -107,7 +107,7 @@ def test_a_publisher_that_counts_from_the_start_again_is_heard() -> None:
 def test_nobody_waits_for_what_was_shed_here() -> None:
     publishers = Publishers()
     assert passed(publishers, [0]) == [0]
-    publishers.excuse(ROW)
+    publishers.excuse(np.array([ROW, 99]))
     released = put(publishers, [5, 6])
     assert released.due.tolist() == [0, 1]
     assert released.missing == 0
