@@ -14,7 +14,9 @@ def environment() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": _PACKAGES}
 
 
-def python(*arguments: str, text_input: str | None = None, timeout_s: float = 240.0) -> subprocess.CompletedProcess[str]:
+def python(
+    *arguments: str, text_input: str | None = None, timeout_s: float = 240.0
+) -> subprocess.CompletedProcess[str]:
     """Runs `python ARGUMENTS` to its end."""
     return subprocess.run(
         [sys.executable, *arguments],
