@@ -30,7 +30,15 @@ from .update import bound_speed, predict_range, update_bearing, update_heading, 
 
 
 @njit(nogil=True)
+def _is_instant(node: Any) -> bool:
+    """Nothing passed since the node before: a range fell on the IMU sample that had ended one."""
+    return bool(node.dt_s == 0.0 and node.dyaw == 0.0 and node.dyaw_var == 0.0 and node.dv_forward == 0.0)
+
+
+@njit(nogil=True)
 def _predict_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
+    if _is_instant(node):
+        return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     _, slow, tau = error_of(row, node.heading_var)
     for kind in range(2):
