@@ -10,19 +10,17 @@ from .gap import begins_again, place_again, repeats, watch_gap
 from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
 from .layout import COMMON, PHI, STEADY, YAW, R, V, Work
 from .manage import best_of, finite, limit, merge, normalise, prune, split
-from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, NO_HEADING, RANGE
+from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, RANGE
 from .pool import load, mirror, release, store
 from .predict import diffuse, fill_decay, move, transport
 from .publish import publish
 from .start import (
+    begin,
     counts_from,
     give_reference_error,
     is_referred,
-    median,
     recount_yaw,
     reseed,
-    start_known,
-    start_ring,
     turn_about,
 )
 from .tuning import Tuning
@@ -174,34 +172,6 @@ def _manage(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> i
 
 
 @njit(nogil=True)
-def _begin(work: Any, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
-    """Collect what a start needs and make the first hypotheses; returns their count."""
-    row.ring_s += node.dt_s
-    if node.kind == RANGE and row.anchor < 0:
-        row.anchor = node.anchor
-    if node.heading_kind == NO_HEADING:
-        row.reason = 1
-        return 0
-    if node.heading_kind == MEASURED_HEADING and row.hm_started == 0:
-        reset_models(row, node.heading, node.heading_var, t)
-    if row.anchor < 0:
-        row.reason = 0
-        return 0
-    anchor = anchors[row.anchor]
-    if row.start_known == 1 or row.again == 1:
-        return start_known(work, row, anchor, node, t)
-    if node.kind == RANGE and node.anchor == row.anchor:
-        row.ring[row.ring_count % layout.RING_RANGES] = node.z / row.range_scale - row.offset
-        row.ring_count += 1
-    if row.ring_count < 5 or (row.ring_count < layout.RING_RANGES and row.ring_s < 1.0):
-        row.reason = 0
-        return 0
-    slant = median(row.ring, min(row.ring_count, layout.RING_RANGES))
-    horizontal = math.sqrt(max(slant**2 - (row.height - anchor.z) ** 2, 0.01))
-    return start_ring(work, row, horizontal, node, node.rest == 1, t)
-
-
-@njit(nogil=True)
 def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, scratch: Any, belief: Any) -> int:
     """One node on a running row; returns the count of hypotheses."""
     H, PH, out = scratch.H, scratch.PH, scratch.out
@@ -270,7 +240,7 @@ def _continue(
             return count
         place_again(row, anchors[row.anchor])
         _reset(row, pool)
-    count = _begin(work, row, node, anchors, t)
+    count = begin(work, row, node, anchors, t)
     for h in range(count):
         mirror(work[h].cov)
     return count

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from .compiled import njit
-from .heading import error_of, told_of
-from .layout import ACC, COMMON, CRAB, GYRO, KEEP, MOUNT, OFFSET, PHI, REF, STEADY, YAW, N, R, V
+from .heading import error_of, reset_models, told_of
+from .layout import ACC, COMMON, CRAB, GYRO, KEEP, MOUNT, OFFSET, PHI, REF, RING_RANGES, STEADY, YAW, N, R, V
 from .manage import best_of, copy_hypothesis
-from .node import ABSOLUTE_HEADING, DERIVED_HEADING, NO_HEADING, RELATIVE_HEADING
+from .node import ABSOLUTE_HEADING, DERIVED_HEADING, MEASURED_HEADING, NO_HEADING, RANGE, RELATIVE_HEADING
 from .tuning import Tuning
 from .update import update_component, wrap
 
@@ -234,3 +234,31 @@ def start_ring(work: Any, row: Any, horizontal: float, node: Any, at_rest: bool,
 def median(values: Any, count: int) -> float:
     """Of the first `count`."""
     return float(np.median(values[:count]))
+
+
+@njit(nogil=True)
+def begin(work: Any, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
+    """Collect what a start needs and make the first hypotheses; returns their count."""
+    row.ring_s += node.dt_s
+    if node.kind == RANGE and row.anchor < 0:
+        row.anchor = node.anchor
+    if node.heading_kind == NO_HEADING:
+        row.reason = 1
+        return 0
+    if node.heading_kind == MEASURED_HEADING and row.hm_started == 0:
+        reset_models(row, node.heading, node.heading_var, t)
+    if row.anchor < 0:
+        row.reason = 0
+        return 0
+    anchor = anchors[row.anchor]
+    if row.start_known == 1 or row.again == 1:
+        return start_known(work, row, anchor, node, t)
+    if node.kind == RANGE and node.anchor == row.anchor:
+        row.ring[row.ring_count % RING_RANGES] = node.z / row.range_scale - row.offset
+        row.ring_count += 1
+    if row.ring_count < 5 or (row.ring_count < RING_RANGES and row.ring_s < 1.0):
+        row.reason = 0
+        return 0
+    slant = median(row.ring, min(row.ring_count, RING_RANGES))
+    horizontal = math.sqrt(max(slant**2 - (row.height - anchor.z) ** 2, 0.01))
+    return start_ring(work, row, horizontal, node, node.rest == 1, t)
