@@ -27,7 +27,7 @@ def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
     )
     options = ["--config", str(config), "--data-dir", str(tmp_path)]
     create_engine(load_settings(config, environment={}))  # what has to be compiled is, before the service must answer
-    end_ns = time.time_ns()
+    end_ns = time.time_ns() - 20 * S  # a clock ahead of ours would be mapped
     with running_service(*options) as service, connected_session(service.zenoh) as session:
         for step in range(10):
             frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
