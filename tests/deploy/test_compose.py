@@ -33,6 +33,12 @@ def test_every_mounted_file_is_there_or_made_by_the_operator() -> None:
                 assert (DEPLOY / source).exists(), source
 
 
+def test_the_compiled_estimator_lies_where_the_service_can_write() -> None:
+    mounted = {volume.split(":")[1] for volume in services()["service"]["volumes"]}
+    assert "XDG_CACHE_HOME=/var/cache " in (DEPLOY / "Dockerfile").read_text()
+    assert {"/var/cache/dropanchor", "/var/lib/dropanchor"} <= mounted
+
+
 def test_our_containers_cannot_write_gain_rights_or_run_as_root() -> None:
     for name in ("router", "service"):
         service = services()[name]

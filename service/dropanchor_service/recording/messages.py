@@ -12,6 +12,7 @@ from dropanchor_service.store.answers import to_json
 from dropanchor_service.store.columns import REASONS, STATES
 from dropanchor_service.store.geodesy import lat_lon
 from dropanchor_service.store.site import SiteDocument
+from dropanchor_service.store.track_answers import ESTIMATED
 
 FRAME = "site"
 SITE_TOPIC = "/site"
@@ -67,7 +68,7 @@ def _estimate(pose: Array, anchor: str | None) -> dict[str, object]:
         "state": STATES[pose["state"]],
         "reason": REASONS[pose["reason"]],
     }
-    numbers = {name: float(pose[field]) for name, field in schemas.ESTIMATED.items()}
+    numbers = {name: float(pose[field]) for name, field in ESTIMATED.items()}
     said |= {name: value for name, value in numbers.items() if math.isfinite(value)}
     if np.isfinite(pose["cov"]).all():
         said["covariance"] = pose["cov"].reshape(-1).tolist()

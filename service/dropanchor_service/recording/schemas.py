@@ -8,6 +8,8 @@ that has no place in that is left out of the schema, not of the message.
 from collections.abc import Mapping
 from typing import Any
 
+from dropanchor_service.store.track_answers import ESTIMATED
+
 POSE = "foxglove.PoseInFrame"
 LOCATION = "foxglove.LocationFix"
 TRANSFORM = "foxglove.FrameTransform"
@@ -58,20 +60,6 @@ def all_schemas() -> dict[str, Schema]:
         PACKED_SAMPLES: _record(data=_BASE64),
         SITE: _record(site=_record(id=_TEXT, name=_TEXT, anchors=_listed(id=_TEXT, x=_NUMBER, y=_NUMBER, z=_NUMBER))),
     }
-
-
-ESTIMATED = {
-    "x": "x",
-    "y": "y",
-    "heading_rad": "heading",
-    "speed_mps": "speed",
-    "yaw_rate_radps": "yaw_rate",
-    "p_mode": "p_mode",
-    "sigma_pos_m": "sigma_pos",
-    "sigma_obs_m": "sigma_obs",
-    "range_m": "range",
-}
-"""Numbers of an estimate, and the fields of POSE that they come from."""
 
 
 def _record(**properties: Schema) -> Schema:

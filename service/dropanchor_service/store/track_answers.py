@@ -75,7 +75,7 @@ def _columns(stored: Stored, site: SiteStore) -> dict[str, list[Any]]:
         "t_ns": poses["t_ns"].tolist(),
         "state": [STATES[state] for state in poses["state"].tolist()],
         "reason": [REASONS[reason] for reason in poses["reason"].tolist()],
-        **{name: _short(poses[field]).tolist() for name, field in _FIELDS.items()},
+        **{name: _short(poses[field]).tolist() for name, field in ESTIMATED.items()},
         "covariance": [cov if finite else None for cov, finite in zip(covariances, known, strict=True)],
         "anchor": list(stored.anchors),
     }
@@ -86,7 +86,7 @@ def _columns(stored: Stored, site: SiteStore) -> dict[str, list[Any]]:
     return columns
 
 
-_FIELDS = {
+ESTIMATED = {
     "x": "x",
     "y": "y",
     "heading_rad": "heading",
@@ -97,6 +97,7 @@ _FIELDS = {
     "sigma_obs_m": "sigma_obs",
     "range_m": "range",
 }
+"""Numbers of an estimate, and the fields of POSE that they come from."""
 
 
 def _short(values: Array) -> Array:
