@@ -52,7 +52,7 @@ check: install
 	@$(BIN)/python -m dropanchor_schemas.export --check
 	@$(BIN)/python -m dropanchor_service.api.export --check
 
-bench: install
+bench: install chromium
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
 clean:

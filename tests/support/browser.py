@@ -46,6 +46,11 @@ class Watched:
             assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}"
             self.page.wait_for_timeout(50)
 
+    def wait_for_map(self, visible: int) -> None:
+        """Until the site has arrived, so many tags are on the map, and the map has come to rest around them."""
+        site = "document.getElementById('site').textContent"
+        self.wait_for(f"{site} && dropanchor.drawing().still && dropanchor.drawing().visible === {visible}")
+
     def pixel(self, x: float, y: float) -> tuple[int, ...]:
         """Red, green, blue and opacity of the map at a place in CSS pixels."""
         script = """([x, y]) => {

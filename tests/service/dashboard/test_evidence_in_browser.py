@@ -107,11 +107,12 @@ def test_the_map_shows_the_rings_of_all_anchors_and_how_well_the_heading_is_know
 ) -> None:
     with watched_page(chromium, place.url, scheme, reduced_motion="reduce") as page:
         drive(place)
-        page.wait_for("dropanchor.drawing().visible === 1")
+        page.wait_for_map(1)
         empty = sector(page, 0.0), sector(page, 2.5 * HEADING_SIGMA)
         select(page)
-        page.wait_for("dropanchor.drawing().drawings > 3")
-        page.page.wait_for_timeout(200)
+        end_s = time.monotonic() + 40
+        while sector(page, 0.0) == empty[0] and time.monotonic() < end_s:
+            page.page.wait_for_timeout(50)
         assert sector(page, 0.0) != empty[0]
         assert sector(page, 2.5 * HEADING_SIGMA) == empty[1]
 

@@ -126,7 +126,7 @@ Object.defineProperty(window, "dropanchor", {
   value: Object.freeze({
     status: () => connection.status,
     received: () => ({ ...connection.stats }),
-    drawing: () => ({ ...map.stats }),
+    drawing: () => ({ ...map.stats, still: map.still }),
     tags: () => fleet.names.map((tag, row) => ({
       tag,
       state: STATES[fleet.state[row]].name,

@@ -51,6 +51,11 @@ export class LiveMap extends EventTarget {
     evidence.addEventListener("change", () => this.redraw());
   }
 
+  /** Nothing waits to be drawn or glides: what is on the screen is what is known. */
+  get still() {
+    return !this.#asked && this.#goal === null;
+  }
+
   /** @param {readonly import("./draw_site.js").Anchor[]} anchors */
   setAnchors(anchors) {
     if (JSON.stringify(anchors) === JSON.stringify(this.anchors)) return;
