@@ -96,6 +96,12 @@ class TagSettings(_Settings):
     mount_angle_std_rad: NotNegative | None = Field(
         default=None, description="How well that is known; 0: exactly, null: the engine's default."
     )
+    lever_forward_m: Number = Field(
+        default=0.0,
+        description="How far antenna and IMU sit before the point that follows the course (rear axle, feet of whoever "
+        "carries the tag), along body x axis.",
+    )
+    lever_left_m: Number = Field(default=0.0, description="How far to the left of it, along body y axis.")
     slip_std_rad: NotNegative | None = Field(
         default=None,
         description="Of the direction of travel about body x axis plus mounting angle: slip of what drives, sway of "

@@ -42,6 +42,7 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["range_scale"] = tag.range_scale
     columns["mount_angle"] = _or_nan(tag.mount_angle_rad)
     columns["mount_angle_std"] = _or_nan(tag.mount_angle_std_rad)
+    columns["lever_x"], columns["lever_y"] = tag.lever_forward_m, tag.lever_left_m
     columns["slip_std"] = _or_nan(tag.slip_std_rad)
     columns["speed_max"] = _or_nan(tag.speed_max_mps)
     columns["reverse_allowed"] = tag.reverse_allowed

@@ -22,6 +22,11 @@ def test_settings_of_a_tag_become_columns_and_what_is_not_known_nan() -> None:
     assert math.isnan(columns["start_heading"])
 
 
+def test_a_lever_is_told_forward_and_to_the_left() -> None:
+    columns = tag_columns(TagSettings(lever_forward_m=0.6, lever_left_m=-0.2), 0.0)
+    assert [columns[name].item() for name in ("lever_x", "lever_y")] == [0.6, -0.2]
+
+
 def test_zero_is_an_answer_where_nothing_told_is_nan() -> None:
     settings = TagSettings(range_bias_std_m=0.0, mount_angle_std_rad=0.0, slip_std_rad=0.0, heading_std_rad=0.0)
     columns = tag_columns(settings, 0.0)

@@ -83,6 +83,8 @@ TAG_SETTINGS: dict[str, Any] = {
     "range_scale": 1.0,
     "mount_angle_rad": 0.0,
     "mount_angle_std_rad": None,
+    "lever_forward_m": 0.3,
+    "lever_left_m": 0.0,
     "slip_std_rad": None,
     "speed_max_mps": None,
     "reverse_allowed": False,

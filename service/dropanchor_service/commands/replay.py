@@ -78,6 +78,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known.add_argument("--range-scale", type=float, default=1.0, metavar="K")
     known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
     known.add_argument("--mount-angle-std", type=float, metavar="RAD", help="how well that is known; 0: exactly")
+    known.add_argument(
+        "--lever-forward", type=float, default=0.0, metavar="M", help="tag before what follows the course"
+    )
+    known.add_argument("--lever-left", type=float, default=0.0, metavar="M", help="and to the left of it")
     known.add_argument("--slip-std", type=float, metavar="RAD", help="of the direction of travel about that; 0: none")
     known.add_argument("--heading-std", type=float, metavar="RAD", help="of a platform's heading that does not drift")
     known.add_argument("--speed-max", type=float, metavar="M/S", help="it never moves faster")
@@ -166,6 +170,8 @@ def _tag_settings(arguments: argparse.Namespace) -> TagSettings:
             range_scale=arguments.range_scale,
             mount_angle_rad=arguments.mount_angle,
             mount_angle_std_rad=arguments.mount_angle_std,
+            lever_forward_m=arguments.lever_forward,
+            lever_left_m=arguments.lever_left,
             slip_std_rad=arguments.slip_std,
             speed_max_mps=arguments.speed_max,
             reverse_allowed=arguments.reverse,

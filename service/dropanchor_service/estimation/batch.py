@@ -29,6 +29,8 @@ TAG_SETTINGS = np.dtype(
         ("range_scale", "f8"),
         ("mount_angle", "f8"),  # NaN: not known
         ("mount_angle_std", "f8"),  # rad, NaN: the engine's default
+        ("lever_x", "f8"),  # m, from the point that follows the course to the tag, body frame
+        ("lever_y", "f8"),
         ("slip_std", "f8"),  # of the course about body axis and mounting angle, NaN: the engine's default
         ("speed_max", "f8"),  # m/s, NaN: the engine's default
         ("reverse_allowed", "?"),

@@ -113,7 +113,8 @@ def section(found: dict[str, Results]) -> Section:
         text=[
             "Start and heading zero are given; range bias, mounting angle and noise are not taken from the truth. "
             "Told, as an operator could: a top speed; Plaza: the scale of its radios, 1.069, and 0.6 m; the mower: an "
-            "IMU along its wheels; Hanyang: a heading that is the direction of travel. Prototype: a Gaussian-sum "
+            "IMU along its wheels; starloc: a rig held 0.6 m in front of who walks; "
+            "Hanyang: a heading that is the direction of travel. Prototype: a Gaussian-sum "
             "filter whose parameters were searched for per family on these very recordings. Heading: that of each "
             "engine's own attitude filter where the recording has an IMU, else that of the platform (Plaza's drifts "
             "by 0.3 °/s). Tuned: the service's tuned parameters, the same for all; their speed estimator wants ranges "

@@ -4,6 +4,7 @@ from dropanchor_service.estimation.batch import Array
 from dropanchor_service.evaluation.plaza import PLAZA_SCALE, PLAZA_STD
 
 TOP_SPEED_MPS = {"iasl": 1.5, "tiers": 0.7, "starloc": 2.5, "mower": 1.0, "plaza": 6.0, "hanyang": 3.0}
+ARM_M = 0.6
 PROTOTYPE = {
     "iasl_s1": (0.79, 1.32),
     "iasl_s3": (0.82, 1.15),
@@ -28,5 +29,7 @@ def tell(name: str, settings: Array) -> None:
         settings["range_scale"], settings["range_std"] = PLAZA_SCALE, PLAZA_STD
     elif family == "hanyang":  # its heading is the direction of travel, made from the truth
         settings["heading_std"] = settings["slip_std"] = 0.0
+    elif family == "starloc":  # the rig is held out in front with both hands
+        settings["lever_x"] = ARM_M
     elif family == "mower":  # the IMU is mounted along its wheels
         settings["mount_angle"] = 0.0

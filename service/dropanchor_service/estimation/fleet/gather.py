@@ -6,6 +6,7 @@ import numpy as np
 
 from .compiled import njit
 from .frontend import close_node, feed
+from .lever import swing
 from .node import BEARING, NO_MEASUREMENT, RANGE
 from .platform import derive_node, hear, refer_to_platform, watch_start
 
@@ -45,6 +46,7 @@ def _close(front: Any, platform: Any, row: Any, t_ns: int, node: Any) -> None:
         newest = max(t_ns, platform.t_node)
         derive_node(platform, newest, node)
         node.t_ns = newest
+    swing(row, node)
 
 
 @njit(nogil=True)

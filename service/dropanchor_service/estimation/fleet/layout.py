@@ -36,6 +36,8 @@ LOST: Final = 5
 SETTINGS: Final = [
     ("mount", np.float64),
     ("mount_std", np.float64),
+    ("lever_x", np.float64),  # m, from the point that follows the course to the tag, body frame
+    ("lever_y", np.float64),
     ("crab_std", np.float64),
     ("crab_tau", np.float64),  # s
     ("slip_known", np.uint8),  # 1: crab_std was told
@@ -102,6 +104,7 @@ ROW: Final = np.dtype(
         ("gap_var", np.float64),  # m^2
         ("gap_speed", np.float64),
         ("again", np.uint8),  # 1: the start is where the tag was before such a gap
+        ("lever_rate", np.float64),  # rad/s, mean of the last node
         ("last_z", np.float64),  # the last range, and for how long it has been the same
         ("same_count", np.int32),
         ("same_s", np.float64),

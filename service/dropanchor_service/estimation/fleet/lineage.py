@@ -43,8 +43,9 @@ def before(s: Any, node: Any, out: Any) -> None:
     out[YAW] = s[YAW] - node.dyaw
     d = (out[V] + f / 2) * node.dt_s
     course = out[YAW] + node.dyaw / 2 + m
-    x = s[R] * math.cos(s[PHI]) - d * math.cos(course)
-    y = s[R] * math.sin(s[PHI]) - d * math.sin(course)
+    c, sn = math.cos(out[YAW]), math.sin(out[YAW])
+    x = s[R] * math.cos(s[PHI]) - d * math.cos(course) - node.swing_forward * c + node.swing_left * sn
+    y = s[R] * math.sin(s[PHI]) - d * math.sin(course) - node.swing_forward * sn - node.swing_left * c
     out[R] = max(math.hypot(x, y), 1e-3)
     out[PHI] = math.atan2(y, x)
 

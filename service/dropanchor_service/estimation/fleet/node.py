@@ -29,6 +29,8 @@ NODE: Final = np.dtype(
         ("gyro_step", np.float64),  # rad/s, by which that bias about the vertical changed in the interval
         ("dv_forward", np.float64),  # m/s, gravity removed, in the body-yaw frame at the start of the interval
         ("dv_left", np.float64),  # m/s
+        ("swing_forward", np.float64),  # m, of the tag about the point that follows the course, in the same frame
+        ("swing_left", np.float64),  # m
         ("dv_var", np.float64),  # (m/s)^2, inf without an accelerometer
         ("heading", np.float64),  # rad, body yaw at the end of the interval
         ("heading_var", np.float64),  # rad^2

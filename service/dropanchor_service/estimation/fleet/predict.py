@@ -1,9 +1,9 @@
 """Predict one hypothesis over a node: constant-course step in polar coordinates.
 
 With w = dyaw - b_g dt, m = mount + crab, alpha = yaw + w/2 + m - phi, f = dv_forward cos m + dv_left sin m - b_a dt and
-d = v dt + f dt/2:
+d = v dt + f dt/2, and with the swing g of a lever (forward, left), turned by yaw - phi:
 
-    z = (r + d cos alpha, d sin alpha),  r' = |z|,  phi' = phi + atan2(z_y, z_x),
+    z = (r + d cos alpha, d sin alpha) + R(yaw - phi) g,  r' = |z|,  phi' = phi + atan2(z_y, z_x),
     yaw' = yaw + w,  v' = v + f,  crab, b_a and the reference error decay with their time constants.
 """
 
@@ -35,14 +35,18 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     d = s[V] * dt + f * dt / 2
     alpha = s[YAW] + w / 2 + m - s[PHI]
     ca, sa = math.cos(alpha), math.sin(alpha)
-    zx, zy = s[R] + d * ca, d * sa
+    cb, sb = math.cos(s[YAW] - s[PHI]), math.sin(s[YAW] - s[PHI])
+    sx = node.swing_forward * cb - node.swing_left * sb
+    sy = node.swing_forward * sb + node.swing_left * cb
+    zx, zy = s[R] + d * ca + sx, d * sa + sy
     r = max(math.hypot(zx, zy), 1e-6)
     r_alpha, r_d = (-zx * d * sa + zy * d * ca) / r, (zx * ca + zy * sa) / r
     p_alpha, p_d = (zx * d * ca + zy * d * sa) / r**2, (zx * sa - zy * ca) / r**2
+    r_beta, p_beta = (zy * sx - zx * sy) / r, (zx * sx + zy * sy) / r**2
     F[:] = 0.0
     F[0, R], F[1, R] = zx / r, -zy / r**2
-    F[0, PHI], F[1, PHI] = -r_alpha, 1.0 - p_alpha
-    F[0, YAW], F[1, YAW] = r_alpha, p_alpha
+    F[0, PHI], F[1, PHI] = -r_alpha - r_beta, 1.0 - p_alpha - p_beta
+    F[0, YAW], F[1, YAW] = r_alpha + r_beta, p_alpha + p_beta
     F[0, V], F[1, V] = r_d * dt, p_d * dt
     F[0, MOUNT], F[1, MOUNT] = r_alpha + r_d * f_m * dt / 2, p_alpha + p_d * f_m * dt / 2
     F[0, CRAB], F[1, CRAB] = F[0, MOUNT], F[1, MOUNT]

@@ -35,8 +35,11 @@ STATE = np.array([12.0, 0.7, -2.1, 1.4, 0.2, -0.05, 0.004, 0.08, 0.03, 0.12])
 DECAY = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.97, 1.0, 0.98, 0.995, 1.0])
 
 
-def node_of(dt: float = 0.1, dyaw: float = 0.06, forward: float = 0.05, left: float = 0.08) -> Any:
+def node_of(
+    dt: float = 0.1, dyaw: float = 0.06, forward: float = 0.05, left: float = 0.08, swing: tuple[float, float] = (0, 0)
+) -> Any:
     node = np.zeros((), NODE)
+    node["swing_forward"], node["swing_left"] = swing
     node["dt_s"], node["dyaw"], node["dv_forward"], node["dv_left"], node["dv_var"] = dt, dyaw, forward, left, 1e-4
     return node.view(np.recarray)[()]
 
@@ -50,6 +53,8 @@ def readable_step(s: Any, node: Any) -> Any:
     course = s[YAW] + w / 2 + mount
     place = s[R] * np.array([math.cos(s[PHI]), math.sin(s[PHI])])
     place = place + (s[V] * dt + along * dt / 2) * np.array([math.cos(course), math.sin(course)])
+    c, sn = math.cos(s[YAW]), math.sin(s[YAW])
+    place = place + np.array([[c, -sn], [sn, c]]) @ [node["swing_forward"], node["swing_left"]]
     out = s.copy()
     out[R], out[PHI] = np.hypot(*place), math.atan2(place[1], place[0])
     out[YAW], out[V] = s[YAW] + w, s[V] + along
@@ -77,15 +82,17 @@ def jacobian_fd(f: Any, s: Any) -> Any:
     return np.array(columns).T
 
 
+@pytest.mark.parametrize("swing", [(0.0, 0.0), (-0.1, 0.3)])
 @pytest.mark.parametrize("dyaw", [-0.4, 0.0, 0.06])
-def test_a_polar_step_is_the_cartesian_step(dyaw: float) -> None:
-    node = node_of(dyaw=dyaw)
+def test_a_polar_step_is_the_cartesian_step(dyaw: float, swing: tuple[float, float]) -> None:
+    node = node_of(dyaw=dyaw, swing=swing)
     np.testing.assert_allclose(stepped(STATE, node)[0], readable_step(STATE, node), atol=1e-12)
 
 
+@pytest.mark.parametrize("swing", [(0.0, 0.0), (-0.1, 0.3)])
 @pytest.mark.parametrize("dyaw", [-0.4, 0.0, 0.06])
-def test_the_jacobian_of_the_step_equals_finite_differences(dyaw: float) -> None:
-    node = node_of(dyaw=dyaw)
+def test_the_jacobian_of_the_step_equals_finite_differences(dyaw: float, swing: tuple[float, float]) -> None:
+    node = node_of(dyaw=dyaw, swing=swing)
     expected = jacobian_fd(lambda s: readable_step(s, node)[:4], STATE)
     np.testing.assert_allclose(stepped(STATE, node)[1], expected, atol=1e-7)
 
