@@ -63,6 +63,6 @@ def test_publishing_does_not_wait_while_the_router_is_away(router: KillableRoute
         began = time.monotonic()
         for i in range(1000):
             tag.publish_range(1, float(i))
-        assert time.monotonic() - began < 4.0
+        assert time.monotonic() - began < 20.0
         closing = time.monotonic()
     assert time.monotonic() - closing < 15.0
