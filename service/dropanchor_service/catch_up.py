@@ -5,18 +5,27 @@ what is live, what was fetched, and when an answer is complete.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from threading import Lock
 from typing import NamedTuple
 
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, Rejection, read_header
 from dropanchor_service.buffer import MESSAGE_OVERHEAD, MessageBuffer
+from dropanchor_service.publishers import Passed
 
 MOST_BYTES = 64 * 2**20  # of held messages; beyond it they go on as they are
 
-IsRepeated = Callable[[str, int, int], bool]
-"""Whether the message with this key, boot id and sequence was fused before the restart."""
+PassedOf = Callable[[str], Mapping[int, Passed]]
+"""What was fused before the restart of the tag with this key, by boot id."""
+
+
+class _Number(NamedTuple):
+    """t_ns: of a sample, on the publisher's own clock."""
+
+    boot_id: int
+    sequence: int
+    t_ns: int
 
 
 class _Held(NamedTuple):
@@ -24,34 +33,44 @@ class _Held(NamedTuple):
     payload: bytes
     encoding: str
     arrival_ns: int
+    number: _Number | None
 
 
 class CatchUp:
     """Between the session and the buffer. Its methods may be called from any thread; none of them waits.
 
-    expected: keys of tags that the last process knew or an operator has listed. ask: called once for each of them that
-    is heard after the first round; `answered` is to be called when all that its caches hold was `fetched`.
+    expected: keys of tags that the last process knew or an operator has listed. ask: called for each of them that is
+    heard after the first round, and where an answer was cut short, with the number of messages that are missing, 0
+    when it is not known; `answered` is to be called when all that was asked for is `fetched`. most_of_new: so many are
+    asked for of a publisher that the last process did not know.
     """
 
     def __init__(
-        self, buffer: MessageBuffer, expected: Iterable[str], is_repeated: IsRepeated, ask: Callable[[str], None]
+        self,
+        buffer: MessageBuffer,
+        expected: Iterable[str],
+        passed_of: PassedOf,
+        ask: Callable[[str, int], None],
+        most_of_new: int,
     ) -> None:
         self._lock = Lock()
         self._buffer = buffer
         self._expected = set(expected)
-        self._is_repeated = is_repeated
+        self._passed_of = passed_of
         self._ask = ask
+        self._most_of_new = most_of_new
         self._first_round = True  # all caches are being asked, all messages are held
         self._held: dict[str, list[_Held]] = {}
-        self._fetched: Counter[str] = Counter()
+        self._fetched: Counter[str] = Counter()  # since the key was asked last
         self._bytes = 0
 
     def hear(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """A live message."""
         if self._first_round or key in self._expected:
+            held = _Held(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
             with self._lock:
                 if self._first_round or key in self._expected:
-                    self._hold(_Held(key, payload, encoding, arrival_ns))
+                    self._hold(held)
                     return
         self._buffer.append(key, payload, encoding, arrival_ns)
 
@@ -63,103 +82,123 @@ class CatchUp:
 
     def fetch(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """A message from a cache."""
+        held = _Held(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
         with self._lock:
             if self._first_round or key in self._held:
                 self._fetched[key] += 1
-                self._hold(_Held(key, payload, encoding, arrival_ns))
+                self._hold(held)
 
-    def answered(self, key: str) -> int:
-        """The caches of this tag have told all. Returns how many messages go on."""
+    def answered(self, key: str, most: int) -> int:
+        """The caches of this tag have told all, or their newest `most`. Returns how many messages go on."""
         with self._lock:
+            if self._is_short(key, most):
+                self._ask_again(key)
+                return 0
             return self._release(key)
 
-    def first_round_answered(self) -> int:
-        """All caches that could be reached have told all. Tags that were heard without one are asked once more: a
-        session that has just been opened tells of its caches last."""
+    def first_round_answered(self, most: int) -> int:
+        """All caches that could be reached have told all, or their newest `most`. Tags that were heard without one are
+        asked once more: a session that has just been opened tells of its caches last."""
         with self._lock:
             self._first_round = False
-            released = 0
-            for key in list(self._held):
-                if key in self._expected and not self._fetched[key]:
-                    self._ask(key)
-                else:
-                    released += self._release(key)
-            return released
+            unheard = {key for key in self._held if key in self._expected and not self._fetched[key]}
+            again = unheard | {key for key in self._held if self._is_short(key, most)}
+            for key in again:
+                self._ask_again(key)
+            return self._release(*(self._held.keys() - again))
+
+    def _is_short(self, key: str, most: int) -> bool:
+        return self._fetched[key] >= most and self._missing(key) > most
+
+    def _missing(self, key: str) -> int:
+        """How many messages one of its publishers has sent that were not fused, as far as their numbers tell."""
+        passed = self._passed_of(key)
+        return max(
+            (self._missing_to(held.number, passed) for held in self._held.get(key, ()) if held.number), default=0
+        )
+
+    def _missing_to(self, number: _Number, passed: Mapping[int, Passed]) -> int:
+        known = passed.get(number.boot_id)
+        return 1 + known.missing_to(number.sequence) if known else min(number.sequence + 1, self._most_of_new)
+
+    def _ask_again(self, key: str) -> None:
+        self._fetched[key] = 0
+        self._ask(key, self._missing(key))
 
     def _hold(self, message: _Held) -> None:
         self._open(message.key)
         self._held[message.key].append(message)
         self._bytes += len(message.payload) + MESSAGE_OVERHEAD
         if self._bytes > MOST_BYTES:
-            for key in list(self._held):
-                self._release(key)
+            self._release(*self._held)
 
     def _open(self, key: str) -> None:
         if key not in self._held:
             self._held[key] = []
             if not self._first_round:
-                self._ask(key)
+                self._ask(key, 0)
 
-    def _release(self, key: str) -> int:
-        self._expected.discard(key)
-        self._fetched.pop(key, None)
-        held = self._held.pop(key, [])
-        self._bytes -= sum(len(message.payload) + MESSAGE_OVERHEAD for message in held)
-        ordered = _in_order(held, self._is_repeated)
-        for message in ordered:
-            self._buffer.append(*message)
-        return len(ordered)
-
-
-class _Numbered(NamedTuple):
-    message: _Held
-    sequence: int
-    t_ns: int
+    def _release(self, *keys: str) -> int:
+        """In the order in which they would have arrived: one message of a tag is fused at a time, but of many tags at
+        once."""
+        released: list[_Held] = []
+        for key in keys:
+            self._expected.discard(key)
+            self._fetched.pop(key, None)
+            held = self._held.pop(key, [])
+            self._bytes -= sum(len(message.payload) + MESSAGE_OVERHEAD for message in held)
+            released += _in_order(held, self._passed_of(key))
+        for message in sorted(released, key=lambda message: message.arrival_ns):
+            self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns)
+        return len(released)
 
 
-def _in_order(held: list[_Held], is_repeated: IsRepeated) -> list[_Held]:
+_Numbered = tuple[_Number, _Held]
+
+
+def _in_order(held: list[_Held], passed: Mapping[int, Passed]) -> list[_Held]:
     """Every message once, as they would have arrived: each publisher's in the order of their numbers, with the delay
     that its newest one has."""
     by_publisher: dict[int, dict[int, _Numbered]] = {}
     others: list[_Held] = []
     for message in held:
-        number = _number_of(message)
+        number = message.number
         if number is None:
             others.append(message)
             continue
-        boot_id, sequence, t_ns = number
-        if not is_repeated(message.key, boot_id, sequence):
-            by_publisher.setdefault(boot_id, {}).setdefault(sequence, _Numbered(message, sequence, t_ns))
+        known = passed.get(number.boot_id)
+        if known is None or not known.has(number.sequence):
+            by_publisher.setdefault(number.boot_id, {}).setdefault(number.sequence, (number, message))
     for messages in by_publisher.values():
         others += _as_if_live(list(messages.values()))
-    return sorted(others, key=lambda message: message.arrival_ns)
+    return others
 
 
-def _as_if_live(messages: list[_Numbered]) -> list[_Held]:
+def _as_if_live(messages: list[_Numbered]) -> Iterator[_Held]:
     """One publisher's, with the arrivals that they would have had; clocks that jump move none behind the next one."""
-    first = messages[0].sequence
-    ordered = sorted(messages, key=lambda entry: (entry.sequence - first + 2**31) % 2**32)
-    newest = ordered[-1]
-    delay_ns = newest.message.arrival_ns - newest.t_ns
-    arrival_ns = newest.message.arrival_ns
-    live: list[_Held] = []
-    for message, _, t_ns in reversed(ordered):
-        arrival_ns = min(arrival_ns, t_ns + delay_ns)
-        live.append(message._replace(arrival_ns=arrival_ns))
-    return live[::-1]
+    first = messages[0][0].sequence
+    ordered = sorted(messages, key=lambda entry: (entry[0].sequence - first + 2**31) % 2**32)
+    newest, last = ordered[-1]
+    delay_ns, arrival_ns = last.arrival_ns - newest.t_ns, last.arrival_ns
+    arrivals: list[int] = []
+    for number, _ in reversed(ordered):
+        arrival_ns = min(arrival_ns, number.t_ns + delay_ns)
+        arrivals.append(arrival_ns)
+    for (number, held), arrived_ns in zip(ordered, reversed(arrivals), strict=True):
+        yield _Held(held.key, held.payload, held.encoding, arrived_ns, number)
 
 
-def _number_of(message: _Held) -> tuple[int, int, int] | None:
-    """Boot id, sequence and the time of a sample on the publisher's own clock; None where it is not numbered."""
-    kind = message.encoding.partition(";")[0]
+def _number_of(payload: bytes, encoding: str) -> _Number | None:
+    """None where it is not numbered."""
+    kind = encoding.partition(";")[0]
     if kind == ENCODING_PACKED:
-        header = read_header(message.payload)
+        header = read_header(payload)
         if isinstance(header, Rejection):
             return None
         _, _, sequence, boot_id, t_ns = header
-        return (boot_id, sequence, t_ns) if boot_id else None
-    frame = decode_json(message.payload) if kind == ENCODING_JSON else None
+        return _Number(boot_id, sequence, t_ns) if boot_id else None
+    frame = decode_json(payload) if kind == ENCODING_JSON else None
     if not isinstance(frame, Frame) or frame.sequence is None or not frame.boot_id:
         return None
     columns = (frame.imu, frame.ranges, frame.headings, frame.bearings)
-    return frame.boot_id, frame.sequence, min(sample.t_ns for column in columns for sample in column)
+    return _Number(frame.boot_id, frame.sequence, min(sample.t_ns for column in columns for sample in column))

@@ -63,6 +63,7 @@ class Keepers:
         return NO_TAPS if recorder is None else Taps(recorder.messages, take)
 
     def problems(self) -> Sequence[str]:
-        """Why one of them does not write."""
-        parts = (self.tracks, self.recorder)
-        return [part.writer.problem for part in parts if part is not None and part.writer.problem is not None]
+        """Why one of them does not write, or has lost what it had."""
+        of_tracks = [] if self.tracks is None else self.tracks.problems
+        recorder = None if self.recorder is None else self.recorder.writer.problem
+        return [*of_tracks, *([] if recorder is None else [recorder])]

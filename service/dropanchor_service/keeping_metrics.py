@@ -21,6 +21,9 @@ class HistoryMetrics(Collector):
         tracks = self._tracks
         yield CounterMetricFamily("dropanchor_history_poses", "Poses written to the history.", tracks.written)
         yield GaugeMetricFamily("dropanchor_history_bytes", "Bytes that the history uses.", tracks.used_bytes)
+        yield CounterMetricFamily(
+            "dropanchor_history_damaged", "Damaged files of the history that were set aside.", len(tracks.damaged)
+        )
         yield from _of_writer("history", tracks.writer)
 
 

@@ -1,6 +1,7 @@
 """What is known of each publisher of a tag: which of its messages have come, in which order, and its clock."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,23 @@ class Sequenced:
     duplicates: Array
     missing: int
     slots: Array
+
+
+class Passed(NamedTuple):
+    """next: the number that is expected; seen: bit n % WINDOW is set when the message n has come."""
+
+    next: int
+    seen: int
+
+    def has(self, sequence: int) -> bool:
+        """Whether this message was fused already, or is older than what is remembered."""
+        behind = (self.next - sequence) % 2**32
+        return 0 < behind < 2**31 and (behind > WINDOW or bool(self.seen >> sequence % WINDOW & 1))
+
+    def missing_to(self, sequence: int) -> int:
+        """How many numbers lie before this one and were not seen; 0 when it is not ahead."""
+        ahead = (sequence - self.next) % 2**32
+        return ahead if ahead < 2**31 else 0
 
 
 class Publishers:
@@ -59,15 +77,15 @@ class Publishers:
         again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.HELD))
         return Sequenced(due, waiting, again, missing, slots)
 
-    def has_passed(self, row: int, boot_id: int, sequence: int) -> bool:
-        """Whether this message of this tag was fused already, or is older than what is remembered."""
-        for publisher in self._columns[row * PER_TAG : (row + 1) * PER_TAG]:
-            if publisher["status"] == sequences.RUNNING and publisher["boot_id"] == boot_id:
-                behind = (int(publisher["next"]) - sequence) % 2**32
-                lane, bit = sequence % WINDOW // 64, sequence % 64
-                seen = bool(int(publisher["seen"][lane]) >> bit & 1)
-                return 0 < behind < 2**31 and (seen or behind > WINDOW)
-        return False
+    def passed(self, row: int) -> dict[int, Passed]:
+        """By boot id, of this tag's publishers."""
+        of_tag = self._columns[row * PER_TAG : (row + 1) * PER_TAG]
+        return {
+            int(publisher["boot_id"]): Passed(
+                int(publisher["next"]), int.from_bytes(publisher["seen"].astype("<u8").tobytes(), "little")
+            )
+            for publisher in of_tag[of_tag["status"] == sequences.RUNNING]
+        }
 
     def excuse(self, rows: Array) -> None:
         """Messages of these rows were shed before they got here: nobody need wait for them."""

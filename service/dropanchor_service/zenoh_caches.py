@@ -7,12 +7,13 @@ loses thousands of samples.
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
 import zenoh
 
 from dropanchor_schemas import keys
@@ -21,12 +22,14 @@ from dropanchor_service.catch_up import CatchUp
 from dropanchor_service.clock import UtcClock
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
-from dropanchor_service.publishers import Publishers
+from dropanchor_service.publishers import Passed, Publishers
 from dropanchor_service.store import TagTable
 
 ANSWER_S = 2.0
 FEWEST = 100  # messages that a cache is asked for
 PER_SECOND = 200  # and more, for every second that the tag was not heard: no publisher sends as many
+NINE_OF_TEN = 0.9  # tags have sent all that they are asked for in the first round; the others are asked again
+SPARE = 1.2
 
 _log = logging.getLogger(__name__)
 
@@ -54,8 +57,13 @@ class ZenohCaches:
         self._clock = clock
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         expected = [keys.samples_key(site, tag.name) for tag in tags.all()]
+        self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # by the last process
         self.catch_up = CatchUp(
-            buffer, expected, self._is_repeated, lambda key: self._tasks.put(partial(self._ask, key))
+            buffer,
+            expected,
+            self._passed,
+            lambda key, missing: self._tasks.put(partial(self._ask, key, missing)),
+            self._most(self._newest_ns),
         )
         self._thread = threading.Thread(target=self._run, name="caches", daemon=True)
 
@@ -70,9 +78,9 @@ class ZenohCaches:
         self._tasks.put(None)
         self._thread.join(1.0)
 
-    def _is_repeated(self, key: str, boot_id: int, sequence: int) -> bool:
+    def _passed(self, key: str) -> Mapping[int, Passed]:
         tag = self._tags.find(keys.tag_from_key(key))
-        return tag is not None and self._publishers.has_passed(tag.row, boot_id, sequence)
+        return {} if tag is None else self._publishers.passed(tag.row)
 
     def _run(self) -> None:
         while (task := self._tasks.get()) is not None:
@@ -83,20 +91,21 @@ class ZenohCaches:
                 self._rare.exception("caches", error)
 
     def _ask_all(self) -> None:
-        newest_ns = max((tag.last_heard_ns or 0 for tag in self._tags.all()), default=0)
-        self._get(keys.all_tags(self._site, "samples"), newest_ns, self.catch_up.first_round_answered)
+        most = min(self._usual(), self._most(self._newest_ns))
+        self._get(keys.all_tags(self._site, "samples"), most, self.catch_up.first_round_answered)
 
-    def _ask(self, key: str) -> None:
+    def _ask(self, key: str, missing: int) -> None:
         tag = self._tags.find(keys.tag_from_key(key))
         heard_ns = None if tag is None else tag.last_heard_ns
-        self._get(key, heard_ns or 0, partial(self.catch_up.answered, key))
+        most = FEWEST + missing if missing else self._most(heard_ns or 0)
+        self._get(key, most, partial(self.catch_up.answered, key))
 
-    def _get(self, samples: str, heard_ns: int, answered: Callable[[], int]) -> None:
-        """Ask for all since then; `answered` is run in our thread."""
-        done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
+    def _get(self, samples: str, most: int, answered: Callable[[int], int]) -> None:
+        """Ask for the newest `most`; `answered` is run in our thread."""
+        done = partial(self._tasks.put, partial(self._finish, partial(answered, most), time.monotonic()))
         try:
             self._session.get(
-                f"{samples}/@adv/**?_max={self._most(heard_ns)}",
+                f"{samples}/@adv/**?_max={most}",
                 zenoh.handlers.Callback(self._on_reply, done),
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
@@ -104,12 +113,24 @@ class ZenohCaches:
                 timeout=ANSWER_S,
             )
         except zenoh.ZError:
-            answered()
+            answered(most)
             raise
 
+    def _usual(self) -> int:
+        """How many messages most tags have sent since the last process heard them, if they went on as before."""
+        counts = self._tags.copy_counts()
+        heard = counts[counts["messages"] > 0]
+        if not len(heard):
+            return FEWEST
+        heard_s = np.maximum((heard["last_heard_ns"] - heard["first_heard_ns"]) * 1e-9, 1.0)
+        rate = float(np.quantile(heard["messages"] / heard_s, NINE_OF_TEN))
+        return FEWEST // 5 + round(SPARE * rate * self._silent_s(self._newest_ns))
+
     def _most(self, heard_ns: int) -> int:
-        silent_s = (self._clock.now_ns() - heard_ns) * 1e-9 if heard_ns else 0.0
-        return FEWEST + round(PER_SECOND * max(silent_s, 0.0))
+        return FEWEST + round(PER_SECOND * self._silent_s(heard_ns))
+
+    def _silent_s(self, heard_ns: int) -> float:
+        return max((self._clock.now_ns() - heard_ns) * 1e-9, 0.0) if heard_ns else 0.0
 
     def _on_reply(self, reply: Any) -> None:
         message = reply.ok

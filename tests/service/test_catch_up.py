@@ -1,6 +1,7 @@
 """What was fetched from caches goes on before what is live: once, in order, and only where somebody waits for it."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import pytest
@@ -19,8 +20,10 @@ from dropanchor_service import catch_up
 from dropanchor_service.buffer import MessageBuffer
 from dropanchor_service.catch_up import CatchUp
 from dropanchor_service.decode import read_forms
+from dropanchor_service.publishers import Passed
 
 S = 1_000_000_000
+MOST = 100  # messages that a cache was asked for
 T0 = 1_760_000_000 * S
 A, B, NEW = (samples_key("default", tag) for tag in ("a", "b", "new"))
 
@@ -37,12 +40,17 @@ class Came(NamedTuple):
 class House:
     """A catch-up that expects the tags a and b, and what goes on from it."""
 
-    def __init__(self, is_repeated: Callable[[str, int, int], bool] = lambda *_: False) -> None:
+    def __init__(self, passed: Mapping[str, Mapping[int, Passed]] = MappingProxyType({})) -> None:
         self.asked: list[str] = []
+        self.missing: list[int] = []
         self._buffer = MessageBuffer(10**8)
         for row, key in enumerate((A, B, NEW)):
             self._buffer.admit(key, row)
-        self.catch_up = CatchUp(self._buffer, [A, B], is_repeated, self.asked.append)
+        self.catch_up = CatchUp(self._buffer, [A, B], lambda key: passed.get(key, {}), self._ask, most_of_new=4)
+
+    def _ask(self, key: str, missing: int) -> None:
+        self.asked.append(key)
+        self.missing.append(missing)
 
     def came(self) -> list[Came]:
         messages, _ = self._buffer.drain(1000)
@@ -78,18 +86,18 @@ def test_what_is_live_waits_for_what_was_fetched_and_each_comes_once() -> None:
     live(house, 6)
     cached(house, 3, 2, 5, 4)
     assert house.came() == []
-    assert house.catch_up.first_round_answered() == 5
+    assert house.catch_up.first_round_answered(MOST) == 5
     live(house, 7)
     assert house.sequences() == [2, 3, 4, 5, 6, 7]
     assert house.asked == []
 
 
 def test_what_was_fused_before_the_restart_is_left_out() -> None:
-    house = House(lambda key, boot_id, sequence: (key, boot_id) == (A, 1) and sequence <= 3)
+    house = House({A: {1: Passed(next=4, seen=0b1111)}})
     cached(house, 2, 3, 4)
     cached(house, 2, boot_id=9)
     cached(house, 2, key=B)
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     assert sorted((message.key, message.boot_id, message.sequence) for message in house.came()) == [
         (A, 1, 4),
         (A, 9, 2),
@@ -101,7 +109,7 @@ def test_fetched_messages_get_the_arrival_that_the_delay_of_the_newest_implies()
     house = House()
     live(house, 5, delay_ns=30_000_000)
     cached(house, 3, 4)
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     assert [message.arrival_ns - T0 for message in house.came()] == [330_000_000, 430_000_000, 530_000_000]
 
 
@@ -110,7 +118,7 @@ def test_two_publishers_of_one_tag_are_merged_in_order_of_time() -> None:
     for boot_id, sequences in ((1, (2, 4, 6)), (2, (3, 5, 7))):
         cached(house, *sequences[:2], boot_id=boot_id)
         live(house, sequences[2], boot_id=boot_id)
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     assert house.sequences() == [2, 3, 4, 5, 6, 7]
 
 
@@ -118,7 +126,7 @@ def test_a_clock_that_was_set_back_meanwhile_leaves_the_order_of_the_numbers() -
     house = House()
     for sequence, t_ns in ((1, T0), (2, T0 + S), (3, T0 - 3600 * S), (4, T0 - 3599 * S)):
         house.catch_up.fetch(A, payload(sequence, t_ns), ENCODING_PACKED, T0 + 3 * S)
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     assert house.sequences() == [1, 2, 3, 4]
 
 
@@ -127,7 +135,7 @@ def test_numbers_that_wrap_stay_in_order() -> None:
     for sequence in (2**32 - 1, 1, 2**32 - 2, 0):
         t_ns = T0 + (sequence + 2) % 2**32 * S
         house.catch_up.fetch(A, payload(sequence, t_ns), ENCODING_PACKED, T0 + 10 * S)
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     assert house.sequences() == [2**32 - 2, 2**32 - 1, 0, 1]
 
 
@@ -144,20 +152,20 @@ def test_json_and_messages_without_a_number_go_on_too() -> None:
         (b"", "text/plain"),
     ):
         house.catch_up.hear(A, content, encoding, T0 + 20)
-    assert house.catch_up.first_round_answered() == 7
+    assert house.catch_up.first_round_answered(MOST) == 7
     assert house.sequences()[:2] == [1, 2]
 
 
 def test_a_tag_that_is_heard_later_is_asked_by_itself_while_others_go_on() -> None:
     house = House()
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     live(house, 1, key=NEW)
     live(house, 5, key=B)
     live(house, 6, key=B)
     assert house.asked == [B]
     assert [message.key for message in house.came()] == [NEW]
     cached(house, 4, key=B)
-    house.catch_up.answered(B)
+    house.catch_up.answered(B, MOST)
     live(house, 7, key=B)
     assert house.sequences() == [4, 5, 6, 7]
     assert house.asked == [B]
@@ -165,12 +173,12 @@ def test_a_tag_that_is_heard_later_is_asked_by_itself_while_others_go_on() -> No
 
 def test_a_tag_that_is_there_but_silent_is_asked_too() -> None:
     house = House()
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     house.catch_up.appear(A)
     house.catch_up.appear(NEW)
     assert house.asked == [A]
     cached(house, 1, 2)
-    house.catch_up.answered(A)
+    house.catch_up.answered(A, MOST)
     assert house.sequences() == [1, 2]
 
 
@@ -178,12 +186,41 @@ def test_a_tag_that_is_heard_in_the_first_round_without_an_answer_of_its_caches_
     house = House()
     live(house, 5)
     live(house, 5, key=NEW)
-    house.catch_up.first_round_answered()
+    house.catch_up.first_round_answered(MOST)
     assert house.asked == [A]
     assert [message.key for message in house.came()] == [NEW]
     cached(house, 4)
-    house.catch_up.answered(A)
+    house.catch_up.answered(A, MOST)
     assert house.sequences() == [4, 5]
+
+
+def test_a_tag_whose_answer_was_cut_short_is_asked_for_all_that_is_missing() -> None:
+    house = House({A: {1: Passed(next=4, seen=0b1111)}})
+    live(house, 10)
+    live(house, 10, boot_id=2, key=NEW)
+    live(house, 6, key=B)
+    cached(house, 8, 9)
+    cached(house, 8, 9, boot_id=2, key=NEW)
+    cached(house, 5, key=B)
+    house.catch_up.first_round_answered(2)
+    assert dict(zip(house.asked, house.missing, strict=True)) == {A: 7, NEW: 4}
+    assert [message.key for message in house.came()] == [B, B]
+    cached(house, *range(4, 10))
+    house.catch_up.answered(A, 7)
+    assert house.sequences() == [4, 5, 6, 7, 8, 9, 10]
+    cached(house, *range(6, 10), boot_id=2, key=NEW)
+    house.catch_up.answered(NEW, 4)
+    assert house.sequences() == [6, 7, 8, 9, 10]
+    assert len(house.asked) == 2
+
+
+def test_what_goes_on_of_several_tags_goes_on_in_order_of_time() -> None:
+    house = House()
+    for key in (B, A):
+        cached(house, 1, 2, 3, key=key)
+        live(house, 4, key=key)
+    house.catch_up.first_round_answered(MOST)
+    assert house.sequences() == [1, 1, 2, 2, 3, 3, 4, 4]
 
 
 def test_what_is_held_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

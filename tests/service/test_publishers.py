@@ -135,9 +135,11 @@ def test_a_copy_of_the_columns_goes_on_where_the_first_stopped() -> None:
     first, second = Publishers(), Publishers()
     assert passed(first, list(range(50))) == list(range(50))
     second.columns = first.columns
-    assert [first.has_passed(ROW, BOOT, number) for number in (0, 49, 50, 2**32 - 1)] == [True, True, False, False]
-    assert not first.has_passed(ROW, BOOT + 1, 0)
-    assert not first.has_passed(ROW + 1, BOOT, 0)
+    known = first.passed(ROW)[BOOT]
+    assert [known.has(number) for number in (0, 49, 50, 2**32 - 1)] == [True, True, False, False]
+    assert [known.missing_to(number) for number in (0, 49, 50, 52)] == [0, 0, 0, 2]
+    assert first.passed(ROW).keys() == {BOOT}
+    assert first.passed(ROW + 1) == {}
     again = put(second, [48, 49, 50, 52])
     assert again.duplicates.tolist() == [0, 1]
     assert again.due.tolist() == [2]

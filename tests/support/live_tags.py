@@ -3,7 +3,9 @@
 import json
 import time
 from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 from threading import Event, Thread
 from types import TracebackType
@@ -34,7 +36,7 @@ class LiveTags:
         self._cache_messages = cache_messages
         self._seed = seed
         self._tags = tags
-        self._sent: list[Delivery] = []
+        self._sent = 0  # deliveries
         self._clients = ExitStack()
         self._thread = Thread(target=self._run, daemon=True)
         self.samples: dict[str, Counter[str]] = defaultdict(Counter)
@@ -87,13 +89,18 @@ class LiveTags:
         """POSE by tag, after all that was published, of a run that nothing interrupted."""
         settings = load_settings(config, environment={})
         bench = Bench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
-        for delivery in self._sent:
-            bench.send(tag_name(delivery.tag), Frame(imu=delivery.imu, ranges=delivery.ranges))
+        for together in batched_by_tag(islice(self._deliveries(), self._sent)):
+            for delivery in together:
+                bench.put(tag_name(delivery.tag), Frame(imu=delivery.imu, ranges=delivery.ranges))
+            bench.ingest.turn()
         found = {tag.name: bench.latest.row(tag.row) for tag in bench.tags.all()}
         return {name: pose for name, pose in found.items() if pose is not None}
 
+    def _deliveries(self) -> Iterator[Delivery]:
+        return deliveries(self._tags, "yard", self._seed, preset("calibrated"), self._t0_ns, self._step_s)
+
     def _run(self) -> None:
-        every = deliveries(self._tags, "yard", self._seed, preset("calibrated"), self._t0_ns, self._step_s)
+        every = self._deliveries()
         while not self._stop.is_set():
             delivery = next(every)  # one message each
             self._stop.wait(max(0.0, self._t0_ns * 1e-9 + delivery.due_s - time.time()))
@@ -106,8 +113,19 @@ class LiveTags:
         for heard in delivery.ranges:
             client.publish_range(heard.anchor, heard.range_m, t_ns=heard.t_ns, std_m=heard.std_m)
         client.flush()
-        self._sent.append(delivery)
+        self._sent += 1
         self.samples[tag_name(delivery.tag)].update(imu=len(delivery.imu), range=len(delivery.ranges))
+
+
+def batched_by_tag(every: Iterable[Delivery]) -> Iterator[list[Delivery]]:
+    """Side by side as long as no tag comes twice."""
+    together: dict[int, Delivery] = {}
+    for delivery in every:
+        if delivery.tag in together:
+            yield list(together.values())
+            together = {}
+        together[delivery.tag] = delivery
+    yield list(together.values())
 
 
 def distance(pose: Any, answer: dict[str, Any]) -> float:

@@ -27,11 +27,13 @@ S = 1_000_000_000
 
 @dataclass
 class Running:
-    """A service that runs. log: its lines on stderr so far. ca: of whoever signed its certificate."""
+    """A service that runs, since `began_s` (monotonic). log: its lines on stderr so far. ca: of whoever signed its
+    certificate."""
 
     process: subprocess.Popen[str]
     zenoh: str
     log: list[str]
+    began_s: float
     url: str = ""
     ca: Path | None = None
 
@@ -80,10 +82,11 @@ def running_service(
     compile_once()
     zenoh = endpoint or free_endpoint()
     listening = () if any("--zenoh" in argument for argument in arguments) else ("--zenoh-listen", zenoh)
+    began_s = time.monotonic()
     process = subprocess.Popen(
         command(subcommand, "--port", "0", *listening, *arguments), stderr=subprocess.PIPE, text=True, env=environment()
     )
-    running = Running(process, zenoh, [], ca=ca)
+    running = Running(process, zenoh, [], began_s, ca=ca)
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()
     try:

@@ -1,5 +1,6 @@
 """The tracks of all tags, kept on disk: thinned, written in the background, pruned by age and size."""
 
+import logging
 import sqlite3
 import time
 from collections.abc import Callable, Sequence
@@ -10,6 +11,7 @@ import numpy as np
 
 from dropanchor_service.background import BackgroundWriter
 from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.store.damaged_file import is_damage, move_aside, set_aside
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 from dropanchor_service.store.thinning import Thinning
@@ -19,6 +21,9 @@ FILE_NAME = "history.sqlite"
 WRITE_S = 2.0
 PRUNE_S = 0.5  # at most so long at a time
 MOST_WAITING_BYTES = 64 * 2**20
+MOST_DAMAGED = 3  # files that are set aside; a disk that damages more of them is not filled with them
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,7 @@ class Tracks:
         self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MOST_WAITING_BYTES)
         self.written = 0
         self.used_bytes = 0
+        self.damaged: list[str] = []  # names of files that were set aside
 
     def __enter__(self) -> "Tracks":
         self.writer.start()
@@ -73,7 +79,22 @@ class Tracks:
         """Whether poses of this tag were ever kept. Raises sqlite3.Error."""
         return self._reader.knows(tag)
 
+    @property
+    def problems(self) -> Sequence[str]:
+        """What an operator should know: that nothing can be written, that there was a damaged file."""
+        told = [f"the history was damaged and begun afresh; what there was is kept as {name}" for name in self.damaged]
+        return told if self.writer.problem is None else [self.writer.problem, *told]
+
     def _write(self, batches: Sequence[Array]) -> None:
+        try:
+            self._put(batches)
+        except sqlite3.DatabaseError as error:
+            if not is_damage(error) or len(set_aside(self._path)) >= MOST_DAMAGED:
+                raise
+            self._set_aside(error)
+            self._put(batches)
+
+    def _put(self, batches: Sequence[Array]) -> None:
         if self._file is None:
             self._file = TrackWriter(self._path)
         try:
@@ -83,6 +104,12 @@ class Tracks:
             self._file.close()  # opened afresh for the next attempt: what was wrong may have been repaired
             self._file = None
             raise
+
+    def _set_aside(self, error: sqlite3.Error) -> None:
+        when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(self._now_ns() * 1e-9))
+        name = move_aside(self._path, when)
+        self.damaged.append(name)
+        _log.error("%s is damaged (%s): it is kept as %s, and a new history is begun", self._path, error, name)
 
     def _insert(self, file: TrackWriter, poses: Array) -> None:
         if len(poses):
