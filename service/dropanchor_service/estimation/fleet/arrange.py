@@ -1,8 +1,10 @@
 """One compiled pass that puts a batch's samples, and those that have waited, in order of row and time.
 
-Every row that a batch touches gets a list of its samples; what is due of it is merged in order of time.
+Every row that a batch touches gets a list of its samples; what is due of it is merged in order of time. A sample is an
+index: inertial ones, which never wait, into their own column, all others into the batch's events behind it.
 """
 
+import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -40,8 +42,8 @@ class Batch(NamedTuple):
     """Buffers of one pass, as long as it has samples and samples that wait."""
 
     events: Array  # EVENT
-    following: Array  # the next event of the same row
-    order: Array  # the result: indices into events
+    following: Array  # the next sample of the same row
+    order: Array  # the result: indices into the inertial samples and, behind them, the events
     spare: Array
     touched: Array  # rows
     counts: Array
@@ -59,26 +61,37 @@ class Held(NamedTuple):
 def arrange(
     imu: Any, headings: Any, ranges: Any, bearings: Any, anchors: int, clocks: Any, held: Held, batch: Batch
 ) -> int:
-    """Fill batch.order and return how many are due."""
+    """Fill batch.order and return how many are due; NONE, and nothing done, where a sample's row has no clock."""
+    rows = len(clocks)
+    if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
+        return NONE
     batch.counts[:] = 0
     for k in range(len(imu)):
-        _take_imu(imu[k], clocks, batch)
+        _take_imu(imu, k, clocks, batch)
     for k in range(len(headings)):
         sample = headings[k]
-        _take_scalar(sample, sample.heading, HEADING_EVENT, NONE, clocks, batch)
+        _take_scalar(imu, sample, sample.heading, HEADING_EVENT, NONE, clocks, batch)
     for k in range(len(ranges)):
         sample = ranges[k]
         if _anchor_known(sample.anchor, anchors, batch):
-            _take_scalar(sample, sample.range, RANGE_EVENT, sample.anchor, clocks, batch)
+            _take_scalar(imu, sample, sample.range, RANGE_EVENT, sample.anchor, clocks, batch)
     for k in range(len(bearings)):
         sample = bearings[k]
         if _anchor_known(sample.anchor, anchors, batch):
             value = sample.bearing if sample.std > 0.0 else np.nan
-            _take_scalar(sample, value, BEARING_EVENT, sample.anchor, clocks, batch)
+            _take_scalar(imu, sample, value, BEARING_EVENT, sample.anchor, clocks, batch)
     due = 0
     for k in range(batch.counts[TOUCHED]):
-        due = _choose(clocks[batch.touched[k]], held, batch, due)
+        due = _choose(imu, clocks[batch.touched[k]], held, batch, due)
     return due
+
+
+@njit(nogil=True)
+def _within(column: Any, rows: int) -> bool:
+    within = True
+    for k in range(len(column)):
+        within = within and 0 <= column[k].row < rows
+    return within
 
 
 @njit(nogil=True)
@@ -90,72 +103,69 @@ def _anchor_known(anchor: int, anchors: int, batch: Batch) -> bool:
 
 
 @njit(nogil=True)
-def _take_imu(sample: Any, clocks: Any, batch: Batch) -> None:
-    if not np.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
+def _take_imu(imu: Any, index: int, clocks: Any, batch: Batch) -> None:
+    sample = imu[index]
+    if not math.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
         batch.counts[NOT_FINITE] += 1
         return
-    index = _enter(sample.row, sample.t_ns, IMU_EVENT, clocks, batch)
-    if index >= 0:
-        value = batch.events[index].value
-        for i in range(3):
-            value[i] = sample.acc[i]
-            value[3 + i] = sample.gyro[i]
-            value[6 + i] = sample.mag[i]
+    clock = clocks[sample.row]
+    _touch(clock, sample.row, batch)
+    if sample.t_ns < clock.imu:  # of the batches before
+        batch.counts[LATE] += 1
+        return
+    clock.imu_next = max(clock.imu_next, sample.t_ns)
+    _enter(clock, sample.t_ns, index, batch)
 
 
 @njit(nogil=True)
-def _take_scalar(sample: Any, value: float, kind: int, anchor: int, clocks: Any, batch: Batch) -> None:
-    if not np.isfinite(value):
+def _take_scalar(imu: Any, sample: Any, value: float, kind: int, anchor: int, clocks: Any, batch: Batch) -> None:
+    if not math.isfinite(value):
         batch.counts[NOT_FINITE] += 1
         return
-    index = _enter(sample.row, sample.t_ns, kind, clocks, batch)
-    if index >= 0:
-        event = batch.events[index]
-        event.anchor = anchor
-        event.value[0] = value
-        event.value[1] = sample.std
+    clock = clocks[sample.row]
+    _touch(clock, sample.row, batch)
+    if sample.t_ns < clock.newest - HOLD:
+        batch.counts[LATE] += 1
+        return
+    index = batch.counts[EVENTS]
+    batch.counts[EVENTS] += 1
+    event = batch.events[index]
+    event.row, event.t_ns, event.kind, event.anchor = sample.row, sample.t_ns, kind, anchor
+    event.value, event.std = value, sample.std
+    _enter(clock, sample.t_ns, len(imu) + index, batch)
 
 
 @njit(nogil=True)
-def _enter(row: int, t_ns: int, kind: int, clocks: Any, batch: Batch) -> int:
-    """A new event at the end of the row's list, or NONE.
-
-    Inertial samples cannot be used behind the newest one of the batches before, others behind the window.
-    """
-    clock, counts = clocks[row], batch.counts
+def _touch(clock: Any, row: int, batch: Batch) -> None:
+    """The batch has something of this row."""
     if clock.first == UNTOUCHED:
         clock.first = clock.last = NONE
         clock.imu_next, clock.newest_next = clock.imu, clock.newest
-        batch.touched[counts[TOUCHED]] = row
-        counts[TOUCHED] += 1
-    if t_ns < (clock.imu if kind == IMU_EVENT else clock.newest - HOLD):
-        counts[LATE] += 1
-        return NONE
-    if kind == IMU_EVENT:
-        clock.imu_next = max(clock.imu_next, t_ns)
+        batch.touched[batch.counts[TOUCHED]] = row
+        batch.counts[TOUCHED] += 1
+
+
+@njit(nogil=True)
+def _enter(clock: Any, t_ns: int, index: int, batch: Batch) -> None:
+    """A sample at the end of the row's list."""
     clock.newest_next = max(clock.newest_next, t_ns)
-    index = counts[EVENTS]
-    counts[EVENTS] += 1
-    event = batch.events[index]
-    event.row, event.t_ns, event.kind = row, t_ns, kind
     batch.following[index] = NONE
     if clock.last == NONE:
         clock.first = index
     else:
         batch.following[clock.last] = index
     clock.last = index
-    return int(index)
 
 
 @njit(nogil=True)
 def _is_due(clock: Any, event: Any) -> bool:
-    if event.kind == IMU_EVENT or clock.imu >= event.t_ns - TOLERANCE:
+    if clock.imu >= event.t_ns - TOLERANCE:
         return True
     return bool(clock.newest - event.t_ns >= HOLD or clock.newest - clock.imu > SILENT)
 
 
 @njit(nogil=True)
-def _choose(clock: Any, held: Held, batch: Batch, start: int) -> int:
+def _choose(imu: Any, clock: Any, held: Held, batch: Batch, start: int) -> int:
     """The row's due events to batch.order from `start` on, in order; the others wait. Returns the end."""
     clock.imu, clock.newest = clock.imu_next, clock.newest_next
     fresh, slot = clock.first, clock.waiting
@@ -167,20 +177,20 @@ def _choose(clock: Any, held: Held, batch: Batch, start: int) -> int:
             index = batch.counts[EVENTS]
             batch.counts[EVENTS] += 1
             batch.events[index] = held.events[slot]
-            batch.order[end] = index
+            batch.order[end] = len(imu) + index
             end += 1
             _free(held, slot)
         else:
             _append(clock, held, slot)
         slot = following
     while fresh != NONE:
-        if _is_due(clock, batch.events[fresh]):
+        if fresh < len(imu) or _is_due(clock, batch.events[fresh - len(imu)]):
             batch.order[end] = fresh
             end += 1
         else:
-            hold(clock, held, batch.events[fresh])
+            hold(clock, held, batch.events[fresh - len(imu)])
         fresh = batch.following[fresh]
-    _sort(batch, start, end)
+    _sort(imu, batch, start, end)
     return end
 
 
@@ -221,33 +231,43 @@ def drop_held(clock: Any, held: Held) -> None:
 
 
 @njit(nogil=True)
-def _after(batch: Batch, a: int, b: int) -> bool:
-    """Event a is later than event b, or at the same time and of a later kind."""
-    first, second = batch.events[a], batch.events[b]
-    return bool(first.t_ns > second.t_ns or (first.t_ns == second.t_ns and first.kind > second.kind))
+def _time_of(imu: Any, batch: Batch, index: int) -> int:
+    return int(imu[index].t_ns if index < len(imu) else batch.events[index - len(imu)].t_ns)
 
 
 @njit(nogil=True)
-def _sort(batch: Batch, start: int, end: int) -> None:
+def _kind_of(imu: Any, batch: Batch, index: int) -> int:
+    return IMU_EVENT if index < len(imu) else int(batch.events[index - len(imu)].kind)
+
+
+@njit(nogil=True)
+def _after(imu: Any, batch: Batch, a: int, b: int) -> bool:
+    """Sample a is later than sample b, or at the same time and of a later kind."""
+    first, second = _time_of(imu, batch, a), _time_of(imu, batch, b)
+    return first > second or (first == second and _kind_of(imu, batch, a) > _kind_of(imu, batch, b))
+
+
+@njit(nogil=True)
+def _sort(imu: Any, batch: Batch, start: int, end: int) -> None:
     """Stable, from the bottom up; two neighbouring runs that are in order are only looked at."""
     order = batch.order
     width = 1
     while width < end - start:
         for low in range(start, end - width, 2 * width):
             middle = low + width
-            if _after(batch, order[middle - 1], order[middle]):
-                _merge(batch, low, middle, min(middle + width, end))
+            if _after(imu, batch, order[middle - 1], order[middle]):
+                _merge(imu, batch, low, middle, min(middle + width, end))
         width *= 2
 
 
 @njit(nogil=True)
-def _merge(batch: Batch, low: int, middle: int, high: int) -> None:
+def _merge(imu: Any, batch: Batch, low: int, middle: int, high: int) -> None:
     order, spare = batch.order, batch.spare
     for k in range(low, middle):
         spare[k] = order[k]
     left, right, k = low, middle, low
     while left < middle:
-        if right < high and _after(batch, spare[left], order[right]):
+        if right < high and _after(imu, batch, spare[left], order[right]):
             order[k] = order[right]
             right += 1
         else:

@@ -55,7 +55,7 @@ def rotate_by(q: Any, x: float, y: float, z: float) -> None:
     i = c * q1 + x * q0 + z * q2 - y * q3
     j = c * q2 + y * q0 + x * q3 - z * q1
     l = c * q3 + z * q0 + y * q1 - x * q2  # noqa: E741
-    n = 1.0 / math.sqrt(w * w + i * i + j * j + l * l)
+    n = 1.5 - 0.5 * (w * w + i * i + j * j + l * l)  # one Newton step to 1/|q|, which is 1 to 1e-7 here
     q[0], q[1], q[2], q[3] = w * n, i * n, j * n, l * n
 
 

@@ -60,7 +60,7 @@ class FleetEngine:
         if not len(due.order):
             return PoseBatch(rejected=dict(rejected))
         nodes = np.zeros(len(due.order), NODE)
-        nodes = nodes[: gather(due.events, due.order, self._fronts, self._platforms, self._rows, nodes)]
+        nodes = nodes[: gather(samples.imu, due.events, due.order, self._fronts, self._platforms, self._rows, nodes)]
         beliefs = self._believe(nodes)
         return PoseBatch(
             poses_of(nodes, beliefs),

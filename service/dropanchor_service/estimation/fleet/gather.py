@@ -21,11 +21,12 @@ EVENT: Final = np.dtype(
         ("t_ns", np.int64),
         ("kind", np.uint8),
         ("anchor", np.int32),
-        ("value", np.float64, (9,)),  # acc, gyro, mag; or heading, std; range, std; bearing, std
+        ("value", np.float64),  # of the heading, range or bearing
+        ("std", np.float64),
     ]
 )
 
-LONGEST: Final = 100_000_000  # ns, of a node
+LONGEST: Final = 150_000_000  # ns, of a node: with ranges at 10 Hz, every node ends with one
 AUTO, IMU_ONLY, PLATFORM_ONLY = 0, 1, 2
 
 
@@ -54,11 +55,11 @@ def _measure(node: Any, event: Any, row: Any, platform: Any) -> None:
     """Put the event's measurement into its node."""
     node.kind = RANGE if event.kind == RANGE_EVENT else BEARING
     node.anchor = event.anchor
-    node.z = event.value[0]
-    node.z_std = event.value[1]
+    node.z = event.value
+    node.z_std = event.std
     node.lag_s = (node.t_ns - event.t_ns) * 1e-9
     if row.start_known == 1 and not np.isfinite(node.dv_var):
-        watch_start(platform, node, event.value[0] if node.kind == RANGE else np.nan, row.range_std)
+        watch_start(platform, node, event.value if node.kind == RANGE else np.nan, row.range_std)
 
 
 @njit(nogil=True)
@@ -69,33 +70,39 @@ def _last_end(front: Any, platform: Any) -> int:
 
 
 @njit(nogil=True)
-def _take(event: Any, front: Any, platform: Any, row: Any) -> None:
-    """An inertial sample or a heading into its front-end."""
-    v = event.value
-    if event.kind == IMU_EVENT:
-        feed(front, event.t_ns, v[0:3], v[3:6], v[6:9])
-    elif row.heading_source != IMU_ONLY:
-        hear(platform, front, event.t_ns, v[0], v[1])
+def _is_long(front: Any, platform: Any, t_ns: int) -> bool:
+    """The row's node has lasted long enough."""
+    end = _last_end(front, platform)
+    return end >= 0 and t_ns - end >= LONGEST
 
 
 @njit(cache=True, nogil=True)
-def gather(events: Any, order: Any, fronts: Any, platforms: Any, rows: Any, nodes: Any) -> int:
-    """Fill nodes (at least as many as order) from the events in this order and return their number."""
+def gather(imu: Any, events: Any, order: Any, fronts: Any, platforms: Any, rows: Any, nodes: Any) -> int:
+    """Fill nodes (at least as many as order) from the samples in this order, IMU and EVENT; returns their number."""
     n = 0
     for k in range(len(order)):
-        event = events[order[k]]
-        row, front, platform = rows[event.row], fronts[event.row], platforms[event.row]
+        index = order[k]
         node = nodes[n]
-        if event.kind >= RANGE_EVENT:
-            _close(front, platform, row, event.t_ns, node)
-            _measure(node, event, row, platform)
-            node.row = event.row
-            n += 1
-            continue
-        _take(event, front, platform, row)
-        end = _last_end(front, platform)
-        if end >= 0 and event.t_ns - end >= LONGEST and (event.kind == IMU_EVENT or front.running == 0):
-            _close(front, platform, row, event.t_ns, node)
-            node.row = event.row
-            n += 1
+        if index < len(imu):
+            sample = imu[index]
+            r, t_ns = sample.row, sample.t_ns
+            row, front, platform = rows[r], fronts[r], platforms[r]
+            feed(front, t_ns, sample.acc, sample.gyro, sample.mag)
+            if not _is_long(front, platform, t_ns):
+                continue
+            _close(front, platform, row, t_ns, node)
+        else:
+            event = events[index - len(imu)]
+            r, t_ns = event.row, event.t_ns
+            row, front, platform = rows[r], fronts[r], platforms[r]
+            if event.kind == HEADING_EVENT:
+                if row.heading_source != IMU_ONLY:
+                    hear(platform, front, t_ns, event.value, event.std)
+                if front.running == 1 or not _is_long(front, platform, t_ns):
+                    continue
+            _close(front, platform, row, t_ns, node)
+            if event.kind >= RANGE_EVENT:
+                _measure(node, event, row, platform)
+        node.row = r
+        n += 1
     return n

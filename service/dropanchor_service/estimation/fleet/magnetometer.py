@@ -143,17 +143,25 @@ def strain_of(g: Any, R: Any, m: Any) -> float:
 @njit(cache=True, nogil=True)
 def fuse_axis(g: Any, R: Any, m: Any, axis: int, inflation: float) -> None:
     """Scalar Kalman update with one body axis."""
+    P = g.P
     e = innovation(g, R, m, axis)
-    k = np.empty(N)
-    for i in range(N):
-        k[i] = project(g.P, R, axis, i)
+    k = (
+        project(P, R, axis, 0),
+        project(P, R, axis, 1),
+        project(P, R, axis, 2),
+        project(P, R, axis, 3),
+        project(P, R, axis, 4),
+        project(P, R, axis, 5),
+        project(P, R, axis, BIAS),
+        project(P, R, axis, SCALE),
+    )
     S = R[0, axis] * k[0] + R[1, axis] * k[1] + R[2, axis] * k[2] + k[3 + axis] + inflation * g.noise[axis]
     for i in range(N):
         gain = k[i] / S
         g.x[i] += gain * e
         for j in range(i + 1):
-            g.P[i, j] -= gain * k[j]
-            g.P[j, i] = g.P[i, j]
+            P[i, j] -= gain * k[j]
+            P[j, i] = P[i, j]
 
 
 @njit(cache=True, nogil=True)
@@ -205,9 +213,12 @@ def sum_sample(g: Any, q: Any, mx: float, my: float, mz: float) -> None:
 
 @njit(cache=True, nogil=True)
 def fuse(g: Any, dt: float, rest: bool) -> None:
-    """Update with the mean of the summed samples; dt s since the last update."""
-    R = g.sum_R / g.count
-    m = g.sum_m / g.count
+    """Update with the mean of the summed samples, which the sums become; dt s since the last update."""
+    R, m = g.sum_R, g.sum_m
+    for i in range(3):
+        m[i] /= g.count
+        for j in range(3):
+            R[i, j] /= g.count
     if rest and g.age > NOISE_PRIOR + REST_LEARNING:
         return
     if judge(g, dt, strain_of(g, R, m)):

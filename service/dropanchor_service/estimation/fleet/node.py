@@ -1,4 +1,4 @@
-"""What the front-end hands to the pose belief: one node per range, at most 0.1 s long.
+"""What the front-end hands to the pose belief: one node per range, about 0.15 s long at most.
 
 A node is the pre-integrated IMU between two instants, together with what ended it.
 Rows of different tags may be mixed; the nodes of one row are in order of time.

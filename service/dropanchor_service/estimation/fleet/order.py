@@ -14,7 +14,8 @@ NEVER: Final = np.iinfo(np.int64).min // 2
 
 
 class Due(NamedTuple):
-    """events: EVENT; order: indices into it, by row, then time, then kind, then arrival. Valid until the next batch."""
+    """order: indices into the batch's inertial samples and, behind them, events (EVENT), by row, then time, then kind,
+    then arrival. Valid until the next batch."""
 
     events: Array
     order: Array
@@ -62,12 +63,11 @@ class Order:
     def due(self, samples: SampleBatch, anchors: int, rejected: Counter[str]) -> Due:
         """What can be fused now; counts what is not usable in `rejected`."""
         columns = (samples.imu, samples.headings, samples.ranges, samples.bearings)
-        for column in columns:
-            if len(column) and not 0 <= column["row"].min() <= column["row"].max() < self._rows:
-                raise IndexError("samples of a row that is not configured")
         count = sum(map(len, columns))
         self._make_room(count, count - len(samples.imu))
-        ordered = arrange(*columns, anchors, self._clocks, self._held, self._batch)
+        ordered = arrange(*columns, anchors, self._clocks[: self._rows], self._held, self._batch)
+        if ordered == NONE:
+            raise IndexError("samples of a row that is not configured")
         for reason, index in REASONS.items():
             if self._batch.counts[index]:
                 rejected[reason] += int(self._batch.counts[index])
