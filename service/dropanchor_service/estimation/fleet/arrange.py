@@ -1,7 +1,8 @@
 """One compiled pass that puts a batch's samples, and those that have waited, in order of row and time.
 
 Every row that a batch touches gets a list of its samples; what is due of it is merged in order of time. A sample is an
-index: inertial ones, which never wait, into their own column, all others into the batch's events behind it.
+index: inertial ones, which never wait, into their own column, all others into the batch's events behind it. Loops are
+handed arrays: compiled code counts a reference, atomically, whenever it takes an array out of a tuple.
 """
 
 import math
@@ -43,6 +44,7 @@ class Batch(NamedTuple):
 
     events: Array  # EVENT
     following: Array  # the next sample of the same row
+    times: Array  # ns, of the samples
     order: Array  # the result: indices into the inertial samples and, behind them, the events
     spare: Array
     touched: Array  # rows
@@ -66,23 +68,26 @@ def arrange(
     if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
         return NONE
     batch.counts[:] = 0
-    for k in range(len(imu)):
-        _take_imu(imu, k, clocks, batch)
+    _take_imu(imu, clocks, batch.following, batch.times, batch.touched, batch.counts)
     for k in range(len(headings)):
         sample = headings[k]
-        _take_scalar(imu, sample, sample.heading, HEADING_EVENT, NONE, clocks, batch)
+        _take_scalar(len(imu), sample, sample.heading, HEADING_EVENT, NONE, clocks, batch)
     for k in range(len(ranges)):
         sample = ranges[k]
         if _anchor_known(sample.anchor, anchors, batch):
-            _take_scalar(imu, sample, sample.range, RANGE_EVENT, sample.anchor, clocks, batch)
+            _take_scalar(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, clocks, batch)
     for k in range(len(bearings)):
         sample = bearings[k]
         if _anchor_known(sample.anchor, anchors, batch):
             value = sample.bearing if sample.std > 0.0 else np.nan
-            _take_scalar(imu, sample, value, BEARING_EVENT, sample.anchor, clocks, batch)
+            _take_scalar(len(imu), sample, value, BEARING_EVENT, sample.anchor, clocks, batch)
     due = 0
     for k in range(batch.counts[TOUCHED]):
-        due = _choose(imu, clocks[batch.touched[k]], held, batch, due)
+        start, clock = due, clocks[batch.touched[k]]
+        clock.imu, clock.newest = clock.imu_next, clock.newest_next
+        due = _release(len(imu), clock, held, batch, start)
+        due = _choose(len(imu), clock, held, batch.events, batch.following, batch.order, due)
+        _sort(batch, len(imu), start, due)
     return due
 
 
@@ -103,57 +108,60 @@ def _anchor_known(anchor: int, anchors: int, batch: Batch) -> bool:
 
 
 @njit(nogil=True)
-def _take_imu(imu: Any, index: int, clocks: Any, batch: Batch) -> None:
-    sample = imu[index]
-    if not math.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
-        batch.counts[NOT_FINITE] += 1
-        return
-    clock = clocks[sample.row]
-    _touch(clock, sample.row, batch)
-    if sample.t_ns < clock.imu:  # of the batches before
-        batch.counts[LATE] += 1
-        return
-    clock.imu_next = max(clock.imu_next, sample.t_ns)
-    _enter(clock, sample.t_ns, index, batch)
+def _take_imu(imu: Any, clocks: Any, following: Any, times: Any, touched: Any, counts: Any) -> None:
+    for index in range(len(imu)):
+        sample = imu[index]
+        if not math.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
+            counts[NOT_FINITE] += 1
+            continue
+        clock, t_ns = clocks[sample.row], sample.t_ns
+        _touch(clock, sample.row, touched, counts)
+        if t_ns < clock.imu:  # of the batches before
+            counts[LATE] += 1
+            continue
+        clock.imu_next = max(clock.imu_next, t_ns)
+        _enter(clock, t_ns, index, following, times)
 
 
 @njit(nogil=True)
-def _take_scalar(imu: Any, sample: Any, value: float, kind: int, anchor: int, clocks: Any, batch: Batch) -> None:
+def _take_scalar(inertial: int, sample: Any, value: float, kind: int, anchor: int, clocks: Any, batch: Batch) -> None:
+    counts = batch.counts
     if not math.isfinite(value):
-        batch.counts[NOT_FINITE] += 1
+        counts[NOT_FINITE] += 1
         return
     clock = clocks[sample.row]
-    _touch(clock, sample.row, batch)
+    _touch(clock, sample.row, batch.touched, counts)
     if sample.t_ns < clock.newest - HOLD:
-        batch.counts[LATE] += 1
+        counts[LATE] += 1
         return
-    index = batch.counts[EVENTS]
-    batch.counts[EVENTS] += 1
+    index = counts[EVENTS]
+    counts[EVENTS] += 1
     event = batch.events[index]
     event.row, event.t_ns, event.kind, event.anchor = sample.row, sample.t_ns, kind, anchor
     event.value, event.std = value, sample.std
-    _enter(clock, sample.t_ns, len(imu) + index, batch)
+    _enter(clock, sample.t_ns, inertial + index, batch.following, batch.times)
 
 
 @njit(nogil=True)
-def _touch(clock: Any, row: int, batch: Batch) -> None:
+def _touch(clock: Any, row: int, touched: Any, counts: Any) -> None:
     """The batch has something of this row."""
     if clock.first == UNTOUCHED:
         clock.first = clock.last = NONE
         clock.imu_next, clock.newest_next = clock.imu, clock.newest
-        batch.touched[batch.counts[TOUCHED]] = row
-        batch.counts[TOUCHED] += 1
+        touched[counts[TOUCHED]] = row
+        counts[TOUCHED] += 1
 
 
 @njit(nogil=True)
-def _enter(clock: Any, t_ns: int, index: int, batch: Batch) -> None:
+def _enter(clock: Any, t_ns: int, index: int, following: Any, times: Any) -> None:
     """A sample at the end of the row's list."""
     clock.newest_next = max(clock.newest_next, t_ns)
-    batch.following[index] = NONE
+    times[index] = t_ns
+    following[index] = NONE
     if clock.last == NONE:
         clock.first = index
     else:
-        batch.following[clock.last] = index
+        following[clock.last] = index
     clock.last = index
 
 
@@ -165,32 +173,38 @@ def _is_due(clock: Any, event: Any) -> bool:
 
 
 @njit(nogil=True)
-def _choose(imu: Any, clock: Any, held: Held, batch: Batch, start: int) -> int:
-    """The row's due events to batch.order from `start` on, in order; the others wait. Returns the end."""
-    clock.imu, clock.newest = clock.imu_next, clock.newest_next
-    fresh, slot = clock.first, clock.waiting
-    clock.first, clock.waiting = UNTOUCHED, NONE
-    end = start
+def _release(inertial: int, clock: Any, held: Held, batch: Batch, start: int) -> int:
+    """What has waited and is due to batch.order from `start` on; the others go on waiting. Returns the end."""
+    slot, end = clock.waiting, start
+    clock.waiting = NONE
     while slot != NONE:
         following = held.following[slot]
         if _is_due(clock, held.events[slot]):
             index = batch.counts[EVENTS]
             batch.counts[EVENTS] += 1
             batch.events[index] = held.events[slot]
-            batch.order[end] = len(imu) + index
+            batch.times[inertial + index] = held.events[slot].t_ns
+            batch.order[end] = inertial + index
             end += 1
             _free(held, slot)
         else:
             _append(clock, held, slot)
         slot = following
-    while fresh != NONE:
-        if fresh < len(imu) or _is_due(clock, batch.events[fresh - len(imu)]):
-            batch.order[end] = fresh
+    return end
+
+
+@njit(nogil=True)
+def _choose(inertial: int, clock: Any, held: Held, events: Any, following: Any, order: Any, start: int) -> int:
+    """The row's fresh samples that are due to order from `start` on; the others wait. Returns the end."""
+    index, end = clock.first, start
+    clock.first = UNTOUCHED
+    while index != NONE:
+        if index < inertial or _is_due(clock, events[index - inertial]):
+            order[end] = index
             end += 1
         else:
-            hold(clock, held, batch.events[fresh - len(imu)])
-        fresh = batch.following[fresh]
-    _sort(imu, batch, start, end)
+            hold(clock, held, events[index - inertial])
+        index = following[index]
     return end
 
 
@@ -231,43 +245,34 @@ def drop_held(clock: Any, held: Held) -> None:
 
 
 @njit(nogil=True)
-def _time_of(imu: Any, batch: Batch, index: int) -> int:
-    return int(imu[index].t_ns if index < len(imu) else batch.events[index - len(imu)].t_ns)
-
-
-@njit(nogil=True)
-def _kind_of(imu: Any, batch: Batch, index: int) -> int:
-    return IMU_EVENT if index < len(imu) else int(batch.events[index - len(imu)].kind)
-
-
-@njit(nogil=True)
-def _after(imu: Any, batch: Batch, a: int, b: int) -> bool:
+def _after(a: int, b: int, times: Any, inertial: int, events: Any) -> bool:
     """Sample a is later than sample b, or at the same time and of a later kind."""
-    first, second = _time_of(imu, batch, a), _time_of(imu, batch, b)
-    return first > second or (first == second and _kind_of(imu, batch, a) > _kind_of(imu, batch, b))
+    if times[a] != times[b] or a < inertial:
+        return bool(times[a] > times[b])
+    return b < inertial or bool(events[a - inertial].kind > events[b - inertial].kind)
 
 
 @njit(nogil=True)
-def _sort(imu: Any, batch: Batch, start: int, end: int) -> None:
+def _sort(batch: Batch, inertial: int, start: int, end: int) -> None:
     """Stable, from the bottom up; two neighbouring runs that are in order are only looked at."""
-    order = batch.order
+    order, times, events = batch.order, batch.times, batch.events
     width = 1
     while width < end - start:
         for low in range(start, end - width, 2 * width):
             middle = low + width
-            if _after(imu, batch, order[middle - 1], order[middle]):
-                _merge(imu, batch, low, middle, min(middle + width, end))
+            if _after(order[middle - 1], order[middle], times, inertial, events):
+                _merge(batch, inertial, low, middle, min(middle + width, end))
         width *= 2
 
 
 @njit(nogil=True)
-def _merge(imu: Any, batch: Batch, low: int, middle: int, high: int) -> None:
-    order, spare = batch.order, batch.spare
+def _merge(batch: Batch, inertial: int, low: int, middle: int, high: int) -> None:
+    order, spare, times, events = batch.order, batch.spare, batch.times, batch.events
     for k in range(low, middle):
         spare[k] = order[k]
     left, right, k = low, middle, low
     while left < middle:
-        if right < high and _after(imu, batch, spare[left], order[right]):
+        if right < high and _after(spare[left], order[right], times, inertial, events):
             order[k] = order[right]
             right += 1
         else:

@@ -12,7 +12,7 @@ from .layout import COMMON, PHI, STEADY, YAW, R, V, Work
 from .manage import best_of, finite, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, RANGE
 from .pool import load, mirror, release, store
-from .predict import diffuse, fill_decay, move, transport
+from .predict import diffuse, fill_decay, fill_reference, move, transport
 from .publish import publish
 from .start import (
     begin,
@@ -39,17 +39,18 @@ def _predict_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     _, slow, tau = error_of(row, node.heading_var)
+    fill_decay(decay, growth, node, row, t)
     for kind in range(2):
         std, seconds = slow, tau
         if kind == 1 and row.model != STEADY:
             std = math.sqrt(slow * slow + t.second_std**2)
             seconds = max(t.second_tau, tau)
-        fill_decay(decay, growth, node, row, t, std, seconds)
+        fill_reference(decay, growth, node, row, std, seconds)
         for h in range(count):
             if work[h].kind == kind:
                 move(work[h].mean, node, decay, F)
                 transport(work[h].cov, F, decay, FP)
-                diffuse(work[h].mean, work[h].cov, growth, node, t, work[h].blocked)
+                diffuse(work[h].mean, work[h].cov, F, growth, node, t, work[h].blocked)
 
 
 @njit(nogil=True)
@@ -149,7 +150,7 @@ def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
     white, _, _ = error_of(row, node.heading_var)
     for h in range(count):
         if row.model != STEADY or work[h].kind == 0:
-            update_heading(work[h].mean, work[h].cov, scratch.H, scratch.PH, node.heading - row.north, white)
+            update_heading(work[h].mean, work[h].cov, scratch.PH, node.heading - row.north, white)
 
 
 @njit(nogil=True)

@@ -157,6 +157,10 @@ HYPOTHESIS: Final = np.dtype(
         ("mean", np.float64, (N,)),
         ("cov", np.float64, (N, N)),
         ("shift", np.float64, (N,)),  # scratch of merging and splitting
+        ("weight", np.float64),  # what follows is filled by `locate`
+        ("direction", np.float64, (2,)),  # unit vector from the anchor
+        ("place", np.float64, (2,)),  # m, from the anchor
+        ("spread", np.float64),  # m^2, variance but for a rotation of everything about the anchor
         ("order", np.int32),  # index of the k-th heaviest
         ("gone", np.bool_),
         ("member", np.bool_),  # of the mode under consideration

@@ -28,6 +28,9 @@ def best_of(work: Any, count: int) -> int:
 @njit(nogil=True)
 def normalise(work: Any, count: int) -> None:
     """Log weights to a sum of one."""
+    if count == 1:
+        work[0].log_weight = 0.0
+        return
     top = work[best_of(work, count)].log_weight
     total = 0.0
     for h in range(count):

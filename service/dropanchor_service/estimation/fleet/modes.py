@@ -6,7 +6,7 @@ from .compiled import njit
 from .layout import Work
 from .manage import normalise
 from .pool import load
-from .summary import add_reference, cluster, moments
+from .summary import add_reference, cluster, locate, moments
 
 
 @njit(nogil=True)
@@ -29,6 +29,7 @@ def list_modes(row: Any, pool: Any, anchors: Any, workspace: Work, modes: Any) -
         work[h].taken = False
     if count > 0:
         normalise(work, count)
+        locate(work, count)
     for n in range(len(modes)):
         head = _heaviest(work, count)
         weight = cluster(work, count, head) if head >= 0 else 0.0

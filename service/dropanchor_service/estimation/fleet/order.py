@@ -118,4 +118,5 @@ def _enlarged(held: Held, slots: int) -> Held:
 
 def _batch(samples: int) -> Batch:
     following, order, spare, touched = np.zeros((4, samples), np.int32)
-    return Batch(np.zeros(samples, EVENT), following, order, spare, touched, np.zeros(5, np.int64))
+    times = np.zeros(samples, np.int64)
+    return Batch(np.zeros(samples, EVENT), following, times, order, spare, touched, np.zeros(5, np.int64))

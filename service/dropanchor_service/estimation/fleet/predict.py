@@ -10,8 +10,6 @@ d = v dt + f dt/2, and with the swing g of a lever (forward, left), turned by ya
 import math
 from typing import Any
 
-import numpy as np
-
 from .compiled import njit
 from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
 from .node import ABSOLUTE_HEADING, RELATIVE_HEADING
@@ -35,11 +33,13 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     d = s[V] * dt + f * dt / 2
     alpha = s[YAW] + w / 2 + m - s[PHI]
     ca, sa = math.cos(alpha), math.sin(alpha)
-    cb, sb = math.cos(s[YAW] - s[PHI]), math.sin(s[YAW] - s[PHI])
-    sx = node.swing_forward * cb - node.swing_left * sb
-    sy = node.swing_forward * sb + node.swing_left * cb
+    sx, sy = 0.0, 0.0
+    if node.swing_forward != 0.0 or node.swing_left != 0.0:
+        cb, sb = math.cos(s[YAW] - s[PHI]), math.sin(s[YAW] - s[PHI])
+        sx = node.swing_forward * cb - node.swing_left * sb
+        sy = node.swing_forward * sb + node.swing_left * cb
     zx, zy = s[R] + d * ca + sx, d * sa + sy
-    r = max(math.hypot(zx, zy), 1e-6)
+    r = max(math.sqrt(zx * zx + zy * zy), 1e-6)
     r_alpha, r_d = (-zx * d * sa + zy * d * ca) / r, (zx * ca + zy * sa) / r
     p_alpha, p_d = (zx * d * ca + zy * d * sa) / r**2, (zx * sa - zy * ca) / r**2
     r_beta, p_beta = (zy * sx - zx * sy) / r, (zx * sx + zy * sy) / r**2
@@ -63,44 +63,53 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     s[GYRO] -= node.gyro_step
 
 
+@njit(nogil=True)
+def _of_row(F: Any, i: int) -> tuple[float, float, float, float, float, float, float]:
+    """What is not zero of a row of F; of mount and crab, which act alike, the first."""
+    return F[i, R], F[i, PHI], F[i, YAW], F[i, V], F[i, MOUNT], F[i, GYRO], F[i, ACC]
+
+
+@njit(nogil=True)
+def _of_column(P: Any, j: int) -> tuple[float, float, float, float, float, float, float]:
+    return P[R, j], P[PHI, j], P[YAW, j], P[V, j], P[MOUNT, j] + P[CRAB, j], P[GYRO, j], P[ACC, j]
+
+
+@njit(nogil=True)
+def _dot(f: Any, p: Any) -> float:
+    return float(f[0] * p[0] + f[1] * p[1] + f[2] * p[2] + f[3] * p[3] + f[4] * p[4] + f[5] * p[5] + f[6] * p[6])
+
+
 @njit(nogil=True, inline="never")
-def transport(P: Any, F: Any, decay: Any, scratch: Any) -> None:
-    """P = A P A^T with A = [F; diag(decay)]: the lower states only decay. scratch is (4, N)."""
-    scratch[:] = 0.0
-    for i in range(4):
-        for k in range(ACC + 1):  # F is zero beyond
-            a = F[i, k]
-            if a != 0.0:
-                for j in range(N):
-                    scratch[i, j] += a * P[k, j]
+def transport(P: Any, F: Any, decay: Any, A: Any) -> None:
+    """P = J P J^T with J = [F; diag(decay)] of `move`, without the zeros and ones of F. A (4, N) is scratch."""
+    f, g = _of_row(F, R), _of_row(F, PHI)
+    yaw_g, v_m, v_a = F[YAW, GYRO], F[V, MOUNT], F[V, ACC]
+    for j in range(N):
+        p = _of_column(P, j)
+        A[R, j], A[PHI, j] = _dot(f, p), _dot(g, p)
+        A[YAW, j], A[V, j] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_a * p[6]
     for i in range(4, N):
-        for j in range(4, N):
-            P[i, j] *= decay[i] * decay[j]
+        for j in range(i, N):
+            P[i, j] = P[j, i] = P[i, j] * (decay[i] * decay[j])
     for i in range(4):
         for j in range(4, N):
-            P[i, j] = P[j, i] = scratch[i, j] * decay[j]
-    _upper(P, F, scratch)
+            P[i, j] = P[j, i] = A[i, j] * decay[j]
+        p = _of_column(A.T, i)
+        P[i, R], P[i, PHI] = _dot(f, p), _dot(g, p)
+        P[i, YAW], P[i, V] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_a * p[6]
+    for i in range(4):
+        for j in range(i):
+            P[i, j] = P[j, i]
 
 
 @njit(nogil=True)
-def _upper(P: Any, F: Any, scratch: Any) -> None:
-    for i in range(4):
-        for j in range(i, 4):
-            total = 0.0
-            for k in range(ACC + 1):
-                total += scratch[i, k] * F[j, k]
-            P[i, j] = P[j, i] = total
-
-
-@njit(nogil=True)
-def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning, ref_std: float, ref_tau: float) -> None:
-    """Per-state decay over the node and the variance it adds; r's and phi's are added by `diffuse`."""
+def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning) -> None:
+    """Per-state decay over the node and the variance it adds; r's and phi's by `diffuse`, the reference's below."""
     dt = node.dt_s
     decay[:] = 1.0
     growth[:] = 0.0
     decay[CRAB] = math.exp(-dt / row.crab_tau)
     decay[ACC] = math.exp(-dt / t.acc_tau)
-    decay[REF] = math.exp(-dt / ref_tau)
     growth[YAW] = node.dyaw_var
     rough = 0.0
     if math.isfinite(node.dv_var):
@@ -113,15 +122,22 @@ def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning, ref_std:
     own = node.heading_kind == ABSOLUTE_HEADING or node.heading_kind == RELATIVE_HEADING
     growth[GYRO] = (t.q_gyro_own if own else t.q_gyro) * dt
     growth[ACC] = (t.acc_std**2 + t.acc_rough * rough) * (1.0 - decay[ACC] ** 2)
-    growth[REF] = ref_std**2 * (1.0 - decay[REF] ** 2)
-    if row.model == COMMON and node.heading_kind != ABSOLUTE_HEADING:
-        decay[REF], growth[REF] = 1.0, 0.0
     growth[OFFSET] = t.q_offset * dt if row.offset_std > 0.0 else 0.0
 
 
 @njit(nogil=True)
-def diffuse(s: Any, P: Any, growth: Any, node: Any, t: Tuning, blocked: int) -> None:
-    """Add the process noise of one node to P."""
+def fill_reference(decay: Any, growth: Any, node: Any, row: Any, std: float, tau: float) -> None:
+    """The same of the error of the heading reference."""
+    if row.model == COMMON and node.heading_kind != ABSOLUTE_HEADING:
+        decay[REF], growth[REF] = 1.0, 0.0
+        return
+    decay[REF] = math.exp(-node.dt_s / tau)
+    growth[REF] = std**2 * (1.0 - decay[REF] ** 2)
+
+
+@njit(nogil=True)
+def diffuse(s: Any, P: Any, F: Any, growth: Any, node: Any, t: Tuning, blocked: int) -> None:
+    """Add the process noise of one node, of `move`'s F, to P."""
     dt = node.dt_s
     P[R, R] += t.q_position * dt
     P[PHI, PHI] += t.q_position * dt / max(s[R], 0.1) ** 2
@@ -131,26 +147,19 @@ def diffuse(s: Any, P: Any, growth: Any, node: Any, t: Tuning, blocked: int) -> 
         P[V, V] += t.q_speed_blind_moving * min(abs(s[V]), 1.0) ** 2 * dt
     if blocked == 1:
         P[OFFSET, OFFSET] += t.q_blocked * dt
-    growth_speed = growth[V]
     # speed noise acts during the step, so half of it is already travelled at the end
-    if growth_speed > 0.0 and dt > 0.05:
-        _travel(s, P, growth_speed, dt)
+    if growth[V] > 0.0 and dt > 0.05:
+        _travel(P, F[0, V], F[1, V], growth[V])
 
 
 @njit(nogil=True)
-def _travel(s: Any, P: Any, q: float, dt: float) -> None:
-    a = math.cos(s[YAW] + s[MOUNT] + s[CRAB] - s[PHI])
-    b = math.sin(s[YAW] + s[MOUNT] + s[CRAB] - s[PHI]) / max(s[R], 0.1)
-    P[R, V] += q * dt / 2 * a
+def _travel(P: Any, r_v: float, phi_v: float, q: float) -> None:
+    """r_v, phi_v: what a speed has moved the tag by in the step; q: variance that the speed has gathered."""
+    P[R, V] += q / 2 * r_v
     P[V, R] = P[R, V]
-    P[PHI, V] += q * dt / 2 * b
+    P[PHI, V] += q / 2 * phi_v
     P[V, PHI] = P[PHI, V]
-    P[R, R] += q * dt * dt / 3 * a * a
-    P[R, PHI] += q * dt * dt / 3 * a * b
+    P[R, R] += q / 3 * r_v * r_v
+    P[R, PHI] += q / 3 * r_v * phi_v
     P[PHI, R] = P[R, PHI]
-    P[PHI, PHI] += q * dt * dt / 3 * b * b
-
-
-def make_scratch() -> tuple[Any, ...]:
-    """decay (N,), growth (N,), F (4, N), scratch (4, N)."""
-    return np.ones(N), np.zeros(N), np.zeros((4, N)), np.zeros((4, N))
+    P[PHI, PHI] += q / 3 * phi_v * phi_v

@@ -24,7 +24,7 @@ from .compiled import njit
 from .heading import error_of
 from .layout import GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
 from .node import BEARING, RANGE
-from .predict import diffuse, fill_decay, move, transport
+from .predict import diffuse, fill_decay, fill_reference, move, transport
 from .start import counts_from
 from .tuning import Tuning
 from .update import correct, gaussian, predict_range, project, rest_variance, wrap
@@ -84,7 +84,8 @@ def noise_of(node: Any, row: Any, kind: int, t: Tuning, decay: Any, growth: Any)
     if kind == 1 and row.model != STEADY:
         std = math.sqrt(std * std + t.second_std**2)
         seconds = max(t.second_tau, seconds)
-    fill_decay(decay, growth, node, row, t, std, seconds)
+    fill_decay(decay, growth, node, row, t)
+    fill_reference(decay, growth, node, row, std, seconds)
 
 
 @njit(nogil=True)
@@ -103,7 +104,7 @@ def _predict(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, sc
         m[j] += decay[j] * d[j]
     P[:] = track.cov[k - 1]
     transport(P, F, decay, A)
-    diffuse(s, P, growth, node, t, track.blocked[k])
+    diffuse(s, P, F, growth, node, t, track.blocked[k])
     if track.blocked[k] != track.blocked[k - 1]:
         P[OFFSET, OFFSET] += BLOCK_STD**2
 

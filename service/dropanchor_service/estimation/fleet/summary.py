@@ -13,8 +13,12 @@ from .update import wrap
 @njit(nogil=True)
 def planar(s: Any, P: Any, out: Any) -> None:
     """out (3, 3): covariance of (x, y, course) from the polar covariance."""
-    c, sn = math.cos(s[PHI]), math.sin(s[PHI])
-    r = s[R]
+    planar_towards(math.cos(s[PHI]), math.sin(s[PHI]), s[R], P, out)
+
+
+@njit(nogil=True)
+def planar_towards(c: float, sn: float, r: float, P: Any, out: Any) -> None:
+    """`planar` of a tag in the direction (c, sn) at distance r."""
     prr, ppp, prp = P[R, R], P[PHI, PHI], P[R, PHI]
     out[0, 0] = c * c * prr - 2 * c * sn * r * prp + sn * sn * r * r * ppp
     out[1, 1] = sn * sn * prr + 2 * c * sn * r * prp + c * c * r * r * ppp
@@ -63,64 +67,76 @@ def course_of(s: Any) -> float:
 
 
 @njit(nogil=True)
-def relative_sigma(s: Any, P: Any) -> float:
-    """Position standard deviation but for a rotation of everything about the anchor, m."""
-    return math.sqrt(max(P[R, R] + s[R] ** 2 * min(angle_variance(P), P[PHI, PHI]), 0.0))
+def locate(work: Any, count: int) -> None:
+    """Where every hypothesis is, and how sure of it, for all that follows. Weights must be normalised."""
+    for h in range(count):
+        one = work[h]
+        s, P = one.mean, one.cov
+        one.weight = math.exp(one.log_weight)
+        one.direction[0], one.direction[1] = math.cos(s[PHI]), math.sin(s[PHI])
+        one.place[0], one.place[1] = s[R] * one.direction[0], s[R] * one.direction[1]
+        one.spread = max(P[R, R] + s[R] ** 2 * min(angle_variance(P), P[PHI, PHI]), 0.0)
 
 
 @njit(nogil=True)
 def apart(a: Any, b: Any) -> bool:
     """Whether two hypotheses are two places: further from each other than 1 m + 2 sigma of both."""
-    sa, sb = a.mean, b.mean
-    dx = sb[R] * math.cos(sb[PHI]) - sa[R] * math.cos(sa[PHI])
-    dy = sb[R] * math.sin(sb[PHI]) - sa[R] * math.sin(sa[PHI])
-    sigma2 = relative_sigma(sa, a.cov) ** 2 + relative_sigma(sb, b.cov) ** 2
-    return bool(dx * dx + dy * dy > (1.0 + 2.0 * math.sqrt(sigma2)) ** 2)
+    dx, dy = b.place[0] - a.place[0], b.place[1] - a.place[1]
+    return bool(dx * dx + dy * dy > (1.0 + 2.0 * math.sqrt(a.spread + b.spread)) ** 2)
 
 
 @njit(nogil=True)
 def cluster(work: Any, count: int, head: int) -> float:
-    """Mark the members of head's mode that are not taken; returns their weight. Weights must be normalised."""
+    """Mark the members of head's mode that are not taken; returns their weight."""
     weight = 0.0
     for h in range(count):
         work[h].member = not work[h].taken and not apart(work[head], work[h])
         if work[h].member:
-            weight += math.exp(work[h].log_weight)
+            weight += work[h].weight
     return weight
 
 
 @njit(nogil=True)
 def moments(work: Any, count: int, head: int, scratch: Any) -> float:
     """Mean (x, y, course, speed, yaw) and covariance (x, y, course) of the members; returns their relative sigma."""
-    mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
-    total, sigma2 = 0.0, 0.0
+    mean, cov = scratch.mean, scratch.cov
+    total, spread = 0.0, 0.0
     mean[:] = 0.0
     cov[:] = 0.0
-    course0, yaw0 = course_of(work[head].mean), work[head].mean[YAW]
+    first = work[head]
+    x0, y0, course0, yaw0 = first.place[0], first.place[1], course_of(first.mean), first.mean[YAW]
     for h in range(count):
-        if not work[h].member:
-            continue
-        w = math.exp(work[h].log_weight)
-        s = work[h].mean
-        point[0], point[1] = s[R] * math.cos(s[PHI]), s[R] * math.sin(s[PHI])
-        point[2] = wrap(course_of(s) - course0)
-        planar(s, work[h].cov, part)
-        for i in range(3):
-            mean[i] += w * point[i]
-            for j in range(3):
-                cov[i, j] += w * (part[i, j] + point[i] * point[j])
-        mean[3] += w * s[V]
-        mean[4] += w * wrap(s[YAW] - yaw0)
-        sigma2 += w * (relative_sigma(s, work[h].cov) ** 2 + _from_head(work[head].mean, s))
-        total += w
+        one = work[h]
+        if one.member:
+            w, s = one.weight, one.mean
+            _add_moments(one, w, x0, y0, course0, scratch)
+            mean[3] += w * s[V]
+            mean[4] += w * wrap(s[YAW] - yaw0)
+            spread += w * (one.spread + _from_head(first.mean, s))
+            total += w
     for i in range(5):
         mean[i] /= total
     for i in range(3):
         for j in range(3):
             cov[i, j] = cov[i, j] / total - mean[i] * mean[j]
+    mean[0] += x0
+    mean[1] += y0
     mean[2] = wrap(mean[2] + course0)
     mean[4] = wrap(mean[4] + yaw0)
-    return math.sqrt(sigma2 / total)
+    return math.sqrt(spread / total)
+
+
+@njit(nogil=True)
+def _add_moments(one: Any, w: float, x0: float, y0: float, course0: float, scratch: Any) -> None:
+    """Add w times the first and second moments of a hypothesis about (x0, y0, course0)."""
+    mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
+    point[0], point[1] = one.place[0] - x0, one.place[1] - y0
+    point[2] = wrap(course_of(one.mean) - course0)
+    planar_towards(one.direction[0], one.direction[1], one.mean[R], one.cov, part)
+    for i in range(3):
+        mean[i] += w * point[i]
+        for j in range(3):
+            cov[i, j] += w * (part[i, j] + point[i] * point[j])
 
 
 @njit(nogil=True)
@@ -134,17 +150,12 @@ def _from_head(head: Any, s: Any) -> float:
 @njit(nogil=True)
 def spread_over_all(work: Any, count: int, scratch: Any) -> None:
     """scratch.cov becomes that of all hypotheses about scratch.mean: an ellipse that other modes lie in, too."""
-    mean, cov, part, point = scratch.mean, scratch.cov, scratch.part, scratch.point
+    mean, cov = scratch.mean, scratch.cov
+    x, y, course = mean[0], mean[1], mean[2]
     cov[:] = 0.0
     for h in range(count):
-        w = math.exp(work[h].log_weight)
-        s = work[h].mean
-        point[0], point[1] = s[R] * math.cos(s[PHI]) - mean[0], s[R] * math.sin(s[PHI]) - mean[1]
-        point[2] = wrap(course_of(s) - mean[2])
-        planar(s, work[h].cov, part)
-        for i in range(3):
-            for j in range(3):
-                cov[i, j] += w * (part[i, j] + point[i] * point[j])
+        _add_moments(work[h], work[h].weight, x, y, course, scratch)
+    mean[0], mean[1], mean[2] = x, y, course
 
 
 @njit(nogil=True)
@@ -193,9 +204,8 @@ def stay(work: Any, count: int, x: float, y: float, loyalty: float) -> int:
     head = best_of(work, count)
     near = -1
     for h in range(count):
-        dx = work[h].mean[R] * math.cos(work[h].mean[PHI]) - x
-        dy = work[h].mean[R] * math.sin(work[h].mean[PHI]) - y
-        close = dx * dx + dy * dy <= (1.0 + 2.0 * relative_sigma(work[h].mean, work[h].cov)) ** 2
+        dx, dy = work[h].place[0] - x, work[h].place[1] - y
+        close = dx * dx + dy * dy <= (1.0 + 2.0 * math.sqrt(work[h].spread)) ** 2
         if close and (near < 0 or work[h].log_weight > work[near].log_weight):
             near = h
     if near >= 0 and work[near].log_weight > work[head].log_weight - loyalty:
@@ -206,6 +216,7 @@ def stay(work: Any, count: int, x: float, y: float, loyalty: float) -> int:
 @njit(nogil=True)
 def best_mode(work: Any, count: int, row: Any, scratch: Any, t: Tuning) -> tuple[float, float, int]:
     """(p_mode, relative sigma, head) of the mode that is published."""
+    locate(work, count)
     head = stay(work, count, row.last_x, row.last_y, t.loyalty)
     for h in range(count):
         work[h].taken = False

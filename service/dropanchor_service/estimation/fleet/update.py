@@ -115,13 +115,12 @@ def update_bearing(s: Any, P: Any, H: Any, PH: Any, ox: float, oy: float, z: flo
 
 
 @njit(nogil=True)
-def update_heading(s: Any, P: Any, H: Any, PH: Any, z: float, variance: float) -> None:
+def update_heading(s: Any, P: Any, PH: Any, z: float, variance: float) -> None:
     """z = yaw + error of the reference."""
-    H[:] = 0.0
-    H[YAW] = 1.0
-    H[REF] = 1.0
+    for i in range(N):
+        PH[i] = P[YAW, i] + P[REF, i]
     e = wrap(z - s[YAW] - s[REF])
-    S = project(P, H, PH) + variance
+    S = PH[YAW] + PH[REF] + variance
     correct(s, P, PH, S, e, 1.0)
 
 
@@ -168,13 +167,10 @@ def bound_speed(s: Any, P: Any, PH: Any, low: float, high: float) -> float:
 
     Moments of a one-sided truncated Gaussian, carried to the other states by their covariance with the speed.
     """
-    sd = math.sqrt(max(P[V, V], 1e-12))
-    if s[V] < low:
-        a, sign = (s[V] - low) / sd, 1.0
-    elif s[V] > high:
-        a, sign = (high - s[V]) / sd, -1.0
-    else:
+    if low <= s[V] <= high:
         return 0.0
+    sd = math.sqrt(max(P[V, V], 1e-12))
+    a, sign = ((s[V] - low) / sd, 1.0) if s[V] < low else ((high - s[V]) / sd, -1.0)
     if a < -8.0:  # asymptotic Mills ratio
         ratio = -a + 1.0 / -a
         log_mass = -0.5 * a * a - math.log(-a) - 0.9189385332

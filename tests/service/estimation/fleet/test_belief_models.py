@@ -136,7 +136,7 @@ def test_a_heading_update_is_the_kalman_filter() -> None:
     h = np.zeros(N)
     h[YAW] = h[REF] = 1.0
     expected = kalman(s, P, h, 0.02, 0.01)
-    update_heading(s, P, np.zeros(N), np.zeros(N), STATE[YAW] + STATE[REF] + 0.02 + 2 * math.pi, 0.01)
+    update_heading(s, P, np.zeros(N), STATE[YAW] + STATE[REF] + 0.02 + 2 * math.pi, 0.01)
     np.testing.assert_allclose(s, expected[0], atol=1e-12)
     np.testing.assert_allclose(P, expected[1], atol=1e-12)
 
