@@ -13,7 +13,7 @@ import numpy as np
 from dropanchor_service.estimation.batch import Array
 
 from .compiled import njit
-from .gather import BEARING_EVENT, HEADING_EVENT, IMU_EVENT, RANGE_EVENT
+from .gather import BEARING_EVENT, HEADING_EVENT, RANGE_EVENT
 
 HOLD: Final = 250_000_000  # ns: the window in which late samples are put in order
 TOLERANCE: Final = 40_000_000  # ns that the IMU may lag behind a measurement
