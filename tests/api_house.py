@@ -19,7 +19,7 @@ from dropanchor_service.api.rates import Buckets
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Doorkeeper
-from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 from dropanchor_service.store.tracks import Keeping, Tracks
 
@@ -78,7 +78,7 @@ def make_house(site: Site | None = None, folder: Path | None = None, keeping: Ke
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
     tags = TagTable()
     tracks = Tracks(folder, keeping, tags, store, lambda: house.now_ns) if folder and keeping else None
-    house = House(Answers(store, tags, LatestPoses(), tracks=tracks))
+    house = House(Answers(store, tags, LatestPoses(), tracks=tracks, newcomers=Newcomers(10)))
     house.answers.now_ns = lambda: house.now_ns
     return house
 

@@ -59,6 +59,22 @@ class TagList(_Answer):
     tags: list[TagStatus]
 
 
+class Newcomer(_Answer):
+    """A tag that has been heard and has no row."""
+
+    tag: str
+    first_heard_ns: int = Field(description="UTC, ns.")
+    last_heard_ns: int
+    messages: int
+
+
+class NewcomerList(_Answer):
+    """Who would like to be a tag of this site, heard last first."""
+
+    t_ns: int = Field(description="UTC, ns: the moment of the answer.")
+    newcomers: list[Newcomer]
+
+
 class AnchorList(_Answer):
     """The anchors of the site."""
 

@@ -58,6 +58,8 @@ class Reason(StrEnum):
     DUPLICATE = "duplicate"
     KEY_INVALID = "key_invalid"
     TAG_UNKNOWN = "tag_unknown"
+    TAG_UNPROVEN = "tag_unproven"
+    TAG_QUARANTINED = "tag_quarantined"
     TAGS_FULL = "tags_full"
     SHED = "shed"
     ESTIMATOR_FAULT = "estimator_fault"

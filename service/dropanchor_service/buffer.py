@@ -15,7 +15,8 @@ Stranger = tuple[str, bytes, str, int]
 """The same of a key that has no row yet."""
 
 MESSAGE_OVERHEAD = 200  # bytes that a waiting message takes beside its payload
-STRANGERS = 1024  # messages of tags without a row that may wait
+STRANGER_BYTES = 8 * 2**20  # of messages of tags without a row that may wait
+STRANGERS_PER_TURN = 250  # of them at a time: each costs many times as much as a message of a known tag
 _KEPT_SHARE = 0.75  # of what may wait after shedding, so that shedding is rare
 PATIENCE_NS = 1_000_000_000  # of falling behind, before it counts as overload
 MOST_WAIT_S = 0.5  # for a message in an overload
@@ -39,7 +40,8 @@ class MessageBuffer:
         self._rows: dict[str, int] = {}
         self._messages: list[Message] = []
         self._bytes = 0
-        self._strangers: deque[Stranger] = deque(maxlen=STRANGERS)
+        self._strangers: deque[Stranger] = deque()
+        self._stranger_bytes = 0
         self._shed: Counter[int] = Counter()
         self._strangers_shed = 0
         self._behind_ns: int | None = None  # since when `drain` has left something
@@ -55,8 +57,7 @@ class MessageBuffer:
                 if self._bytes > self._capacity_bytes:
                     self._shed_down_to(_KEPT_SHARE * self._capacity_bytes)
             else:
-                self._strangers_shed += len(self._strangers) == STRANGERS
-                self._strangers.append((key, payload, encoding, arrival_ns))
+                self._append_stranger((key, payload, encoding, arrival_ns))
         if not self._filled.is_set():
             self._filled.set()
 
@@ -73,11 +74,10 @@ class MessageBuffer:
         return self._filled.wait(timeout_s)
 
     def drain(self, most: int, now_ns: int = 0) -> tuple[list[Message], list[Stranger]]:
-        """The oldest messages of known keys, at most so many, and those of strangers. now_ns: UTC."""
+        """The oldest messages of known keys, at most so many, and of strangers. now_ns: UTC."""
         with self._lock:
             if len(self._messages) <= most:
                 taken, self._messages, self._bytes = self._messages, [], 0
-                self._filled.clear()
                 self._behind_ns = None
             else:
                 taken = self._messages[:most]
@@ -85,8 +85,10 @@ class MessageBuffer:
                 size = sum(map(_size, taken))
                 self._bytes -= size
                 self._fall_behind(size, taken[0][3], now_ns)
-            strangers = list(self._strangers)
-            self._strangers.clear()
+            strangers = [self._strangers.popleft() for _ in range(min(STRANGERS_PER_TURN, len(self._strangers)))]
+            self._stranger_bytes -= sum(map(_size, strangers))
+            if not self._messages and not self._strangers:
+                self._filled.clear()
             return taken, strangers
 
     def take_shed(self) -> tuple[Counter[int], int]:
@@ -99,6 +101,13 @@ class MessageBuffer:
     @property
     def depth(self) -> int:
         return len(self._messages) + len(self._strangers)
+
+    def _append_stranger(self, message: Stranger) -> None:
+        self._strangers.append(message)
+        self._stranger_bytes += _size(message)
+        while self._stranger_bytes > STRANGER_BYTES:
+            self._stranger_bytes -= _size(self._strangers.popleft())
+            self._strangers_shed += 1
 
     def _fall_behind(self, taken_bytes: int, oldest_ns: int, now_ns: int) -> None:
         if self._behind_ns is None or oldest_ns < self._behind_ns - _JUST_NS:
@@ -123,7 +132,7 @@ class MessageBuffer:
         self._bytes = int(sizes[kept].sum())
 
 
-def _size(message: Message) -> int:
+def _size(message: Message | Stranger) -> int:
     return len(message[1]) + MESSAGE_OVERHEAD
 
 

@@ -16,7 +16,7 @@ from dropanchor_service.estimators import Estimators
 from dropanchor_service.losses import Losses
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.prepare import Preparation
-from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, SiteStore, Tag, TagTable
 from dropanchor_service.taps import NO_TAPS, Taps
 
 MESSAGES_PER_TURN = 1000
@@ -65,12 +65,13 @@ class Ingest:
         """Everything that waits, up to MESSAGES_PER_TURN."""
         if self._estimators.follow_site():
             self._admission.register_listed()
+        self._admission.review()
         while self._announced:
             self._admission.by_name(self._announced.popleft())
-        self._know_new_tags()
+        waited = list(self._know_new_tags())
         self._count_shed()
         known, strangers = self._buffer.drain(MESSAGES_PER_TURN, self._clock.now_ns())
-        known += self._admitted(strangers)
+        known = [*waited, *known, *self._admitted(strangers)]
         if known:
             self._tell(self._taps.messages, known)
             self._metrics.messages.inc(len(known))
@@ -78,30 +79,33 @@ class Ingest:
         if known or self.holds:
             self._fuse(known)
 
-    def _know_new_tags(self) -> None:
-        """Messages of tags that have a row already wait neither among those of strangers nor for their estimator."""
+    def _know_new_tags(self) -> Iterator[Message]:
+        """Messages of tags that have a row already wait neither among those of strangers nor for their estimator.
+        Returns what waited of tags that others gave a row."""
         for tag in self._tags.all()[self._known_tags :] if len(self._tags) > self._known_tags else ():
             self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
             self._estimators.make_ready(tag.row)
             self._known_tags = tag.row + 1
+            yield from self._waited(tag)
 
     def _admitted(self, strangers: Sequence[Stranger]) -> Iterator[Message]:
-        for key, payload, encoding, arrival_ns in strangers:
-            row = self._row(key)
-            if row is not None:
-                yield row, payload, encoding, arrival_ns
+        for stranger in strangers:
+            key, payload, encoding, arrival_ns = stranger
+            row = self._buffer.row_of(key)
+            if row is None:
+                tag = self._admission.hear(stranger)
+                if isinstance(tag, Reason):
+                    self._losses.refuse(tag, key)
+                if not isinstance(tag, Tag):
+                    continue
+                self._buffer.admit(key, tag.row)
+                yield from self._waited(tag)
+                row = tag.row
+            yield row, payload, encoding, arrival_ns
 
-    def _row(self, key: str) -> int | None:
-        """None: the tag is not admitted."""
-        row = self._buffer.row_of(key)
-        if row is not None:
-            return row
-        tag = self._admission.by_key(key)
-        if isinstance(tag, Reason):
-            self._losses.refuse(tag, key)
-            return None
-        self._buffer.admit(key, tag.row)
-        return tag.row
+    def _waited(self, tag: Tag) -> Iterator[Message]:
+        for payload, encoding, arrival_ns in self._admission.waited(tag):
+            yield tag.row, payload, encoding, arrival_ns
 
     def _fuse(self, messages: list[Message]) -> None:
         now_ns = self._clock.now_ns()
@@ -148,7 +152,8 @@ class Ingest:
 
     def _count_shed(self) -> None:
         by_row, strangers = self._buffer.take_shed()
-        self._losses.shed_strangers(strangers)
+        self._losses.lose_strangers(Reason.SHED, strangers)
+        self._losses.lose_strangers(Reason.TAG_UNPROVEN, self._admission.waited_in_vain())
         if by_row:
             rows = np.fromiter(by_row, np.int64, len(by_row))
             self._losses.reject(Reason.SHED, np.repeat(rows, np.fromiter(by_row.values(), np.int64, len(by_row))))

@@ -28,8 +28,9 @@ class Losses:
         self._metrics.rejected.labels(reason).inc()
         self._log.warning(f"message refused ({reason})", key[:200])
 
-    def shed_strangers(self, count: int) -> None:
-        self._metrics.rejected.labels(Reason.SHED).inc(count)
+    def lose_strangers(self, reason: Reason, messages: int) -> None:
+        """Messages of tags without a row."""
+        self._metrics.rejected.labels(reason).inc(messages)
 
     def give_up(self, messages: int) -> None:
         """Messages that were waited for and did not come."""

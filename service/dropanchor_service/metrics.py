@@ -10,6 +10,7 @@ from prometheus_client.registry import Collector
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.store.columns import STATES, with_age
 from dropanchor_service.store.latest import LatestPoses
+from dropanchor_service.store.newcomers import Newcomers
 from dropanchor_service.store.tags import KINDS, TagTable
 
 _SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
@@ -82,9 +83,15 @@ class FleetGauges(Collector):
     """Gauges that are read from the store when they are asked for."""
 
     def __init__(
-        self, tags: TagTable, latest: LatestPoses, now_ns: Callable[[], int], queue_depth: Callable[[], int]
+        self,
+        tags: TagTable,
+        newcomers: Newcomers,
+        latest: LatestPoses,
+        now_ns: Callable[[], int],
+        queue_depth: Callable[[], int],
     ) -> None:
         self._tags = tags
+        self._newcomers = newcomers
         self._latest = latest
         self._now_ns = now_ns
         self._queue_depth = queue_depth
@@ -98,5 +105,6 @@ class FleetGauges(Collector):
             tags.add_metric([state], count)
         yield tags
         yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that have a row.", len(self._tags))
+        yield GaugeMetricFamily("dropanchor_newcomers", "Tags that were heard and have no row.", len(self._newcomers))
         yield GaugeMetricFamily("dropanchor_tags_online", "Tags whose token is present.", self._tags.online_names)
         yield GaugeMetricFamily("dropanchor_queue_messages", "Messages that wait to be fused.", self._queue_depth())

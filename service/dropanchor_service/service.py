@@ -31,7 +31,7 @@ from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.metrics import FleetGauges, Metrics
 from dropanchor_service.settings import Settings
 from dropanchor_service.settings_sources import SettingsError
-from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 from dropanchor_service.store.checkpoints import CheckpointFolder
 from dropanchor_service.supervision import Supervision
@@ -66,14 +66,15 @@ class Service:
         self.clock = UtcClock()
         self.tags = TagTable()
         self.latest = LatestPoses()
+        newcomers = Newcomers(settings.max_tags)
         self.site = _site_store(settings)
         self._keepers = Keepers(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
-        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._keepers.tracks)
+        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._keepers.tracks, newcomers)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20))
         estimators = Estimators(create_engine(settings), self.site, self.tags, self.metrics)
         self._ingest = Ingest(
             self._buffer,
-            Admission(settings, self.site, self.tags),
+            Admission(settings, self.site, self.tags, newcomers),
             estimators,
             self.site,
             self.tags,
@@ -92,7 +93,9 @@ class Service:
             self._checkpoints.between_turns if self._checkpoints else lambda: None,
         )
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
-        self.metrics.watch(FleetGauges(self.tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth))
+        self.metrics.watch(
+            FleetGauges(self.tags, newcomers, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
+        )
 
     def __enter__(self) -> Self:
         with self._opened:

@@ -219,8 +219,15 @@ class Settings(_Section):
     checkpoint_s: Annotated[float, Field(gt=0, le=3600)] = Field(
         default=0.5, description="From one checkpoint to the next: what a killed service has to make up for."
     )
-    unknown_tags: Literal["accept", "refuse"] = Field(
-        default="accept", description="Whether a tag that is not listed here is registered when it is heard."
+    unknown_tags: Literal["accept", "quarantine", "refuse"] = Field(
+        default="accept",
+        description="Whether a tag that is not listed here gets a row when it is heard; quarantine: once somebody has "
+        "put its settings, until then it is listed under newcomers.",
+    )
+    unproven_tags: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
+        default=200,
+        description="So many accepted tags may have a row that were heard no more than once; if there are more, a tag "
+        "gets one with its second message.",
     )
     max_tags: Annotated[int, Field(ge=1, le=1_000_000)] = 20_000
     insecure: bool = Field(default=False, description="Listen beyond the loopback although anybody may then connect.")

@@ -4,7 +4,7 @@ import threading
 from collections import Counter
 from collections.abc import Iterable
 
-from dropanchor_service.buffer import MESSAGE_OVERHEAD, MOST_WAIT_S, STRANGERS, MessageBuffer
+from dropanchor_service.buffer import MESSAGE_OVERHEAD, MOST_WAIT_S, STRANGER_BYTES, STRANGERS_PER_TURN, MessageBuffer
 
 PAYLOAD = b"x" * (1000 - MESSAGE_OVERHEAD)  # a message counts 1,000 bytes
 
@@ -94,10 +94,16 @@ def test_strangers_push_out_only_each_other() -> None:
     put(buffer, "known", 0)
     for number in range(100_000):
         put(buffer, f"stranger{number}", number)
-    assert buffer.take_shed() == ({}, 100_000 - STRANGERS)
+    shed = buffer.take_shed()[1]
     messages, strangers = buffer.drain(10**9)
     assert [message[0] for message in messages] == [0]
-    assert len(strangers) == STRANGERS
+    assert len(strangers) == STRANGERS_PER_TURN
+    while more := buffer.drain(10**9)[1]:
+        assert len(more) <= STRANGERS_PER_TURN
+        strangers += more
+    assert not buffer.wait(0.0)
+    assert len(strangers) == 100_000 - shed
+    assert len(strangers) * MESSAGE_OVERHEAD < STRANGER_BYTES
     assert strangers[-1][0] == "stranger99999"
 
 

@@ -18,13 +18,14 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_service import prepare
-from dropanchor_service.buffer import STRANGERS
+from dropanchor_service.buffer import STRANGERS_PER_TURN
 from dropanchor_service.decode import Forms, read_forms
 from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
 from dropanchor_service.estimators import FAULTS_BEFORE_QUARANTINE
 from support.ingest import Bench
 
 T = 1_760_000_000_000_000_000
+S = 1_000_000_000
 IMU = ImuSample(T, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0))
 
 
@@ -261,17 +262,103 @@ def test_a_payload_that_the_decoder_fails_on_costs_nothing_but_itself(monkeypatc
 def test_a_flood_of_unknown_tags_is_bounded_and_known_tags_are_unharmed() -> None:
     bench = Bench(max_tags=10)
     bench.send("known", ranges(1.0))
-    for number in range(20_000):
+    for number in range(50_000):
         bench.put(f"stranger{number}", ranges(1.0))
     bench.send("known", ranges(2.0))
     assert bench.x_of(["known"]) == [2.0]
+    take_turns(bench)
     assert len(bench.tags) == 10
     rejected = bench.rejected()
-    assert rejected["shed"] + rejected["tags_full"] == 20_000 - 9
+    assert rejected["shed"] > 0
+    assert rejected["shed"] + rejected["tags_full"] == 50_000 - 9
+
+
+def take_turns(bench: Bench) -> None:
+    while bench.buffer.depth:
+        bench.ingest.turn()
+
+
+def fused(bench: Bench) -> list[float]:
+    return [value for batch in bench.engine.batches for value in batch.ranges["range"].tolist()]
+
+
+def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses_neither() -> None:
+    bench = Bench(unproven_tags=1)
+    bench.send("quick", ranges(1.0))
+    bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["quick"]
+    assert len(bench.newcomers) == 1
+    bench.put("slow", ranges(3.0, sequence=1, boot_id=5), at_ns=T + S)
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["quick", "slow"]
+    assert fused(bench) == [1.0, 2.0, 3.0]
+    assert len(bench.newcomers) == 0
+    assert bench.rejected() == {}
+
+
+def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
+    bench = Bench(unproven_tags=0)
+    for _ in range(3):
+        bench.put("doubled", ranges(1.0), at_ns=T)
+    for second in range(3):
+        bench.put("junk", b"junk", at_ns=T + second * S)
+    bench.ingest.turn()
+    assert len(bench.tags) == 0
+    assert bench.rejected() == {"version_unknown": 3}
+    assert [newcomer.name for newcomer in bench.newcomers.all()] == ["doubled"]
+
+
+def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
+    bench = Bench(unproven_tags=1)
+    bench.put("first", ranges(1.0), at_ns=T)
+    bench.put("waits", ranges(2.0), at_ns=T)
+    bench.ingest.turn()
+    bench.put("first", ranges(3.0), at_ns=T + S)
+    bench.ingest.turn()
+    bench.put("at-once", ranges(4.0), at_ns=T + S)
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["first", "at-once"]
+
+
+def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_counted() -> None:
+    bench = Bench(max_tags=100, unproven_tags=10)
+    for number in range(5_000):
+        bench.put(f"stranger{number}", ranges(1.0))
+        if number % 200 == 0:
+            bench.ingest.turn()
+    take_turns(bench)
+    bench.ingest.turn()
+    assert len(bench.tags) == 10
+    assert len(bench.newcomers) == 100
+    assert bench.rejected() == {"tag_unproven": 5_000 - 10 - 100}
+
+
+def test_a_tag_in_quarantine_is_listed_and_comes_in_once_somebody_has_put_its_settings() -> None:
+    bench = Bench(unknown_tags="quarantine", tags={"listed": {}})
+    bench.send("listed", ranges(1.0))
+    for value in (2.0, 3.0):
+        bench.send("stranger", ranges(value))
+    assert fused(bench) == [1.0]
+    assert [(newcomer.name, newcomer.messages) for newcomer in bench.newcomers.all()] == [("stranger", 2)]
+    assert bench.rejected() == {"tag_quarantined": 2}
+    bench.site.set_tag("stranger", TagSettings())
+    bench.send("stranger", ranges(4.0))
+    assert fused(bench) == [1.0, 4.0]
+    assert len(bench.newcomers) == 0
+
+
+def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
+    bench = Bench(unproven_tags=0)
+    bench.put("a", ranges(1.0), at_ns=T)
+    bench.ingest.turn()
+    bench.tags.register("a")  # as REST does
+    bench.ingest.turn()
+    assert fused(bench) == [1.0]
 
 
 def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
-    names = [f"listed-{number}" for number in range(STRANGERS + 500)]
+    names = [f"listed-{number}" for number in range(STRANGERS_PER_TURN + 500)]
     bench = Bench(tags={name: {} for name in names})
     bench.ingest.turn()
     for name in names:

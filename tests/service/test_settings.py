@@ -88,7 +88,7 @@ def test_variables_of_others_with_our_prefix_are_left_alone() -> None:
         ("[http]\nprot = 1", ["http.prot is not a setting", "did you mean port?"]),
         ("[htp]\nport = 1", ["htp is not a setting", "did you mean http?"]),
         ('engine = "magic"', ["engine", "'paper'"]),
-        ('unknown_tags = "maybe"', ["unknown_tags", "'accept' or 'refuse'"]),
+        ('unknown_tags = "maybe"', ["unknown_tags", "'accept', 'quarantine' or 'refuse'"]),
         ("max_tags = 0", ["max_tags", "greater than or equal to 1"]),
         ('[zenoh]\nlisten = "7447"', ["zenoh.listen.0", "tcp/127.0.0.1:7447"]),
         ('[[site.anchors]]\nid = "7"\nx = "left"', ["site.anchors.0.x", "a number was expected"]),

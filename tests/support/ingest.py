@@ -20,7 +20,7 @@ from dropanchor_service.ingest import Ingest
 from dropanchor_service.kernels import warm_up_passes
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.settings_sources import load_settings
-from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
 from dropanchor_service.whole_state import WholeState
 
 
@@ -70,12 +70,13 @@ class Bench:
         self.metrics = Metrics()
         self.tags = TagTable()
         self.latest = LatestPoses()
+        self.newcomers = Newcomers(settings.max_tags)
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
         self.estimators = Estimators(engine or self.engine, self.site, self.tags, self.metrics)
         self.ingest = Ingest(
             self.buffer,
-            Admission(settings, self.site, self.tags),
+            Admission(settings, self.site, self.tags, self.newcomers),
             self.estimators,
             self.site,
             self.tags,

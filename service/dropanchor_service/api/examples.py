@@ -103,6 +103,17 @@ TAG: dict[str, Any] = {
     "settings": TAG_SETTINGS,
 }
 TAG_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "tags": [TAG]}
+NEWCOMER_LIST: dict[str, Any] = {
+    "t_ns": 1_800_000_000_042_000_000,
+    "newcomers": [
+        {
+            "tag": "tag-7",
+            "first_heard_ns": 1_800_000_000_000_000_000,
+            "last_heard_ns": 1_800_000_000_040_000_000,
+            "messages": 3,
+        }
+    ],
+}
 ANCHOR: dict[str, Any] = {"id": "17", "x": 0.0, "y": 0.0, "z": 2.5}
 SITE: dict[str, Any] = {
     "id": "default",

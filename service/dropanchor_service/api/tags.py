@@ -6,7 +6,7 @@ from typing import Annotated
 from fastapi import APIRouter, Body
 from starlette.responses import Response
 
-from dropanchor_schemas.answers import TagList, TagStatus
+from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api import examples
 from dropanchor_service.api.errors import Kind, ProblemError, problems
@@ -29,6 +29,28 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     )
     def list_tags() -> Response:
         return json_response({"t_ns": answers.now_ns(), "tags": list(_statuses(answers, answers.tags.all()))})
+
+    @router.get(
+        "/newcomers",
+        operation_id="list_newcomers",
+        summary="Tags that have been heard and are not admitted",
+        description='With `unknown_tags = "quarantine"` they stay here until their settings are put, `{}` at least; '
+        "with `accept` until they have sent a second message, where many are new at once. As many as `max_tags` are "
+        "remembered, those that were heard last. A restart forgets them.",
+        response_model=NewcomerList,
+        responses=shown(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
+    )
+    def list_newcomers() -> Response:
+        newcomers = [
+            {
+                "tag": newcomer.name,
+                "first_heard_ns": newcomer.first_heard_ns,
+                "last_heard_ns": newcomer.last_heard_ns,
+                "messages": newcomer.messages,
+            }
+            for newcomer in answers.newcomers.all()
+        ]
+        return json_response({"t_ns": answers.now_ns(), "newcomers": newcomers})
 
     @router.get(
         "/tags/{tag}",

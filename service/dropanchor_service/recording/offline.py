@@ -16,12 +16,13 @@ from dropanchor_service.ingest import MESSAGES_PER_TURN, Ingest
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.recording.reading import Turn
 from dropanchor_service.settings import Settings
-from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
 from dropanchor_service.store.site import SiteDocument
 from dropanchor_service.taps import Taps
 
 SETTLE_NS = 1_000_000_000  # what may still wait for messages before it comes out within that
 _BUFFER_BYTES = 2**30
+_MOST_TAGS = 1_000_000
 
 
 class RecordedClock(UtcClock):
@@ -45,10 +46,12 @@ class OfflineService:
         self._clock = RecordedClock()
         self._buffer = MessageBuffer(_BUFFER_BYTES)
         self._poses: list[Array] = []
-        settings = settings.model_copy(update={"unknown_tags": "accept", "max_tags": 1_000_000})
+        settings = settings.model_copy(
+            update={"unknown_tags": "accept", "max_tags": _MOST_TAGS, "unproven_tags": _MOST_TAGS}
+        )
         self._ingest = Ingest(
             self._buffer,
-            Admission(settings, self.site, self.tags),
+            Admission(settings, self.site, self.tags, Newcomers(0)),
             Estimators(create_engine(settings), self.site, self.tags, self.metrics),
             self.site,
             self.tags,

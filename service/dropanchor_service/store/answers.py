@@ -15,6 +15,7 @@ from dropanchor_service.estimation.batch import POSE, Array, State
 from dropanchor_service.store.at_time import BeforeMemoryError, pose_at
 from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95, with_age
 from dropanchor_service.store.latest import LatestPoses
+from dropanchor_service.store.newcomers import Newcomers
 from dropanchor_service.store.pose_json import list_json, poses_json
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
@@ -41,13 +42,15 @@ class Answers:
         latest: LatestPoses,
         now_ns: Callable[[], int] = time.time_ns,
         tracks: Tracks | None = None,
+        newcomers: Newcomers | None = None,
     ) -> None:
-        """tracks: where poses are kept for long, None for nowhere."""
+        """tracks: where poses are kept for long, None for nowhere. newcomers: tags that have no row yet."""
         self.site = site
         self.tags = tags
         self.latest = latest
         self.now_ns = now_ns
         self.tracks = tracks
+        self.newcomers = Newcomers(0) if newcomers is None else newcomers
 
     def pose_of(self, tag: Tag) -> Answer | None:
         """`Pose`, None before the tag's first one."""

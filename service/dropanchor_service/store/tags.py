@@ -118,8 +118,9 @@ class TagTable:
             self.register(name)
         self._counts[: len(names)] = counts
 
-    def counts(self, row: int) -> Array:
-        return self._counts[row]  # type: ignore[no-any-return]
+    def counts(self, row: int | Array) -> Array:
+        """Of one row, or of each of several."""
+        return self._counts[row]
 
     def count_messages(self, rows: Array, now_ns: int) -> None:
         """One message from each of `rows` (repeated for several)."""

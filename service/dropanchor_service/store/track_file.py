@@ -16,7 +16,7 @@ from dropanchor_service.estimation.batch import POSE, Array
 
 VERSION = 1
 SLOT_NS = 10_000_000_000
-ROWS_PER_STATEMENT = 500  # sqlite3 gives up the interpreter's lock per statement, and has to win it back
+MOST_ROWS = 512  # of a statement: sqlite3 gives up the interpreter's lock with each, and has to win it back
 BUSY_S = 5.0
 
 # What a row holds beside its key, 66 bytes; float32 is exact to 0.2 mm at 3 km.
@@ -135,11 +135,12 @@ class TrackWriter:
 
     def _insert(self, slots: list[int], tags: list[int], times: list[int], blobs: list[bytes]) -> None:
         flat = [value for row in zip(slots, tags, times, blobs, strict=True) for value in row]
-        step = 4 * ROWS_PER_STATEMENT
-        for start in range(0, len(flat), step):
-            values = flat[start : start + step]
-            places = ",".join(["(?,?,?,?)"] * (len(values) // 4))
+        start = 0
+        for rows in _powers(len(slots)):
+            places = ",".join(["(?,?,?,?)"] * rows)
+            values = flat[start : start + 4 * rows]
             self._connection.execute(f"INSERT OR REPLACE INTO poses VALUES {places}", values)
+            start += len(values)
 
     def _numbers(self, table: str, names: Sequence[str | None]) -> Array:
         """The ids of these names in one of the tables of names, -1 for None."""
@@ -183,6 +184,15 @@ class TrackReader:
 
     def _connected(self) -> closing[sqlite3.Connection]:
         return closing(sqlite3.connect(f"{self._path.absolute().as_uri()}?mode=ro", BUSY_S, uri=True))
+
+
+def _powers(count: int) -> Iterator[int]:
+    """Powers of two, MOST_ROWS at most, that add up to the count: sqlite3 keeps the last 128 different statements, and
+    one for every number of rows would be 20 MB of them."""
+    while count:
+        rows = min(MOST_ROWS, 1 << (count.bit_length() - 1))
+        yield rows
+        count -= rows
 
 
 def _tag_number(connection: sqlite3.Connection, tag: str) -> int | None:

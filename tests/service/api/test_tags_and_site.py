@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from api_house import ask, kind_of, make_house
-from dropanchor_schemas.answers import TagList, TagStatus
+from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Reason
 
@@ -31,6 +31,17 @@ def test_the_list_of_tags_holds_those_that_were_never_heard_too() -> None:
     house.answers.tags.register("a")
     tags = TagList.model_validate(ask(house.app(), "GET", "/api/v1/tags").json()).tags
     assert [(tag.tag, tag.first_heard_ns) for tag in tags] == [("b", None), ("a", None)]
+
+
+def test_newcomers_are_listed_by_when_they_were_heard_last() -> None:
+    house = make_house()
+    for name, t_ns in (("a", 10), ("b", 20), ("a", 30)):
+        house.answers.newcomers.hear(name, t_ns)
+    listed = NewcomerList.model_validate(ask(house.app(), "GET", "/api/v1/newcomers").json()).newcomers
+    assert [(n.tag, n.first_heard_ns, n.last_heard_ns, n.messages) for n in listed] == [
+        ("a", 10, 30, 2),
+        ("b", 20, 20, 1),
+    ]
 
 
 def test_settings_are_kept_and_register_a_new_tag() -> None:

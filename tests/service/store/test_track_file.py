@@ -2,6 +2,7 @@
 
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -49,6 +50,27 @@ def test_a_window_includes_its_ends_and_can_be_read_from_either(tmp_path: Path) 
     assert times(reader, "a", 9, 40, most=3) == [9, 10, 11]
     assert times(reader, "a", 9, 40, most=2, newest_first=True) == [40, 39]
     writer.close()
+
+
+def test_however_many_poses_come_at_a_time_few_different_statements_are_kept_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    statements: set[str] = set()
+
+    class Noting(sqlite3.Connection):
+        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
+            statements.add(sql)
+            return super().execute(sql, *values)
+
+    connect = sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", lambda *given, **named: connect(*given, **named, factory=Noting))
+    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+    counts = [*range(1, 150), 1023, 1024, 1025]
+    for number, count in enumerate(counts):
+        writer.insert(poses(*range(count)), [str(number)] * count, [None] * count)
+    writer.close()
+    assert len([sql for sql in statements if "INTO poses" in sql]) <= 10
+    assert [len(times(reader, str(number), most=2000)) for number in range(len(counts))] == counts
 
 
 def test_a_pose_of_the_same_time_is_replaced(tmp_path: Path) -> None:
