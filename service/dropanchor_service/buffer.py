@@ -1,13 +1,17 @@
 """Messages between the threads that receive them and the one that fuses them."""
 
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterable
 from itertools import compress
 from threading import Event, Lock
+from typing import NamedTuple
 
 import numpy as np
 
+from dropanchor_schemas.wire import ENCODING_PACKED, HEADER
 from dropanchor_service.estimation.batch import Array
+from dropanchor_service.fair_share import fair_cap, newer_of_same
+from dropanchor_service.store.rings import rank_in_row
 
 Message = tuple[int, bytes, str, int]
 """Row of the tag, payload, encoding, UTC of arrival in ns."""
@@ -17,24 +21,41 @@ Stranger = tuple[str, bytes, str, int]
 MESSAGE_OVERHEAD = 200  # bytes that a waiting message takes beside its payload
 STRANGER_BYTES = 8 * 2**20  # of messages of tags without a row that may wait
 STRANGERS_PER_TURN = 250  # of them at a time: each costs many times as much as a message of a known tag
-_KEPT_SHARE = 0.75  # of what may wait after shedding, so that shedding is rare
-PATIENCE_NS = 1_000_000_000  # of falling behind, before it counts as overload
-MOST_WAIT_S = 0.5  # for a message in an overload
-_JUST_NS = 100_000_000
+MAX_WAIT_NS = 500_000_000
+_KEPT_SHARE = 0.75  # of what may wait after shedding for room, so that it is rare
+_COUNTS = np.dtype({"names": ["some", "bearing"], "formats": [("<u2", 3), "<u2"], "offsets": [2, 24], "itemsize": 32})
+
+
+class Shed(NamedTuple):
+    """What was lost. by_row: messages. samples: in those of them that were packed. strangers: their messages."""
+
+    by_row: Counter[int]
+    samples: int
+    strangers: int
+
+
+class _Behind(NamedTuple):
+    """Since when `drain` has left something, and for how long the oldest message had waited then."""
+
+    since_ns: int
+    waited_ns: int
 
 
 class MessageBuffer:
-    """Bounded. When it is full, the tags that fill it most lose their oldest messages.
+    """In the order of arrival, as long as `drain` keeps up with it.
 
-    So they do in an overload: when `drain` has not caught up for PATIENCE_NS, no more may wait than it takes in
-    MOST_WAIT_S. Messages that arrived before it fell behind, from a cache or while nobody drained, start that time
-    afresh: a burst is no overload.
+    It is bounded in bytes: when it is full, the tags that fill it most lose their oldest messages. And in time: when
+    `drain` has not caught up for `max_wait_ns` and what it takes waits longer and longer, that is an overload. Until
+    all has been taken, only so much waits as it can take in half that time, at least the newest message of each tag,
+    and the tags take turns. What comes from caches, or came while nobody drained, is no overload: it waits for as long
+    as it takes, and others behind it.
 
     Keys that are not known wait apart, where only they push out each other: a flood of them harms no known tag.
     """
 
-    def __init__(self, capacity_bytes: int) -> None:
+    def __init__(self, capacity_bytes: int, max_wait_ns: int = MAX_WAIT_NS) -> None:
         self._capacity_bytes = capacity_bytes
+        self._max_wait_ns = max_wait_ns
         self._lock = Lock()
         self._filled = Event()
         self._rows: dict[str, int] = {}
@@ -43,19 +64,26 @@ class MessageBuffer:
         self._strangers: deque[Stranger] = deque()
         self._stranger_bytes = 0
         self._shed: Counter[int] = Counter()
+        self._shed_samples = 0
         self._strangers_shed = 0
-        self._behind_ns: int | None = None  # since when `drain` has left something
+        self._cached = 0  # messages up to the last one that a cache gave
+        self._behind: _Behind | None = None
         self._drained_bytes = 0  # since then
+        self._overloaded = False
+        self._drains = 0
+        self._served = np.zeros(0, np.int64)  # by row: the last drain in an overload that took something of it
 
-    def append(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
-        """From any thread; blocks for no longer than shedding takes."""
+    def append(self, key: str, payload: bytes, encoding: str, arrival_ns: int, cached: bool = False) -> None:
+        """From any thread; blocks for no longer than shedding takes. cached: it was not published just now."""
         row = self._rows.get(key)
         with self._lock:
             if row is not None:
                 self._messages.append((row, payload, encoding, arrival_ns))
                 self._bytes += len(payload) + MESSAGE_OVERHEAD
+                if cached:
+                    self._cached = len(self._messages)
                 if self._bytes > self._capacity_bytes:
-                    self._shed_down_to(_KEPT_SHARE * self._capacity_bytes)
+                    self._make_room(_KEPT_SHARE * self._capacity_bytes)
             else:
                 self._append_stranger((key, payload, encoding, arrival_ns))
         if not self._filled.is_set():
@@ -74,28 +102,31 @@ class MessageBuffer:
         return self._filled.wait(timeout_s)
 
     def drain(self, most: int, now_ns: int = 0) -> tuple[list[Message], list[Stranger]]:
-        """The oldest messages of known keys, at most so many, and of strangers. now_ns: UTC."""
+        """At most so many messages of known keys, each tag's in their order, and of strangers. now_ns: UTC."""
         with self._lock:
+            if len(self._messages) > most:
+                self._judge(now_ns)
             if len(self._messages) <= most:
                 taken, self._messages, self._bytes = self._messages, [], 0
-                self._behind_ns = None
+                self._behind, self._overloaded = None, False
+            elif self._overloaded:
+                taken = self._take(self._next_in_turn(most))
             else:
-                taken = self._messages[:most]
-                del self._messages[:most]
-                size = sum(map(_size, taken))
-                self._bytes -= size
-                self._fall_behind(size, taken[0][3], now_ns)
+                taken, self._messages = self._messages[:most], self._messages[most:]
+                self._bytes -= sum(map(_size, taken))
+            self._cached = max(0, self._cached - len(taken))
+            self._drained_bytes += sum(map(_size, taken)) if self._behind else 0
             strangers = [self._strangers.popleft() for _ in range(min(STRANGERS_PER_TURN, len(self._strangers)))]
             self._stranger_bytes -= sum(map(_size, strangers))
             if not self._messages and not self._strangers:
                 self._filled.clear()
             return taken, strangers
 
-    def take_shed(self) -> tuple[Counter[int], int]:
-        """Messages lost since the last call: by row, and of strangers."""
+    def take_shed(self) -> Shed:
+        """What was lost since the last call."""
         with self._lock:
-            shed = self._shed, self._strangers_shed
-            self._shed, self._strangers_shed = Counter(), 0
+            shed = Shed(self._shed, self._shed_samples, self._strangers_shed)
+            self._shed, self._shed_samples, self._strangers_shed = Counter(), 0, 0
             return shed
 
     @property
@@ -109,51 +140,71 @@ class MessageBuffer:
             self._stranger_bytes -= _size(self._strangers.popleft())
             self._strangers_shed += 1
 
-    def _fall_behind(self, taken_bytes: int, oldest_ns: int, now_ns: int) -> None:
-        if self._behind_ns is None or oldest_ns < self._behind_ns - _JUST_NS:
-            self._behind_ns, self._drained_bytes = now_ns, 0
-            return
-        self._drained_bytes += taken_bytes
-        behind_ns = now_ns - self._behind_ns
-        if behind_ns > PATIENCE_NS:
-            may_wait = MOST_WAIT_S * self._drained_bytes / (behind_ns * 1e-9)
-            if self._bytes > may_wait:
-                self._shed_down_to(_KEPT_SHARE * may_wait)
+    def _judge(self, now_ns: int) -> None:
+        """Whether this is an overload, and then shed."""
+        waited_ns = now_ns - self._messages[0][3]
+        if self._behind is None or self._cached:
+            self._behind, self._overloaded, self._drained_bytes = _Behind(now_ns, waited_ns), False, 0
+        behind_ns = now_ns - self._behind.since_ns
+        if min(behind_ns, waited_ns - max(0, self._behind.waited_ns)) > self._max_wait_ns:
+            self._overloaded = True
+        if self._overloaded:
+            self._keep_newest(self._drained_bytes / behind_ns * self._max_wait_ns / 2)
 
-    def _shed_down_to(self, target_bytes: float) -> None:
+    def _keep_newest(self, target_bytes: float) -> None:
+        """Of every tag the newest message, and more where all together are no more than this."""
+        rows, sizes = self._columns()
+        newer = newer_of_same(rows, sizes)
+        self._shed_but((newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes))
+
+    def _make_room(self, target_bytes: float) -> None:
+        rows, sizes = self._columns()
+        newer = newer_of_same(rows, sizes)
+        kept = (newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes)
+        total = np.cumsum(np.where(kept, sizes, 0)[::-1])[::-1]
+        self._shed_but(kept & (total <= target_bytes))
+
+    def _shed_but(self, kept: Array) -> None:
+        if kept.all():
+            return
+        self._cached = int(kept[: self._cached].sum())
+        lost = self._take(np.flatnonzero(~kept))
+        self._shed.update(message[0] for message in lost)
+        self._shed_samples += _samples_of(lost)
+
+    def _next_in_turn(self, most: int) -> Array:
+        """So many messages of the tags that have waited for their turn longest."""
+        rows, _ = self._columns()
+        self._drains += 1
+        missing = int(rows.max()) + 1 - len(self._served)
+        if missing > 0:
+            self._served = np.concatenate([self._served, np.zeros(missing, np.int64)])
+        turns = self._served[rows] + rank_in_row(rows)
+        chosen = np.sort(np.argsort(turns, kind="stable")[:most])
+        self._served[rows[chosen]] = self._drains
+        return chosen
+
+    def _take(self, chosen: Array) -> list[Message]:
+        """Out of the waiting ones, in their order."""
+        stays = np.ones(len(self._messages), bool)
+        stays[chosen] = False
+        taken = list(compress(self._messages, (~stays).tolist()))
+        self._messages = list(compress(self._messages, stays.tolist()))
+        self._bytes -= sum(map(_size, taken))
+        return taken
+
+    def _columns(self) -> tuple[Array, Array]:
+        """Row and size of each message."""
         rows = np.array([message[0] for message in self._messages])
-        sizes = np.array([_size(message) for message in self._messages])
-        _, tags = np.unique(rows, return_inverse=True)
-        cap = _fair_cap(np.bincount(tags, sizes), int(target_bytes))
-        kept = _newer_of_same(tags, sizes) <= cap
-        lost, counts = np.unique(rows[~kept], return_counts=True)
-        self._shed.update(dict(zip(lost.tolist(), counts.tolist(), strict=True)))
-        self._messages = list(compress(self._messages, kept.tolist()))
-        self._bytes = int(sizes[kept].sum())
+        return rows, np.array([_size(message) for message in self._messages])
 
 
 def _size(message: Message | Stranger) -> int:
     return len(message[1]) + MESSAGE_OVERHEAD
 
 
-def _newer_of_same(tags: Array, sizes: Array) -> Array:
-    """The sum of the sizes of each message and of all newer ones of its tag."""
-    order = np.argsort(tags[::-1], kind="stable")
-    ordered, summed = tags[::-1][order], np.cumsum(sizes[::-1][order])
-    first = np.append(True, ordered[1:] != ordered[:-1])
-    before = (summed - sizes[::-1][order])[first]
-    sums = np.empty(len(tags), np.int64)
-    sums[order] = summed - before[np.cumsum(first) - 1]
-    return sums[::-1]
-
-
-def _fair_cap(sizes: Array, target: int) -> int:
-    """The largest share c with sum(min(size, c)) <= target."""
-    left = target
-    ascending: Sequence[float] = np.sort(sizes).tolist()
-    for index, size in enumerate(ascending):
-        share = left // (len(ascending) - index)
-        if size > share:
-            return int(share)
-        left -= int(size)
-    return target
+def _samples_of(messages: Iterable[Message]) -> int:
+    """In those that are packed, by their headers."""
+    headers = b"".join(m[1][: HEADER.size] for m in messages if m[2] == ENCODING_PACKED and len(m[1]) >= HEADER.size)
+    counts = np.frombuffer(headers, _COUNTS)
+    return int(counts["some"].sum() + counts["bearing"].sum())

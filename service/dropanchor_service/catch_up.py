@@ -141,15 +141,15 @@ class CatchUp:
     def _release(self, *keys: str) -> int:
         """In the order in which they would have arrived: one message of a tag is fused at a time, but of many tags at
         once."""
-        released: list[_Held] = []
+        released, cached = list[_Held](), False
         for key in keys:
             self._expected.discard(key)
-            self._fetched.pop(key, None)
+            cached |= self._fetched.pop(key, 0) > 0
             held = self._held.pop(key, [])
             self._bytes -= sum(len(message.payload) + MESSAGE_OVERHEAD for message in held)
             released += _in_order(held, self._passed_of(key))
         for message in sorted(released, key=lambda message: message.arrival_ns):
-            self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns)
+            self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns, cached)
         return len(released)
 
 

@@ -61,23 +61,24 @@ class Ingest:
         """Whether a message waits for one before it, so that a turn may be due although nothing comes in."""
         return self.preparation.holds > 0
 
-    def turn(self) -> None:
-        """Everything that waits, up to MESSAGES_PER_TURN."""
+    def turn(self, most: int = MESSAGES_PER_TURN) -> int:
+        """So many of the messages that wait, at most. Returns how many of tags that are known were taken."""
         if self._estimators.follow_site():
             self._admission.register_listed()
         self._admission.review()
         while self._announced:
             self._admission.by_name(self._announced.popleft())
         waited = list(self._know_new_tags())
+        fresh, strangers = self._buffer.drain(most, self._clock.now_ns())
         self._count_shed()
-        known, strangers = self._buffer.drain(MESSAGES_PER_TURN, self._clock.now_ns())
-        known = [*waited, *known, *self._admitted(strangers)]
+        known = [*waited, *fresh, *self._admitted(strangers)]
         if known:
             self._tell(self._taps.messages, known)
             self._metrics.messages.inc(len(known))
             self._tags.count_messages(np.array([message[0] for message in known], np.int32), known[-1][3])
         if known or self.holds:
             self._fuse(known)
+        return len(fresh)
 
     def _know_new_tags(self) -> Iterator[Message]:
         """Messages of tags that have a row already wait neither among those of strangers nor for their estimator.
@@ -151,12 +152,13 @@ class Ingest:
             self._losses.tap_failed(error)
 
     def _count_shed(self) -> None:
-        by_row, strangers = self._buffer.take_shed()
+        by_row, samples, strangers = self._buffer.take_shed()
         self._losses.lose_strangers(Reason.SHED, strangers)
         self._losses.lose_strangers(Reason.TAG_UNPROVEN, self._admission.waited_in_vain())
         if by_row:
             rows = np.fromiter(by_row, np.int64, len(by_row))
-            self._losses.reject(Reason.SHED, np.repeat(rows, np.fromiter(by_row.values(), np.int64, len(by_row))))
+            times = np.fromiter(by_row.values(), np.int64, len(by_row))
+            self._losses.shed(np.repeat(rows, times), samples)
             self.preparation.publishers.excuse(rows)
 
 

@@ -14,6 +14,8 @@ IDLE_S = 0.25
 HOLDING_S = 0.02  # of waiting while a held message may become due
 BACKLOG = 1000  # messages beyond which there is no waiting for more
 SILENT_S = 5.0  # without a turn the thread counts as stuck
+TURN_S = 0.1  # that a turn may take when more waits than it takes
+FEWEST, MOST = 100, 2000  # messages of such a turn
 
 
 class IngestThread:
@@ -35,6 +37,7 @@ class IngestThread:
         self._between_turns = between_turns
         self._stop = threading.Event()
         self._turned_s = time.monotonic()
+        self._most = MOST
         self._thread = threading.Thread(target=self._run, name="ingest", daemon=True)
 
     def start(self) -> None:
@@ -67,9 +70,14 @@ class IngestThread:
     def _turn(self) -> None:
         self._turned_s = time.monotonic()
         try:
-            self._ingest.turn()
+            taken = self._ingest.turn(self._most)
+            if taken == self._most:
+                self._adapt(taken / (time.monotonic() - self._turned_s))
             self._between_turns()
         except Exception as error:
             self._metrics.faults.labels("ingest").inc()
             self._log.exception("ingest", error)
             self._stop.wait(self._period_s)
+
+    def _adapt(self, messages_per_s: float) -> None:
+        self._most = min(max(round(TURN_S * messages_per_s), FEWEST), MOST)

@@ -28,6 +28,11 @@ class Losses:
         self._metrics.rejected.labels(reason).inc()
         self._log.warning(f"message refused ({reason})", key[:200])
 
+    def shed(self, rows: Array, samples: int) -> None:
+        """A message of each of `rows`, in all with so many samples."""
+        self.reject(Reason.SHED, rows)
+        self._metrics.shed_samples.inc(samples)
+
     def lose_strangers(self, reason: Reason, messages: int) -> None:
         """Messages of tags without a row."""
         self._metrics.rejected.labels(reason).inc(messages)

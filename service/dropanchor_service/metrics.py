@@ -29,6 +29,9 @@ class Metrics:
         self.rejected = Counter(
             "dropanchor_rejected", "Messages and samples that were not used.", ["reason"], registry=self.registry
         )
+        self.shed_samples = Counter(
+            "dropanchor_shed_samples", "Samples of packed messages that were shed.", registry=self.registry
+        )
         self.poses = Counter("dropanchor_poses", "Poses that the estimators gave.", registry=self.registry)
         self.misses = Counter(
             "dropanchor_missed_messages",

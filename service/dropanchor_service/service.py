@@ -70,7 +70,7 @@ class Service:
         self.site = _site_store(settings)
         self._keepers = Keepers(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
         self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._keepers.tracks, newcomers)
-        self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20))
+        self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         estimators = Estimators(create_engine(settings), self.site, self.tags, self.metrics)
         self._ingest = Ingest(
             self._buffer,

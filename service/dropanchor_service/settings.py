@@ -119,8 +119,12 @@ class IngestSettings(_Section):
     reorder_ms: Annotated[float, Field(ge=0, le=10_000)] = Field(
         default=250.0, description="A message waits at most so long for those that its publisher numbered before it."
     )
+    max_wait_ms: Annotated[float, Field(ge=10, le=60_000)] = Field(
+        default=500.0,
+        description="When live messages wait longer than this, and ever longer, the older ones of each tag are shed.",
+    )
     buffer_mib: Annotated[float, Field(gt=0, le=4096)] = Field(
-        default=32.0, description="Messages that may wait; beyond it the oldest of the busiest tags are shed."
+        default=64.0, description="Messages that may wait; beyond it the oldest of the busiest tags are shed."
     )
 
 

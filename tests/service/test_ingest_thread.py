@@ -36,12 +36,12 @@ def test_an_error_of_ours_is_counted_and_the_thread_goes_on(monkeypatch: pytest.
     bench = Bench()
     turn, failures = bench.ingest.turn, 3
 
-    def failing() -> None:
+    def failing(most: int) -> int:
         nonlocal failures
         if failures:
             failures -= 1
             raise RuntimeError("a bug")
-        turn()
+        return turn(most)
 
     monkeypatch.setattr(bench.ingest, "turn", failing)
     thread = thread_of(bench)
@@ -57,7 +57,7 @@ def test_a_thread_that_does_not_run_or_is_stuck_is_a_problem(monkeypatch: pytest
     thread = thread_of(bench)
     assert thread.problem == "the ingest thread does not run"
     release = threading.Event()
-    monkeypatch.setattr(bench.ingest, "turn", lambda: release.wait(5.0))
+    monkeypatch.setattr(bench.ingest, "turn", lambda _: release.wait(5.0))
     monkeypatch.setattr(ingest_thread, "SILENT_S", 0.05)
     thread.start()
     wait_until(lambda: "stuck" in (thread.problem or ""))
