@@ -10,7 +10,7 @@ from .configure import configured
 from .frontend import FRONTEND, start_frontend
 from .gather import gather
 from .kernel import advance
-from .layout import BELIEF, KEEP, ROW, make_pool, make_work, with_room
+from .layout import BELIEF, KEEP, ROW, make_pool, make_workspace, with_room
 from .node import NODE
 from .order import Order
 from .outputs import innovations_of, modes_of, poses_of
@@ -37,7 +37,7 @@ class FleetEngine:
         self._fronts = np.zeros(0, FRONTEND)
         self._platforms = np.zeros(0, PLATFORM)
         self._pool = make_pool(KEEP * 2)
-        self._work = make_work()
+        self._workspace = make_workspace()
         self._order = Order()
 
     def set_anchors(self, anchors: Array) -> None:
@@ -64,7 +64,7 @@ class FleetEngine:
         beliefs = self._believe(nodes)
         return PoseBatch(
             poses_of(nodes, beliefs),
-            modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._work),
+            modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspace),
             innovations_of(nodes, beliefs, self._rows),
             dict(rejected),
         )
@@ -88,7 +88,7 @@ class FleetEngine:
         while left > 0:
             self._pool = with_room(self._pool, KEEP)
             rest, found = nodes[-left:], beliefs[-left:]
-            left = advance(self._rows, self._pool, rest, self._anchors, self._numbers, self._work, found)
+            left = advance(self._rows, self._pool, rest, self._anchors, self._numbers, self._workspace, found)
         return beliefs
 
     def state(self) -> dict[str, Array]:

@@ -8,7 +8,7 @@ from .blocked import expect_clear, open_alternative, recover, unblock
 from .compiled import njit
 from .gap import begins_again, place_again, repeats, watch_gap
 from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
-from .layout import COMMON, PHI, STEADY, YAW, R, V, Work
+from .layout import COMMON, PHI, STEADY, YAW, R, V
 from .manage import best_of, finite, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, RANGE
 from .pool import load, mirror, release, store
@@ -71,7 +71,7 @@ def _range_all(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuni
         variance = std * std + (dz * row.height_std / max(z, 0.1)) ** 2
         if node.anchor != row.anchor:
             variance += row.offset_std**2
-        update_range(s, P, H, PH, e, variance, t, out)
+        update_range(work[h], scratch, e, variance, t)
         work[h].log_weight += t.temper * out[0]
         if s[R] < 0.0:
             s[R] = 1e-3
@@ -150,7 +150,7 @@ def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
     white, _, _ = error_of(row, node.heading_var)
     for h in range(count):
         if row.model != STEADY or work[h].kind == 0:
-            update_heading(work[h].mean, work[h].cov, scratch.PH, node.heading - row.north, white)
+            update_heading(work[h], scratch, node.heading - row.north, white)
 
 
 @njit(nogil=True)
@@ -248,12 +248,12 @@ def _continue(
 
 
 @njit(nogil=True, cache=True)
-def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Work, beliefs: Any) -> int:
+def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Any, beliefs: Any) -> int:
     """Run the nodes (of one row in order of time; a row's nodes may be apart) and write one belief per node.
 
     Returns how many are left, because the pool has no room for another row.
     """
-    work, scratch, t = workspace.hypotheses, workspace.scratch[0], tuning[0]
+    work, scratch, t = workspace[0].hypotheses, workspace[0].scratch, tuning[0]
     current = -1
     count = 0
     for k in range(len(nodes)):

@@ -1,6 +1,6 @@
 """Where things lie: the state vector, one row per tag, and the pool of hypothesis slots rows point into."""
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -186,16 +186,13 @@ SCRATCH: Final = np.dtype(
 )
 
 
-class Work(NamedTuple):
-    """What one thread works on. Records, because compiled code counts no references to parts of a record."""
-
-    hypotheses: npt.NDArray[np.void]  # HYPOTHESIS (WORK,): those of one row, unpacked
-    scratch: npt.NDArray[np.void]  # SCRATCH (1,)
+# What one thread works on. One record, because compiled code counts no references to parts of a record.
+WORKSPACE: Final = np.dtype([("hypotheses", HYPOTHESIS, (WORK,)), ("scratch", SCRATCH)], align=True)
 
 
-def make_work() -> Work:
-    """For one thread."""
-    return Work(np.zeros(WORK, HYPOTHESIS), np.zeros(1, SCRATCH))
+def make_workspace() -> npt.NDArray[np.void]:
+    """WORKSPACE (1,): for one thread, with room for the hypotheses of one row, unpacked."""
+    return np.zeros(1, WORKSPACE)
 
 
 def make_pool(capacity: int) -> npt.NDArray[np.void]:

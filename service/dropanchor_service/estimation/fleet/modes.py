@@ -3,7 +3,6 @@
 from typing import Any
 
 from .compiled import njit
-from .layout import Work
 from .manage import normalise
 from .pool import load
 from .summary import add_reference, cluster, locate, moments
@@ -19,10 +18,10 @@ def _heaviest(work: Any, count: int) -> int:
 
 
 @njit(nogil=True)
-def list_modes(row: Any, pool: Any, anchors: Any, workspace: Work, modes: Any) -> int:
+def list_modes(row: Any, pool: Any, anchors: Any, space: Any, modes: Any) -> int:
     """Fill modes (HYPOTHESIS of `batch`) with the clusters above 1 %; returns their number."""
     count = row.count
-    work, scratch = workspace.hypotheses, workspace.scratch[0]
+    work, scratch = space.hypotheses, space.scratch
     mean, cov = scratch.mean, scratch.cov
     load(row, pool, work)
     for h in range(count):

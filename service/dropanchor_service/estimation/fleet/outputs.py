@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
 
 from .compiled import njit
-from .layout import AMBIGUOUS, Work
+from .layout import AMBIGUOUS
 from .modes import list_modes
 from .node import RANGE
 
@@ -31,10 +31,10 @@ def innovations_of(nodes: Array, beliefs: Array, rows: Array) -> Array:
     return records[: _write_innovations(nodes, beliefs, rows, records)]
 
 
-def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, work: Work) -> Array:
+def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
     """HYPOTHESIS, the modes of each row whose last node left it ambiguous. A row's nodes are together."""
     modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
-    return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, work, modes)]
+    return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, workspace, modes)]
 
 
 @njit(cache=True, nogil=True)
@@ -98,12 +98,12 @@ def _count_ambiguous(nodes: Any, beliefs: Any) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _write_modes(nodes: Any, beliefs: Any, rows: Any, pool: Any, anchors: Any, work: Work, modes: Any) -> int:
+def _write_modes(nodes: Any, beliefs: Any, rows: Any, pool: Any, anchors: Any, workspace: Any, modes: Any) -> int:
     n = 0
     for k in range(len(nodes)):
         if _left_ambiguous(nodes, beliefs, k):
             row = nodes[k].row
-            found = list_modes(rows[row], pool, anchors, work, modes[n : n + MODES])
+            found = list_modes(rows[row], pool, anchors, workspace[0], modes[n : n + MODES])
             for mode in range(n, n + found):
                 modes[mode].row = row
             n += found

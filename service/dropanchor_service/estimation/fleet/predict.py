@@ -18,7 +18,10 @@ from .tuning import Tuning
 
 @njit(nogil=True, inline="never")
 def move(s: Any, node: Any, decay: Any, F: Any) -> None:
-    """Move the state s (N,) over the node; F (4, N) receives d(r, phi, yaw, v)'/ds before any decay."""
+    """Move the state s (N,) over the node; F (4, N) receives d(r, phi, yaw, v)'/ds before any decay.
+
+    F must be zero or from another call: what is always zero in it is not written.
+    """
     dt = node.dt_s
     w = node.dyaw - s[GYRO] * dt
     m = s[MOUNT] + s[CRAB]
@@ -43,7 +46,6 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     r_alpha, r_d = (-zx * d * sa + zy * d * ca) / r, (zx * ca + zy * sa) / r
     p_alpha, p_d = (zx * d * ca + zy * d * sa) / r**2, (zx * sa - zy * ca) / r**2
     r_beta, p_beta = (zy * sx - zx * sy) / r, (zx * sx + zy * sy) / r**2
-    F[:] = 0.0
     F[0, R], F[1, R] = zx / r, -zy / r**2
     F[0, PHI], F[1, PHI] = -r_alpha - r_beta, 1.0 - p_alpha - p_beta
     F[0, YAW], F[1, YAW] = r_alpha + r_beta, p_alpha + p_beta
@@ -54,13 +56,23 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     F[0, ACC], F[1, ACC] = r_d * f_b * dt / 2, p_d * f_b * dt / 2
     F[2, YAW], F[2, GYRO] = 1.0, -dt
     F[3, V], F[3, MOUNT], F[3, CRAB], F[3, ACC] = 1.0, f_m, f_m, f_b
-    s[PHI] += math.atan2(zy, zx)
+    s[PHI] += angle_of(zx, zy)
     s[R] = r
     s[YAW] += w
     s[V] += f
     for i in range(4, N):
         s[i] *= decay[i]
     s[GYRO] -= node.gyro_step
+
+
+@njit(nogil=True)
+def angle_of(x: float, y: float) -> float:
+    """atan2(y, x); near zero by its series, whose rest is below the rounding there."""
+    if not abs(y) < 0.03 * x:
+        return math.atan2(y, x)
+    t = y / x
+    u = t * t
+    return t * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * (1.0 / 7.0 - u / 9.0))))
 
 
 @njit(nogil=True)

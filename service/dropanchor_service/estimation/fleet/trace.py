@@ -9,7 +9,7 @@ from dropanchor_service.estimation.batch import Array
 from .compiled import njit
 from .engine import FleetEngine
 from .kernel import advance
-from .layout import BELIEF, KEEP, N, Work, with_room
+from .layout import BELIEF, KEEP, N, with_room
 from .manage import put_in_order
 from .node import NODE
 from .pool import load
@@ -62,17 +62,17 @@ class TracingEngine(FleetEngine):
     def _believe(self, nodes: Array) -> Array:
         beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
         self._pool = with_room(self._pool, KEEP * len(np.unique(nodes["row"])))
-        advance_traced(self._rows, self._pool, nodes, self._anchors, self._numbers, self._work, beliefs, traces)
+        advance_traced(self._rows, self._pool, nodes, self._anchors, self._numbers, self._workspace, beliefs, traces)
         self._steps.append((nodes, beliefs, traces))
         return beliefs
 
 
 @njit(nogil=True, cache=True)
 def advance_traced(
-    rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Work, beliefs: Any, traces: Any
+    rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Any, beliefs: Any, traces: Any
 ) -> None:
     """`advance`, one node at a time, and a copy of the heaviest hypotheses after each."""
-    work = workspace.hypotheses
+    work = workspace[0].hypotheses
     for k in range(len(nodes)):
         advance(rows, pool, nodes[k : k + 1], anchors, tuning, workspace, beliefs[k : k + 1])
         row, trace = rows[nodes[k].row], traces[k]

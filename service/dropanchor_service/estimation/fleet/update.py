@@ -78,17 +78,20 @@ def project(P: Any, H: Any, PH: Any) -> float:
 
 
 @njit(nogil=True)
-def update_range(s: Any, P: Any, H: Any, PH: Any, e: float, variance: float, t: Tuning, out: Any) -> None:
-    """One range with a one-sided outlier mixture; out = (log likelihood, S, probability of an outlier)."""
-    S = project(P, H, PH) + variance
+def update_range(one: Any, scratch: Any, e: float, variance: float, t: Tuning) -> None:
+    """One range, whose H is in scratch, with a one-sided outlier mixture, on a HYPOTHESIS.
+
+    scratch.out = (log likelihood, S, probability of an outlier).
+    """
+    S = project(one.cov, scratch.H, scratch.PH) + variance
     wide = S + t.outlier_std**2
     inside = (1.0 - t.outlier) * gaussian(e, S)
     outside = t.outlier * (gaussian(e - t.outlier_mean, wide) + t.outlier_floor)
     beta = inside / (inside + outside)
-    correct(s, P, PH, S, e, beta)
-    out[0] = math.log(inside + outside)
-    out[1] = S
-    out[2] = 1.0 - beta
+    correct(one.mean, one.cov, scratch.PH, S, e, beta)
+    scratch.out[0] = math.log(inside + outside)
+    scratch.out[1] = S
+    scratch.out[2] = 1.0 - beta
 
 
 @njit(nogil=True)
@@ -115,8 +118,9 @@ def update_bearing(s: Any, P: Any, H: Any, PH: Any, ox: float, oy: float, z: flo
 
 
 @njit(nogil=True)
-def update_heading(s: Any, P: Any, PH: Any, z: float, variance: float) -> None:
-    """z = yaw + error of the reference."""
+def update_heading(one: Any, scratch: Any, z: float, variance: float) -> None:
+    """z = yaw + error of the reference, on a HYPOTHESIS."""
+    s, P, PH = one.mean, one.cov, scratch.PH
     for i in range(N):
         PH[i] = P[YAW, i] + P[REF, i]
     e = wrap(z - s[YAW] - s[REF])

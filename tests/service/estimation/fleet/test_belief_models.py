@@ -18,6 +18,7 @@ from dropanchor_service.estimation.fleet.layout import (
     N,
     R,
     V,
+    make_workspace,
 )
 from dropanchor_service.estimation.fleet.node import NODE
 from dropanchor_service.estimation.fleet.predict import move, transport
@@ -71,6 +72,14 @@ def stepped(s: Any, node: Any) -> tuple[Any, Any]:
 def covariance(seed: int = 3) -> Any:
     A = np.random.default_rng(seed).standard_normal((N, N)) * 0.05
     return A @ A.T + np.diag(np.full(N, 1e-3))
+
+
+def hypothesis_of(s: Any, P: Any, H: Any = 0.0) -> tuple[Any, Any]:
+    """One hypothesis with this mean and covariance, and scratch with this Jacobian of a measurement."""
+    space = make_workspace()[0]
+    one, scratch = space["hypotheses"][0], space["scratch"]
+    one["mean"], one["cov"], scratch["H"] = s, P, H
+    return one, scratch
 
 
 def jacobian_fd(f: Any, s: Any) -> Any:
@@ -136,9 +145,10 @@ def test_a_heading_update_is_the_kalman_filter() -> None:
     h = np.zeros(N)
     h[YAW] = h[REF] = 1.0
     expected = kalman(s, P, h, 0.02, 0.01)
-    update_heading(s, P, np.zeros(N), STATE[YAW] + STATE[REF] + 0.02 + 2 * math.pi, 0.01)
-    np.testing.assert_allclose(s, expected[0], atol=1e-12)
-    np.testing.assert_allclose(P, expected[1], atol=1e-12)
+    one, scratch = hypothesis_of(s, P)
+    update_heading(one, scratch, STATE[YAW] + STATE[REF] + 0.02 + 2 * math.pi, 0.01)
+    np.testing.assert_allclose(one["mean"], expected[0], atol=1e-12)
+    np.testing.assert_allclose(one["cov"], expected[1], atol=1e-12)
 
 
 def test_a_range_without_outliers_is_the_kalman_filter() -> None:
@@ -146,13 +156,14 @@ def test_a_range_without_outliers_is_the_kalman_filter() -> None:
     predicted = predict_range(s, 0.0, 0.0, 0.0, 0.0, H)
     assert predicted == pytest.approx(STATE[R] + STATE[OFFSET])
     expected = kalman(s, P, H, 0.05, 0.04)
-    update_range(s, P, H, np.zeros(N), 0.05, 0.04, Tuning()._replace(outlier=0.0), np.zeros(3))
-    np.testing.assert_allclose(s, expected[0], atol=1e-12)
-    np.testing.assert_allclose(P, expected[1], atol=1e-12)
+    one, scratch = hypothesis_of(s, P, H)
+    update_range(one, scratch, 0.05, 0.04, Tuning()._replace(outlier=0.0))
+    np.testing.assert_allclose(one["mean"], expected[0], atol=1e-12)
+    np.testing.assert_allclose(one["cov"], expected[1], atol=1e-12)
 
 
 def test_a_range_mixes_hit_and_outlier_by_their_probabilities() -> None:
-    s, P, H, out, t = STATE.copy(), covariance(), np.zeros(N), np.zeros(3), Tuning()
+    s, P, H, t = STATE.copy(), covariance(), np.zeros(N), Tuning()
     predict_range(s, 0.0, 0.0, 0.0, 0.0, H)
     e, variance = 0.6, 0.04
     S = H @ P @ H + variance
@@ -167,11 +178,12 @@ def test_a_range_mixes_hit_and_outlier_by_their_probabilities() -> None:
     mean = beta * taken[0] + (1 - beta) * s
     spread = beta * np.outer(taken[0] - mean, taken[0] - mean) + (1 - beta) * np.outer(s - mean, s - mean)
     expected = beta * taken[1] + (1 - beta) * P + spread
-    update_range(s, P, H, np.zeros(N), e, variance, t, out)
-    np.testing.assert_allclose(s, mean, atol=1e-12)
-    np.testing.assert_allclose(P, expected, atol=1e-12)
-    assert out[0] == pytest.approx(math.log(hit + miss))
-    assert out[2] == pytest.approx(1 - beta)
+    one, scratch = hypothesis_of(s, P, H)
+    update_range(one, scratch, e, variance, t)
+    np.testing.assert_allclose(one["mean"], mean, atol=1e-12)
+    np.testing.assert_allclose(one["cov"], expected, atol=1e-12)
+    assert scratch["out"][0] == pytest.approx(math.log(hit + miss))
+    assert scratch["out"][2] == pytest.approx(1 - beta)
 
 
 def test_a_bearing_moves_the_tag_towards_it() -> None:

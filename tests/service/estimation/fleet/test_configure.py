@@ -15,7 +15,7 @@ from dropanchor_service.estimation.fleet.configure import (
     configured,
 )
 from dropanchor_service.estimation.fleet.heading import error_of
-from dropanchor_service.estimation.fleet.layout import COMMON, STEADY, make_work
+from dropanchor_service.estimation.fleet.layout import COMMON, STEADY, make_workspace
 from dropanchor_service.estimation.fleet.node import DERIVED_HEADING, NODE
 from dropanchor_service.estimation.fleet.start import choose_model, second_class
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -69,7 +69,7 @@ def test_a_heading_told_not_to_drift_has_one_class_and_no_error_beyond_what_was_
     for told, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
         rows = row_of(TagSettings(heading_std_rad=told)).reshape(1)
         rows["model"] = STEADY
-        assert second_class(make_work().hypotheses, 0, 1, rows[0], Tuning(), False) == classes
+        assert second_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == classes
         assert error_of(rows[0], 1.0)[1] == slow
 
 
@@ -77,4 +77,4 @@ def test_a_magnetic_heading_is_not_what_was_told_of_the_platforms() -> None:
     rows = row_of(TagSettings(heading_std_rad=0.0)).reshape(1)
     rows["model"] = COMMON
     assert error_of(rows[0], 0.04)[1] == 0.2
-    assert second_class(make_work().hypotheses, 0, 1, rows[0], Tuning(), False) == 1
+    assert second_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == 1

@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.batch import ANCHOR, default_settings
 from dropanchor_service.estimation.fleet.configure import configured
 from dropanchor_service.estimation.fleet.kernel import advance
-from dropanchor_service.estimation.fleet.layout import BELIEF, ROW, make_pool, make_work
+from dropanchor_service.estimation.fleet.layout import BELIEF, ROW, make_pool, make_workspace
 from dropanchor_service.estimation.fleet.node import MEASURED_HEADING, NODE, RANGE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
@@ -74,7 +74,7 @@ ANCHORS = np.zeros(1, ANCHOR)
 def run(rows: Any, pool: Any, nodes: Any) -> Any:
     """BELIEF, one per node."""
     beliefs = np.zeros(len(nodes), BELIEF)
-    assert advance(rows, pool, nodes, ANCHORS, CALIBRATED.numbers(), make_work(), beliefs) == 0
+    assert advance(rows, pool, nodes, ANCHORS, CALIBRATED.numbers(), make_workspace(), beliefs) == 0
     return beliefs
 
 
