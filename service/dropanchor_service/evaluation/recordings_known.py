@@ -28,7 +28,7 @@ def tell(name: str, settings: Array) -> None:
     if family == "plaza":
         settings["range_scale"], settings["range_std"] = PLAZA_SCALE, PLAZA_STD
     elif family == "hanyang":  # its heading is the direction of travel, made from the truth
-        settings["heading_std"] = settings["slip_std"] = 0.0
+        settings["heading_std"] = settings["slip_std"] = settings["mount_angle"] = settings["mount_angle_std"] = 0.0
     elif family == "starloc":  # the rig is held out in front with both hands
         settings["lever_x"] = ARM_M
     elif family == "mower":  # the IMU is mounted along its wheels

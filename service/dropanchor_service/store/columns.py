@@ -33,8 +33,8 @@ _HINTS = {
     StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move away from it.",
     StateReason.UNCERTAIN: _MOVE_HINT,
     StateReason.FAULT: "The estimate had to start afresh; if this repeats, check what the tag sends.",
-    StateReason.HEADING_UNSURE: "Where it is about the anchor is as good as its compass: say where the tag starts, "
-    "or add a second anchor.",
+    StateReason.HEADING_UNSURE: "How far it is and what it has walked is known, but not where north is: say where the "
+    "tag starts, or add a second anchor.",
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
 

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from .compiled import njit
-from .layout import PHI, R, V
+from .layout import PHI, WATCHED, R, V
 from .manage import best_of
 from .node import RANGE
 from .start import is_referred
@@ -66,13 +66,15 @@ def place_again(row: Any, anchor: Any) -> None:
 
 @njit(nogil=True)
 def repeats(row: Any, node: Any, speed: float) -> bool:
-    """Whether a radio gives the same range again and again although the tag moves."""
-    row.same_s += node.dt_s
+    """Whether a radio gives the same range of one anchor again and again although the tag moves."""
     if node.kind != RANGE:
         return False
-    if node.z != row.last_z:
-        row.last_z, row.same_count, row.same_s = node.z, 0, 0.0
+    slot = node.anchor % WATCHED
+    if node.z != row.last_z[slot] or node.anchor != row.last_anchor[slot]:
+        row.last_anchor[slot], row.last_z[slot] = node.anchor, node.z
+        row.same_count[slot], row.same_ns[slot] = 0, node.t_ns
         return False
-    row.same_count += 1
+    row.same_count[slot] += 1
+    lasts = (node.t_ns - row.same_ns[slot]) * 1e-9 >= REPEATS_S
     moves = node.rest == 0 if math.isfinite(node.dv_var) else abs(speed) > MOVES
-    return row.same_count >= REPEATS and row.same_s >= REPEATS_S and moves
+    return row.same_count[slot] >= REPEATS and lasts and moves

@@ -13,6 +13,8 @@ from .layout import COMMON, MODELS, STEADY
 from .tuning import Tuning
 from .update import wrap
 
+COMES_AGAIN = 3.0
+
 
 @njit(nogil=True)
 def model_of(m: int, variance: float) -> tuple[float, float, float]:
@@ -35,9 +37,16 @@ def model_of(m: int, variance: float) -> tuple[float, float, float]:
 
 @njit(nogil=True)
 def error_of(row: Any, variance: float) -> tuple[float, float, float]:
-    """`model_of` the row's model; of a platform's heading, what was told of it goes before."""
+    """`model_of` the row's model; of a platform's heading, what was told of it goes before.
+
+    Where the start's heading is given, the magnetometer has three times the error it claims: that of soft iron and
+    place comes again with every lap, so it does not average out; gyroscope and ranges bound yaw better for minutes.
+    """
     if not told_of(row):
-        return model_of(row.model, variance)
+        white, slow, tau = model_of(row.model, variance)
+        if row.model == COMMON and row.start_known == 1 and math.isfinite(row.start_heading):
+            slow *= COMES_AGAIN
+        return white, slow, tau
     white, _, _ = model_of(STEADY if row.model == STEADY else 0, variance)
     return white, row.heading_std, 60.0
 

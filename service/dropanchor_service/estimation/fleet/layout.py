@@ -22,6 +22,7 @@ PACKED: Final = N * (N + 1) // 2
 WORK: Final = 320  # hypotheses of one row while it is being worked on
 KEEP: Final = 192  # hypotheses of one row between batches, at most
 RING_RANGES: Final = 15
+WATCHED: Final = 4  # anchors of a row whose last ranges are kept; those of equal remainder share a slot
 MODELS: Final = 4  # models of the heading error that are judged by their predictions
 COMMON: Final = 4  # and two that are given by where the heading comes from
 STEADY: Final = 5
@@ -105,9 +106,10 @@ ROW: Final = np.dtype(
         ("gap_speed", np.float64),
         ("again", np.uint8),  # 1: the start is where the tag was before such a gap
         ("lever_rate", np.float64),  # rad/s, mean of the last node
-        ("last_z", np.float64),  # the last range, and for how long it has been the same
-        ("same_count", np.int32),
-        ("same_s", np.float64),
+        ("last_anchor", np.int32, (WATCHED,)),  # of each slot: the last range, how often and since when it is the same
+        ("last_z", np.float64, (WATCHED,)),
+        ("same_count", np.int32, (WATCHED,)),
+        ("same_ns", np.int64, (WATCHED,)),
     ]
 )
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dropanchor_schemas import TagSettings
+from dropanchor_schemas import StartPose, TagSettings
 from dropanchor_service.engine import tag_columns
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.estimation.fleet.configure import (
@@ -14,7 +14,7 @@ from dropanchor_service.estimation.fleet.configure import (
     V_MAX,
     configured,
 )
-from dropanchor_service.estimation.fleet.heading import error_of
+from dropanchor_service.estimation.fleet.heading import COMES_AGAIN, error_of
 from dropanchor_service.estimation.fleet.layout import COMMON, STEADY, make_workspace
 from dropanchor_service.estimation.fleet.node import DERIVED_HEADING, NODE
 from dropanchor_service.estimation.fleet.start import choose_model, second_class
@@ -78,3 +78,12 @@ def test_a_magnetic_heading_is_not_what_was_told_of_the_platforms() -> None:
     rows["model"] = COMMON
     assert error_of(rows[0], 0.04)[1] == 0.2
     assert second_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == 1
+
+
+@pytest.mark.parametrize(("heading", "times"), [(0.5, COMES_AGAIN), (None, 1.0)])
+def test_a_magnetometer_counts_for_less_where_the_heading_at_the_start_was_told(
+    heading: float | None, times: float
+) -> None:
+    row = row_of(TagSettings(start=StartPose(x=1.0, y=0.0, heading_rad=heading))).reshape(1)
+    row["model"] = COMMON
+    assert error_of(row[0], 0.04)[1] == pytest.approx(0.2 * times)
