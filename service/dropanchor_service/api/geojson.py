@@ -17,6 +17,8 @@ _WEIGHT = re.compile(r"0(\.[0-9]{0,3})?|1(\.0{0,3})?")
 def wanted(request: Request, answers: Answers) -> bool:
     """Whether the client would rather have GeoJSON than JSON. Raises ProblemError when neither can be given."""
     accept = request.headers.get("accept", "*/*")
+    if accept in ("*/*", JSON):
+        return False
     as_json, as_geojson = quality(accept, JSON), quality(accept, MEDIA_TYPE)
     if as_json == as_geojson == 0:
         raise ProblemError(Kind.NOT_ACCEPTABLE, f"{JSON} and {MEDIA_TYPE} are offered.")

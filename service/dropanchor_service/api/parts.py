@@ -19,7 +19,7 @@ def json_response(answer: Any, media_type: str = "application/json", status: int
     return Response(to_json(answer), status, media_type=media_type, headers={"cache-control": "no-store"})
 
 
-def refuse_query(request: Request) -> None:
+async def refuse_query(request: Request) -> None:
     """For routes without query parameters: a misspelt one must not look as if it had worked."""
     if request.query_params:
         name = next(iter(request.query_params))
@@ -46,7 +46,7 @@ def id_of(escaped: str) -> str:
     return identifier
 
 
-def _tag_id(
+async def _tag_id(
     tag: Annotated[
         str, Path(description="The tag's id, percent-escaped.", examples=["tag-1"], json_schema_extra=ID_SCHEMA)
     ],
@@ -54,7 +54,7 @@ def _tag_id(
     return id_of(tag)
 
 
-def _anchor_id(
+async def _anchor_id(
     anchor: Annotated[
         str, Path(description="The anchor's id, percent-escaped.", examples=["17"], json_schema_extra=ID_SCHEMA)
     ],
