@@ -16,6 +16,7 @@ BACKLOG = 1000  # messages beyond which there is no waiting for more
 SILENT_S = 5.0  # without a turn the thread counts as stuck
 TURN_S = 0.1  # that a turn may take when more waits than it takes
 FEWEST, MOST = 100, 2000  # messages of such a turn
+TELLING = 50  # messages of a turn from which on its time tells what another one will take
 
 
 class IngestThread:
@@ -37,7 +38,7 @@ class IngestThread:
         self._between_turns = between_turns
         self._stop = threading.Event()
         self._turned_s = time.monotonic()
-        self._most = MOST
+        self._most = FEWEST
         self._thread = threading.Thread(target=self._run, name="ingest", daemon=True)
 
     def start(self) -> None:
@@ -71,7 +72,7 @@ class IngestThread:
         self._turned_s = time.monotonic()
         try:
             taken = self._ingest.turn(self._most)
-            if taken == self._most:
+            if taken >= TELLING:
                 self._adapt(taken / (time.monotonic() - self._turned_s))
             self._between_turns()
         except Exception as error:

@@ -37,7 +37,7 @@ def main(endpoint: str, first: int, tags: int, sessions: int, duration_s: float,
         def put(tag: int, payload: bytes) -> None:
             opened[tag % sessions].put(names[tag], payload, encoding=encoding, congestion_control=when_full)
 
-        registered = register_all(put, motions, register)
+        registered = register_all(put, motions, first, register)
         print("ready", flush=True)
         report = send(put, motions, first, tags, int(sys.stdin.readline()), round(duration_s / MESSAGE_S), registered)
         sys.stdin.readline()  # sessions stay open until everything has been counted
@@ -56,9 +56,10 @@ def wait_for_listener(session: zenoh.Session) -> None:
     publisher.undeclare()
 
 
-def register_all(put: Put, motions: list[list[bytes]], count: int) -> bool:
+def register_all(put: Put, motions: list[list[bytes]], first: int, count: int) -> bool:
     for tag in range(count):
-        put(tag, message(motions[tag % len(motions)][0], 0, tag + 1, time.time_ns() // 1000 * 1000))
+        motion = motions[(first + tag) % len(motions)]
+        put(tag, message(motion[0], 0, first + tag + 1, time.time_ns() // 1000 * 1000))
         if tag % (REGISTERED_PER_S // 100) == 0:
             time.sleep(0.01)
     return count > 0

@@ -18,6 +18,7 @@ class Counters:
 
     fused: float  # samples
     shed: float  # messages
+    shed_samples: float
     cpu_s: float
     resident_bytes: int
     delays: dict[float, float] = field(default_factory=dict)
@@ -30,6 +31,7 @@ def counters(service: Running) -> Counters:
     return Counters(
         sum(values[f'dropanchor_samples_total{{kind="{kind}"}}'] for kind in ("imu", "range")),
         values['dropanchor_rejected_total{reason="shed"}'],
+        values["dropanchor_shed_samples_total"],
         proc.cpu_s(service.process.pid),
         proc.resident_bytes(service.process.pid),
         delays,

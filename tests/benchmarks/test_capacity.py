@@ -8,7 +8,7 @@ from benchmarks import report
 from benchmarks.baselines import engine_cost, filterpy_cost
 from benchmarks.step import Figures, run_receiver, run_step
 
-STEPS = (250, 1000, 2000, 4000, 6000, 8000, 10_000, 12_000, 16_000)
+STEPS = (250, 1000, 2000, 3000, 4000, 6000, 8000, 10_000, 12_000, 16_000)
 BROKEN_MS = 250.0
 
 pytestmark = pytest.mark.benchmark
@@ -20,15 +20,19 @@ def breaks(figures: Figures) -> bool:
 
 def test_the_fleet_is_stepped_up_until_latency_or_loss_breaks(tmp_path: Path) -> None:
     lines, held = [report.HEAD], list[Figures]()
-    for tags in STEPS:
+
+    def holds(tags: int) -> bool:
         figures = run_step(tags, tmp_path)
         broken = breaks(figures)
         lines.append(report.row(figures, " (broken)" if broken else ""))
         print(lines[-1], flush=True)
-        if broken:
-            break
-        held.append(figures)
+        held.extend([] if broken else [figures])
+        return not broken
+
+    broken = next((tags for tags in STEPS if not holds(tags)), None)
     assert held, f"not even {STEPS[0]} tags are carried\n" + "\n".join(lines)
+    if broken is not None:
+        holds((held[-1].tags + broken) // 2)
     best = held[-1]
     half = run_step(best.tags // 2, tmp_path)
     lines += [report.row(half, " (half)"), report.row(run_step(best.tags // 2, tmp_path, embedded=True), " (embedded)")]
