@@ -15,6 +15,7 @@ from dropanchor_service.buffer import MESSAGE_OVERHEAD, MessageBuffer
 from dropanchor_service.publishers import Passed
 
 MOST_BYTES = 64 * 2**20  # of held messages; beyond it they go on as they are
+TRIES = 10  # of asking again
 
 PassedOf = Callable[[str], Mapping[int, Passed]]
 """What was fused before the restart of the tag with this key, by boot id."""
@@ -40,9 +41,10 @@ class CatchUp:
     """Between the session and the buffer. Its methods may be called from any thread; none of them waits.
 
     expected: keys of tags that the last process knew or an operator has listed. ask: called for each of them that is
-    heard after the first round, and where an answer was cut short, with the number of messages that are missing, 0
-    when it is not known; `answered` is to be called when all that was asked for is `fetched`. most_of_new: so many are
-    asked for of a publisher that the last process did not know.
+    heard after the first round, and again where an answer lacks something, with the number of messages that are
+    missing, 0 when it is not known, and how often it was asked for them before; `answered` is to be called when all
+    that was asked for is `fetched`. most_of_new: so many are asked for of a publisher that the last process did not
+    know.
     """
 
     def __init__(
@@ -50,7 +52,7 @@ class CatchUp:
         buffer: MessageBuffer,
         expected: Iterable[str],
         passed_of: PassedOf,
-        ask: Callable[[str, int], None],
+        ask: Callable[[str, int, int], None],
         most_of_new: int,
     ) -> None:
         self._lock = Lock()
@@ -62,16 +64,20 @@ class CatchUp:
         self._first_round = True  # all caches are being asked, all messages are held
         self._held: dict[str, list[_Held]] = {}
         self._fetched: Counter[str] = Counter()  # since the key was asked last
+        self._tries: Counter[str] = Counter()  # of asking again
         self._bytes = 0
 
     def hear(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """A live message."""
-        if self._first_round or key in self._expected:
+        if self._waits(key):
             held = _Held(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
             with self._lock:
-                if self._first_round or key in self._expected:
+                waits = self._waits(key)
+                if waits:
                     self._hold(held)
-                    return
+            if waits:
+                self._bound()
+                return
         self._buffer.append(key, payload, encoding, arrival_ns)
 
     def appear(self, key: str) -> None:
@@ -87,14 +93,15 @@ class CatchUp:
             if self._first_round or key in self._held:
                 self._fetched[key] += 1
                 self._hold(held)
+        self._bound()
 
     def answered(self, key: str, most: int) -> int:
         """The caches of this tag have told all, or their newest `most`. Returns how many messages go on."""
         with self._lock:
-            if self._is_short(key, most):
+            if self._lacks(key, most):
                 self._ask_again(key)
                 return 0
-            return self._release(key)
+        return self._release(key)
 
     def first_round_answered(self, most: int) -> int:
         """All caches that could be reached have told all, or their newest `most`. Tags that were heard without one are
@@ -102,55 +109,100 @@ class CatchUp:
         with self._lock:
             self._first_round = False
             unheard = {key for key in self._held if key in self._expected and not self._fetched[key]}
-            again = unheard | {key for key in self._held if self._is_short(key, most)}
+            again = unheard | {key for key in self._held if self._lacks(key, most)}
             for key in again:
                 self._ask_again(key)
-            return self._release(*(self._held.keys() - again))
+            complete = self._held.keys() - again
+        return self._release(*complete)
 
-    def _is_short(self, key: str, most: int) -> bool:
-        return self._fetched[key] >= most and self._missing(key) > most
+    def _waits(self, key: str) -> bool:
+        return self._first_round or key in self._expected or key in self._held
+
+    def _lacks(self, key: str, most: int) -> bool:
+        """Whether the answer is worth another question: it was cut short, nothing came although something is missing,
+        or there is a hole in it. A publisher that learns of our subscription while it publishes may send a message
+        neither to us nor to its cache in time."""
+        if self._tries[key] >= TRIES:
+            return False
+        distances = self._distances(key)
+        missing = self._missing(key)
+        cut_short, silent = self._fetched[key] >= most, not self._fetched[key]
+        return (missing > most and cut_short) or any(
+            max(numbers) - min(numbers) >= len(numbers) or (silent and known and min(numbers) > 0)
+            for known, numbers in distances
+        )
+
+    def _distances(self, key: str) -> list[tuple[bool, set[int]]]:
+        """For each publisher, whether the last process knew it, and the numbers that were not fused, counted from the
+        one that it expected, or from any."""
+        passed, found = self._passed_of(key), dict[int, set[int]]()
+        first: dict[int, Passed] = {}
+        for message in self._held.get(key, ()):
+            if message.number:
+                boot_id, sequence, _ = message.number
+                origin = passed.get(boot_id) or first.setdefault(boot_id, Passed(sequence, 0))
+                ahead = origin.ahead(sequence)
+                if ahead >= 0 or boot_id in first:
+                    found.setdefault(boot_id, set()).add(ahead)
+        return [(boot_id in passed, numbers) for boot_id, numbers in found.items()]
 
     def _missing(self, key: str) -> int:
         """How many messages one of its publishers has sent that were not fused, as far as their numbers tell."""
         passed = self._passed_of(key)
-        return max(
-            (self._missing_to(held.number, passed) for held in self._held.get(key, ()) if held.number), default=0
-        )
+        numbers = [held.number for held in self._held.get(key, ()) if held.number]
+        return max((self._missing_to(number, passed) for number in numbers), default=0)
 
     def _missing_to(self, number: _Number, passed: Mapping[int, Passed]) -> int:
         known = passed.get(number.boot_id)
-        return 1 + known.missing_to(number.sequence) if known else min(number.sequence + 1, self._most_of_new)
+        return max(0, known.ahead(number.sequence)) + 1 if known else min(number.sequence + 1, self._most_of_new)
 
     def _ask_again(self, key: str) -> None:
+        self._ask(key, self._missing(key), self._tries[key])
         self._fetched[key] = 0
-        self._ask(key, self._missing(key))
+        self._tries[key] += 1
 
     def _hold(self, message: _Held) -> None:
         self._open(message.key)
         self._held[message.key].append(message)
-        self._bytes += len(message.payload) + MESSAGE_OVERHEAD
+        self._bytes += _size(message)
+
+    def _bound(self) -> None:
         if self._bytes > MOST_BYTES:
-            self._release(*self._held)
+            self._release(*list(self._held))
 
     def _open(self, key: str) -> None:
         if key not in self._held:
             self._held[key] = []
             if not self._first_round:
-                self._ask(key, 0)
+                self._ask(key, 0, 0)
 
     def _release(self, *keys: str) -> int:
         """In the order in which they would have arrived: one message of a tag is fused at a time, but of many tags at
-        once."""
-        released, cached = list[_Held](), False
-        for key in keys:
-            self._expected.discard(key)
-            cached |= self._fetched.pop(key, 0) > 0
-            held = self._held.pop(key, [])
-            self._bytes -= sum(len(message.payload) + MESSAGE_OVERHEAD for message in held)
-            released += _in_order(held, self._passed_of(key))
-        for message in sorted(released, key=lambda message: message.arrival_ns):
+        once. Nobody who hears something waits for the sorting; what is heard meanwhile follows."""
+        with self._lock:
+            taken = {key: self._held[key] for key in keys if key in self._held}
+            cached = any(self._fetched[key] for key in taken)
+            self._held |= {key: [] for key in taken}
+        released = [message for key, held in taken.items() for message in _in_order(held, self._passed_of(key))]
+        released.sort(key=lambda message: message.arrival_ns)
+        for message in released:
             self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns, cached)
+        gone = {(message.key, message.number) for message in released if message.number}
+        with self._lock:
+            for key, held in taken.items():
+                self._expected.discard(key)
+                self._fetched.pop(key, None)
+                self._tries.pop(key, None)
+                meanwhile = self._held.pop(key, [])
+                self._bytes -= sum(map(_size, held)) + sum(map(_size, meanwhile))
+                for message in meanwhile:
+                    if (key, message.number) not in gone:
+                        self._buffer.append(key, message.payload, message.encoding, message.arrival_ns)
         return len(released)
+
+
+def _size(message: _Held) -> int:
+    return len(message.payload) + MESSAGE_OVERHEAD
 
 
 _Numbered = tuple[_Number, _Held]

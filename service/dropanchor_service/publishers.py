@@ -29,15 +29,14 @@ class Passed(NamedTuple):
     next: int
     seen: int
 
+    def ahead(self, sequence: int) -> int:
+        """How many numbers lie from the expected one to this one; negative when it is behind."""
+        return (sequence - self.next + 2**31) % 2**32 - 2**31
+
     def has(self, sequence: int) -> bool:
         """Whether this message was fused already, or is older than what is remembered."""
-        behind = (self.next - sequence) % 2**32
-        return 0 < behind < 2**31 and (behind > WINDOW or bool(self.seen >> sequence % WINDOW & 1))
-
-    def missing_to(self, sequence: int) -> int:
-        """How many numbers lie before this one and were not seen; 0 when it is not ahead."""
-        ahead = (sequence - self.next) % 2**32
-        return ahead if ahead < 2**31 else 0
+        behind = -self.ahead(sequence)
+        return behind > 0 and (behind > WINDOW or bool(self.seen >> sequence % WINDOW & 1))
 
 
 class Publishers:

@@ -7,9 +7,10 @@ loses thousands of samples.
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Self
 
@@ -23,6 +24,7 @@ from dropanchor_service.clock import UtcClock
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.publishers import Passed, Publishers
+from dropanchor_service.received import received
 from dropanchor_service.store import TagTable
 
 ANSWER_S = 2.0
@@ -30,6 +32,8 @@ FEWEST = 100  # messages that a cache is asked for
 PER_SECOND = 200  # and more, for every second that the tag was not heard: no publisher sends as many
 NINE_OF_TEN = 0.9  # tags have sent all that they are asked for in the first round; the others are asked again
 SPARE = 1.2
+PAUSE_S = 0.1  # before the same tag is asked again
+REPLIES = 2**16  # that may wait for us: a receive thread that waited for the interpreter would hold up what is live
 
 _log = logging.getLogger(__name__)
 
@@ -55,6 +59,7 @@ class ZenohCaches:
         self._publishers = publishers
         self._metrics = metrics
         self._clock = clock
+        self._later: deque[tuple[float, str, int]] = deque()  # to be asked again, and when
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         expected = [keys.samples_key(site, tag.name) for tag in tags.all()]
         self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # by the last process
@@ -62,7 +67,7 @@ class ZenohCaches:
             buffer,
             expected,
             self._passed,
-            lambda key, missing: self._tasks.put(partial(self._ask, key, missing)),
+            self._want,
             self._most(self._newest_ns),
         )
         self._thread = threading.Thread(target=self._run, name="caches", daemon=True)
@@ -82,39 +87,62 @@ class ZenohCaches:
         tag = self._tags.find(keys.tag_from_key(key))
         return {} if tag is None else self._publishers.passed(tag.row)
 
+    def _want(self, key: str, missing: int, tries: int) -> None:
+        if tries:
+            self._later.append((time.monotonic() + PAUSE_S, key, missing))
+        self._tasks.put(self._ask_later if tries else partial(self._ask, key, missing))
+
     def _run(self) -> None:
-        while (task := self._tasks.get()) is not None:
+        while True:
+            try:
+                task = self._tasks.get(timeout=PAUSE_S if self._later else None)
+            except Empty:
+                task = self._ask_later
+            if task is None:
+                return
             try:
                 task()
             except Exception as error:
                 self._metrics.faults.labels("caches").inc()
                 self._rare.exception("caches", error)
 
+    def _ask_later(self) -> None:
+        """Those whose time has come."""
+        while self._later and self._later[0][0] <= time.monotonic():
+            _, key, missing = self._later.popleft()
+            self._ask(key, missing)
+
     def _ask_all(self) -> None:
-        most = min(self._usual(), self._most(self._newest_ns))
-        self._get(keys.all_tags(self._site, "samples"), most, self.catch_up.first_round_answered)
+        most, asked_s = min(self._usual(), self._most(self._newest_ns)), time.monotonic()
+        try:
+            replies = self._asked(keys.all_tags(self._site, "samples"), most, zenoh.handlers.FifoChannel(REPLIES))
+            for reply in received(replies):
+                self._on_reply(reply)
+        finally:
+            self._finish(partial(self.catch_up.first_round_answered, most), asked_s)
 
     def _ask(self, key: str, missing: int) -> None:
         tag = self._tags.find(keys.tag_from_key(key))
         heard_ns = None if tag is None else tag.last_heard_ns
         most = FEWEST + missing if missing else self._most(heard_ns or 0)
-        self._get(key, most, partial(self.catch_up.answered, key))
-
-    def _get(self, samples: str, most: int, answered: Callable[[int], int]) -> None:
-        """Ask for the newest `most`; `answered` is run in our thread."""
-        done = partial(self._tasks.put, partial(self._finish, partial(answered, most), time.monotonic()))
+        answered = partial(self.catch_up.answered, key, most)
+        done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
         try:
-            self._session.get(
-                f"{samples}/@adv/**?_max={most}",
-                zenoh.handlers.Callback(self._on_reply, done),
-                target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE,
-                accept_replies=zenoh.ReplyKeyExpr.ANY,
-                timeout=ANSWER_S,
-            )
+            self._asked(key, most, zenoh.handlers.Callback(self._on_reply, done))
         except zenoh.ZError:
-            answered(most)
+            answered()
             raise
+
+    def _asked(self, samples: str, most: int, handler: Any) -> Any:
+        """Ask for the newest `most`."""
+        return self._session.get(
+            f"{samples}/@adv/**?_max={most}",
+            handler,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            accept_replies=zenoh.ReplyKeyExpr.ANY,
+            timeout=ANSWER_S,
+        )
 
     def _usual(self) -> int:
         """How many messages most tags have sent since the last process heard them, if they went on as before."""

@@ -1,6 +1,11 @@
-"""What comes in over Zenoh: samples and liveliness. Callbacks put things down and return; they never call Zenoh."""
+"""What comes in over Zenoh: samples and liveliness. Callbacks put things down and return; they never call Zenoh.
+
+Samples have no callback: a receive thread that had to win the interpreter for each of them would wait up to 5 ms each
+time another thread computes, and what is live would pile up in the router and be dropped there.
+"""
 
 import logging
+import threading
 from types import TracebackType
 from typing import Any, Self
 
@@ -14,8 +19,11 @@ from dropanchor_service.ingest import Ingest
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.publishers import Publishers
+from dropanchor_service.received import received
 from dropanchor_service.store import TagTable
 from dropanchor_service.zenoh_caches import ZenohCaches
+
+WAITING = 2**14  # messages between the receive thread and ours
 
 
 class ZenohIntake:
@@ -48,7 +56,7 @@ class ZenohIntake:
         samples = zenoh.ext.declare_advanced_subscriber(
             self._session,
             keys.all_tags(self._site, "samples"),
-            zenoh.handlers.Callback(self._on_samples, indirect=False),
+            zenoh.handlers.FifoChannel(WAITING),
             recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
         )
         misses = samples.sample_miss_listener(zenoh.handlers.Callback(self._on_miss, indirect=False))
@@ -58,6 +66,8 @@ class ZenohIntake:
             history=True,
         )
         self._declared = [misses, samples, tokens]
+        self._thread = threading.Thread(target=self._take_all, args=(samples.handler,), name="samples", daemon=True)
+        self._thread.start()
         self._caches.__enter__()
         return self
 
@@ -67,8 +77,14 @@ class ZenohIntake:
         self._caches.__exit__(kind, error, traceback)
         for declared in self._declared:
             declared.undeclare()
+        self._thread.join(1.0)
 
-    def _on_samples(self, message: zenoh.Sample) -> None:
+    def _take_all(self, samples: Any) -> None:
+        """Until the subscriber is undeclared."""
+        for message in received(samples):
+            self._hear(message)
+
+    def _hear(self, message: zenoh.Sample) -> None:
         now_ns = self._clock.now_ns()
         self._caches.catch_up.hear(str(message.key_expr), bytes(message.payload), str(message.encoding), now_ns)
 
