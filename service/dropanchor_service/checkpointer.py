@@ -55,6 +55,8 @@ class Checkpointer:
         """Writes the last checkpoint. The ingest thread has stopped."""
         self._stop.set()
         self._thread.join(_TURN_S)
+        if self._thread.is_alive():
+            self._state.keep_buffers_apart()
         self._snapshot = None
         self._wanted.set()
         self.between_turns()
@@ -81,19 +83,27 @@ class Checkpointer:
         if not self._wanted.is_set():
             return
         self._wanted.clear()
+        try:
+            self._take()
+        finally:
+            self._taken.set()
+
+    def _take(self) -> None:
         messages, now_s = self._state.messages, time.monotonic()
         if messages == self._messages:
             self._current_s = now_s
         else:
             self._snapshot, self._of = self._state.snapshot(), (messages, now_s)
-        self._taken.set()
 
     def _run(self) -> None:
         while not self._stop.wait(max(self._period_s, REST * self._took_s)):
             self._taken.clear()
             self._wanted.set()
-            if self._taken.wait(_TURN_S):
-                self._write()
+            # Not asked for again before it was taken: a snapshot must not be overwritten while it is written.
+            while not self._taken.wait(_TURN_S):
+                if self._stop.is_set():
+                    return
+            self._write()
 
     def _write(self) -> None:
         snapshot, self._snapshot = self._snapshot, None

@@ -61,10 +61,10 @@ class Estimators:
         return isinstance(self._engine, Restorable)
 
     def state(self) -> dict[str, Array]:
-        """Copies of the engine's state and of what it was made with. Empty where the engine keeps none."""
+        """The engine's state and what it was made with, to be copied. Empty where the engine keeps none."""
         if not isinstance(self._engine, Restorable):
             return {}
-        settings = self._settings[: len(self._tags)].copy()
+        settings = self._settings[: len(self._tags)]
         return {"anchors": self._anchors, "settings": settings} | self._engine.state()
 
     def restore(self, state: dict[str, Array]) -> None:

@@ -41,7 +41,7 @@ from dropanchor_service.zenoh_intake import ZenohIntake
 from dropanchor_service.zenoh_link import ZenohLink
 from dropanchor_service.zenoh_poses import ZenohPoses
 
-HTTP_STOP_S = 2.5
+HTTP_STOP_S = 1.5
 
 _log = logging.getLogger(__name__)
 

@@ -1,5 +1,7 @@
 """All that a restarted service must know to go on as if it had not been away: what a checkpoint holds."""
 
+import numpy as np
+
 from dropanchor_schemas.site import Anchor
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.estimators import Estimators
@@ -7,6 +9,7 @@ from dropanchor_service.kernel_cache import sources_digest
 from dropanchor_service.publishers import Publishers
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.checkpoints import Snapshot, layout_of
+from dropanchor_service.store.records import put
 
 
 class WholeState:
@@ -20,6 +23,7 @@ class WholeState:
         self._latest = latest
         self._estimators = estimators
         self._publishers = publishers
+        self._buffers: dict[str, Array] = {}
         self.template = self.snapshot()
         self.layout = layout_of(self.template, meaning=sources_digest())
 
@@ -29,13 +33,26 @@ class WholeState:
         return int(self._tags.copy_counts()["messages"].sum())
 
     def snapshot(self) -> Snapshot:
-        """Copies: what comes in later does not change them."""
-        arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns.copy()}
+        """Copies: what comes in later does not change them. The next snapshot does, for it uses the same memory: pages
+        that are fresh from the operating system cost ten times as much as copying into them."""
+        arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns}
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
         arrays |= {f"engine.{name}": array for name, array in self._estimators.state().items()}
         anchors = [anchor.model_dump() for anchor in self._site.anchors_by_index()]
         document = {"site": self._site.site.id, "anchors": anchors, "tags": [tag.name for tag in self._tags.all()]}
-        return Snapshot(arrays, document)
+        return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, document)
+
+    def keep_buffers_apart(self) -> None:
+        """The next snapshot leaves the last one as it is."""
+        self._buffers = {}
+
+    def _copied(self, name: str, array: Array) -> Array:
+        buffer = self._buffers.get(name)
+        if buffer is None or len(buffer) < len(array):
+            spare = len(array) // 8 if buffer is not None else 0
+            buffer = self._buffers[name] = np.empty((len(array) + spare, *array.shape[1:]), array.dtype)
+        put(buffer, slice(len(array)), array)
+        return buffer[: len(array)]
 
     def restore(self, snapshot: Snapshot) -> None:
         """Take over a snapshot of this layout, before anything has come in."""

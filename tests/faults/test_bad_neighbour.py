@@ -2,10 +2,13 @@
 
 import math
 import random
+import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import pytest
 
 from dropanchor_schemas.wire import Frame, ImuSample, RangeSample, encode_packed
 from dropanchor_service.estimation.batch import Engine, PoseBatch, SampleBatch
@@ -15,6 +18,7 @@ from support.traffic import T0_NS, Message, traffic
 
 TAGS = 3
 SECONDS = 60.0
+MANY, SETTLED = 50, 100  # tags and turns of the benchmark
 HOUR_NS = 3_600_000_000_000
 EXTREMES = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-45, -1.0, 0.0)
 
@@ -56,6 +60,39 @@ def test_a_row_that_makes_the_engine_fail_changes_no_bit_of_its_neighbours() -> 
     assert poses_of_good_tags(failing) == poses_of_good_tags(clean)
     assert bench.total(bench.metrics.faults) >= 3
     assert bench.rejected()["estimator_fault"] > 0
+
+
+@pytest.mark.benchmark
+def test_a_bad_neighbour_costs_the_others_no_latency() -> None:
+    """A good message waits for its turn to end: processor time of the turns with and without the bad tag, one after the
+    other."""
+    good = traffic(MANY, SECONDS, seed=7, step_s=0.1)
+    bad = sorted([*good, *garbage()], key=lambda message: message.due_ns)
+    took = {"without": list[float](), "with": list[float]()}
+    runs = zip(turns(good, MANY), turns(bad, MANY), strict=True)
+    for clean, harmed in runs:
+        took["without"].append(clean)
+        took["with"].append(harmed)
+    for percentile in (50, 99):
+        without, harmed = (float(np.percentile(times[SETTLED:], percentile)) for times in took.values())
+        print(f"p{percentile} of {MANY} tags: {1e3 * without:.2f} ms, {harmed / without:.3f} times as much with a bad one")
+    assert harmed < 1.1 * without
+
+
+def turns(messages: list[Message], tags: int) -> Iterator[float]:
+    """s of processor time of each turn with all messages of a tenth of a second."""
+    bench = Bench(engine=FleetEngine())
+    for index in range(tags):
+        bench.ingest.announce(f"sim-{index + 1}")
+    together: dict[int, list[Message]] = defaultdict(list)
+    for message in messages:
+        together[(message.due_ns - T0_NS) // 100_000_000].append(message)
+    for index in range(round(SECONDS / 0.1)):
+        for message in together[index]:
+            bench.put(message.tag, message.payload, at_ns=message.due_ns)
+        began_s = time.thread_time()
+        bench.ingest.turn()
+        yield time.thread_time() - began_s
 
 
 def feed(engine: Engine, messages: list[Message]) -> Bench:

@@ -13,7 +13,7 @@ from starlette.types import ASGIApp
 
 from dropanchor_service.api.limits import GuardedProtocol
 
-GRACE_S = 2
+GRACE_S = 1  # for requests under way; clients that are stuck take all of it
 _SEND_BUFFER_BYTES = 262_144  # what a client that stops reading can hold back in the kernel
 _MAX_HEADER_BYTES = 16_384
 

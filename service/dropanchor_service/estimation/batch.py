@@ -196,7 +196,8 @@ class Restorable(Protocol):
     """An engine whose state can be kept: restored, it gives the same poses to the last bit."""
 
     def state(self) -> dict[str, Array]:
-        """Copies of all that samples have changed. Names and dtypes are the same for every state of one version."""
+        """All that samples have changed, to be copied before the next call. Names and dtypes are the same for every
+        state of one version."""
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over what `state` gave, in an engine that has processed nothing."""

@@ -92,9 +92,9 @@ class FleetEngine:
         return beliefs
 
     def state(self) -> dict[str, Array]:
-        """Copies of the rows, the pool, and the samples that wait."""
-        kept = {name: getattr(self, f"_{name}")[: self._configured].copy() for name in _BY_ROW}
-        return kept | {"pool": self._pool.copy()} | self._order.state()
+        """The rows, the pool, and the samples that wait; no copies."""
+        kept = {name: getattr(self, f"_{name}")[: self._configured] for name in _BY_ROW}
+        return kept | {"pool": self._pool} | self._order.state()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over a state. The settings are part of the rows; the anchors are not."""

@@ -240,6 +240,6 @@ def test_what_waits_is_part_of_the_state() -> None:
     fleet.process(ahead)
     assert len(fleet.state()["waiting"]) > 0
     restored.set_anchors(np.zeros(1, ANCHOR))
-    restored.restore(fleet.state())
+    restored.restore({name: array.copy() for name, array in fleet.state().items()})
     rest = SampleBatch(batch.imu[1000:], batch.ranges[110:], batch.headings[110:])
     assert restored.process(rest).poses.tobytes() == fleet.process(rest).poses.tobytes()
