@@ -181,7 +181,7 @@ class CatchUp:
         once. Nobody who hears something waits for the sorting; what is heard meanwhile follows."""
         with self._lock:
             taken = {key: self._held[key] for key in keys if key in self._held}
-            cached = any(self._fetched[key] for key in taken)
+            cached = any(self._fetched[key] or self._tries[key] for key in taken)
             self._held |= {key: [] for key in taken}
         released = [message for key, held in taken.items() for message in _in_order(held, self._passed_of(key))]
         released.sort(key=lambda message: message.arrival_ns)

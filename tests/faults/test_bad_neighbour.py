@@ -1,5 +1,6 @@
 """One tag's fault stays its own: whatever one tag sends, and whatever its row does, others' poses are the same bits."""
 
+import logging
 import math
 import random
 import time
@@ -19,6 +20,8 @@ from support.traffic import T0_NS, Message, traffic
 TAGS = 3
 SECONDS = 60.0
 MANY, SETTLED = 50, 100  # tags and turns of the benchmark
+_log = logging.getLogger(__name__)
+
 HOUR_NS = 3_600_000_000_000
 EXTREMES = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-45, -1.0, 0.0)
 
@@ -75,7 +78,9 @@ def test_a_bad_neighbour_costs_the_others_no_latency() -> None:
         took["with"].append(harmed)
     for percentile in (50, 99):
         without, harmed = (float(np.percentile(times[SETTLED:], percentile)) for times in took.values())
-        print(f"p{percentile} of {MANY} tags: {1e3 * without:.2f} ms, {harmed / without:.3f} times as much with a bad one")
+        _log.info(
+            "p%d of %d tags: %.2f ms, with a bad one %.3f times that", percentile, MANY, 1e3 * without, harmed / without
+        )
     assert harmed < 1.1 * without
 
 
