@@ -40,7 +40,8 @@ class Known:
 
     start: whether the true start is given (with the heading where it is raw samples that must find it). heading_std:
     of the scalar heading, rad. calibrated: the operator says what is true of a simulated tag, that its ranges have no
-    bias and that it travels exactly as its mounting angle says.
+    bias and that it travels exactly as its mounting angle says; with exact_heading also that the scalar heading has no
+    error but its white noise, as the bound assumes.
     """
 
     feed: Feed = "level"
@@ -48,6 +49,7 @@ class Known:
     heading_std: float = np.nan
     reverse: bool = False
     calibrated: bool = False
+    exact_heading: bool = True
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,8 @@ def _settings(simulation: Simulation, known: Known) -> Array:
     settings["heading_source"] = HeadingSource.IMU if known.feed == "raw" else HeadingSource.PLATFORM
     if known.calibrated:
         settings["range_bias_std"] = settings["mount_angle_std"] = settings["slip_std"] = 0.0
+        if known.exact_heading:
+            settings["heading_std"] = 0.0
     settings["range_std"] = simulation.ranges.std_m[0]
     if known.start:
         settings["start_known"], settings["start_std"] = True, START_STD

@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from .compiled import njit
-from .layout import COMMON, MODELS, STEADY
+from .layout import COMMON, DRIFTING, MODELS, OWN_ERROR, STEADY
 from .tuning import Tuning
 from .update import wrap
 
@@ -49,6 +49,17 @@ def error_of(row: Any, variance: float) -> tuple[float, float, float]:
         return white, slow, tau
     white, _, _ = model_of(STEADY if row.model == STEADY else 0, variance)
     return white, row.heading_std, 60.0
+
+
+@njit(nogil=True)
+def error_of_class(row: Any, kind: int, variance: float, t: Tuning) -> tuple[float, float, float]:
+    """`error_of` for one class of hypotheses."""
+    if kind == DRIFTING:
+        return model_of(0, variance)
+    white, slow, tau = error_of(row, variance)
+    if kind == OWN_ERROR and row.model != STEADY:
+        return white, math.sqrt(slow * slow + t.second_std**2), max(t.second_tau, tau)
+    return white, slow, tau
 
 
 @njit(nogil=True)

@@ -7,15 +7,16 @@ from . import layout
 from .blocked import expect_clear, open_alternative, recover, unblock
 from .compiled import njit
 from .gap import begins_again, place_again, repeats, watch_gap
-from .heading import error_of, judge_models, model_of, predict_models, reset_models, told_of
-from .layout import COMMON, PHI, STEADY, YAW, R, V
+from .heading import error_of_class, judge_models, model_of, predict_models, reset_models, told_of
+from .layout import COMMON, CRAB, DRIFTING, PHI, STEADY, YAW, R, V
 from .manage import best_of, finite, limit, merge, normalise, prune, split
 from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, RANGE
 from .pool import load, mirror, release, store
-from .predict import diffuse, fill_decay, fill_reference, move, transport
+from .predict import diffuse, fill_class, fill_decay, move, transport
 from .publish import publish
 from .start import (
     begin,
+    blame_gyro,
     counts_from,
     give_reference_error,
     is_referred,
@@ -38,16 +39,14 @@ def _predict_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
     if _is_instant(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
-    _, slow, tau = error_of(row, node.heading_var)
     fill_decay(decay, growth, node, row, t)
-    for kind in range(2):
-        std, seconds = slow, tau
-        if kind == 1 and row.model != STEADY:
-            std = math.sqrt(slow * slow + t.second_std**2)
-            seconds = max(t.second_tau, tau)
-        fill_reference(decay, growth, node, row, std, seconds)
+    for kind in range(3):
+        filled = False
         for h in range(count):
             if work[h].kind == kind:
+                if not filled:
+                    fill_class(decay, growth, node, row, kind, t)
+                    filled = True
                 move(work[h].mean, node, decay, F)
                 transport(work[h].cov, F, decay, FP)
                 diffuse(work[h].mean, work[h].cov, F, growth, node, t, work[h].blocked)
@@ -71,6 +70,8 @@ def _range_all(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuni
         variance = std * std + (dz * row.height_std / max(z, 0.1)) ** 2
         if node.anchor != row.anchor:
             variance += row.offset_std**2
+        if math.isfinite(node.dv_var):
+            variance += t.bilinear * P[V, V] * P[CRAB, CRAB] * row.crab_tau**2
         update_range(work[h], scratch, e, variance, t)
         work[h].log_weight += t.temper * out[0]
         if s[R] < 0.0:
@@ -98,20 +99,27 @@ def _judge_fit(row: Any, y: float, S: float, p_outlier: float) -> None:
 
 
 @njit(nogil=True)
-def _judge_reference(work: Any, count: int, row: Any, node: Any, t: Tuning) -> None:
-    """Let the readings say how their error behaves; a new model gives every hypothesis its slow error."""
+def _judge_reference(work: Any, count: int, row: Any, node: Any, t: Tuning) -> int:
+    """Let the readings say how their error behaves; a new model gives every hypothesis its slow error.
+
+    Returns the count of hypotheses.
+    """
     if row.hm_started == 0:
         reset_models(row, node.heading, node.heading_var, t)
-        return
+        return count
     predict_models(row, node, node.heading_var, t)
     chosen = judge_models(row, node, t)
-    if chosen != row.model:
-        _, before, _ = model_of(row.model, node.heading_var)
-        _, after, _ = model_of(chosen, node.heading_var)
-        row.model = chosen
-        if after > before:
-            for h in range(count):
+    if chosen == row.model:
+        return count
+    _, before, _ = model_of(row.model, node.heading_var)
+    _, after, _ = model_of(chosen, node.heading_var)
+    row.model = chosen
+    count = blame_gyro(work, count, chosen, after, t)
+    if after > before:
+        for h in range(count):
+            if work[h].kind != DRIFTING:
                 give_reference_error(work[h].cov, math.sqrt(after * after - before * before), False)
+    return count
 
 
 @njit(nogil=True)
@@ -141,16 +149,18 @@ def _refer(work: Any, count: int, row: Any, node: Any) -> bool:
 
 
 @njit(nogil=True)
-def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> None:
+def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch: Any) -> int:
+    """Returns the count of hypotheses."""
     if node.heading_kind == MEASURED_HEADING:
         if not told_of(row):
-            _judge_reference(work, count, row, node, t)
+            count = _judge_reference(work, count, row, node, t)
     elif node.heading_kind == ABSOLUTE_HEADING and row.model != COMMON and not _refer(work, count, row, node):
-        return
-    white, _, _ = error_of(row, node.heading_var)
+        return count
     for h in range(count):
         if row.model != STEADY or work[h].kind == 0:
+            white, _, _ = error_of_class(row, work[h].kind, node.heading_var, t)
             update_heading(work[h], scratch, node.heading - row.north, white)
+    return count
 
 
 @njit(nogil=True)
@@ -178,7 +188,7 @@ def _step(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, s
     H, PH, out = scratch.H, scratch.PH, scratch.out
     _predict_all(work, count, row, node, t, scratch)
     if is_referred(node.heading_kind):
-        _heading_all(work, count, row, node, t, scratch)
+        count = _heading_all(work, count, row, node, t, scratch)
     for h in range(count):
         if node.rest > 0:
             work[h].log_weight += update_rest(work[h].mean, work[h].cov, PH, node, t)

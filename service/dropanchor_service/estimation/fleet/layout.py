@@ -26,6 +26,11 @@ WATCHED: Final = 4  # anchors of a row whose last ranges are kept; those of equa
 MODELS: Final = 4  # models of the heading error that are judged by their predictions
 COMMON: Final = 4  # and two that are given by where the heading comes from
 STEADY: Final = 5
+WANDERING: Final = 2  # of the judged ones: heading and gyroscope drift apart, slowly
+
+EXACT: Final = 0  # classes of hypotheses: the heading's error is as the model says
+OWN_ERROR: Final = 1  # the heading reference has a slow error of its own, or drifts
+DRIFTING: Final = 2  # it is the gyroscope that drifts, the heading does not
 
 INITIALISING: Final = 0
 AMBIGUOUS: Final = 1
@@ -116,7 +121,7 @@ ROW: Final = np.dtype(
 SLOT: Final = np.dtype(
     [
         ("next", np.int32),
-        ("kind", np.int32),  # 0: heading reference exact, 1: it has an error of its own
+        ("kind", np.int32),  # EXACT, OWN_ERROR or DRIFTING
         ("blocked", np.int32),  # 1: the range is now longer than the line of sight
         ("free", np.int32),  # in slot 0: how many slots are free
         ("log_weight", np.float64),
@@ -183,6 +188,7 @@ SCRATCH: Final = np.dtype(
         ("mean", np.float64, (5,)),
         ("cov", np.float64, (3, 3)),
         ("part", np.float64, (3, 3)),
+        ("share", np.float64, (3,)),
         ("point", np.float64, (3,)),
     ]
 )

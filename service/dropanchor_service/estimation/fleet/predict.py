@@ -11,8 +11,9 @@ import math
 from typing import Any
 
 from .compiled import njit
-from .layout import ACC, COMMON, CRAB, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
-from .node import ABSOLUTE_HEADING, RELATIVE_HEADING
+from .heading import error_of_class
+from .layout import ACC, COMMON, CRAB, DRIFTING, GYRO, MOUNT, OFFSET, PHI, REF, YAW, N, R, V
+from .node import ABSOLUTE_HEADING, MEASURED_HEADING, NO_HEADING
 from .tuning import Tuning
 
 
@@ -116,7 +117,7 @@ def transport(P: Any, F: Any, decay: Any, A: Any) -> None:
 
 @njit(nogil=True)
 def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning) -> None:
-    """Per-state decay over the node and the variance it adds; r's and phi's by `diffuse`, the reference's below."""
+    """Per-state decay over the node and the variance it adds; r's and phi's by `diffuse`, the classes' own below."""
     dt = node.dt_s
     decay[:] = 1.0
     growth[:] = 0.0
@@ -131,18 +132,19 @@ def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning) -> None:
         growth[V] = t.q_speed_blind * dt
     growth[MOUNT] = t.q_mount * dt if row.mount_std > 0.0 else 0.0
     growth[CRAB] = row.crab_std**2 * (1.0 - decay[CRAB] ** 2)
-    own = node.heading_kind == ABSOLUTE_HEADING or node.heading_kind == RELATIVE_HEADING
-    growth[GYRO] = (t.q_gyro_own if own else t.q_gyro) * dt
     growth[ACC] = (t.acc_std**2 + t.acc_rough * rough) * (1.0 - decay[ACC] ** 2)
     growth[OFFSET] = t.q_offset * dt if row.offset_std > 0.0 else 0.0
 
 
 @njit(nogil=True)
-def fill_reference(decay: Any, growth: Any, node: Any, row: Any, std: float, tau: float) -> None:
-    """The same of the error of the heading reference."""
+def fill_class(decay: Any, growth: Any, node: Any, row: Any, kind: int, t: Tuning) -> None:
+    """The same of what a class of hypotheses has of its own: the drifts of the gyroscope and of the reference."""
+    beside = node.heading_kind == MEASURED_HEADING or node.heading_kind == NO_HEADING
+    growth[GYRO] = (t.q_gyro_own if not beside else t.q_gyro_drift if kind == DRIFTING else t.q_gyro) * node.dt_s
     if row.model == COMMON and node.heading_kind != ABSOLUTE_HEADING:
         decay[REF], growth[REF] = 1.0, 0.0
         return
+    _, std, tau = error_of_class(row, kind, node.heading_var if math.isfinite(node.heading_var) else 1.0, t)
     decay[REF] = math.exp(-node.dt_s / tau)
     growth[REF] = std**2 * (1.0 - decay[REF] ** 2)
 

@@ -6,7 +6,7 @@ from typing import Any
 from . import layout
 from .compiled import njit
 from .node import RANGE
-from .summary import add_reference, best_mode, forget_information, sigma_obs, spread_over_all
+from .summary import add_reference, best_mode, forget_information, sigma_obs, spread_over_all, spread_over_classes
 from .tuning import Tuning
 
 UNRANGED = 3.0  # s without a range after which a place has to be resolved anew
@@ -36,6 +36,9 @@ def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning,
     _judge(row, relative, _sigma(cov), math.sqrt(r2), work[head].blocked == 1)
     if row.declared == 0 or p_mode < 0.9:
         spread_over_all(work, count, scratch)
+        _refer(row, mean, cov)
+    else:
+        spread_over_classes(work, count, head, scratch, t.refuted)
         _refer(row, mean, cov)
     for i in range(3):
         for j in range(3):

@@ -8,7 +8,7 @@ from dropanchor_service.estimation.batch import Array, State, StateReason
 
 from .heading import error_of
 from .lag import describe_all, smooth_lagged
-from .layout import COMMON, PHI, REF, STEADY, YAW, V
+from .layout import COMMON, DRIFTING, OWN_ERROR, PHI, REF, STEADY, YAW, V
 from .lineage import trace_back
 from .node import ABSOLUTE_HEADING, RANGE
 from .outputs import poses_of
@@ -73,11 +73,13 @@ def _all(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning) -> 
 
 def _reference_variance(nodes: Array, traces: Array, now: Array, kind: int, t: Tuning) -> float:
     """Variance of the error of the heading reference that the model at the end has, in rad^2."""
+    if kind == DRIFTING:
+        return 0.0
     absolute = nodes["heading_var"][nodes["heading_kind"] == ABSOLUTE_HEADING]
     model = int(now["model"])
     claimed = float(absolute[0]) if model == COMMON and len(absolute) else 0.0
     slow = error_of(now, claimed)[1] if model != STEADY else float(traces["cov"][0, 0, REF, REF]) ** 0.5
-    return slow**2 + (t.second_std**2 if kind == 1 and model != STEADY else 0.0)
+    return slow**2 + (t.second_std**2 if kind == OWN_ERROR and model != STEADY else 0.0)
 
 
 def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_variance: float) -> None:

@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .compiled import njit
-from .heading import error_of
+from .heading import error_of_class
 from .layout import GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
 from .node import BEARING, RANGE
-from .predict import diffuse, fill_decay, fill_reference, move, transport
+from .predict import diffuse, fill_class, fill_decay, move, transport
 from .start import counts_from
 from .tuning import Tuning
 from .update import correct, gaussian, predict_range, project, rest_variance, wrap
@@ -80,12 +80,8 @@ def make_track(n: int) -> Track:
 @njit(nogil=True)
 def noise_of(node: Any, row: Any, kind: int, t: Tuning, decay: Any, growth: Any) -> None:
     """Decay of the states over the node and the variances it adds, as in the filter."""
-    _, std, seconds = error_of(row, node.heading_var if math.isfinite(node.heading_var) else 1.0)
-    if kind == 1 and row.model != STEADY:
-        std = math.sqrt(std * std + t.second_std**2)
-        seconds = max(t.second_tau, seconds)
     fill_decay(decay, growth, node, row, t)
-    fill_reference(decay, growth, node, row, std, seconds)
+    fill_class(decay, growth, node, row, kind, t)
 
 
 @njit(nogil=True)
@@ -134,7 +130,7 @@ def _inertial(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, H
     """Heading, standstill, and the bounds on the speed."""
     s = track.reference[k]
     if counts_from(row, node) and (row.model != STEADY or kind == 0):
-        white, _, _ = error_of(row, node.heading_var)
+        white, _, _ = error_of_class(row, kind, node.heading_var, t)
         H[:] = 0.0
         H[YAW] = H[REF] = 1.0
         _measure(track, k, H, wrap(node.heading - row.north - s[YAW] - s[REF]), white)

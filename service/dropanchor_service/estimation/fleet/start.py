@@ -7,7 +7,27 @@ import numpy as np
 
 from .compiled import njit
 from .heading import error_of, reset_models, told_of
-from .layout import ACC, COMMON, CRAB, GYRO, KEEP, MOUNT, OFFSET, PHI, REF, RING_RANGES, STEADY, YAW, N, R, V
+from .layout import (
+    ACC,
+    COMMON,
+    CRAB,
+    DRIFTING,
+    EXACT,
+    GYRO,
+    KEEP,
+    MOUNT,
+    OFFSET,
+    OWN_ERROR,
+    PHI,
+    REF,
+    RING_RANGES,
+    STEADY,
+    WANDERING,
+    YAW,
+    N,
+    R,
+    V,
+)
 from .manage import best_of, copy_hypothesis
 from .node import ABSOLUTE_HEADING, DERIVED_HEADING, MEASURED_HEADING, NO_HEADING, RANGE, RELATIVE_HEADING
 from .tuning import Tuning
@@ -29,7 +49,7 @@ def _common(work: Any, h: int, row: Any, node: Any, yaw: float, yaw_variance: fl
     P[ACC, ACC] = t.acc_std**2
     P[OFFSET, OFFSET] = row.offset_std**2
     work[h].log_weight = 0.0
-    work[h].kind = 0
+    work[h].kind = EXACT
     work[h].blocked = 0
 
 
@@ -150,7 +170,7 @@ def second_class(work: Any, source: int, target: int, row: Any, t: Tuning, yaw_f
     if told_of(row):
         return 0
     copy_hypothesis(work, source, target)
-    work[target].kind = 1
+    work[target].kind = OWN_ERROR
     if row.model == STEADY:
         work[target].log_weight += t.drift_log_prior
         work[target].cov[GYRO, GYRO] = t.drift_std**2
@@ -161,6 +181,28 @@ def second_class(work: Any, source: int, target: int, row: Any, t: Tuning, yaw_f
 
 
 @njit(nogil=True)
+def blame_gyro(work: Any, count: int, model: int, slow: float, t: Tuning) -> int:
+    """Heading and gyroscope drift apart: copies for which it is the gyroscope, as likely as not; the ranges decide.
+
+    Where the heading's error is not white after all, those hypotheses take that error. Returns the count.
+    """
+    old = count
+    blamed = False
+    for h in range(old):
+        blamed |= work[h].kind == DRIFTING
+    for h in range(old):
+        if model == WANDERING and not blamed and work[h].kind == EXACT and count < KEEP:
+            copy_hypothesis(work, h, count)
+            work[count].kind = DRIFTING
+            work[count].log_weight += t.drift_again
+            count += 1
+        elif model != WANDERING and slow > 0.0 and work[h].kind == DRIFTING:
+            work[h].kind = EXACT
+            give_reference_error(work[h].cov, slow, False)
+    return count
+
+
+@njit(nogil=True)
 def first_class(work: Any, source: int, target: int, PH: Any, t: Tuning) -> int:
     """A copy of `source`, of the second class, with an exact heading reference after all; returns 1.
 
@@ -168,7 +210,7 @@ def first_class(work: Any, source: int, target: int, PH: Any, t: Tuning) -> int:
     """
     copy_hypothesis(work, source, target)
     new = work[target]
-    new.kind = 0
+    new.kind = EXACT
     error, variance = new.mean[REF], max(new.cov[REF, REF], 1e-9)
     new.log_weight += 0.5 * math.log(t.second_std**2 / variance) - 0.5 * error * error / variance - t.second_class
     update_component(new.mean, new.cov, PH, REF, 0.0, 1e-8)
@@ -185,7 +227,7 @@ def reseed(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> in
         return count
     wrong = 0
     for h in range(count):
-        wrong += work[h].kind
+        wrong += work[h].kind == OWN_ERROR
     best = best_of(work, count)
     if wrong == 0:
         added = second_class(work, best, count, row, t, False)

@@ -159,6 +159,35 @@ def spread_over_all(work: Any, count: int, scratch: Any) -> None:
 
 
 @njit(nogil=True)
+def _counts(one: Any, head: Any) -> bool:
+    """Of the head's own class only the members of its mode count, of the others all."""
+    return bool(one.member or one.kind != head.kind)
+
+
+@njit(nogil=True)
+def spread_over_classes(work: Any, count: int, head: int, scratch: Any, refuted: float) -> None:
+    """scratch.cov becomes the mean over the classes that are not refuted, whatever their odds, about scratch.mean.
+
+    Whether a reference is exact is seen late: until then an ellipse must not rest on the prior that it mostly is.
+    """
+    mean, share = scratch.mean, scratch.share
+    x, y, course = mean[0], mean[1], mean[2]
+    share[:] = 0.0
+    scratch.cov[:] = 0.0
+    for h in range(count):
+        if _counts(work[h], work[head]):
+            share[work[h].kind] += work[h].weight
+    classes = 0
+    for kind in range(3):
+        classes += share[kind] > refuted
+    for h in range(count):
+        of_class = share[work[h].kind]
+        if of_class > refuted and _counts(work[h], work[head]):
+            _add_moments(work[h], work[h].weight / (of_class * classes), x, y, course, scratch)
+    mean[0], mean[1], mean[2] = x, y, course
+
+
+@njit(nogil=True)
 def forget_information(J: Any, course: float, dt: float, q: float, t: Tuning) -> None:
     """J <- e^(-dt/W) A^-T J A^-1 for p += v u dt, then lose speed information: J -= J e_v e_v^T J q/(1 + q J_vv)."""
     c, s = math.cos(course) * dt, math.sin(course) * dt

@@ -21,9 +21,12 @@ class Tuning(NamedTuple):
     gyro_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0
-    q_gyro: float = 1e-6  # (rad/s)^2/s
-    q_gyro_own: float = 1e-6  # the same, where no platform measures the heading
-    acc_std: float = 0.12  # m/s^2
+    q_gyro: float = 1e-7  # (rad/s)^2/s, of a tag whose platform measures its heading beside it
+    q_gyro_drift: float = 1e-4  # the same, of one that drifts
+    refuted: float = 1e-3  # weight below which a class of hypotheses no longer counts for the ellipse
+    drift_again: float = 0.0  # log prior of that, where heading and gyroscope drift apart
+    q_gyro_own: float = 1e-6  # the same, of all others
+    acc_std: float = 0.11  # m/s^2
     acc_rough: float = 0.7  # s: what the roughness of the motion adds to its variance, per dv_var / dt
     acc_tau: float = 5.0  # s
     offset_std: float = 0.15  # m, of a tag and anchor pair that nobody calibrated: antenna delays
@@ -34,6 +37,7 @@ class Tuning(NamedTuple):
     outlier_mean: float = 0.8  # m
     outlier_std: float = 0.8  # m
     outlier_floor: float = 1e-4
+    bilinear: float = 0.25  # of the product of the variances of speed and slip: added to that of a range
     blocked_log_prior: float = -2.5
     blocked_depth: float = 6.0  # log weight below the best at which a hypothesis gets no alternative
     blocked_min: float = 0.15  # m, less than that is a clear line of sight

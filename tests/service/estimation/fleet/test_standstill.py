@@ -81,3 +81,14 @@ def test_a_short_pause_teaches_nothing_and_a_start_does_not_spoil_what_was_learn
     slow_start = noise(10, 40, 0.014, 0.002, rate=0.015)
     acc, gyro = (np.concatenate([still[i], slow_start[i], moving[i]]) for i in (0, 1))
     assert abs(watched(acc, gyro)[1]).max() < 1e-3
+
+
+def test_a_second_of_rest_at_switch_on_teaches_the_bias_and_the_same_second_later_does_not() -> None:
+    moving = noise(11, 300, 0.3, 0.05)
+    rest = noise(12, 100, 0.03, 0.005, rate=0.012)
+    acc, gyro = (np.concatenate([rest[i], moving[i]]) for i in (0, 1))
+    _, bias, row = watched(acc, gyro)
+    assert bias[2] == pytest.approx(0.012, abs=3.0 * np.sqrt(row["bias_var"]))
+    assert np.sqrt(row["bias_var"]) < 2.5e-3
+    acc, gyro = (np.concatenate([moving[i], rest[i][:90], moving[i]]) for i in (0, 1))
+    assert (watched(acc, gyro)[1] == 0).all()
