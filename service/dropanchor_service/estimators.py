@@ -22,6 +22,7 @@ from dropanchor_service.estimation.batch import (
 from dropanchor_service.logs import RareLog
 from dropanchor_service.metrics import Metrics
 from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_service.store.records import enlarged
 
 FAULTS_BEFORE_QUARANTINE = 3
 QUARANTINE_NS = 10_000_000_000
@@ -177,10 +178,8 @@ class Estimators:
         self._keep_settings(row, tag_columns(wanted.tag, wanted.declination_rad))
 
     def _keep_settings(self, row: int, settings: Array) -> None:
-        missing = row + 1 - len(self._settings)
-        if missing > 0:
-            spare = np.zeros(max(missing, len(self._settings)), TAG_SETTINGS)
-            self._settings = np.concatenate([self._settings, spare])
+        if row >= len(self._settings):
+            self._settings = enlarged(self._settings, max(row + 1, 2 * len(self._settings)))
         self._settings[row] = settings
 
     def _wanted(self, row: int) -> _Configured:

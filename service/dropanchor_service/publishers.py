@@ -9,6 +9,7 @@ from dropanchor_service.estimation.batch import Array
 from dropanchor_service.passes import clocks, sequences
 from dropanchor_service.passes.sequences import PER_TAG, PUBLISHER, WINDOW
 from dropanchor_service.passes.values import newest_times
+from dropanchor_service.store.records import enlarged
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,6 @@ class Publishers:
         return offsets if offsets.any() else np.zeros(0, np.int64), jumps
 
     def _grow(self, rows: Array) -> None:
-        missing = (int(rows.max(initial=-1)) + 1) * PER_TAG - len(self._columns)
-        if missing > 0:
-            spare = max(missing, len(self._columns))
-            self._columns = np.concatenate([self._columns, np.zeros(spare, PUBLISHER)])
+        needed = (int(rows.max(initial=-1)) + 1) * PER_TAG
+        if needed > len(self._columns):
+            self._columns = enlarged(self._columns, max(needed, 2 * len(self._columns)))

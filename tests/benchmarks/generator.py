@@ -2,7 +2,7 @@
 reads when to start (UTC, ns), sends, and reports.
 
 Arguments: endpoint, first tag, number of tags, sessions, seconds, "block" or "drop" where the network is congested,
-and of how many tags one message each is to be sent first, slowly.
+and of how many tags two messages each are to be sent first, slowly.
 """
 
 import json
@@ -20,12 +20,14 @@ from dropanchor_schemas.wire import ENCODING_PACKED
 from support.zenoh_router import connected_session, wait_until
 
 SLOTS = 40  # a message period is sent in so many bursts, 5 ms apart
-REGISTERED_PER_S = 4000
+REGISTERED_PER_S = 4000  # messages
+REGISTERED_AT_ONCE = 1000  # tags, whose second messages follow their first ones
+REGISTERING = 2  # messages that make a tag known
 Put = Callable[[int, bytes], None]
 
 
 def main(endpoint: str, first: int, tags: int, sessions: int, duration_s: float, control: str, register: int) -> None:
-    motions = [track.bodies for track in tracks(duration_s + 2 * MESSAGE_S)]
+    motions = [track.bodies for track in tracks(duration_s + (1 + REGISTERING) * MESSAGE_S)]
     names = [samples_key("default", f"sim-{first + index}") for index in range(max(tags, register))]
     encoding = zenoh.Encoding(ENCODING_PACKED)
     when_full = zenoh.CongestionControl.BLOCK if control == "block" else zenoh.CongestionControl.DROP
@@ -56,19 +58,22 @@ def wait_for_listener(session: zenoh.Session) -> None:
     publisher.undeclare()
 
 
-def register_all(put: Put, motions: list[list[bytes]], first: int, count: int) -> bool:
-    for tag in range(count):
-        motion = motions[(first + tag) % len(motions)]
-        put(tag, message(motion[0], 0, first + tag + 1, time.time_ns() // 1000 * 1000))
-        if tag % (REGISTERED_PER_S // 100) == 0:
-            time.sleep(0.01)
-    return count > 0
+def register_all(put: Put, motions: list[list[bytes]], first: int, count: int) -> int:
+    """Returns how many messages each of them has sent."""
+    for start in range(0, count, REGISTERED_AT_ONCE):
+        for sequence in range(REGISTERING):
+            for tag in range(start, min(start + REGISTERED_AT_ONCE, count)):
+                motion = motions[(first + tag) % len(motions)]
+                put(tag, message(motion[sequence], sequence, first + tag + 1, time.time_ns() // 1000 * 1000))
+                if tag % (REGISTERED_PER_S // 100) == 0:
+                    time.sleep(0.01)
+    return REGISTERING if count else 0
 
 
 def send(
-    put: Put, motions: list[list[bytes]], first: int, tags: int, start_ns: int, rounds: int, registered: bool
+    put: Put, motions: list[list[bytes]], first: int, tags: int, start_ns: int, rounds: int, registered: int
 ) -> dict[str, float]:
-    """A message of every tag in every round, spread over it; numbered from 1 when one has been sent before."""
+    """A message of every tag in every round, spread over it. registered: so many have been sent before."""
     edges = np.linspace(0, tags, SLOTS + 1).astype(int).tolist()
     late_ms = []
     for number in range(rounds):

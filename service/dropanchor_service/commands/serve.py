@@ -10,6 +10,7 @@ from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.service import Service
 from dropanchor_service.settings_sources import SettingsError
 from dropanchor_service.signals import interrupts
+from dropanchor_service.spare_memory import SpareMemory
 from dropanchor_service.systemd import Systemd
 from dropanchor_service.zenoh_session import ZenohError
 
@@ -52,7 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
                 made = Service(settings_of(arguments))
             with made as service:
                 systemd.ready()
-                stopped = interrupt.wait(lambda: goes_on(service, systemd))
+                spare = SpareMemory()
+                stopped = interrupt.wait(lambda: goes_on(service, systemd, spare))
                 systemd.stopping()
     except KeyboardInterrupt:
         return 0
@@ -70,8 +72,9 @@ class Supervised(Protocol):
     def has_died(self) -> bool: ...
 
 
-def goes_on(service: Supervised, systemd: Systemd) -> bool:
+def goes_on(service: Supervised, systemd: Systemd, spare: SpareMemory) -> bool:
     """Asked twice a second. A service that is stuck says nothing to systemd, which starts it again."""
     if service.makes_progress:
         systemd.progress()
+    spare.give_back()
     return not service.has_died

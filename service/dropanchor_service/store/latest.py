@@ -7,7 +7,7 @@ import numpy as np
 
 from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from dropanchor_service.store.history import PoseHistory
-from dropanchor_service.store.records import put, take
+from dropanchor_service.store.records import enlarged, put, take
 from dropanchor_service.store.rings import RowRings, rank_in_row
 
 MODES = 8  # hypotheses that are kept of a tag
@@ -99,10 +99,9 @@ class LatestPoses:
         np.maximum.at(self._modes, kept["row"], rank + 1)
 
     def _grow(self, rows: int) -> None:
-        missing = rows - len(self._poses)
-        if missing > 0:
-            spare = max(missing, len(self._poses))
-            self._poses = np.concatenate([self._poses, np.zeros(spare, POSE)])
-            self._changed = np.concatenate([self._changed, np.zeros(spare, np.int64)])
-            self._hypotheses = np.concatenate([self._hypotheses, np.zeros((spare, MODES), HYPOTHESIS)])
-            self._modes = np.concatenate([self._modes, np.zeros(spare, np.int64)])
+        if rows > len(self._poses):
+            room = max(rows, 2 * len(self._poses))
+            self._poses = enlarged(self._poses, room)
+            self._changed = enlarged(self._changed, room)
+            self._hypotheses = enlarged(self._hypotheses, room)
+            self._modes = enlarged(self._modes, room)

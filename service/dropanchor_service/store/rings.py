@@ -3,7 +3,7 @@
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array
-from dropanchor_service.store.records import put, take
+from dropanchor_service.store.records import enlarged, put, take
 
 FEWEST = 2  # records of a row, however many rows there are
 
@@ -18,7 +18,7 @@ class RowRings:
         """dtype: of a record, with its `row`."""
         self._most = depth
         self._most_bytes = most_bytes
-        self._records: Array = np.zeros((0, depth), dtype)
+        self._records: Array = np.zeros((depth, 0), dtype)  # place by place: a row that has few touches little memory
         self._counts = np.zeros(0, np.int64)
 
     def write(self, records: Array) -> None:
@@ -28,15 +28,15 @@ class RowRings:
         rows = records["row"]
         self._grow(int(rows.max()) + 1)
         number = self._counts[rows] + rank_in_row(rows)
-        put(self._records, (rows, number % self._records.shape[1]), records)
+        put(self._records, (number % len(self._records), rows), records)
         self._counts[rows] = number + 1
 
     def of(self, row: int) -> Array:
         """A copy, oldest first."""
         if row >= len(self._counts):
-            return self._records[:0, 0].copy()
-        count, depth = int(self._counts[row]), self._records.shape[1]
-        kept: Array = self._records[row, np.arange(max(0, count - depth), count) % depth]
+            return np.zeros(0, self._records.dtype)
+        count, depth = int(self._counts[row]), len(self._records)
+        kept: Array = self._records[np.arange(max(0, count - depth), count) % depth, row]
         return kept
 
     def _grow(self, rows: int) -> None:
@@ -44,14 +44,14 @@ class RowRings:
             return
         capacity = max(rows, 2 * len(self._counts))
         depth = max(FEWEST, min(self._most, self._most_bytes // (capacity * self._records.itemsize)))
-        grown = np.zeros((capacity, depth), self._records.dtype)
+        grown = np.zeros((depth, capacity), self._records.dtype)
         # The newest `depth` records of each row, numbered from the first that it ever had.
         number = self._counts[:, None] - depth + np.arange(depth)
         row, column = np.nonzero(number >= 0)
         kept = number[row, column]
-        put(grown, (row, kept % depth), take(self._records, (row, kept % self._records.shape[1])))
+        put(grown, (kept % depth, row), take(self._records, (kept % len(self._records), row)))
         self._records = grown
-        self._counts = np.concatenate([self._counts, np.zeros(capacity - len(self._counts), np.int64)])
+        self._counts = enlarged(self._counts, capacity)
 
 
 def rank_in_row(rows: Array) -> Array:

@@ -37,6 +37,7 @@ class SiteStore:
         Raises OSError or pydantic's ValidationError when the file cannot be read.
         """
         self._lock = Lock()
+        self._nothing_known = TagSettings()
         self._path = None if folder is None else folder / FILE_NAME
         self._document = SiteDocument(site=site, tags=tags)
         if self._path is not None and self._path.exists():
@@ -59,7 +60,7 @@ class SiteStore:
         return self._document.tags
 
     def tag_settings(self, tag: str) -> TagSettings:
-        return self._document.tags.get(tag, TagSettings())
+        return self._document.tags.get(tag, self._nothing_known)
 
     def anchor_index(self, number: int) -> int | None:
         """The engine's index of the anchor with this number, None when the site does not have it."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.batch import Array
+from dropanchor_service.store.records import enlarged
 
 KINDS = ("imu", "range", "heading", "bearing")
 REASONS = tuple(Reason)
@@ -24,7 +25,7 @@ _COUNTS = np.dtype(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Tag:
     """One tag. Its counters live in the columns of the table."""
 
@@ -138,7 +139,7 @@ class TagTable:
 
     def _grow(self, rows: int) -> None:
         if rows > len(self._counts):
-            self._counts = np.concatenate([self._counts, np.zeros(len(self._counts), _COUNTS)])
+            self._counts = enlarged(self._counts, 2 * len(self._counts))
 
 
 def _count(column: Array, rows: Array) -> None:

@@ -72,14 +72,13 @@ class FleetEngine:
     def _reach(self, rows: int) -> None:
         """Room for this many rows, twice as much as before where it lacks."""
         self._configured = max(self._configured, rows)
-        missing = rows - len(self._rows)
-        if missing <= 0:
+        if rows <= len(self._rows):
             return
-        more = max(missing, len(self._rows))
-        self._rows = np.concatenate([self._rows, np.zeros(more, ROW)])
-        self._rows["head"][-more:] = -1
-        self._fronts = np.concatenate([self._fronts, np.zeros(more, FRONTEND)])
-        self._platforms = np.concatenate([self._platforms, np.zeros(more, PLATFORM)])
+        for name in _BY_ROW:
+            before = getattr(self, f"_{name}")
+            room = np.zeros(max(rows, 2 * len(before)), before.dtype)  # takes no memory until it is written
+            room[: len(before)] = before
+            setattr(self, f"_{name}", room)
 
     def _believe(self, nodes: Array) -> Array:
         """BELIEF, one per node."""
