@@ -1,9 +1,11 @@
 """What the operators of the recordings could have known, and what a prototype reached on them."""
 
+import math
+
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.evaluation.plaza import PLAZA_SCALE, PLAZA_STD
 
-TOP_SPEED_MPS = {"iasl": 1.5, "tiers": 0.7, "starloc": 2.5, "mower": 1.0, "plaza": 6.0, "hanyang": 3.0}
+TOP_SPEED_MPS = {"iasl": 1.5, "tiers": 0.7, "starloc": 2.5, "mower": 1.0, "plaza": 6.0, "hanyang": 3.0, "inrol": 1.0}
 ARM_M = 0.6
 PROTOTYPE = {
     "iasl_s1": (0.79, 1.32),
@@ -31,5 +33,7 @@ def tell(name: str, settings: Array) -> None:
         settings["heading_std"] = settings["slip_std"] = settings["mount_angle"] = settings["mount_angle_std"] = 0.0
     elif family == "starloc":  # the rig is held out in front with both hands
         settings["lever_x"] = ARM_M
+    elif family == "inrol":  # carried sideways, by hand
+        settings["mount_angle"], settings["mount_angle_std"], settings["slip_std"] = -math.pi / 2, 0.3, 0.3
     elif family == "mower":  # the IMU is mounted along its wheels
         settings["mount_angle"] = 0.0
