@@ -24,8 +24,7 @@ HELD_BYTES = 2**26
 class Preparation:
     """Owned by one thread.
 
-    window_ns: so long a message waits for those that its publisher numbered before it. Who fetches messages from the
-    publishers' caches widens it until they are there.
+    window_ns: so long a message waits for those that its publisher numbered before it.
     """
 
     def __init__(self, site: SiteStore, estimators: Estimators, losses: Losses, window_ns: int) -> None:

@@ -14,16 +14,8 @@ from .node import ABSOLUTE_HEADING, BEARING, MEASURED_HEADING, RANGE
 from .pool import load, mirror, release, store
 from .predict import diffuse, fill_class, fill_decay, move, transport
 from .publish import publish
-from .start import (
-    begin,
-    blame_gyro,
-    counts_from,
-    give_reference_error,
-    is_referred,
-    recount_yaw,
-    reseed,
-    turn_about,
-)
+from .reference import give_reference_error, recount_yaw, turn_about
+from .start import begin, blame_gyro, counts_from, is_referred, reseed
 from .tuning import Tuning
 from .update import bound_speed, predict_range, update_bearing, update_heading, update_range, update_rest, wrap
 

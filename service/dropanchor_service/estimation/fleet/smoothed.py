@@ -12,8 +12,8 @@ from .layout import COMMON, DRIFTING, OWN_ERROR, PHI, REF, STEADY, YAW, V
 from .lineage import trace_back
 from .node import ABSOLUTE_HEADING, RANGE
 from .outputs import poses_of
+from .reference import recount_yaw
 from .smoother import Track, make_track, smooth
-from .start import recount_yaw
 from .summary import add_reference
 from .trace import TracingEngine
 from .tuning import Tuning

@@ -30,6 +30,7 @@ from .layout import (
 )
 from .manage import best_of, copy_hypothesis
 from .node import ABSOLUTE_HEADING, DERIVED_HEADING, MEASURED_HEADING, NO_HEADING, RANGE, RELATIVE_HEADING
+from .reference import give_reference_error, turn_about
 from .tuning import Tuning
 from .update import update_component, wrap
 
@@ -51,49 +52,6 @@ def _common(work: Any, h: int, row: Any, node: Any, yaw: float, yaw_variance: fl
     work[h].log_weight = 0.0
     work[h].kind = EXACT
     work[h].blocked = 0
-
-
-@njit(nogil=True)
-def give_reference_error(P: Any, std: float, yaw_follows: bool) -> None:
-    """Let the heading reference be wrong by `std`; the yaw known only from it shares that error."""
-    P[REF, REF] += std * std
-    if yaw_follows:
-        P[YAW, YAW] += std * std
-        P[YAW, REF] -= std * std
-        P[REF, YAW] = P[YAW, REF]
-
-
-@njit(nogil=True)
-def turn_about(P: Any, std: float) -> None:
-    """An error of the reference that turned bearing and yaw together about the anchor."""
-    v = std * std
-    P[YAW, YAW] += v
-    P[PHI, PHI] += v
-    P[REF, REF] += v
-    P[YAW, PHI] += v
-    P[YAW, REF] -= v
-    P[PHI, REF] -= v
-    P[PHI, YAW], P[REF, YAW], P[REF, PHI] = P[YAW, PHI], P[YAW, REF], P[PHI, REF]
-
-
-@njit(nogil=True)
-def recount_yaw(P: Any, variance: float) -> None:
-    """Count yaw from a reference that agrees with it now: its error is the reference's, what it was is the mount's.
-
-    mount' = mount + yaw - yaw', so the course is what it was.
-    """
-    for i in range(N):
-        P[MOUNT, i] += P[YAW, i]
-    for i in range(N):
-        P[i, MOUNT] += P[i, YAW]
-    for i in range(N):
-        P[YAW, i] = P[i, YAW] = P[REF, i] = P[i, REF] = 0.0
-    P[YAW, YAW] = P[REF, REF] = variance
-    P[YAW, REF] = P[REF, YAW] = -variance
-    for i in range(N):
-        P[MOUNT, i] -= P[YAW, i]
-    for i in range(N):
-        P[i, MOUNT] -= P[i, YAW]
 
 
 @njit(nogil=True)

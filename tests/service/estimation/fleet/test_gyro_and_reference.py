@@ -6,7 +6,7 @@ import pytest
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.estimation.fleet.layout import GYRO, MOUNT, REF, YAW, N, R
 from dropanchor_service.estimation.fleet.node import NODE
-from dropanchor_service.estimation.fleet.start import recount_yaw
+from dropanchor_service.estimation.fleet.reference import recount_yaw
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from dropanchor_service.estimation.fleet.update import update_rest
 from support.frontend import new_frontend, run
