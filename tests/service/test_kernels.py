@@ -1,5 +1,6 @@
 """Compiled kernels and their cache."""
 
+import json
 import os
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dropanchor_service.kernel_cache import VARIABLE, keep_compiled
-from support.service import environment
+from support.service import ROOT, environment
 
 PLACE = "import os; from dropanchor_service.kernel_cache import *; keep_compiled(); print(os.environ[VARIABLE])"
 
@@ -37,3 +38,10 @@ def test_what_the_environment_says_is_left_alone(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv(VARIABLE, "somewhere")
     keep_compiled()
     assert os.environ[VARIABLE] == "somewhere"
+
+
+def test_nothing_is_left_to_be_compiled_while_samples_come_in() -> None:
+    path = f"{environment()['PYTHONPATH']}{os.pathsep}{ROOT / 'tests'}"
+    command = [sys.executable, "-m", "support.compiled_later"]
+    ended = subprocess.run(command, env=environment(PYTHONPATH=path), check=True, text=True, capture_output=True)
+    assert json.loads(ended.stdout) == []

@@ -34,8 +34,6 @@ def innovations_of(nodes: Array, beliefs: Array, rows: Array) -> Array:
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
     """HYPOTHESIS, the modes of each row whose last node left it ambiguous. A row's nodes are together."""
     modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
-    if not len(modes):
-        return modes
     return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, workspace, modes)]
 
 

@@ -1,0 +1,59 @@
+"""A program: what the warm-up has left to be compiled while samples come in, as a JSON list of functions."""
+
+import json
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from numba.core.dispatcher import Dispatcher
+
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.kernels import warm_up
+from dropanchor_service.store.checkpoints import CheckpointFolder
+from support.ingest import Bench
+from support.traffic import Message, traffic
+
+TAGS, DURATION_S = 4, 12.0
+HEARD = 3  # tags that send all the time; the last one leaves out whole seconds
+
+
+def main() -> None:
+    messages = [m for m in traffic(TAGS, DURATION_S, 1, 0.05) if m.tag[-1:] != "3" or int(m.due_ns / 1e9) % 3]
+    half = len(messages) // 2
+    with TemporaryDirectory() as folder:
+        before = _bench(Path(folder) / "before")  # makes ready what every service does at its start
+        warm_up(FleetEngine())
+        ready = _signatures()
+        _send(before, messages[:half])
+        state, after = before.whole_state(), _bench(Path(folder) / "after")
+        kept = CheckpointFolder(Path(folder) / "checkpoints", state.layout, state.template)
+        kept.write(state.snapshot())
+        found, _ = kept.newest()
+        assert found is not None
+        after.whole_state().restore(found)
+        _send(after, messages[half:])
+    print(json.dumps(sorted(name for name, count in _signatures().items() if count > ready.get(name, 0))))
+
+
+def _bench(folder: Path) -> Bench:
+    return Bench(folder, engine=FleetEngine(), site={"anchors": [{"id": "0"}]})
+
+
+def _send(bench: Bench, messages: list[Message]) -> None:
+    for message in messages:
+        bench.put(message.tag, message.payload, at_ns=message.due_ns)
+        bench.ingest.turn()
+
+
+def _signatures() -> dict[str, int]:
+    """Of each compiled function, how many kinds of arguments it has met."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("dropanchor_service")]
+    found: list[Any] = [value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)]
+    return {
+        f"{function.py_func.__module__}.{function.py_func.__name__}": len(function.signatures) for function in found
+    }
+
+
+if __name__ == "__main__":
+    main()
