@@ -33,7 +33,7 @@ def main() -> None:
         assert found is not None
         after.whole_state().restore(found)
         _send(after, messages[half:])
-    print(json.dumps(sorted(name for name, count in _signatures().items() if count > ready.get(name, 0))))
+    json.dump(sorted(name for name, count in _signatures().items() if count > ready.get(name, 0)), sys.stdout)
 
 
 def _bench(folder: Path) -> Bench:
