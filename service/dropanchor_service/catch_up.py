@@ -193,11 +193,12 @@ class CatchUp:
                 self._expected.discard(key)
                 self._fetched.pop(key, None)
                 self._tries.pop(key, None)
-                meanwhile = self._held.pop(key, [])
+                meanwhile = self._held[key]
                 self._bytes -= sum(map(_size, held)) + sum(map(_size, meanwhile))
                 for message in meanwhile:
                     if (key, message.number) not in gone:
                         self._buffer.append(key, message.payload, message.encoding, message.arrival_ns)
+                del self._held[key]  # from now on what is heard does not wait for the lock
         return len(released)
 
 

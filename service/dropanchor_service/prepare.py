@@ -43,7 +43,7 @@ class Preparation:
     def batches_of(self, fresh: list[Message], now_ns: int) -> Iterator[SampleBatch]:
         """Those of the fresh messages and of ones held before that are due, at most one of each tag in a batch: what
         becomes of a message does not depend on which others of its tag came in with it."""
-        due_ns = now_ns if self._held.is_full else now_ns - self.window_ns
+        due_ns = self._due_ns(fresh, now_ns)
         messages = [*self._held.wake(fresh, due_ns), *fresh] if self.holds else fresh
         if not messages:
             return
@@ -62,6 +62,13 @@ class Preparation:
             offsets, jumps = self.publishers.utc_offsets(read.forms, in_part, arrived, _times(decoded))
             self._losses.clocks_jumped(jumps)
             yield self._batch(_in_utc(decoded, offsets, rejected), rejected, of_row)
+
+    def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
+        """What arrived until then has waited long enough. The window counts in arrivals: where messages have lain in a
+        backlog, one that came soon after those behind the gap may still lie there."""
+        if self._held.is_full:
+            return now_ns
+        return min(now_ns, max((message[3] for message in fresh), default=now_ns)) - self.window_ns
 
     def _forms(self, payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
         """A payload that the decoder fails on, which is an error of ours, costs nothing but itself."""

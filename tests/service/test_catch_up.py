@@ -1,6 +1,7 @@
 """What was fetched from caches goes on before what is live: once, in order, and only where somebody waits for it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from threading import Thread
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -37,13 +38,25 @@ class Came(NamedTuple):
     arrival_ns: int
 
 
+class Interrupted(MessageBuffer):
+    """before: what happens just before a message goes in, by its payload."""
+
+    def __init__(self) -> None:
+        super().__init__(10**8)
+        self.before: dict[bytes, Callable[[], None]] = {}
+
+    def append(self, key: str, payload: bytes, encoding: str, arrival_ns: int, cached: bool = False) -> None:
+        self.before.pop(payload, lambda: None)()
+        super().append(key, payload, encoding, arrival_ns, cached)
+
+
 class House:
     """A catch-up that expects the tags a and b, and what goes on from it."""
 
     def __init__(self, passed: Mapping[str, Mapping[int, Passed]] = MappingProxyType({})) -> None:
         self.asked: list[str] = []
         self.missing: list[int] = []
-        self._buffer = MessageBuffer(10**8)
+        self._buffer = Interrupted()
         for row, key in enumerate((A, B, NEW)):
             self._buffer.admit(key, row)
         self.catch_up = CatchUp(self._buffer, [A, B], lambda key: passed.get(key, {}), self._ask, most_of_new=4)
@@ -51,6 +64,9 @@ class House:
     def _ask(self, key: str, missing: int, _tries: int) -> None:
         self.asked.append(key)
         self.missing.append(missing)
+
+    def before(self, sequence: int, happens: Callable[[], None]) -> None:
+        self._buffer.before[payload(sequence, measured_ns(sequence))] = happens
 
     def came(self) -> list[Came]:
         messages, _ = self._buffer.drain(1000)
@@ -68,16 +84,20 @@ def payload(sequence: int, t_ns: int, boot_id: int = 1) -> bytes:
     return encode_packed(Frame(ranges=[RangeSample(t_ns, 7, 1.0)], sequence=sequence, boot_id=boot_id))
 
 
+def measured_ns(sequence: int) -> int:
+    """A tenth of a second after the one before."""
+    return T0 + sequence * S // 10
+
+
 def live(house: House, sequence: int, delay_ns: int = 20_000_000, boot_id: int = 1, key: str = A) -> None:
-    """One that was measured `sequence` tenths of a second after T0."""
-    t_ns = T0 + sequence * S // 10
+    t_ns = measured_ns(sequence)
     house.catch_up.hear(key, payload(sequence, t_ns, boot_id), ENCODING_PACKED, t_ns + delay_ns)
 
 
 def cached(house: House, *sequences: int, boot_id: int = 1, key: str = A) -> None:
     for sequence in sequences:
-        t_ns = T0 + sequence * S // 10
-        house.catch_up.fetch(key, payload(sequence, t_ns, boot_id), ENCODING_PACKED, T0 + 100 * S)
+        content = payload(sequence, measured_ns(sequence), boot_id)
+        house.catch_up.fetch(key, content, ENCODING_PACKED, T0 + 100 * S)
 
 
 def test_what_is_live_waits_for_what_was_fetched_and_each_comes_once() -> None:
@@ -239,6 +259,23 @@ def test_what_goes_on_of_several_tags_goes_on_in_order_of_time() -> None:
         live(house, 4, key=key)
     house.catch_up.first_round_answered(MOST)
     assert house.sequences() == [1, 1, 2, 2, 3, 3, 4, 4]
+
+
+def test_what_is_heard_while_messages_go_on_overtakes_none_of_them() -> None:
+    house = House()
+    cached(house, 1)
+    live(house, 2)
+    newest = Thread(target=live, args=(house, 4))
+
+    def hear_the_newest() -> None:
+        newest.start()
+        newest.join(0.2)  # it may have to wait for those before it
+
+    house.before(2, lambda: live(house, 3))
+    house.before(3, hear_the_newest)
+    house.catch_up.first_round_answered(MOST)
+    newest.join()
+    assert house.sequences() == [1, 2, 3, 4]
 
 
 def test_what_is_held_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -163,6 +163,20 @@ def test_a_message_that_comes_twice_is_fused_once() -> None:
     assert bench.rejected() == {"duplicate": 3}
 
 
+def test_a_gap_waits_for_what_came_soon_after_it_however_long_both_have_lain_in_a_backlog() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0, sequence=0, boot_id=1))
+    now_ns = bench.clock.now_ns()
+    for sequence, ago_ns in ((2, 900_000_000), (1, 800_000_000), (4, 700_000_000)):
+        bench.put("a", ranges(1.0, sequence=sequence, boot_id=1), at_ns=now_ns - ago_ns)
+    passed = []
+    for _ in range(4):
+        bench.ingest.turn(most=1)
+        passed.append(bench.total(bench.metrics.samples))
+    assert passed == [1, 3, 3, 4]
+    assert bench.total(bench.metrics.given_up) == 1
+
+
 def test_two_publishers_of_one_tag_and_two_tags_count_on_their_own() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=5), ranges(1.0, sequence=0, boot_id=6))
