@@ -72,7 +72,7 @@ class CatchUp:
         if self._waits(key):
             held = _Held(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
             with self._lock:
-                waits = self._waits(key)
+                waits = self._waits(key) and not self._is_first(held)
                 if waits:
                     self._hold(held)
             if waits:
@@ -117,6 +117,14 @@ class CatchUp:
 
     def _waits(self, key: str) -> bool:
         return self._first_round or key in self._expected or key in self._held
+
+    def _is_first(self, message: _Held) -> bool:
+        """Whether a tag that is new begins with it, so that there is nothing to ask its caches for."""
+        number, key = message.number, message.key
+        if self._first_round or key in self._held or number is None or number.sequence or self._passed_of(key):
+            return False
+        self._expected.discard(key)
+        return True
 
     def _lacks(self, key: str, most: int) -> bool:
         """Whether the answer is worth another question: it was cut short, nothing came although something is missing,

@@ -112,6 +112,18 @@ def test_what_is_live_waits_for_what_was_fetched_and_each_comes_once() -> None:
     assert house.asked == []
 
 
+def test_a_listed_tag_that_begins_is_not_asked_for_what_it_cannot_have() -> None:
+    house = House({B: {1: Passed(next=4, seen=0b1111)}})
+    house.catch_up.first_round_answered(MOST)
+    for sequence in (0, 1):
+        live(house, sequence)
+    assert house.sequences() == [0, 1]
+    assert house.asked == []
+    live(house, 0, boot_id=2, key=B)  # the last process knew a publisher of it that may have more
+    assert house.came() == []
+    assert house.asked == [B]
+
+
 def test_what_was_fused_before_the_restart_is_left_out() -> None:
     house = House({A: {1: Passed(next=4, seen=0b1111)}})
     cached(house, 2, 3, 4)
