@@ -24,6 +24,7 @@ from dropanchor_service.store import TagTable
 from dropanchor_service.zenoh_caches import ZenohCaches
 
 WAITING = 2**14  # messages between the receive thread and ours
+GATHER_S = 0.005  # of messages that are taken together
 
 
 class ZenohIntake:
@@ -81,7 +82,7 @@ class ZenohIntake:
 
     def _take_all(self, samples: Any) -> None:
         """Until the subscriber is undeclared."""
-        for message in received(samples):
+        for message in received(samples, GATHER_S):
             self._hear(message)
 
     def _hear(self, message: zenoh.Sample) -> None:
