@@ -42,8 +42,8 @@ class Figures:
         return float(np.percentile(self.latency_ms, q)) if self.latency_ms else float("inf")
 
 
-def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = False) -> Figures:
-    """embedded: the service is the router."""
+def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = False, share: float = 1.0) -> Figures:
+    """embedded: the service is the router. share: of the time, in which the service runs."""
     endpoint = free_endpoint()
     link = "--zenoh-listen" if embedded else "--zenoh-connect"
     with ExitStack() as stack:
@@ -52,6 +52,7 @@ def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = Fa
         service = stack.enter_context(running_service(*arguments))
         fleet = generator(endpoint, tags, WARM_UP_S + MEASURE_S + 1.0)
         stack.callback(fleet.end)
+        stack.enter_context(proc.throttled(service.process.pid, share))
         start_ns = (time.time_ns() + 300_000_000) // 1000 * 1000
         at_first = counters(service)
         fleet.tell(start_ns)
