@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dropanchor_schemas.site import Site
 from dropanchor_schemas.wire import (
     ENCODING_PACKED,
     BearingSample,
@@ -19,11 +20,24 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_service.decode import read_forms, read_samples
-from dropanchor_service.estimation.batch import ANCHOR, HEADING, IMU, RANGE, Engine, SampleBatch, default_settings
+from dropanchor_service.estimation.batch import (
+    ANCHOR,
+    HEADING,
+    HYPOTHESIS,
+    IMU,
+    POSE,
+    RANGE,
+    Engine,
+    SampleBatch,
+    State,
+    default_settings,
+)
 from dropanchor_service.kernel_cache import VARIABLE
 from dropanchor_service.passes.values import shift_times
 from dropanchor_service.publishers import Publishers
 from dropanchor_service.screening import screen
+from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.answers import Answers
 
 SAY_EVERY_S = 5.0
 
@@ -109,3 +123,17 @@ def _pass(payloads: list[bytes]) -> None:
     offsets, _ = publishers.utc_offsets(read.forms, sequenced, arrivals, samples)
     for messages, t_ns in samples:
         shift_times(t_ns, messages, offsets)
+
+
+@_said_while_compiling("the writer of answers")
+def warm_up_answers() -> None:
+    """Compile what every answer goes through: an old pose, and one of a tag that may be in two places."""
+    answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
+    poses, modes = np.zeros(2, POSE), np.zeros(2, HYPOTHESIS)
+    for row in range(len(poses)):
+        answers.tags.register(f"tag-{row}")
+        poses["row"][row] = row
+    poses["t_ns"] = [0, answers.now_ns()]
+    poses["state"], modes["row"] = State.AMBIGUOUS, 1
+    answers.latest.write(poses, modes)
+    b"".join(answers.pose_list_json())

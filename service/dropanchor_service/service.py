@@ -27,7 +27,7 @@ from dropanchor_service.http_thread import HttpThread
 from dropanchor_service.ingest import Ingest
 from dropanchor_service.ingest_thread import IngestThread
 from dropanchor_service.keepers import Keepers
-from dropanchor_service.kernels import warm_up_passes
+from dropanchor_service.kernels import warm_up_answers, warm_up_passes
 from dropanchor_service.metrics import FleetGauges, Metrics
 from dropanchor_service.settings import Settings
 from dropanchor_service.settings_sources import SettingsError
@@ -59,6 +59,7 @@ class Service:
         self._certificate = certificate_of(settings.http, self._credentials)
         self._keeper = doorkeeper_of(settings.security)
         warm_up_passes()
+        warm_up_answers()
         self._stopping = Event()
         self._opened = ExitStack()
         self._supervision = Supervision()

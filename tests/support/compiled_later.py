@@ -9,7 +9,8 @@ from typing import Any
 from numba.core.dispatcher import Dispatcher
 
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.kernels import warm_up
+from dropanchor_service.kernels import warm_up, warm_up_answers
+from dropanchor_service.store.answers import Answers
 from dropanchor_service.store.checkpoints import CheckpointFolder
 from support.ingest import Bench
 from support.traffic import Message, traffic
@@ -24,6 +25,7 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         before = _bench(Path(folder) / "before")  # makes ready what every service does at its start
         warm_up(FleetEngine())
+        warm_up_answers()
         ready = _signatures()
         _send(before, messages[:half])
         state, after = before.whole_state(), _bench(Path(folder) / "after")
@@ -33,6 +35,7 @@ def main() -> None:
         assert found is not None
         after.whole_state().restore(found)
         _send(after, messages[half:])
+        _answer(after)
     json.dump(sorted(name for name, count in _signatures().items() if count > ready.get(name, 0)), sys.stdout)
 
 
@@ -44,6 +47,13 @@ def _send(bench: Bench, messages: list[Message]) -> None:
     for message in messages:
         bench.put(message.tag, message.payload, at_ns=message.due_ns)
         bench.ingest.turn()
+
+
+def _answer(bench: Bench) -> None:
+    answers = Answers(bench.site, bench.tags, bench.latest)
+    b"".join(answers.pose_list_json())
+    answers.pose_of(bench.tags.at(0))
+    answers.frame_of(answers.rows(), answers.now_ns())
 
 
 def _signatures() -> dict[str, int]:

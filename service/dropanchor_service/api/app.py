@@ -61,8 +61,8 @@ def create_app(
     app.add_middleware(SecurityHeaders)
     add_error_handlers(app)
     for router in (
-        tags_router(answers, max_tags),
         poses_router(answers),
+        tags_router(answers, max_tags),
         track_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),

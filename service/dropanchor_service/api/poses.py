@@ -1,18 +1,19 @@
 """Poses: one, or many."""
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
+from fastapi.routing import APIRoute
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_service.api import examples, geojson
 from dropanchor_service.api.errors import Kind, ProblemError, problems
-from dropanchor_service.api.parts import AtTime, LastInnovations, TagFilter, TagId, json_response, shown
+from dropanchor_service.api.parts import AtTime, LastInnovations, TagFilter, TagId, id_of, json_response, shown
 from dropanchor_service.store.answers import Answer, Answers
 from dropanchor_service.store.at_time import NoPoseThenError, TooFarAheadError
 from dropanchor_service.store.explain import explanation_of
@@ -24,14 +25,6 @@ _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUES
 def poses_router(answers: Answers) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
-    @router.get(
-        "/tags/{tag}/pose",
-        operation_id="get_pose",
-        summary="The latest pose of a tag, or its pose at a time",
-        response_model=Pose,
-        responses=_offers(examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the place is unknown.")
-        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
-    )
     async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
         as_geojson = geojson.wanted(request, answers)
         if query.at is None:
@@ -39,6 +32,18 @@ def poses_router(answers: Answers) -> APIRouter:
         else:  # may have to read from disk
             pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
         return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
+
+    router.add_api_route(
+        "/tags/{tag}/pose",
+        get_pose,
+        methods=["GET"],
+        route_class_override=PlainPose,
+        operation_id="get_pose",
+        summary="The latest pose of a tag, or its pose at a time",
+        response_model=Pose,
+        responses=_offers(examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the place is unknown.")
+        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
+    )
 
     @router.get(
         "/tags/{tag}/explain",
@@ -72,7 +77,24 @@ def poses_router(answers: Answers) -> APIRouter:
     return router
 
 
-async def _in_turn(chunks: Iterator[bytes]) -> AsyncIterator[bytes]:
+class PlainPose(APIRoute):
+    """Where nothing but a tag is asked for, its id is all that has to be found out: solving the declared parameters,
+    none of which is there, would take longer than the answer."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        with_parameters = super().get_route_handler()
+        nothing = AtTime()
+
+        async def handle(request: Request) -> Response:
+            if request.scope["query_string"]:
+                return await with_parameters(request)
+            answer: Response = await self.endpoint(id_of(request.path_params["tag"]), nothing, request)
+            return answer
+
+        return handle
+
+
+async def _in_turn(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
     """Other answers have their turn between two chunks."""
     for chunk in chunks:
         yield chunk

@@ -5,7 +5,7 @@ import argparse
 from dropanchor_service import logs
 from dropanchor_service.commands.options import add_log_option
 from dropanchor_service.engine import create_engine
-from dropanchor_service.kernels import warm_up_passes
+from dropanchor_service.kernels import warm_up_answers, warm_up_passes
 from dropanchor_service.settings import Settings
 
 DESCRIPTION = """\
@@ -28,4 +28,5 @@ def run(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
     create_engine(Settings(engine="fleet"))
     warm_up_passes()
+    warm_up_answers()
     return 0

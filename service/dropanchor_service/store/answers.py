@@ -14,9 +14,10 @@ import orjson
 from dropanchor_service.estimation.batch import POSE, Array, State
 from dropanchor_service.store.at_time import BeforeMemoryError, pose_at
 from dropanchor_service.store.columns import PoseColumns, columns_of, ellipse_95, with_age
+from dropanchor_service.store.filled import Filled
 from dropanchor_service.store.latest import LatestPoses
 from dropanchor_service.store.newcomers import Newcomers
-from dropanchor_service.store.pose_json import list_json, poses_json
+from dropanchor_service.store.pose_json import CHUNK, hypotheses_json, list_json, poses_json
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
 from dropanchor_service.store.track_answers import pose_in_tracks
@@ -91,17 +92,26 @@ class Answers:
         now_ns = self.now_ns()
         return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
 
-    def pose_list_json(self, tags: Sequence[Tag] | None = None) -> Iterator[bytes]:
+    def pose_list_json(self, tags: Sequence[Tag] | None = None) -> Iterator[bytes | memoryview]:
         """The JSON of `pose_list`, in chunks and without an object per tag."""
         now_ns = self.now_ns()
-        return list_json(now_ns, self.rows(tags), lambda poses: self._poses_json(poses, now_ns))
+        return list_json(now_ns, (filled for _, filled in self._filled(self.rows(tags), now_ns)))
 
-    def _poses_json(self, poses: Array, now_ns: int) -> bytes:
-        columns = columns_of(poses, self.site, self.tags, now_ns)
-        hypotheses = [b"[]"] * len(poses)
-        for place in np.flatnonzero(columns.poses["state"] == State.AMBIGUOUS).tolist():
-            hypotheses[place] = to_json(self._hypotheses_of(int(poses["row"][place]), _AMBIGUOUS))
-        return poses_json(columns, hypotheses)
+    def pose_jsons(self, poses: Array, now_ns: int) -> Iterator[tuple[str, bytes]]:
+        """Tag, and JSON of its `Pose`, for each of the POSE rows, which are the latest."""
+        for names, filled in self._filled(poses, now_ns):
+            yield from zip(names, filled.each, strict=True)
+
+    def _filled(self, poses: Array, now_ns: int) -> Iterator[tuple[list[str], Filled]]:
+        """Tags, and JSON of their poses, in chunks."""
+        for begin in range(0, len(poses), CHUNK):
+            columns = columns_of(poses[begin : begin + CHUNK], self.site, self.tags, now_ns)
+            yield columns.tags, poses_json(columns, self._hypotheses_json(columns.poses))
+
+    def _hypotheses_json(self, poses: Array) -> list[bytes]:
+        """Of those of the POSE rows that are ambiguous."""
+        rows = poses["row"][poses["state"] == State.AMBIGUOUS]
+        return hypotheses_json(*self.latest.hypotheses_of(rows)) if len(rows) else []
 
     def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
         """`Pose` for each of the POSE rows, which are the latest."""
@@ -133,7 +143,9 @@ class Answers:
         frame["semi_major_m"] = np.round(columns.semi_major_m, 4)
         frame["semi_minor_m"] = np.round(columns.semi_minor_m, 4)
         frame["angle_rad"] = np.round(columns.angle_rad, 4)
-        frame["hypotheses"] = list(map(self._hypotheses_of, poses["row"].tolist(), columns.states))
+        modes = map(orjson.Fragment, self._hypotheses_json(columns.poses))
+        ambiguous = columns.poses["state"] == State.AMBIGUOUS
+        frame["hypotheses"] = [next(modes) if several else None for several in ambiguous.tolist()]
         if columns.lat is not None and columns.lon is not None:
             frame["lat"], frame["lon"] = np.round(columns.lat, 9), np.round(columns.lon, 9)
         return frame

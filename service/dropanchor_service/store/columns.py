@@ -8,13 +8,11 @@ import numpy as np
 from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.estimation.batch import Array, State, StateReason
+from dropanchor_service.passes.shown import STALE_AFTER_S, ellipses, grow_old
 from dropanchor_service.store.geodesy import lat_lon
+from dropanchor_service.store.records import copied
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
-
-STALE_AFTER_S = 1.0
-LOST_AFTER_S = 10.0
-CHI2_95_OF_2 = 5.991464547107979  # -2 ln 0.05: 95 % quantile of the chi-squared distribution, 2 degrees of freedom
 
 STATES = [TrackingState[state.name].value for state in State]
 REASONS = [ReasonName[reason.name].value for reason in StateReason]
@@ -41,22 +39,36 @@ HINTS = [_HINTS[reason] for reason in StateReason]
 
 @dataclass(frozen=True)
 class PoseColumns:
-    """One entry per pose. poses: POSE; the others derived; an unknown float is NaN. lat, lon: None without a
-    georeference."""
+    """One entry per pose. poses: POSE; the others derived; an unknown float is NaN. anchor_ids: by the index that the
+    poses have of them. lat, lon: None without a georeference."""
 
     poses: Array
     tags: list[str]
     online: list[bool]
-    anchors: list[str | None]
+    anchor_ids: list[str]
     age_s: Array
-    states: list[str]
-    reasons: list[str]
-    hints: list[str]
     semi_major_m: Array
     semi_minor_m: Array
     angle_rad: Array
     lat: Array | None
     lon: Array | None
+
+    @property
+    def states(self) -> list[str]:
+        return [STATES[state] for state in self.poses["state"].tolist()]
+
+    @property
+    def reasons(self) -> list[str]:
+        return [REASONS[reason] for reason in self.poses["reason"].tolist()]
+
+    @property
+    def hints(self) -> list[str]:
+        return [HINTS[reason] for reason in self.poses["reason"].tolist()]
+
+    @property
+    def anchors(self) -> list[str | None]:
+        ids = self.anchor_ids
+        return [ids[index] if 0 <= index < len(ids) else None for index in self.poses["anchor"].tolist()]
 
 
 def columns_of(
@@ -71,21 +83,16 @@ def columns_of(
     and do not get old."""
     age_s = (now_ns - poses["t_ns"]) * 1e-9
     aged = poses if then else with_age(poses, age_s)
-    of_tags = [tags.at(row).name for row in aged["row"].tolist()] if names is None else list(names)
-    anchor_ids = [anchor.id for anchor in site.anchors_by_index()]
-    reasons = aged["reason"].tolist()
-    ellipse = ellipse_95(aged["cov"][:, :2, :2])
+    of_tags = tags.names(aged["row"].tolist()) if names is None else list(names)
+    ellipse = ellipse_95(aged["cov"])
     origin = site.site.georeference
     lat, lon = (None, None) if origin is None else lat_lon(origin, aged["x"], aged["y"])
     return PoseColumns(
         poses=aged,
         tags=of_tags,
-        online=[tags.is_online(tag) for tag in of_tags],
-        anchors=[anchor_ids[index] if 0 <= index < len(anchor_ids) else None for index in aged["anchor"].tolist()],
+        online=tags.are_online(of_tags),
+        anchor_ids=[anchor.id for anchor in site.anchors_by_index()],
         age_s=age_s,
-        states=[STATES[state] for state in aged["state"].tolist()],
-        reasons=[REASONS[reason] for reason in reasons],
-        hints=[HINTS[reason] for reason in reasons],
         semi_major_m=ellipse[0],
         semi_minor_m=ellipse[1],
         angle_rad=ellipse[2],
@@ -97,28 +104,16 @@ def columns_of(
 def with_age(poses: Array, age_s: Array) -> Array:
     """The poses (POSE) as they may be shown at this age: no engine runs while a tag is silent, yet an old pose must
     not look like a good one."""
-    coasting = (age_s > STALE_AFTER_S) & (poses["state"] == State.TRACKING)
-    lost = age_s > LOST_AFTER_S
-    late = coasting | lost
-    if not late.any():
+    if age_s.max(initial=0.0) <= STALE_AFTER_S:
         return poses
-    aged = poses.copy()
-    aged["state"][coasting] = State.COASTING
-    aged["state"][lost] = State.LOST
-    aged["reason"][late] = StateReason.RANGES_MISSING
+    aged = copied(poses)
+    grow_old(aged, age_s)
     return aged
 
 
-def ellipse_95(cov: Array) -> tuple[Array, Array, Array]:
-    """Semi-major and semi-minor axis [m] and direction [rad] of the 95 % ellipses of cov (n × 2 × 2), NaN where cov
-    is not finite: x = sqrt(χ² λ) with the eigenvalues λ of a symmetric 2 × 2 matrix in closed form."""
-    a, b, c = cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1]
-    with np.errstate(invalid="ignore"):
-        mean, half = (a + c) / 2, np.hypot((a - c) / 2, b)
-        major = np.sqrt(CHI2_95_OF_2 * np.maximum(mean + half, 0.0))
-        minor = np.sqrt(CHI2_95_OF_2 * np.maximum(mean - half, 0.0))
-        angle = np.arctan2(2 * b, a - c) / 2
-    unknown = ~np.isfinite(major + minor + angle)
-    for column in (major, minor, angle):
-        column[unknown] = np.nan
-    return major, minor, angle
+def ellipse_95(cov: Array) -> Array:
+    """Semi-major and semi-minor axis [m] and direction [rad] of the 95 % ellipses of cov, n × 2 × 2 or more, NaN where
+    cov is not finite."""
+    axes = np.empty((3, len(cov)))
+    ellipses(np.ascontiguousarray(cov), axes)
+    return axes

@@ -7,7 +7,7 @@ import numpy as np
 
 from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from dropanchor_service.store.history import PoseHistory
-from dropanchor_service.store.records import enlarged, put, take
+from dropanchor_service.store.records import copied, enlarged, put, take
 from dropanchor_service.store.rings import RowRings, rank_in_row
 
 MODES = 8  # hypotheses that are kept of a tag
@@ -67,7 +67,7 @@ class LatestPoses:
         """POSE (0-d) of one row, None before its first pose."""
         with self._lock:
             known = row < len(self._changed) and self._changed[row] > 0
-            return self._poses[row].copy() if known else None
+            return copied(self._poses[row : row + 1])[0] if known else None
 
     def since(self, version: int = 0) -> tuple[int, Array]:
         """The version of this answer, and POSE of every row that changed after `version`."""
@@ -79,6 +79,12 @@ class LatestPoses:
         with self._lock:
             known = row < len(self._modes)
             return self._hypotheses[row, : self._modes[row]].copy() if known else np.empty(0, HYPOTHESIS)
+
+    def hypotheses_of(self, rows: Array) -> tuple[Array, Array]:
+        """HYPOTHESIS behind the latest poses of these rows, one row after the other, and how many each has."""
+        with self._lock:
+            counts = self._modes[rows]
+            return take(take(self._hypotheses, rows), np.arange(MODES) < counts[:, None]), counts
 
     def history(self, row: int) -> Array:
         """POSE of the row over the last minute or less, thinned, in order of time."""

@@ -1,96 +1,104 @@
-"""Many poses as the JSON of the contract, written column by column: no object per tag.
+"""Many poses as the JSON of the contract, from columns.
 
 The bytes are those that `to_json` writes of the same poses as dictionaries.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import orjson
 
-from dropanchor_service.estimation.batch import Array
-from dropanchor_service.store.columns import PoseColumns
+from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.store.columns import HINTS, REASONS, STATES, PoseColumns, ellipse_95
+from dropanchor_service.store.filled import INTEGER, NUMBER, QUOTED, TEXT, Filled, filled, nothing_of
 
 CHUNK = 1000  # poses
 
-_NULL = b"null"
-_SCALARS = {"x": "x", "y": "y", "heading_rad": "heading", "speed_mps": "speed", "yaw_rate_radps": "yaw_rate"}
-_QUALITY = {"p_mode": "p_mode", "sigma_pos_m": "sigma_pos", "sigma_obs_m": "sigma_obs", "range_m": "range"}
-
-Fields = dict[str, Sequence[bytes]]
+_COVARIANCE = [[NUMBER] * 3] * 3
+_ELLIPSE = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 
 
-def poses_json(columns: PoseColumns, hypotheses: Sequence[bytes]) -> bytes:
-    """`Pose` of each, with commas between. hypotheses: JSON of each."""
-    fields: Fields = {
-        "tag": _texts(columns.tags),
-        "t_ns": _numbers(columns.poses["t_ns"]),
-        "age_s": _numbers(columns.age_s),
-        "state": _repeated(columns.states),
-        "reason": _repeated(columns.reasons),
-        "hint": _repeated(columns.hints),
-        **{name: _numbers(columns.poses[field]) for name, field in _SCALARS.items()},
-        "covariance": _matrices(columns.poses["cov"]),
-        "ellipse_95": _ellipses(columns.semi_major_m, columns.semi_minor_m, columns.angle_rad),
-        **{name: _numbers(columns.poses[field]) for name, field in _QUALITY.items()},
-        "anchor": _repeated(columns.anchors),
-        "hypotheses": hypotheses,
-        "lat": [_NULL] * len(hypotheses) if columns.lat is None else _numbers(columns.lat),
-        "lon": [_NULL] * len(hypotheses) if columns.lon is None else _numbers(columns.lon),
-        "online": _repeated(columns.online),
-    }
-    return _objects(fields, len(hypotheses))
+def poses_json(columns: PoseColumns, hypotheses: Iterable[bytes]) -> Filled:
+    """`Pose` of each. hypotheses: JSON of those of the ambiguous ones."""
+    known = np.isfinite(columns.poses["cov"].reshape(-1, 9)).all(axis=1)
+    codes = _codes(columns, known)
+    used = np.flatnonzero(np.bincount(codes))
+    forms = [_form(columns, code) for code in used.tolist()]
+    form_of = np.searchsorted(used, codes)
+    return filled(forms, form_of, _numbers(columns), columns.poses["t_ns"], _texts(columns, hypotheses))
 
 
-def list_json(t_ns: int, poses: Array, chunk_json: Callable[[Array], bytes]) -> Iterator[bytes]:
-    """`PoseList` of the POSE rows, in chunks."""
+def list_json(t_ns: int, chunks: Iterable[Filled]) -> Iterator[bytes | memoryview]:
+    """`PoseList` of the poses, in chunks."""
     yield b'{"t_ns":%d,"poses":[' % t_ns
-    for begin in range(0, len(poses), CHUNK):
-        yield (b"," if begin else b"") + chunk_json(poses[begin : begin + CHUNK])
+    for place, chunk in enumerate(chunks):
+        yield chunk.text if place else chunk.all
     yield b"]}"
 
 
-def _objects(fields: Fields, count: int) -> bytes:
-    """{"a":1,"b":2},{"a":3,"b":4} of {"a": [1, 3], "b": [2, 4]}."""
-    width = 2 * len(fields)
-    parts: list[bytes] = [b""] * (width * count)
-    for place, (name, values) in enumerate(fields.items()):
-        opening = b',"' if place else b'},{"'
-        parts[2 * place :: width] = [opening + name.encode() + b'":'] * count
-        parts[2 * place + 1 :: width] = values
-    return b"".join(parts)[2:] + b"}" if count else b""
+def hypotheses_json(modes: Array, counts: Array) -> list[bytes]:
+    """`Hypothesis` for each HYPOTHESIS, in a list per tag; counts: how many each tag has."""
+    axes = ellipse_95(modes["cov"])
+    numbers = np.column_stack([modes[name] for name in ("weight", "x", "y", "heading", "speed")] + list(axes))
+    forms = [_hypothesis(ellipse) for ellipse in (nothing_of(3), _ELLIPSE)]
+    each = filled(forms, np.isfinite(axes[0]).astype(np.int64), numbers, np.empty(0, np.int64)).each
+    ends = np.cumsum(counts).tolist()
+    return [b"[%b]" % b",".join(each[begin:end]) for begin, end in zip([0, *ends], ends, strict=False)]
 
 
-def _numbers(values: Array) -> list[bytes]:
-    """Shortest form that reads back equal; NaN as null."""
-    return _dumped(np.ascontiguousarray(values))[1:-1].split(b",")
+def _hypothesis(ellipse: Any) -> bytes:
+    scalars = dict.fromkeys(("weight", "x", "y", "heading_rad", "speed_mps"), NUMBER)
+    return orjson.dumps(scalars | {"ellipse_95": ellipse})
 
 
-def _texts(values: list[str]) -> list[bytes]:
-    """Inside a string a quote is escaped, so only between two of them can `","` stand."""
-    return [b'"%b"' % text for text in orjson.dumps(values)[2:-2].split(b'","')]
+def _codes(columns: PoseColumns, known: Array) -> Array:
+    """One number for all that the form of a pose depends on."""
+    poses = columns.poses
+    anchor = np.where((poses["anchor"] >= 0) & (poses["anchor"] < len(columns.anchor_ids)), poses["anchor"], -1)
+    flags = np.array(columns.online) * 4 + known * 2 + np.isfinite(columns.semi_major_m)
+    states = poses["state"].astype(np.int64) * len(REASONS) + poses["reason"]
+    codes: Array = ((anchor + 1) * len(STATES) * len(REASONS) + states) * 8 + flags
+    return codes
 
 
-def _repeated(values: Sequence[str | bool | None]) -> list[bytes]:
-    """Of which there are few."""
-    known = {value: orjson.dumps(value) for value in set(values)}
-    return [known[value] for value in values]
+def _form(columns: PoseColumns, code: int) -> bytes:
+    code, flags = divmod(code, 8)
+    code, reason = divmod(code, len(REASONS))
+    anchor, state = divmod(code, len(STATES))
+    place = NUMBER if columns.lat is not None else None
+    return orjson.dumps(
+        {"tag": QUOTED, "t_ns": INTEGER, "age_s": NUMBER}
+        | {"state": STATES[state], "reason": REASONS[reason], "hint": HINTS[reason]}
+        | dict.fromkeys(("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps"), NUMBER)
+        | {"covariance": _COVARIANCE if flags & 2 else nothing_of(9)}
+        | {"ellipse_95": _ELLIPSE if flags & 1 else nothing_of(3)}
+        | dict.fromkeys(("p_mode", "sigma_pos_m", "sigma_obs_m", "range_m"), NUMBER)
+        | {"anchor": columns.anchor_ids[anchor - 1] if anchor else None}
+        | {"hypotheses": TEXT if state == State.AMBIGUOUS else []}
+        | {"lat": place, "lon": place, "online": bool(flags & 4)}
+    )
 
 
-def _matrices(values: Array) -> list[bytes]:
-    known: list[bool] = np.logical_and.reduce(np.isfinite(values), axis=(1, 2)).tolist()
-    texts = _dumped(np.ascontiguousarray(values))[3:-3].split(b"]],[[")
-    return [b"[[%b]]" % text if finite else _NULL for text, finite in zip(texts, known, strict=True)]
+def _numbers(columns: PoseColumns) -> Array:
+    """In the order of a form."""
+    poses = columns.poses
+    return np.column_stack(
+        [columns.age_s]
+        + [poses[name] for name in ("x", "y", "heading", "speed", "yaw_rate")]
+        + [poses["cov"].reshape(-1, 9), columns.semi_major_m, columns.semi_minor_m, columns.angle_rad]
+        + [poses[name] for name in ("p_mode", "sigma_pos", "sigma_obs", "range")]
+        + [column for column in (columns.lat, columns.lon) if column is not None]
+    )
 
 
-def _ellipses(major: Array, minor: Array, angle: Array) -> list[bytes]:
-    columns = (_numbers(column) for column in (major, minor, angle))
-    return [
-        b'{"semi_major_m":%b,"semi_minor_m":%b,"angle_rad":%b}' % axes if axes[0] != _NULL else _NULL
-        for axes in zip(*columns, strict=True)
-    ]
-
-
-def _dumped(values: Any) -> bytes:
-    return orjson.dumps(values, option=orjson.OPT_SERIALIZE_NUMPY)
+def _texts(columns: PoseColumns, hypotheses: Iterable[bytes]) -> Sequence[bytes]:
+    """Of each pose its tag, without the quotes, and where it is ambiguous the hypotheses."""
+    # Inside a string a quote is escaped, so only between two of them can `","` stand.
+    tags = orjson.dumps(columns.tags)[2:-2].split(b'","') if columns.tags else []
+    ambiguous = columns.poses["state"] == State.AMBIGUOUS
+    if not ambiguous.any():
+        return tags
+    of_each = iter(hypotheses)
+    pairs = ((tag, next(of_each)) if several else (tag,) for tag, several in zip(tags, ambiguous.tolist(), strict=True))
+    return [text for pair in pairs for text in pair]

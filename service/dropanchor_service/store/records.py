@@ -13,6 +13,11 @@ def take(records: Array, index: Any) -> Array:
     return taken
 
 
+def copied(records: Array) -> Array:
+    copy: Array = _opaque(records).copy().view(records.dtype)
+    return copy
+
+
 def put(records: Array, index: Any, values: Array) -> None:
     """`records[index] = values`, of the same type; with repeated indices the last one stays."""
     _opaque(records)[index] = _opaque(values)

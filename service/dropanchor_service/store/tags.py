@@ -86,6 +86,10 @@ class TagTable:
     def all(self) -> list[Tag]:
         return self._by_row[:]
 
+    def names(self, rows: Sequence[int]) -> list[str]:
+        by_row = self._by_row
+        return [by_row[row].name for row in rows]
+
     def register(self, name: str) -> Tag:
         """The tag of this name, made when it is new."""
         with self._lock:
@@ -103,6 +107,10 @@ class TagTable:
 
     def is_online(self, name: str) -> bool:
         return name in self._online
+
+    def are_online(self, names: Sequence[str]) -> list[bool]:
+        online = self._online
+        return [name in online for name in names]
 
     @property
     def online_names(self) -> int:

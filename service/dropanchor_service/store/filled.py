@@ -1,0 +1,71 @@
+"""JSON of many like objects at once: no object of Python for each of them, nor for a number in them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import orjson
+
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.passes import forms as holes
+from dropanchor_service.passes.forms import fill
+
+NUMBER = orjson.Fragment(bytes([holes.NUMBER]))
+INTEGER = orjson.Fragment(bytes([holes.INTEGER]))
+TEXT = orjson.Fragment(bytes([holes.TEXT]))
+QUOTED = orjson.Fragment(b'"%c"' % holes.TEXT)
+"""What stands in a form where every row has something else."""
+
+
+def nothing_of(numbers: int) -> orjson.Fragment:
+    """In place of so many numbers of the row: null."""
+    return orjson.Fragment(b"null" + bytes([holes.PASSED_OVER]) * numbers)
+
+
+@dataclass(frozen=True)
+class Filled:
+    """text: the objects, with a comma before each of them; ends: where each ends."""
+
+    text: memoryview
+    ends: Array
+
+    @property
+    def all(self) -> memoryview:
+        return self.text[1:]
+
+    @property
+    def each(self) -> list[bytes]:
+        ends = self.ends.tolist()
+        return [bytes(self.text[begin + 1 : end]) for begin, end in zip([0, *ends], ends, strict=False)]
+
+
+def filled(
+    forms: Sequence[bytes], form_of: Array, numbers: Array, integers: Array, texts: Sequence[bytes] = ()
+) -> Filled:
+    """The form of each row (`form_of`: which one), with its holes filled in the order in which they stand.
+
+    numbers: floats, per row as many as its form shows or leaves out; NaN is null. integers, texts: all rows' in turn.
+    """
+    closed = [b",%b%c" % (form, holes.END) for form in forms]
+    lengths = np.array([len(form) for form in closed])
+    begins = np.cumsum(lengths) - lengths
+    form_bytes, text_bytes = _bytes(b"".join(closed)), _bytes(b"".join(texts))
+    number_bytes, integer_bytes = _dumped(numbers), _dumped(integers)
+    text_ends = np.cumsum(np.fromiter(map(len, texts), np.int64, len(texts)))
+    hole_at = np.flatnonzero(form_bytes < 32)
+    first_hole = np.searchsorted(hole_at, begins)
+    most = int(lengths[form_of].sum()) + len(number_bytes) + len(integer_bytes) + len(text_bytes)
+    out, ends = np.empty(most, np.uint8), np.empty(len(form_of), np.int64)
+    fill(
+        form_bytes, begins, hole_at, first_hole, form_of, number_bytes, integer_bytes, text_bytes, text_ends, out, ends
+    )
+    return Filled(out[: ends[-1] if len(ends) else 0].data, ends)
+
+
+def _dumped(numbers: Array) -> Array:
+    """Shortest forms that read back equal."""
+    return _bytes(orjson.dumps(np.ascontiguousarray(numbers), option=orjson.OPT_SERIALIZE_NUMPY))
+
+
+def _bytes(text: bytes) -> Array:
+    return np.frombuffer(text, np.uint8)
