@@ -165,8 +165,9 @@ def _manage(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> i
     if row.since_manage_s >= 0.1:
         row.since_manage_s = 0.0
         if count > 1:
-            count = merge(work, count, t.merge_distance)
-        count = split(work, count, t.split_angle, 6.0)
+            count = merge(work, count, t.merge_distance if node.rest == 0 else t.merge_at_rest, t.merge_light)
+        if node.rest == 0:  # only what moves bends
+            count = split(work, count, t.split_angle, 6.0)
         count = limit(work, count, t.keep_tracking if row.declared == 1 else layout.KEEP)
     if row.since_seed_s >= 2.0 and counts_from(row, node):
         row.since_seed_s = 0.0

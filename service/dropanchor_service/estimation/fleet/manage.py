@@ -119,26 +119,37 @@ def _absorb(work: Any, a: int, b: int) -> None:
 
 
 @njit(nogil=True)
-def merge(work: Any, count: int, distance: float) -> int:
-    """Merge close pairs into the heavier one, heaviest first; returns the new count. Weights must be normalised."""
+def merge(work: Any, count: int, distance: float, light: float) -> int:
+    """Merge close pairs into the heavier one, heaviest first; returns the new count. Weights must be normalised.
+
+    The lighter one may be the further away: what its place is worth shrinks with its weight, as in Salmond (1990).
+    """
     put_in_order(work, count)
     for h in range(count):
         work[h].gone = False
     for ia in range(count):
         a = work[ia].order
-        if work[a].gone:
-            continue
-        for ib in range(ia + 1, count):
-            b = work[ib].order
-            if not work[b].gone and _close(work, a, b, distance):
-                _absorb(work, a, b)
-                work[b].gone = True
+        if not work[a].gone:
+            _absorb_close(work, count, ia, distance, light)
     kept = 0
     for h in range(count):
         if not work[h].gone:
             copy_hypothesis(work, h, kept)
             kept += 1
     return kept
+
+
+@njit(nogil=True)
+def _absorb_close(work: Any, count: int, ia: int, distance: float, light: float) -> None:
+    """Merge what is close to the ia-th heaviest into it."""
+    a = work[ia].order
+    for ib in range(ia + 1, count):
+        b = work[ib].order
+        if not work[b].gone:
+            lacks = max(work[a].log_weight - work[b].log_weight, 0.0)
+            if _close(work, a, b, distance * math.sqrt(1.0 + light * lacks)):
+                _absorb(work, a, b)
+                work[b].gone = True
 
 
 @njit(nogil=True)

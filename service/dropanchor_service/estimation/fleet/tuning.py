@@ -48,9 +48,11 @@ class Tuning(NamedTuple):
     second_std: float = 0.15  # rad
     second_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
-    merge_distance: float = 0.5
+    merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
+    merge_at_rest: float = 1.0  # the same of a tag at rest: they differ in nothing that moves it
+    merge_light: float = 0.5  # by which that squared grows per unit of log weight that the lighter one lacks
     keep_tracking: int = 32
-    prune: float = 16.0
+    prune: float = 10.0  # log weight below the best
     rest_std: float = 0.02  # m/s
     rest_rate_std: float = 0.003  # rad/s
     misfit_s: float = 3.0
