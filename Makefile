@@ -7,6 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 DISTRIBUTIONS := -e schemas -e tag_client -e service
 PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service
+PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
 
 .PHONY: help demo test check bench install chromium clean
@@ -42,7 +43,7 @@ chromium:
 
 test: install chromium
 	@echo '== running all tests'
-	@$(BIN)/python -m pytest $(PYTEST)
+	@$(BIN)/python -m pytest $(PARALLEL) $(PYTEST)
 
 check: install
 	@$(BIN)/ruff format --check .

@@ -1,12 +1,10 @@
 """Nothing is measured while kernels are compiled."""
 
-import subprocess
-
 import pytest
 
-from support.service import command, environment
+from support.kernel_cache import compile_once
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled() -> None:
-    subprocess.run(command("compile"), env=environment(), check=True)
+def _compiled() -> None:
+    compile_once()

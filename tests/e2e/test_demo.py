@@ -32,7 +32,7 @@ def running_demo(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]
     try:
         assert process.stdout is not None
         found = re.search(r"(http://\S+)/\n", process.stdout.readline())
-        assert found, process.communicate(timeout=10.0)
+        assert found, process.communicate(timeout=60.0)
         yield process, found[1]
     finally:
         for child in children(process.pid):
@@ -48,7 +48,7 @@ def children(pid: int) -> list[int]:
 
 
 def poses(url: str) -> dict[str, dict[str, Any]]:
-    return {pose["tag"]: pose for pose in httpx.get(f"{url}/api/v1/poses").json()["poses"]}
+    return {pose["tag"]: pose for pose in httpx.get(f"{url}/api/v1/poses", timeout=60.0).json()["poses"]}
 
 
 def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_of_it_at_once() -> None:
@@ -60,15 +60,15 @@ def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_of_it_at_once() -> None:
                 abs(pose["x"] - before[tag]["x"]) + abs(pose["y"] - before[tag]["y"]) > 1.0
                 for tag, pose in poses(url).items()
             ),
-            20.0,
+            60.0,
         )
-        assert {pose["state"] for pose in poses(url).values()} == {"tracking"}
-        assert "<html" in httpx.get(url).text.lower()
+        wait_until(lambda: {pose["state"] for pose in poses(url).values()} == {"tracking"})
+        assert "<html" in httpx.get(url, timeout=60.0).text.lower()
         (tags,) = children(process.pid)
         started = time.monotonic()
         os.killpg(process.pid, signal.SIGINT)  # what a terminal sends on Ctrl-C
-        assert process.wait(10.0) == 0
-        assert time.monotonic() - started < 15.0
+        assert process.wait(60.0) == 0
+        assert time.monotonic() - started < 30.0
         assert not Path(f"/proc/{tags}").exists()
 
 
@@ -76,7 +76,7 @@ def test_the_demo_ends_with_a_sentence_when_its_tags_die() -> None:
     with running_demo("--tags", "1") as (process, _):
         (tags,) = children(process.pid)
         os.kill(tags, signal.SIGKILL)
-        assert process.wait(10.0) == 1
+        assert process.wait(60.0) == 1
         assert process.stderr is not None
         assert "the simulated tags or the service ended by themselves" in process.stderr.read()
 
@@ -88,18 +88,18 @@ def test_a_recording_is_played_as_a_live_tag_and_the_page_stays_at_its_end(tmp_p
         lines = path.read_text().splitlines()
         path.write_text("\n".join([lines[0], *(line for line in lines[1:] if float(line.split(",")[0]) < 3.0)]) + "\n")
     with running_demo("--recording", str(tmp_path), "--engine", "fleet") as (process, url):
-        wait_until(lambda: tmp_path.name in poses(url) and poses(url)[tmp_path.name]["y"] > 2.0, 30.0)
+        wait_until(lambda: tmp_path.name in poses(url) and poses(url)[tmp_path.name]["y"] > 2.0, 60.0)
         assert poses(url)[tmp_path.name]["x"] == pytest.approx(10.0, abs=0.5)
         time.sleep(1.5)
         assert process.poll() is None
-        assert httpx.get(url).status_code == 200
+        assert httpx.get(url, timeout=60.0).status_code == 200
         os.killpg(process.pid, signal.SIGINT)
-        assert process.wait(10.0) == 0
+        assert process.wait(60.0) == 0
 
 
 def test_a_recording_that_is_not_there_is_said() -> None:
     found = subprocess.run(
-        command("demo", "--recording", "nowhere"), capture_output=True, text=True, env=environment(), timeout=30
+        command("demo", "--recording", "nowhere"), capture_output=True, text=True, env=environment(), timeout=120
     )
     assert found.returncode == 2
     assert "nowhere is not a folder" in found.stderr

@@ -99,8 +99,8 @@ def test_the_page_reconnects_when_the_service_comes_back(chromium: Browser, tmp_
             page.page.locator("tr[data-tag='cart']").wait_for()
         page.page.locator("#lost").wait_for(state="visible")
         with running_service("--config", str(config), "--port", str(port), endpoint=endpoint):
-            page.wait_for("dropanchor.status() === 'live'", timeout_s=20)
+            page.wait_for("dropanchor.status() === 'live'", timeout_s=60)
             page.page.locator("#lost").wait_for(state="hidden")
             frames = page.page.evaluate("dropanchor.received().frames")
-            page.wait_for(f"dropanchor.received().frames > {frames} + 5", timeout_s=20)
+            page.wait_for(f"dropanchor.received().frames > {frames} + 5", timeout_s=60)
             page.wait_for("dropanchor.tags().some((tag) => tag.tag === 'cart')")

@@ -33,13 +33,13 @@ def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
             frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
             session.put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
             session.put(keys.samples_key("default", "b"), encode_json(frame), encoding=ENCODING_JSON)
-        wait_until(lambda: service.metric("dropanchor_poses_total") >= 380, 60.0)
+        wait_until(lambda: service.metric("dropanchor_poses_total") >= 380, 120.0)
         live = service.get("/api/v1/poses")["poses"]
         httpx.put(f"{service.url}/api/v1/tags/a/settings", json={}).raise_for_status()
         wait_until(lambda: service.metric("dropanchor_recording_messages_total") >= 400)
         time.sleep(1.5)  # the chunk is on its way to the disk
         service.process.kill()
-        service.process.wait(10.0)
+        service.process.wait(60.0)
     assert main(["replay", str(tmp_path / "recordings"), "--out", str(tmp_path / "poses.csv")]) == 0
     said = capsys.readouterr()
     assert "ends before its end" in said.err

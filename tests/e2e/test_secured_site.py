@@ -78,7 +78,7 @@ def test_from_the_first_command_to_a_pose_and_out_again(site: Site) -> None:
     log = "".join(service.log)
     assert "ready at https://" in log
     for secret in (reading, writing, guess):
-        assert secret.rpartition("_")[2] not in log
+        assert secret.split("_", 2)[2] not in log  # the last part may hold an underscore of its own
 
 
 def test_a_service_that_is_its_own_router_admits_tags_that_were_added_and_no_others(site: Site) -> None:

@@ -51,4 +51,4 @@ def test_without_room_on_the_disk_poses_go_on_and_the_last_good_checkpoint_is_us
             assert any("going on from a checkpoint" in line for line in service.log)
             wait_until(lambda: is_current(service, TAGS), 60.0)
             tags.finish()
-            wait_until(lambda: samples_of(service) == tags.samples, 30.0)
+            wait_until(lambda: samples_of(service) == tags.samples, 120.0)

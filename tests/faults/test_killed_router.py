@@ -28,7 +28,7 @@ def test_a_router_that_is_killed_costs_no_sample_and_poses_are_live_again(tmp_pa
                 _log.info("live %.2f s after the router was there", time.monotonic() - back_s)
                 if life == KILLS:
                     tags.finish()
-                    wait_until(lambda: samples_of(service) == tags.samples, 30.0)
+                    wait_until(lambda: samples_of(service) == tags.samples, 120.0)
                     answers = {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"]}
                     assert service.metric("dropanchor_missed_messages_total") == 0
                     tags.close()

@@ -21,6 +21,6 @@ def running_server(app: ASGIApp, stopping: Event, port: int = 0) -> Iterator[int
         yield socket.getsockname()[1]
     finally:
         server.should_exit = True
-        thread.join(timeout=10)
+        thread.join(timeout=60)
         assert not thread.is_alive()
         socket.close()

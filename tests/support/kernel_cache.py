@@ -4,6 +4,7 @@ numba looks only at the file of the outermost kernel: after a change in a file t
 running the old code. So the cache's place is named after the sources. Takes effect before numba is imported.
 """
 
+import fcntl
 import functools
 import hashlib
 import os
@@ -28,5 +29,10 @@ def use_cache_of_these_sources() -> None:
 
 @functools.cache
 def compile_once() -> None:
-    """Fill the cache, for services that are started with a limit on the time they may take."""
-    subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
+    """Fill the cache, for services that are started with a limit on the time they may take. Of several processes one
+    does it, and the others wait."""
+    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)

@@ -39,22 +39,22 @@ class Running:
 
     def ask(self, method: str, path: str, **options: Any) -> httpx.Response:
         trusted = True if self.ca is None else ssl.create_default_context(cafile=self.ca)
-        with httpx.Client(verify=trusted, timeout=10.0, trust_env=False) as client:
+        with httpx.Client(verify=trusted, timeout=60.0, trust_env=False) as client:
             return client.request(method, f"{self.url}{path}", **options)
 
     def get(self, path: str) -> Any:
-        return httpx.get(f"{self.url}{path}", timeout=10.0).raise_for_status().json()
+        return httpx.get(f"{self.url}{path}", timeout=60.0).raise_for_status().json()
 
     def put(self, path: str, body: object) -> None:
-        httpx.put(f"{self.url}{path}", json=body, timeout=10.0).raise_for_status()
+        httpx.put(f"{self.url}{path}", json=body, timeout=60.0).raise_for_status()
 
     def metric(self, sample: str) -> float:
         """The value of one sample, such as `dropanchor_samples_total{kind="imu"}`."""
-        text = httpx.get(f"{self.url}/metrics", timeout=10.0).text
+        text = httpx.get(f"{self.url}/metrics", timeout=60.0).text
         found = re.search(rf"^{re.escape(sample)} (\S+)$", text, re.MULTILINE)
         return float(found[1]) if found else 0.0
 
-    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 30.0) -> int:
+    def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 60.0) -> int:
         self.process.send_signal(how)
         return self.process.wait(timeout_s)
 
@@ -115,7 +115,7 @@ def running_router(*arguments: str) -> Iterator[None]:
             yield
         finally:
             process.send_signal(signal.SIGTERM)
-            process.wait(10)
+            process.wait(60)
 
 
 def _read(running: Running) -> None:

@@ -1,12 +1,16 @@
 """Real Zenoh routers on loopback, for tests."""
 
+import functools
+import itertools
 import json
+import os
+import random
 import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import zenoh
@@ -19,11 +23,26 @@ with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
 """
 
 
+@functools.cache
+def _ports() -> Iterator[int]:
+    """Of this process alone: below those that the kernel gives to whoever asks for any, and shared out by worker."""
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    ports = range(10_000, 32_000)[worker::workers]
+    begin = random.randrange(len(ports))  # another run on this machine begins elsewhere
+    return itertools.cycle((*ports[begin:], *ports[:begin]))
+
+
 def free_port() -> int:
-    """A port on loopback that nobody uses at this moment."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port on loopback that nobody uses, and that nobody else is given before it is used."""
+    return next(port for port in _ports() if _is_free(port))
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as probe, suppress(OSError):
+        probe.bind(("127.0.0.1", port))
+        return True
+    return False
 
 
 def free_endpoint() -> str:

@@ -78,8 +78,8 @@ def test_ctrl_c_ends_a_replay_quickly_and_sends_what_waits(
         wait_until(lambda: len(heard.ranges()) >= 3)
         began = time.monotonic()
         process.send_signal(number)
-        _, said = process.communicate(timeout=10)
-        assert time.monotonic() - began < 15.0
+        _, said = process.communicate(timeout=60)
+        assert time.monotonic() - began < 30.0
     assert process.returncode == code
     assert "Traceback" not in said
     assert heard.ranges() == [float(i) for i in range(len(heard.ranges()))]
@@ -91,7 +91,7 @@ def test_ctrl_c_ends_a_client_that_still_looks_for_its_router(recording: Path) -
     assert process.stderr is not None
     assert f"Cannot connect to {endpoint}" in process.stderr.readline()
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=2.0)
+    process.communicate(timeout=60.0)
     assert process.returncode == -signal.SIGINT
 
 

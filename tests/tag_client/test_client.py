@@ -56,9 +56,9 @@ def test_a_full_batch_leaves_at_once_and_messages_are_numbered(router_endpoint: 
 def test_a_lonely_sample_leaves_when_its_time_is_up(router_endpoint: str) -> None:
     with listening(router_endpoint) as heard, TagClient("a", connect=router_endpoint, batch_s=0.05) as tag:
         tag.publish_range(1, 1.0)
-        wait_until(lambda: heard.ranges() == [1.0], timeout_s=3.0)
+        wait_until(lambda: heard.ranges() == [1.0])
         tag.publish_range(1, 2.0)
-        wait_until(lambda: heard.ranges() == [1.0, 2.0], timeout_s=3.0)
+        wait_until(lambda: heard.ranges() == [1.0, 2.0])
 
 
 def test_flush_sends_what_waits(router_endpoint: str) -> None:

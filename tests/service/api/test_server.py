@@ -217,7 +217,7 @@ def test_a_client_that_stops_reading_is_cut_and_harms_nobody() -> None:
             begun_s = time.monotonic()
             next(events)
             gaps_s.append(time.monotonic() - begun_s)
-        assert statistics.median(gaps_s) < 0.5
+        assert statistics.median(gaps_s) < 2.0
         with closing(stuck):
             received = stuck.recv(2**26, socket.MSG_WAITALL)
             assert received.startswith(b"HTTP/1.1 200")
