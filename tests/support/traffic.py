@@ -19,7 +19,7 @@ class Message(NamedTuple):
 def traffic(tags: int, duration_s: float, seed: int, step_s: float = 0.2) -> list[Message]:
     """Raw 9-axis samples and ranges of `tags` tags of the yard, each numbered by a publisher of its own."""
     messages: list[Message] = []
-    sequences = [count(1) for _ in range(tags)]
+    sequences = [count() for _ in range(tags)]
     for delivery in deliveries(tags, "yard", seed, preset("calibrated"), T0_NS, step_s):
         if delivery.due_s > duration_s:
             return messages
