@@ -1,10 +1,12 @@
 """`dropanchor`: one module of `commands` per subcommand; only the chosen one is imported."""
 
 import argparse
+import gc
 import re
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from types import ModuleType
 
 from dropanchor_service.kernel_cache import keep_compiled
 
@@ -48,12 +50,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         one = commands.add_parser(name, help=brief, formatter_class=argparse.RawDescriptionHelpFormatter)
         if words[:1] == [name]:
             keep_compiled()  # before a command imports what is compiled
-            command = import_module(f"dropanchor_service.commands.{name}")
+            command = _imported(f"dropanchor_service.commands.{name}")
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
             one.set_defaults(run=command.run)
     chosen = parser.parse_args(words)
     return int(chosen.run(chosen))
+
+
+def _imported(name: str) -> ModuleType:
+    """What is imported stays: looking through it for garbage again and again would take a tenth of the start."""
+    gc.disable()
+    try:
+        return import_module(name)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def _with_negative_values(arguments: Sequence[str]) -> list[str]:

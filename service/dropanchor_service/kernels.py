@@ -2,10 +2,12 @@
 
 import logging
 import os
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -40,6 +42,7 @@ from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.answers import Answers
 
 SAY_EVERY_S = 5.0
+NOT_TO_BE_FOUND: Final[Any] = None  # in the place of a module
 
 _log = logging.getLogger(__name__)
 
@@ -74,6 +77,18 @@ def _said_while_compiling(what: str) -> Iterator[None]:
         _log.warning("compiled in %.0f s; it is kept in %s", elapsed, os.environ.get(VARIABLE))
 
 
+@contextmanager
+def _without_blas() -> Iterator[None]:
+    """numba looks for BLAS, which no kernel of ours calls, by importing scipy.linalg: 0.2 s of every start."""
+    found = sys.modules.setdefault("scipy.linalg", NOT_TO_BE_FOUND)
+    try:
+        yield
+    finally:
+        if found is NOT_TO_BE_FOUND:
+            del sys.modules["scipy.linalg"]
+
+
+@_without_blas()
 @_said_while_compiling("the estimator, in about a minute")
 def warm_up(engine: Engine) -> None:
     """Compile what `engine`, which is thrown away, runs: a second of a tag that moves off, seen by every sensor."""
@@ -97,6 +112,7 @@ def _moving_off(rows: int) -> SampleBatch:
     return SampleBatch(imu=imu, ranges=ranges, headings=headings)
 
 
+@_without_blas()
 @_said_while_compiling("the reader of messages")
 def warm_up_passes() -> None:
     """Compile what every message goes through: two of a publisher, with a gap between, and one alone, whose columns
@@ -125,6 +141,7 @@ def _pass(payloads: list[bytes]) -> None:
         shift_times(t_ns, messages, offsets)
 
 
+@_without_blas()
 @_said_while_compiling("the writer of answers")
 def warm_up_answers() -> None:
     """Compile what every answer goes through: an old pose, and one of a tag that may be in two places."""

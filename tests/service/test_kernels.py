@@ -40,7 +40,7 @@ def test_what_the_environment_says_is_left_alone(monkeypatch: pytest.MonkeyPatch
     assert os.environ[VARIABLE] == "somewhere"
 
 
-def test_nothing_is_left_to_be_compiled_while_samples_come_in() -> None:
+def test_nothing_is_left_to_be_compiled_or_imported_while_samples_come_in() -> None:
     path = f"{environment()['PYTHONPATH']}{os.pathsep}{ROOT / 'tests'}"
     command = [sys.executable, "-m", "support.compiled_later"]
     ended = subprocess.run(command, env=environment(PYTHONPATH=path), check=True, text=True, capture_output=True)

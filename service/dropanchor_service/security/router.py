@@ -8,7 +8,8 @@ from dropanchor_service.security.access_control import access_control, low_pass_
 LINK: dict[str, Any] = {"tx": {"lease": 4000, "keep_alive": 4}, "rx": {"max_message_size": 2**20}}
 
 QUIET: dict[str, Any] = {
-    "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+    # A router waits for what it might find for half a second, even where it does not look.
+    "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
     # Routers stamp messages by default, one after another for each session. A subscriber with recovery takes those of
     # plain publishers whose stamps are out of order for repeated ones, and drops them without a word.
     "timestamping": {"enabled": False},

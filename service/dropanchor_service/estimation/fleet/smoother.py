@@ -25,6 +25,7 @@ from .heading import error_of_class
 from .layout import GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
 from .node import BEARING, RANGE
 from .predict import diffuse, fill_class, fill_decay, move, transport
+from .products import applied, inner, times
 from .start import counts_from
 from .tuning import Tuning
 from .update import correct, gaussian, predict_range, project, rest_variance, wrap
@@ -230,9 +231,9 @@ def forward(track: Track, nodes: Any, row: Any, anchors: Any, kind: int, t: Tuni
 @njit(nogil=True)
 def _adjoin(H: Any, PH: Any, S: float, e: float, costate: Any, L: Any) -> None:
     """Costate l and its covariance L back over one scalar measurement."""
-    g = np.dot(L, PH) / S
-    c = (np.dot(PH, g) + 1.0) / S
-    pull = (np.dot(PH, costate) + e) / S
+    g = applied(L, PH) / S
+    c = (inner(PH, g) + 1.0) / S
+    pull = (inner(PH, costate) + e) / S
     for i in range(N):
         costate[i] -= H[i] * pull
         for j in range(N):
@@ -245,16 +246,16 @@ def backward(track: Track, n: int) -> None:
     costate, L, A = np.zeros(N), np.zeros((N, N)), np.zeros((N, N))
     for k in range(n - 1, -1, -1):
         P = track.cov[k]
-        track.smooth[k] = track.mean[k] - np.dot(P, costate)
-        track.smooth_cov[k] = P - np.dot(P, np.dot(L, P))
+        track.smooth[k] = track.mean[k] - applied(P, costate)
+        track.smooth_cov[k] = P - times(P, times(L, P))
         for m in range(track.used[k] - 1, -1, -1):
             _adjoin(track.H[k, m], track.PH[k, m], track.S[k, m], track.e[k, m], costate, L)
         A[:] = 0.0
         A[:4] = track.F[k]
         for i in range(4, N):
             A[i, i] = track.decay[k, i]
-        costate[:] = np.dot(A.T, costate)
-        L[:] = np.dot(A.T, np.dot(L, A))
+        costate[:] = applied(A.T, costate)
+        L[:] = times(A.T, times(L, A))
 
 
 @njit(nogil=True)
