@@ -57,7 +57,8 @@ class Hypothesis(_Answer):
 
 
 class Pose(_Answer):
-    """The pose of one tag at one time, in the site frame (ENU, metres, x east)."""
+    """The pose of one tag at one time, in the site frame (ENU, metres, x east). Among the poses of many tags its
+    numbers are rounded: `covariance`, `lat` and `lon` to 9 decimals, the others to 6."""
 
     tag: str
     t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")

@@ -69,8 +69,11 @@ class ZenohAnswers:
             yield keys.pose_key(self._site, name), to_json(pose)
             return
         wanted = [tag for tag in tags.all() if asked.includes(keys.pose_key(self._site, tag.name))]
-        for pose in self._answers.pose_list(wanted)["poses"] if at_ns is None else self._poses_at(wanted, at_ns):
-            yield keys.pose_key(self._site, pose["tag"]), to_json(pose)
+        if at_ns is None:
+            found = self._answers.pose_jsons(self._answers.rows(wanted), self._answers.now_ns())
+        else:
+            found = ((pose["tag"], to_json(pose)) for pose in self._poses_at(wanted, at_ns))
+        yield from ((keys.pose_key(self._site, of), text) for of, text in found)
 
     def _pose(self, name: str, at_ns: int | None) -> Answer | None:
         try:

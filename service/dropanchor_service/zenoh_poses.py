@@ -70,10 +70,10 @@ class ZenohPoses:
             self._tag_version = self._answers.latest.version
             return
         self._tag_version, poses = self._answers.latest.since(self._tag_version)
-        for pose in self._answers.poses_of(poses, self._answers.now_ns()):
+        for tag, pose in self._answers.pose_jsons(poses, self._answers.now_ns()):
             self._session.put(
-                keys.pose_key(self._site, pose["tag"]),
-                to_json(pose),
+                keys.pose_key(self._site, tag),
+                pose,
                 encoding=zenoh.Encoding.APPLICATION_JSON,
                 congestion_control=zenoh.CongestionControl.DROP,
             )

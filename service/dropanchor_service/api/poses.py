@@ -19,6 +19,8 @@ from dropanchor_service.store.at_time import NoPoseThenError, TooFarAheadError
 from dropanchor_service.store.explain import explanation_of
 from dropanchor_service.store.tags import Tag
 
+PIECE_BYTES = 400_000  # sent at once: what the kernel does not take is copied, again and again
+
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
 
@@ -97,7 +99,8 @@ class PlainPose(APIRoute):
 async def _in_turn(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
     """Other answers have their turn between two chunks."""
     for chunk in chunks:
-        yield chunk
+        for begin in range(0, len(chunk), PIECE_BYTES):
+            yield chunk[begin : begin + PIECE_BYTES]
         await asyncio.sleep(0)
 
 

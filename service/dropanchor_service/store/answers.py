@@ -131,7 +131,7 @@ class Answers:
         frame: Answer = {
             "t_ns": now_ns,
             "tags": columns.tags,
-            "online": columns.online,
+            "online": columns.online.tolist(),
             "state": columns.states,
             "reason": columns.reasons,
             "hint": columns.hints,
@@ -154,8 +154,7 @@ class Answers:
         """POSE of these tags, or of all, as far as they have one."""
         if tags is None:
             return self.latest.since()[1]
-        found = [row for row in (self.latest.row(tag.row) for tag in tags) if row is not None]
-        return np.stack(found) if found else np.empty(0, POSE)
+        return self.latest.of(np.array([tag.row for tag in tags], np.int64))
 
     def _hypotheses_of(self, row: int, state: str) -> list[Answer] | None:
         """The modes of a tag that is ambiguous, None of another."""
@@ -197,7 +196,7 @@ def _pose_values(columns: PoseColumns) -> tuple[Sequence[Any], ...]:
         nowhere,
         nowhere if columns.lat is None else columns.lat.tolist(),
         nowhere if columns.lon is None else columns.lon.tolist(),
-        columns.online,
+        columns.online.tolist(),
     )
 
 

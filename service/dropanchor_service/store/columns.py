@@ -44,7 +44,7 @@ class PoseColumns:
 
     poses: Array
     tags: list[str]
-    online: list[bool]
+    online: Array
     anchor_ids: list[str]
     age_s: Array
     semi_major_m: Array
@@ -90,7 +90,7 @@ def columns_of(
     return PoseColumns(
         poses=aged,
         tags=of_tags,
-        online=tags.are_online(of_tags),
+        online=tags.are_online(aged["row"]) if names is None else np.array([tags.is_online(name) for name in names]),
         anchor_ids=[anchor.id for anchor in site.anchors_by_index()],
         age_s=age_s,
         semi_major_m=ellipse[0],

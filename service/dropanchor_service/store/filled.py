@@ -40,31 +40,30 @@ class Filled:
 
 
 def filled(
-    forms: Sequence[bytes], form_of: Array, numbers: Array, integers: Array, texts: Sequence[bytes] = ()
+    forms: Sequence[bytes],
+    form_of: Array,
+    numbers: Array,
+    decimals: Array,
+    integers: Array | None = None,
+    texts: Sequence[bytes] = (),
 ) -> Filled:
     """The form of each row (`form_of`: which one), with its holes filled in the order in which they stand.
 
-    numbers: floats, per row as many as its form shows or leaves out; NaN is null. integers, texts: all rows' in turn.
+    numbers: floats, per row as many as its form shows or leaves out, rounded to `decimals` of each column; NaN is null.
+    integers: at most one per row. texts: all rows' in turn.
     """
     closed = [b",%b%c" % (form, holes.END) for form in forms]
     lengths = np.array([len(form) for form in closed])
     begins = np.cumsum(lengths) - lengths
     form_bytes, text_bytes = _bytes(b"".join(closed)), _bytes(b"".join(texts))
-    number_bytes, integer_bytes = _dumped(numbers), _dumped(integers)
     text_ends = np.cumsum(np.fromiter(map(len, texts), np.int64, len(texts)))
-    hole_at = np.flatnonzero(form_bytes < 32)
+    hole_at = np.flatnonzero(form_bytes < ord(" "))
     first_hole = np.searchsorted(hole_at, begins)
-    most = int(lengths[form_of].sum()) + len(number_bytes) + len(integer_bytes) + len(text_bytes)
+    whole = np.zeros(len(form_of), np.int64) if integers is None else np.ascontiguousarray(integers)
+    most = int(lengths[form_of].sum()) + (numbers.size + len(whole)) * holes.LONGEST + len(text_bytes)
     out, ends = np.empty(most, np.uint8), np.empty(len(form_of), np.int64)
-    fill(
-        form_bytes, begins, hole_at, first_hole, form_of, number_bytes, integer_bytes, text_bytes, text_ends, out, ends
-    )
+    fill(form_bytes, begins, hole_at, first_hole, form_of, numbers, decimals, whole, text_bytes, text_ends, out, ends)
     return Filled(out[: ends[-1] if len(ends) else 0].data, ends)
-
-
-def _dumped(numbers: Array) -> Array:
-    """Shortest forms that read back equal."""
-    return _bytes(orjson.dumps(np.ascontiguousarray(numbers), option=orjson.OPT_SERIALIZE_NUMPY))
 
 
 def _bytes(text: bytes) -> Array:

@@ -69,6 +69,12 @@ class LatestPoses:
             known = row < len(self._changed) and self._changed[row] > 0
             return copied(self._poses[row : row + 1])[0] if known else None
 
+    def of(self, rows: Array) -> Array:
+        """POSE of these rows, in this order, as far as they have one."""
+        with self._lock:
+            known = rows[rows < len(self._changed)]
+            return take(self._poses, known[self._changed[known] > 0])
+
     def since(self, version: int = 0) -> tuple[int, Array]:
         """The version of this answer, and POSE of every row that changed after `version`."""
         with self._lock:

@@ -1,7 +1,5 @@
-"""Many poses as the JSON of the contract, from columns.
-
-The bytes are those that `to_json` writes of the same poses as dictionaries.
-"""
+"""Many poses as the JSON of the contract, from columns: what `to_json` writes of the same poses as dictionaries, but
+without digits that mean nothing."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -10,23 +8,26 @@ import numpy as np
 import orjson
 
 from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.passes.forms import BEYOND
 from dropanchor_service.store.columns import HINTS, REASONS, STATES, PoseColumns, ellipse_95
 from dropanchor_service.store.filled import INTEGER, NUMBER, QUOTED, TEXT, Filled, filled, nothing_of
 
-CHUNK = 1000  # poses
+CHUNK = 2500  # poses
+DECIMALS, FINE_DECIMALS = 6, 9  # µm, µrad, µs; of variances and degrees
 
+_DECIMALS = np.repeat([DECIMALS, FINE_DECIMALS, DECIMALS, FINE_DECIMALS], [6, 9, 7, 2])  # of the columns of _numbers
 _COVARIANCE = [[NUMBER] * 3] * 3
 _ELLIPSE = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 
 
 def poses_json(columns: PoseColumns, hypotheses: Iterable[bytes]) -> Filled:
     """`Pose` of each. hypotheses: JSON of those of the ambiguous ones."""
-    known = np.isfinite(columns.poses["cov"].reshape(-1, 9)).all(axis=1)
-    codes = _codes(columns, known)
+    codes = _codes(columns)
     used = np.flatnonzero(np.bincount(codes))
     forms = [_form(columns, code) for code in used.tolist()]
     form_of = np.searchsorted(used, codes)
-    return filled(forms, form_of, _numbers(columns), columns.poses["t_ns"], _texts(columns, hypotheses))
+    texts = _texts(columns, hypotheses)
+    return filled(forms, form_of, _numbers(columns), _DECIMALS, columns.poses["t_ns"], texts)
 
 
 def list_json(t_ns: int, chunks: Iterable[Filled]) -> Iterator[bytes | memoryview]:
@@ -42,7 +43,7 @@ def hypotheses_json(modes: Array, counts: Array) -> list[bytes]:
     axes = ellipse_95(modes["cov"])
     numbers = np.column_stack([modes[name] for name in ("weight", "x", "y", "heading", "speed")] + list(axes))
     forms = [_hypothesis(ellipse) for ellipse in (nothing_of(3), _ELLIPSE)]
-    each = filled(forms, np.isfinite(axes[0]).astype(np.int64), numbers, np.empty(0, np.int64)).each
+    each = filled(forms, (axes[0] < BEYOND).astype(np.int64), numbers, np.full(8, DECIMALS)).each
     ends = np.cumsum(counts).tolist()
     return [b"[%b]" % b",".join(each[begin:end]) for begin, end in zip([0, *ends], ends, strict=False)]
 
@@ -52,11 +53,12 @@ def _hypothesis(ellipse: Any) -> bytes:
     return orjson.dumps(scalars | {"ellipse_95": ellipse})
 
 
-def _codes(columns: PoseColumns, known: Array) -> Array:
+def _codes(columns: PoseColumns) -> Array:
     """One number for all that the form of a pose depends on."""
     poses = columns.poses
+    known = (np.abs(poses["cov"].reshape(-1, 9)) < BEYOND).all(axis=1)
     anchor = np.where((poses["anchor"] >= 0) & (poses["anchor"] < len(columns.anchor_ids)), poses["anchor"], -1)
-    flags = np.array(columns.online) * 4 + known * 2 + np.isfinite(columns.semi_major_m)
+    flags = columns.online * 4 + known * 2 + (columns.semi_major_m < BEYOND)
     states = poses["state"].astype(np.int64) * len(REASONS) + poses["reason"]
     codes: Array = ((anchor + 1) * len(STATES) * len(REASONS) + states) * 8 + flags
     return codes

@@ -72,6 +72,7 @@ class TagTable:
         self._by_row: list[Tag] = []
         self._counts = np.zeros(16, _COUNTS)
         self._online: set[str] = set()
+        self._is_online = np.zeros(16, bool)  # the same, by row
 
     def __len__(self) -> int:
         return len(self._by_row)
@@ -97,20 +98,25 @@ class TagTable:
             if tag is None:
                 tag = Tag(name, len(self._by_row), self)
                 self._grow(tag.row + 1)
+                self._is_online[tag.row] = name in self._online
                 self._by_row.append(tag)
                 self._by_name[name] = tag
             return tag
 
     def set_online(self, name: str, online: bool) -> None:
         """A token may be seen before the tag is registered; it is remembered."""
-        (self._online.add if online else self._online.discard)(name)
+        with self._lock:
+            (self._online.add if online else self._online.discard)(name)
+            tag = self._by_name.get(name)
+            if tag is not None:
+                self._is_online[tag.row] = online
 
     def is_online(self, name: str) -> bool:
         return name in self._online
 
-    def are_online(self, names: Sequence[str]) -> list[bool]:
-        online = self._online
-        return [name in online for name in names]
+    def are_online(self, rows: Array) -> Array:
+        online: Array = self._is_online[rows]
+        return online
 
     @property
     def online_names(self) -> int:
@@ -148,6 +154,7 @@ class TagTable:
     def _grow(self, rows: int) -> None:
         if rows > len(self._counts):
             self._counts = enlarged(self._counts, 2 * len(self._counts))
+            self._is_online = enlarged(self._is_online, len(self._counts))
 
 
 def _count(column: Array, rows: Array) -> None:
