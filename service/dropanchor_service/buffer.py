@@ -22,6 +22,7 @@ MESSAGE_OVERHEAD = 200  # bytes that a waiting message takes beside its payload
 STRANGER_BYTES = 8 * 2**20  # of messages of tags without a row that may wait
 STRANGERS_PER_TURN = 250  # of them at a time: each costs many times as much as a message of a known tag
 MAX_WAIT_NS = 500_000_000
+CALM_NS = 2_000_000_000  # without shedding anything: then an overload is over
 _KEPT_SHARE = 0.75  # of what may wait after shedding for room, so that it is rare
 _COUNTS = np.dtype({"names": ["some", "bearing"], "formats": [("<u2", 3), "<u2"], "offsets": [2, 24], "itemsize": 32})
 
@@ -46,9 +47,9 @@ class MessageBuffer:
 
     It is bounded in bytes: when it is full, the tags that fill it most lose their oldest messages. And in time: when
     `drain` has not caught up for `max_wait_ns` and what it takes waits longer and longer, that is an overload. Until
-    all has been taken, only so much waits as it can take in half that time, at least the newest message of each tag,
-    and the tags take turns. What comes from caches, or came while nobody drained, is no overload: it waits for as long
-    as it takes, and others behind it.
+    it has caught up for a while, only so much waits as it can take in half that time, at least the newest message of
+    each tag, and the tags take turns. What comes from caches, or came while nobody drained, is no overload: it waits
+    for as long as it takes, and others behind it.
 
     Keys that are not known wait apart, where only they push out each other: a flood of them harms no known tag.
     """
@@ -69,7 +70,9 @@ class MessageBuffer:
         self._cached = 0  # messages up to the last one that a cache gave
         self._behind: _Behind | None = None
         self._drained_bytes = 0  # since then
+        self._bytes_per_ns = 0.0  # that were drained while it was behind
         self._overloaded = False
+        self._shed_ns = 0  # UTC of the last time that it shed because of that
         self._drains = 0
         self._served = np.zeros(0, np.int64)  # by row: the last drain in an overload that took something of it
 
@@ -108,7 +111,7 @@ class MessageBuffer:
                 self._judge(now_ns)
             if len(self._messages) <= most:
                 taken, self._messages, self._bytes = self._messages, [], 0
-                self._behind, self._overloaded = None, False
+                self._behind, self._overloaded = None, self._overloaded and now_ns - self._shed_ns < CALM_NS
             elif self._overloaded:
                 taken = self._take(self._next_in_turn(most))
             else:
@@ -143,19 +146,23 @@ class MessageBuffer:
     def _judge(self, now_ns: int) -> None:
         """Whether this is an overload, and then shed."""
         waited_ns = now_ns - self._messages[0][3]
-        if self._behind is None or self._cached:
-            self._behind, self._overloaded, self._drained_bytes = _Behind(now_ns, waited_ns), False, 0
+        if self._cached:
+            self._behind, self._overloaded = None, False
+        if self._behind is None:
+            self._behind, self._drained_bytes = _Behind(now_ns, waited_ns), 0
         behind_ns = now_ns - self._behind.since_ns
         if min(behind_ns, waited_ns - max(0, self._behind.waited_ns)) > self._max_wait_ns:
             self._overloaded = True
-        if self._overloaded:
-            self._keep_newest(self._drained_bytes / behind_ns * self._max_wait_ns / 2)
+        if self._drained_bytes and behind_ns > 0:
+            self._bytes_per_ns = self._drained_bytes / behind_ns
+        if self._overloaded and self._keep_newest(self._bytes_per_ns * self._max_wait_ns / 2):
+            self._shed_ns = now_ns
 
-    def _keep_newest(self, target_bytes: float) -> None:
-        """Of every tag the newest message, and more where all together are no more than this."""
+    def _keep_newest(self, target_bytes: float) -> bool:
+        """Of every tag the newest message, and more where all together are no more than this. Whether any was lost."""
         rows, sizes = self._columns()
         newer = newer_of_same(rows, sizes)
-        self._shed_but((newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes))
+        return self._shed_but((newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes))
 
     def _make_room(self, target_bytes: float) -> None:
         rows, sizes = self._columns()
@@ -164,13 +171,15 @@ class MessageBuffer:
         total = np.cumsum(np.where(kept, sizes, 0)[::-1])[::-1]
         self._shed_but(kept & (total <= target_bytes))
 
-    def _shed_but(self, kept: Array) -> None:
+    def _shed_but(self, kept: Array) -> bool:
+        """Whether any was lost."""
         if kept.all():
-            return
+            return False
         self._cached = int(kept[: self._cached].sum())
         lost = self._take(np.flatnonzero(~kept))
         self._shed.update(message[0] for message in lost)
         self._shed_samples += _samples_of(lost)
+        return True
 
     def _next_in_turn(self, most: int) -> Array:
         """So many messages of the tags that have waited for their turn longest."""

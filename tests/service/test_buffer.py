@@ -70,11 +70,13 @@ def test_equally_busy_tags_lose_equally() -> None:
     assert max(kept.values()) - min(kept.values()) <= 1
 
 
-def overload(buffer: MessageBuffer, seconds: float, keys: list[str], per_turn: int, most: int = 100) -> list[Message]:
+def overload(
+    buffer: MessageBuffer, seconds: float, keys: list[str], per_turn: int, most: int = 100, since_s: float = 0.0
+) -> list[Message]:
     """A turn every 10 ms takes `most` messages while `per_turn` of these keys, one after the other, come in."""
     taken: list[Message] = []
     for turn in range(round(seconds * 100)):
-        now_ns = turn * 10_000_000
+        now_ns = turn * 10_000_000 + round(since_s * S)
         for number in range(turn * per_turn, (turn + 1) * per_turn):
             buffer.append(keys[number % len(keys)], PAYLOAD, "e", now_ns)
         taken += buffer.drain(most, now_ns)[0]
@@ -93,6 +95,21 @@ def test_in_an_overload_what_waits_is_taken_in_a_quarter_of_a_second_and_the_new
     lost = buffer.take_shed().by_row
     assert len(taken) + 1 + sum(lost.values()) + buffer.depth == 450 * 300
     assert max(lost.values()) - min(lost.values()) < 100
+
+
+def test_an_overload_that_pauses_is_known_at_once_when_it_goes_on() -> None:
+    buffer = MessageBuffer(10**9)
+    keys = [str(i) for i in range(10)]
+    admit(buffer, keys)
+    overload(buffer, 2.0, keys, 300)
+    buffer.drain(10**9, 2 * S)
+    overload(buffer, 0.45, keys, 300, since_s=2.1)
+    assert buffer.depth <= 0.3 * 100 * 100
+    buffer.drain(10**9, 3 * S)
+    buffer.take_shed()
+    buffer.drain(10**9, 5 * S)
+    overload(buffer, 0.45, keys, 300, since_s=5.1)
+    assert not buffer.take_shed().by_row
 
 
 def test_in_an_overload_of_more_tags_than_are_taken_in_that_time_they_take_turns() -> None:
