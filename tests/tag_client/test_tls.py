@@ -47,7 +47,7 @@ def test_only_a_tag_with_a_certificate_of_the_right_authority_is_let_in(tmp_path
     def client(name: str | None, ca: str = "ours") -> TagClient:
         cert, key = (None, None) if name is None else (tmp_path / f"{name}.pem", tmp_path / f"{name}.key")
         settings = SessionSettings(connect=tls, ca=tmp_path / f"{ca}.pem", cert=cert, key=key)
-        return TagClient("a", connect=settings, connect_timeout_s=2.0 if name == "tag" and ca == "ours" else 0.7)
+        return TagClient("a", connect=settings, connect_timeout_s=20.0 if name == "tag" and ca == "ours" else 0.7)
 
     with running_router([tls, plain], {"link": {"tls": files}}), listening(plain) as heard:
         with client("tag") as tag:
