@@ -1,7 +1,7 @@
 """Products of small matrices and vectors.
 
-numba's np.dot calls BLAS, which costs as much as such a product itself, and which it gets by importing scipy.linalg:
-0.2 s of processor time at every start.
+numba's np.dot calls BLAS, which it gets by importing scipy.linalg: 0.2 s of processor time at every start, for 0.2 µs
+less of a product of 10 by 10.
 """
 
 from typing import Any
