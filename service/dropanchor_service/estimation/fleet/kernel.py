@@ -6,7 +6,7 @@ from typing import Any
 from . import layout
 from .blocked import expect_clear, open_alternative, recover, unblock
 from .compiled import njit
-from .gap import begins_again, place_again, repeats, watch_gap
+from .gap import hold_place, is_held, loses_track, place_again, repeats, watch_gap
 from .heading import error_of_class, judge_models, model_of, predict_models, reset_models, told_of
 from .layout import COMMON, CRAB, DRIFTING, PHI, STEADY, YAW, R, V
 from .manage import best_of, finite, limit, merge, normalise, prune, split
@@ -156,6 +156,14 @@ def _heading_all(work: Any, count: int, row: Any, node: Any, t: Tuning, scratch:
 
 
 @njit(nogil=True)
+def _most(row: Any, t: Tuning) -> int:
+    """Hypotheses that the row may have."""
+    if row.declared == 1:
+        return t.keep_tracking
+    return t.keep_coarse if row.coarse == 1 else layout.KEEP
+
+
+@njit(nogil=True)
 def _manage(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> int:
     """Normalise, prune, now and then merge, split and re-seed the second class; returns the count."""
     normalise(work, count)
@@ -167,8 +175,8 @@ def _manage(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> i
         if count > 1:
             count = merge(work, count, t.merge_distance if node.rest == 0 else t.merge_at_rest, t.merge_light)
         if node.rest == 0:  # only what moves bends
-            count = split(work, count, t.split_angle, 6.0)
-        count = limit(work, count, t.keep_tracking if row.declared == 1 else layout.KEEP)
+            count = split(work, count, t.split_coarse if row.coarse == 1 else t.split_angle, 6.0)
+        count = limit(work, count, _most(row, t))
     if row.since_seed_s >= 2.0 and counts_from(row, node):
         row.since_seed_s = 0.0
         count = reseed(work, count, row, node, PH, t)
@@ -234,16 +242,20 @@ def _continue(
     """One node on any row, which starts or begins again where it must; returns the count of hypotheses."""
     if count > 0:
         watch_gap(work, count, row, node)
-        if not begins_again(row, node):
+        if not loses_track(row, node):
             count = _step(work, count, row, node, anchors, t, scratch, belief)
             if count == 0:
                 row.fault += 1
                 row.reason = 10
                 row.start_known = row.again = 0  # it is not there any more
+                row.unwatched_s = 0.0
                 _reset(row, pool)
             return count
-        place_again(row, anchors[row.anchor])
         _reset(row, pool)
+    if is_held(row, node):
+        return 0
+    if row.unwatched_s > 0.0:
+        place_again(row, anchors[row.anchor])
     count = begin(work, row, node, anchors, t)
     for h in range(count):
         mirror(work[h].cov)
@@ -275,8 +287,9 @@ def advance(rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspa
         count = _continue(work, count, row, pool, node, anchors, t, scratch, belief)
         if count > 0:
             publish(work, count, row, node, anchors, t, belief, scratch)
+        elif row.unwatched_s > 0.0:
+            hold_place(row, node, anchors, belief)
         belief.state, belief.reason = row.state, row.reason
-        belief.hypotheses = count
     if current >= 0:
         store(rows[current], pool, work, count)
     return 0

@@ -109,6 +109,12 @@ ROW: Final = np.dtype(
         ("gap_y", np.float64),
         ("gap_var", np.float64),  # m^2
         ("gap_speed", np.float64),
+        ("gap_course", np.float64),
+        ("gap_yaw", np.float64),  # rad, then, and what was watched of its turns since
+        ("gap_yaw_var", np.float64),  # rad^2
+        ("gap_unheard", np.float64),  # s of turns that were not
+        ("watched_s", np.float64),  # since the last such gap
+        ("coarse", np.uint8),  # 1: it began again after such a gap, with few and wide hypotheses until one is declared
         ("again", np.uint8),  # 1: the start is where the tag was before such a gap
         ("lever_rate", np.float64),  # rad/s, mean of the last node
         ("last_anchor", np.int32, (WATCHED,)),  # of each slot: the last range, how often and since when it is the same

@@ -68,7 +68,7 @@ def _declare(row: Any, node: Any, p_mode: float, relative: float, r: float, t: T
     row.good_s = row.good_s + node.dt_s if resolved else 0.0
     row.bad_s = 0.0 if p_mode > 0.9 else row.bad_s + node.dt_s
     if row.good_s >= t.resolved_s or (row.start_known == 1 and row.again == 0 and row.declared == 0 and resolved):
-        row.declared = 1
+        row.declared, row.coarse = 1, 0
     if row.bad_s > 1.0:
         row.declared = 0
     if row.since_range_s > UNRANGED:  # what follows must fit for a while before it is believed

@@ -30,6 +30,7 @@ from .layout import (
 )
 from .manage import best_of, copy_hypothesis
 from .node import ABSOLUTE_HEADING, DERIVED_HEADING, MEASURED_HEADING, NO_HEADING, RANGE, RELATIVE_HEADING
+from .preintegration import unwatched_turn
 from .reference import give_reference_error, turn_about
 from .tuning import Tuning
 from .update import update_component, wrap
@@ -96,13 +97,18 @@ def _aligned(work: Any, count: int, row: Any, t: Tuning) -> int:
 
 
 @njit(nogil=True)
+def _bearings(row: Any, t: Tuning) -> int:
+    return t.coarse_bearings if row.coarse == 1 else t.ring_bearings
+
+
+@njit(nogil=True)
 def start_known(work: Any, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
     """Hypotheses at the given start, one per class, or a ring of headings where none is known; returns the count."""
     x, y = row.start_x - anchor.x, row.start_y - anchor.y
     r = max(math.hypot(x, y), 1e-3)
     given = math.isfinite(row.start_heading)
     known = given or is_referred(node.heading_kind)
-    ring = 1 if known else t.ring_bearings
+    ring = 1 if known else _bearings(row, t)
     cell = 2.0 * math.pi / ring
     choose_model(row, node, t)
     for h in range(ring):
@@ -114,6 +120,9 @@ def start_known(work: Any, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
         P[R, R] = row.start_std**2
         P[PHI, PHI] = (row.start_std / r) ** 2
         P[V, V] = row.start_speed_std**2
+        if row.coarse == 1 and not known:
+            turned = wrap(yaw - row.gap_yaw)
+            work[h].log_weight = -0.5 * turned * turned / (row.gap_yaw_var + unwatched_turn(row.gap_unheard))
     row.referred = 1
     if not is_referred(node.heading_kind):
         return ring + _aligned(work, ring, row, t)
@@ -201,14 +210,15 @@ def reseed(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> in
 def start_ring(work: Any, row: Any, horizontal: float, node: Any, at_rest: bool, t: Tuning) -> int:
     """Bearings x speeds with a standard deviation of half a cell; speeds forward unless reverse is allowed."""
     signs = 2 if row.reverse == 1 and not at_rest else 1
-    speeds = 1 if at_rest else t.ring_speeds // signs  # within KEEP in every case
+    bearings = _bearings(row, t)
+    speeds = 1 if at_rest else (t.coarse_speeds if row.coarse == 1 else t.ring_speeds) // signs  # within KEEP always
     top = min(t.ring_speed_max, row.v_max)
-    cell = 2.0 * math.pi / t.ring_bearings
+    cell = 2.0 * math.pi / bearings
     choose_model(row, node, t)
     row.referred = 1 if is_referred(node.heading_kind) else 0
     variance = node.heading_var if row.referred == 1 else 1e-4
     h = 0
-    for i in range(t.ring_bearings):
+    for i in range(bearings):
         for k in range(speeds):
             for g in range(signs):
                 _common(work, h, row, node, node.heading, variance, t)

@@ -48,6 +48,10 @@ class Tuning(NamedTuple):
     second_std: float = 0.15  # rad
     second_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
+    split_coarse: float = 0.2  # rad, of a tag that begins again after a gap, until it is declared
+    keep_coarse: int = 72  # hypotheses of such a tag
+    coarse_bearings: int = 24
+    coarse_speeds: int = 3
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
     merge_at_rest: float = 1.0  # the same of a tag at rest: they differ in nothing that moves it
     merge_light: float = 0.5  # by which that squared grows per unit of log weight that the lighter one lacks
