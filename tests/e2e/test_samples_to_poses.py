@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -120,6 +121,7 @@ def test_the_pose_at_a_time_is_the_same_over_zenoh_and_rest_and_an_explanation_t
     service: Running, session: zenoh.Session
 ) -> None:
     frame, key = straight_north(100), keys.pose_key("default", "then")
+    frame = replace(frame, imu=[])  # one that repeats itself to the last bit would pass for broken
     put(session, "then", frame)
     newest_ns = frame.ranges[-1].t_ns
     wait_until(lambda: newest_ns in [pose["t_ns"] for pose in service.get("/api/v1/poses")["poses"]])

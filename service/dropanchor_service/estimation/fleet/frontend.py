@@ -15,7 +15,7 @@ import numpy as np
 
 from .attitude import ATTITUDE, correct_tilt, level, spin, turn, up_in_body, yaw_of
 from .compiled import njit
-from .magnetometer import MAGNETOMETER, feel, north_of, spread_yaw
+from .magnetometer import MAGNETOMETER, feel, lose_yaw, north_of
 from .node import ABSOLUTE_HEADING, NO_HEADING, RELATIVE_HEADING
 from .preintegration import GYRO_NOISE, GYRO_SCALE, HORIZON, PREINTEGRATION, accelerate, end_node, unwatched_turn, wrap
 from .standstill import CONFIRM, STANDSTILL, at_rest, learn_bias, observe, start_standstill
@@ -106,7 +106,7 @@ def lose_turn(f: Any, gap: float) -> None:
     f.preintegration.silent += max(0.0, gap - f.preintegration.blind)
     f.standstill.quiet = 0.0
     if f.magnetometer.unit > 0.0:
-        spread_yaw(f.magnetometer, unwatched_turn(gap))
+        lose_yaw(f.magnetometer, unwatched_turn(gap))
     f.drift_var += unwatched_turn(gap)
 
 

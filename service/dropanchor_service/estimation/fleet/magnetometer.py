@@ -87,6 +87,27 @@ def spread_yaw(g: Any, variance: float) -> None:
 
 
 @njit(cache=True, nogil=True)
+def lose_yaw(g: Any, variance: float) -> None:
+    """The same for a turn of any size that nobody watched: mean and covariance of f on the arc over which it may lie.
+
+    Along the tangent alone a turn by a right angle could only be explained by another hard iron.
+    """
+    keeps = math.exp(-0.5 * variance)  # mean cosine of a turn ~ N(0, variance)
+    cos2, sin2 = 0.5 * (1.0 + math.exp(-2.0 * variance)), 0.5 * (1.0 - math.exp(-2.0 * variance))
+    fx, fy, P = g.x[0], g.x[1], g.P
+    radial, tangential = cos2 - keeps * keeps, sin2
+    xx, xy, yy = P[0, 0], P[0, 1], P[1, 1]
+    for j in range(2, N):
+        for i in range(2):
+            P[i, j] *= keeps
+            P[j, i] = P[i, j]
+    P[0, 0] = cos2 * xx + sin2 * yy + radial * fx * fx + tangential * fy * fy
+    P[1, 1] = cos2 * yy + sin2 * xx + radial * fy * fy + tangential * fx * fx
+    P[0, 1] = P[1, 0] = (cos2 - sin2) * xy + (radial - tangential) * fx * fy
+    g.x[0], g.x[1] = keeps * fx, keeps * fy
+
+
+@njit(cache=True, nogil=True)
 def drift(g: Any, dt: float, dyaw: float) -> None:
     """Predict: f turns by phi = b dt + s dyaw."""
     phi = g.x[BIAS] * dt + g.x[SCALE] * dyaw

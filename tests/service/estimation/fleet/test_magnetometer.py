@@ -83,6 +83,22 @@ def test_a_disturbance_makes_the_heading_uncertain_and_does_not_turn_it() -> Non
     assert abs(heading_error(steel, b, ends)[ends > 66]).max() < math.radians(3)
 
 
+@pytest.mark.parametrize("seconds", [0.5, 2.0, 5.0, 8.0])
+def test_after_a_turn_that_nobody_watched_the_field_tells_the_heading_by_the_hard_iron_that_is_known(
+    seconds: float,
+) -> None:
+    m = noisy(60)
+    m = m.at((m.t < 30) | (m.t > 30 + seconds))
+    rows = new_frontend()
+    nodes = run(rows, m, ends := ends_of(m))
+    after = (ends > 30.5 + seconds) & (nodes["heading_kind"] == ABSOLUTE_HEADING)
+    e = heading_error(m, nodes, ends)
+    assert after.sum() > 150
+    assert abs(e / np.sqrt(nodes["heading_var"]))[after].max() < 3
+    assert abs(e[ends > 45 + seconds]).max() < math.radians(8)
+    assert rows[0]["magnetometer"]["x"][3:5] == pytest.approx(IRON[:2], abs=0.03)
+
+
 def test_a_field_that_stays_changed_is_given_up_and_learned_anew() -> None:
     m = noisy(180)
     m.mag[m.t > 40] += [1.0, 0.6, -0.5]  # a magnet glued to the tag
