@@ -20,7 +20,7 @@ TELLING = 50  # messages of a turn from which on its time tells what another one
 
 
 class IngestThread:
-    """Takes a turn every `period_s` while messages come in."""
+    """Takes a turn every `period_s` while messages come in, from the beginning of one to that of the next."""
 
     def __init__(
         self,
@@ -64,7 +64,8 @@ class IngestThread:
         self._turn()  # tags that are known are admitted before anything comes in
         while not self._stop.is_set():
             if self._buffer.wait(HOLDING_S if self._ingest.holds else IDLE_S) and self._buffer.depth < BACKLOG:
-                self._stop.wait(self._period_s)  # so that one call fuses many messages
+                # so that one call fuses many messages
+                self._stop.wait(self._turned_s + self._period_s - time.monotonic())
             self._turn()
         self._turn()  # what has come in before the end
 

@@ -1,28 +1,35 @@
-"""A program: what Zenoh alone costs. Receives every message of the fleet, copies key and payload, and drops them."""
+"""A program: what Zenoh alone costs. Receives every message of the fleet as the service does, out of a channel, copies
+key and payload, and drops them."""
 
 import sys
+import threading
 import time
 from typing import Any
 
 import zenoh
 
 from dropanchor_schemas.keys import all_tags
+from dropanchor_service.received import received
+from dropanchor_service.zenoh_intake import GATHER_S, WAITING
 from support.zenoh_router import connected_session
 
 
 def main(endpoint: str) -> None:
-    received = [0]
+    count = [0]
 
-    def take(sample: zenoh.Sample) -> None:
-        received[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
+    def take_all(channel: Any) -> None:
+        for sample in received(channel, GATHER_S):
+            count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
     with connected_session(endpoint) as session:
-        callback: Any = zenoh.handlers.Callback(take, indirect=False)
-        subscriber = session.declare_subscriber(all_tags("default", "samples"), callback)
+        subscriber = session.declare_subscriber(all_tags("default", "samples"), zenoh.handlers.FifoChannel(WAITING))
+        thread = threading.Thread(target=take_all, args=(subscriber.handler,))
+        thread.start()
         print("ready", flush=True)
         sys.stdin.readline()
         subscriber.undeclare()
-        print(f"{received[0]} {time.process_time()}", flush=True)
+        thread.join()
+        print(f"{count[0]} {time.process_time()}", flush=True)
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ def test_the_fleet_is_stepped_up_until_latency_or_loss_breaks(tmp_path: Path) ->
         "Zenoh alone: receive, copy, drop": run_receiver(best.tags),
         "the engine `fleet` alone, no I/O": engine_cost("fleet", min(best.tags, 1000), 10),
         "the engine `paper` alone, no I/O": engine_cost("paper", 5, 5),
-        "one filterpy EKF per tag, no I/O": filterpy_cost(50, 10),
+        "one filterpy EKF per tag, no I/O": filterpy_cost(50, 40),
     }
     loop = costs["one filterpy EKF per tag, no I/O"] / best.cpu_s_per_million
     unavoidable = sum(list(costs.values())[:2]) / best.cpu_s_per_million

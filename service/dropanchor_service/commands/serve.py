@@ -1,6 +1,7 @@
 """`dropanchor serve`: the service until it is stopped."""
 
 import argparse
+import gc
 import sys
 from typing import Protocol
 
@@ -34,6 +35,8 @@ a settings file:
   height_m = 1.2
   start = { x = 10.0, y = 0.0, heading_rad = 1.57 }
 """
+GARBAGE = 10_000, 20, 20  # more objects until there is a look for cycles: messages are thousands of tuples, in none
+SWITCH_S = 0.0005  # that a thread which waits for the interpreter lets another one go on: poses are asked for meanwhile
 UNUSABLE = 2
 DIED = 1
 
@@ -46,6 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 1 when it died, 2 when it could not start."""
     logs.configure(arguments.log_level)
     open_files.allow_all()
+    gc.set_threshold(*GARBAGE)
+    sys.setswitchinterval(SWITCH_S)
     systemd = Systemd()
     try:
         with interrupts() as interrupt:
