@@ -3,6 +3,7 @@
 from collections import Counter, deque
 from collections.abc import Iterable
 from itertools import compress
+from operator import itemgetter
 from threading import Event, Lock
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ MAX_WAIT_NS = 500_000_000
 CALM_NS = 2_000_000_000  # without shedding anything: then an overload is over
 _KEPT_SHARE = 0.75  # of what may wait after shedding for room, so that it is rare
 _COUNTS = np.dtype({"names": ["some", "bearing"], "formats": [("<u2", 3), "<u2"], "offsets": [2, 24], "itemsize": 32})
+_ROW, _PAYLOAD = itemgetter(0), itemgetter(1)
 
 
 class Shed(NamedTuple):
@@ -107,18 +109,9 @@ class MessageBuffer:
     def drain(self, most: int, now_ns: int = 0) -> tuple[list[Message], list[Stranger]]:
         """At most so many messages of known keys, each tag's in their order, and of strangers. now_ns: UTC."""
         with self._lock:
-            if len(self._messages) > most:
-                self._judge(now_ns)
-            if len(self._messages) <= most:
-                taken, self._messages, self._bytes = self._messages, [], 0
-                self._behind, self._overloaded = None, self._overloaded and now_ns - self._shed_ns < CALM_NS
-            elif self._overloaded:
-                taken = self._take(self._next_in_turn(most))
-            else:
-                taken, self._messages = self._messages[:most], self._messages[most:]
-                self._bytes -= sum(map(_size, taken))
+            taken = self._next(most, now_ns)
             self._cached = max(0, self._cached - len(taken))
-            self._drained_bytes += sum(map(_size, taken)) if self._behind else 0
+            self._drained_bytes += _size_of_all(taken) if self._behind else 0
             strangers = [self._strangers.popleft() for _ in range(min(STRANGERS_PER_TURN, len(self._strangers)))]
             self._stranger_bytes -= sum(map(_size, strangers))
             if not self._messages and not self._strangers:
@@ -143,8 +136,21 @@ class MessageBuffer:
             self._stranger_bytes -= _size(self._strangers.popleft())
             self._strangers_shed += 1
 
-    def _judge(self, now_ns: int) -> None:
-        """Whether this is an overload, and then shed."""
+    def _next(self, most: int, now_ns: int) -> list[Message]:
+        """Those that `drain` takes, and in an overload others are shed."""
+        if len(self._messages) > most and self._is_overload(now_ns):
+            rows, sizes = self._keep_newest(self._bytes_per_ns * self._max_wait_ns / 2, now_ns)
+            if len(rows) > most:
+                return self._take(self._next_in_turn(most, rows), sizes)
+        if len(self._messages) > most:
+            taken, self._messages = self._messages[:most], self._messages[most:]
+            self._bytes -= _size_of_all(taken)
+            return taken
+        taken, self._messages, self._bytes = self._messages, [], 0
+        self._behind, self._overloaded = None, self._overloaded and now_ns - self._shed_ns < CALM_NS
+        return taken
+
+    def _is_overload(self, now_ns: int) -> bool:
         waited_ns = now_ns - self._messages[0][3]
         if self._cached:
             self._behind, self._overloaded = None, False
@@ -155,35 +161,32 @@ class MessageBuffer:
             self._overloaded = True
         if self._drained_bytes and behind_ns > 0:
             self._bytes_per_ns = self._drained_bytes / behind_ns
-        if self._overloaded and self._keep_newest(self._bytes_per_ns * self._max_wait_ns / 2):
-            self._shed_ns = now_ns
+        return self._overloaded
 
-    def _keep_newest(self, target_bytes: float) -> bool:
-        """Of every tag the newest message, and more where all together are no more than this. Whether any was lost."""
+    def _keep_newest(self, target_bytes: float, now_ns: int) -> tuple[Array, Array]:
+        """Of every tag the newest message, and more where all together are no more than this. Returns row and size of
+        each of them."""
         rows, sizes = self._columns()
-        newer = newer_of_same(rows, sizes)
-        return self._shed_but((newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes))
+        kept = _newest(rows, sizes, target_bytes)
+        if not kept.all():
+            self._shed_but(kept, sizes)
+            self._shed_ns = now_ns
+        return rows[kept], sizes[kept]
 
     def _make_room(self, target_bytes: float) -> None:
         rows, sizes = self._columns()
-        newer = newer_of_same(rows, sizes)
-        kept = (newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes)
+        kept = _newest(rows, sizes, target_bytes)
         total = np.cumsum(np.where(kept, sizes, 0)[::-1])[::-1]
-        self._shed_but(kept & (total <= target_bytes))
+        self._shed_but(kept & (total <= target_bytes), sizes)
 
-    def _shed_but(self, kept: Array) -> bool:
-        """Whether any was lost."""
-        if kept.all():
-            return False
+    def _shed_but(self, kept: Array, sizes: Array) -> None:
         self._cached = int(kept[: self._cached].sum())
-        lost = self._take(np.flatnonzero(~kept))
-        self._shed.update(message[0] for message in lost)
+        lost = self._take(np.flatnonzero(~kept), sizes)
+        self._shed.update(map(_ROW, lost))
         self._shed_samples += _samples_of(lost)
-        return True
 
-    def _next_in_turn(self, most: int) -> Array:
-        """So many messages of the tags that have waited for their turn longest."""
-        rows, _ = self._columns()
+    def _next_in_turn(self, most: int, rows: Array) -> Array:
+        """So many messages of the tags that have waited for their turn longest. rows: of all that wait."""
         self._drains += 1
         missing = int(rows.max()) + 1 - len(self._served)
         if missing > 0:
@@ -193,23 +196,35 @@ class MessageBuffer:
         self._served[rows[chosen]] = self._drains
         return chosen
 
-    def _take(self, chosen: Array) -> list[Message]:
-        """Out of the waiting ones, in their order."""
+    def _take(self, chosen: Array, sizes: Array) -> list[Message]:
+        """Out of the waiting ones, which have these sizes, in their order."""
         stays = np.ones(len(self._messages), bool)
         stays[chosen] = False
         taken = list(compress(self._messages, (~stays).tolist()))
         self._messages = list(compress(self._messages, stays.tolist()))
-        self._bytes -= sum(map(_size, taken))
+        self._bytes -= int(sizes[chosen].sum())
         return taken
 
     def _columns(self) -> tuple[Array, Array]:
         """Row and size of each message."""
-        rows = np.array([message[0] for message in self._messages])
-        return rows, np.array([_size(message) for message in self._messages])
+        count = len(self._messages)
+        sizes = np.fromiter(map(len, map(_PAYLOAD, self._messages)), np.int64, count)
+        return np.fromiter(map(_ROW, self._messages), np.int64, count), sizes + MESSAGE_OVERHEAD
 
 
 def _size(message: Message | Stranger) -> int:
     return len(message[1]) + MESSAGE_OVERHEAD
+
+
+def _size_of_all(messages: list[Message]) -> int:
+    return sum(map(len, map(_PAYLOAD, messages))) + MESSAGE_OVERHEAD * len(messages)
+
+
+def _newest(rows: Array, sizes: Array, target_bytes: float) -> Array:
+    """Whether each is its tag's newest, or belongs to a fair share of so many bytes."""
+    newer = newer_of_same(rows, sizes)
+    newest: Array = (newer <= fair_cap(np.bincount(rows, sizes), target_bytes)) | (newer == sizes)
+    return newest
 
 
 def _samples_of(messages: Iterable[Message]) -> int:

@@ -20,6 +20,9 @@ UNWATCHED_REFERRED = 1.0  # s that a row survives without an IMU where a referen
 UNWATCHED = 0.5  # s, where none does
 WATCHED_AGAIN = 0.5  # s without a gap, until a row that lost its track begins again
 WATCHED_ANYWHERE = 2.0  # the same, where it may be anywhere
+PIECES = 2  # of samples between gaps, from which on a row waits for its turn
+TURNS = 10.0  # s over which such rows begin again: a fleet that is hit together would need many times what it costs
+GOLDEN = 0.6180339887498949  # of which the multiples of neighbouring numbers are far apart
 UNWATCHED_LOST = 10.0  # s
 AGAIN_SPEED = 1.0  # m/s beyond the last one, sd of how fast it went on
 FARTHEST = 1.0  # rad, of bearing: who may be further away may be anywhere
@@ -43,6 +46,7 @@ def _keep_place(work: Any, count: int, row: Any) -> None:
     row.gap_speed, row.gap_course = abs(best[V]), course_of(best)
     row.gap_yaw, row.gap_yaw_var = best[YAW], turn
     row.gap_unheard = row.watched_s = 0.0
+    row.pieces = 0
 
 
 @njit(nogil=True)
@@ -78,8 +82,18 @@ def is_held(row: Any, node: Any) -> bool:
     row.gap_unheard += node.unheard_s
     row.gap_yaw += node.dyaw
     row.since_range_s = 0.0 if node.kind == RANGE else row.since_range_s + node.dt_s
-    row.watched_s = 0.0 if node.unheard_s > 0.0 else row.watched_s + node.dt_s
-    return bool(row.watched_s < (WATCHED_AGAIN if _is_near(row) else WATCHED_ANYWHERE))
+    if node.unheard_s > 0.0:
+        row.pieces = min(row.pieces + (row.watched_s > 0.0), PIECES)
+        row.watched_s = 0.0
+    else:
+        row.watched_s += node.dt_s
+    return bool(row.watched_s < (WATCHED_AGAIN if _is_near(row) else WATCHED_ANYWHERE) + _turn(row, node))
+
+
+@njit(nogil=True)
+def _turn(row: Any, node: Any) -> float:
+    """s that the row waits for its turn: by its number, so that the same samples give the same poses."""
+    return TURNS * (node.row * GOLDEN % 1.0) if row.pieces >= PIECES else 0.0
 
 
 @njit(nogil=True)

@@ -114,6 +114,7 @@ ROW: Final = np.dtype(
         ("gap_yaw_var", np.float64),  # rad^2
         ("gap_unheard", np.float64),  # s of turns that were not
         ("watched_s", np.float64),  # since the last such gap
+        ("pieces", np.uint8),  # of samples that were heard between gaps since the track was lost
         ("coarse", np.uint8),  # 1: it began again after such a gap, with few and wide hypotheses until one is declared
         ("again", np.uint8),  # 1: the start is where the tag was before such a gap
         ("lever_rate", np.float64),  # rad/s, mean of the last node

@@ -49,7 +49,7 @@ class Tuning(NamedTuple):
     second_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
     split_coarse: float = 0.2  # rad, of a tag that begins again after a gap, until it is declared
-    keep_coarse: int = 72  # hypotheses of such a tag
+    keep_coarse: int = 48  # hypotheses of such a tag
     coarse_bearings: int = 24
     coarse_speeds: int = 3
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight

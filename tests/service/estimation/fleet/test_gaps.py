@@ -8,6 +8,7 @@ import pytest
 
 from dropanchor_service.estimation.batch import ANCHOR, IMU, POSE, RANGE, SampleBatch, State, default_settings
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.fleet.gap import TURNS, WATCHED_ANYWHERE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
@@ -96,6 +97,17 @@ def test_after_gaps_it_begins_again_with_a_bounded_number_of_hypotheses_and_an_e
     assert most <= Tuning().keep_coarse
     assert {State.AMBIGUOUS, State.DEGRADED} <= set(after["state"].tolist())
     assert holds_truth(after, runs).mean() > 0.8
+
+
+def test_tags_that_were_heard_in_pieces_begin_again_one_after_another(runs: list[Simulation]) -> None:
+    engine, begun = engine_of(runs), []
+    for batch in in_messages(samples_of(runs, lambda number: (number % 5 == 0) | (number > 100))):
+        engine.process(batch)
+        begun.append(int((engine.state()["rows"]["count"] > 0).sum()))
+    in_time = begun[101 : 101 + round((WATCHED_ANYWHERE + TURNS + 1.0) / 0.2)]
+    assert begun[100] == 0
+    assert in_time[-1] == len(runs)
+    assert max(np.diff(in_time)) < len(runs) / 2
 
 
 def test_what_happens_around_gaps_does_not_depend_on_how_samples_were_cut_into_batches(runs: list[Simulation]) -> None:
