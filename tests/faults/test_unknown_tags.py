@@ -74,7 +74,8 @@ def test_a_flood_of_unknown_tags_is_counted_and_costs_the_known_one_nothing(
 
         wait_until(lambda: accounted() >= lost, 60.0)
         assert accounted() == lost
-        wait_until(lambda: service.get("/api/v1/tags/known")["messages"] == known.sent.messages)
+        # a message that Zenoh recovered and a cache told comes twice, and counts once
+        wait_until(lambda: service.get("/api/v1/tags/known")["samples"] == {"range": known.sent.samples})
         assert known.sent.messages >= sent_before + 100
         assert service.get("/api/v1/tags/known")["rejected"].get("shed", 0) == 0
         assert service.metric("dropanchor_tags_registered") == 1 + rows
