@@ -151,6 +151,7 @@ class MessageBuffer:
         return taken
 
     def _is_overload(self, now_ns: int) -> bool:
+        """Follow how far `drain` is behind, and for how long."""
         waited_ns = now_ns - self._messages[0][3]
         if self._cached:
             self._behind, self._overloaded = None, False

@@ -114,7 +114,7 @@ class IngestSettings(_Section):
     """How samples come in."""
 
     period_ms: Annotated[float, Field(gt=0, le=1000)] = Field(
-        default=20.0, description="Samples are gathered for so long before they are fused together."
+        default=20.0, description="Samples that come in within so long are fused together."
     )
     reorder_ms: Annotated[float, Field(ge=0, le=10_000)] = Field(
         default=250.0, description="A message waits at most so long for those that its publisher numbered before it."

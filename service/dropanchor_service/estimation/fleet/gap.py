@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from .compiled import njit
-from .layout import DEGRADED, LOST, PHI, WATCHED, YAW, R, V
+from .layout import DEGRADED, INITIALISING, LOST, PHI, WATCHED, YAW, R, V
 from .manage import best_of
 from .node import RANGE
 from .start import is_referred
@@ -134,7 +134,7 @@ def place_again(row: Any, anchor: Any) -> None:
     near, std = _is_near(row), math.sqrt(_widened(row))
     row.unwatched_s = 0.0
     row.start_heading = math.nan
-    row.coarse = 1
+    row.coarse, row.state = 1, INITIALISING
     if near:
         row.again = 1
         row.start_x, row.start_y = row.gap_x + anchor.x, row.gap_y + anchor.y

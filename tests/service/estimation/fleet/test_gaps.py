@@ -100,14 +100,17 @@ def test_after_gaps_it_begins_again_with_a_bounded_number_of_hypotheses_and_an_e
 
 
 def test_tags_that_were_heard_in_pieces_begin_again_one_after_another(runs: list[Simulation]) -> None:
-    engine, begun = engine_of(runs), []
+    engine, begun, poses = engine_of(runs), [], []
     for batch in in_messages(samples_of(runs, lambda number: (number % 5 == 0) | (number > 100))):
-        engine.process(batch)
+        poses.append(engine.process(batch).poses)
         begun.append(int((engine.state()["rows"]["count"] > 0).sum()))
     in_time = begun[101 : 101 + round((WATCHED_ANYWHERE + TURNS + 1.0) / 0.2)]
     assert begun[100] == 0
     assert in_time[-1] == len(runs)
     assert max(np.diff(in_time)) < len(runs) / 2
+    published = np.concatenate(poses)
+    nowhere = np.isnan(published["x"]) & (published["t_ns"] > FIRST * MESSAGE_NS)
+    assert set(published["state"][nowhere].tolist()) == {State.INITIALISING}
 
 
 def test_what_happens_around_gaps_does_not_depend_on_how_samples_were_cut_into_batches(runs: list[Simulation]) -> None:
