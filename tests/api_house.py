@@ -14,14 +14,14 @@ from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.answers import Problem
 from dropanchor_schemas.site import Anchor, Site
+from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
-from dropanchor_service.api.rates import Buckets
+from dropanchor_service.api.http.rates import Buckets
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
+from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Doorkeeper
 from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
-from dropanchor_service.store.answers import Answers
-from dropanchor_service.store.tracks import Keeping, Tracks
 
 T_NS = 1_800_000_000_000_000_000
 
@@ -73,11 +73,11 @@ class House:
         )
 
 
-def make_house(site: Site | None = None, folder: Path | None = None, keeping: Keeping | None = None) -> House:
-    """keeping: of a history in the folder, whose thread does not run: `House.keep` writes."""
+def make_house(site: Site | None = None, folder: Path | None = None, retention: Retention | None = None) -> House:
+    """retention: of a history in the folder, whose thread does not run: `House.keep` writes."""
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
     tags = TagTable()
-    tracks = Tracks(folder, keeping, tags, store, lambda: house.now_ns) if folder and keeping else None
+    tracks = Tracks(folder, retention, tags, store, lambda: house.now_ns) if folder and retention else None
     house = House(Answers(store, tags, LatestPoses(), tracks=tracks, newcomers=Newcomers(10)))
     house.answers.now_ns = lambda: house.now_ns
     return house

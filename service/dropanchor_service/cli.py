@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
-from dropanchor_service.kernel_cache import keep_compiled
+from dropanchor_service.runtime.kernel_cache import keep_compiled
 
 _COMMANDS = {
     "demo": "the service with simulated tags, to look at in a browser",

@@ -12,34 +12,34 @@ from typing import Self
 import zenoh
 from pydantic import ValidationError
 
-from dropanchor_service.admission import Admission
+from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
-from dropanchor_service.api.rates import Buckets
-from dropanchor_service.api.server import build_server, listen
-from dropanchor_service.buffer import MessageBuffer
-from dropanchor_service.checkpointer import Checkpointer
-from dropanchor_service.clock import UtcClock
-from dropanchor_service.credentials import certificate_of, credentials_of, doorkeeper_of
-from dropanchor_service.engine import create_engine
-from dropanchor_service.estimators import Estimators
-from dropanchor_service.exposure import refuse_exposure
-from dropanchor_service.http_thread import HttpThread
-from dropanchor_service.ingest import Ingest
-from dropanchor_service.ingest_thread import IngestThread
-from dropanchor_service.keepers import Keepers
-from dropanchor_service.kernels import warm_up_answers, warm_up_passes
-from dropanchor_service.metrics import FleetGauges, Metrics
-from dropanchor_service.settings import Settings
-from dropanchor_service.settings_sources import SettingsError
+from dropanchor_service.api.http.rates import Buckets
+from dropanchor_service.api.http.server import build_server, listen
+from dropanchor_service.api.http.thread import HttpThread
+from dropanchor_service.checkpoints.files import CheckpointFolder
+from dropanchor_service.checkpoints.snapshot import WholeState
+from dropanchor_service.checkpoints.thread import Checkpointer
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_passes
+from dropanchor_service.ingest.admission import Admission
+from dropanchor_service.ingest.buffer import MessageBuffer
+from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.thread import IngestThread
+from dropanchor_service.ingest.turn import Ingest
+from dropanchor_service.metrics.registry import FleetGauges, Metrics
+from dropanchor_service.persistence import Keepers
+from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_service.runtime.supervision import Supervision
+from dropanchor_service.security.credentials import certificate_of, credentials_of, doorkeeper_of
+from dropanchor_service.settings.model import Settings
+from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
-from dropanchor_service.store.answers import Answers
-from dropanchor_service.store.checkpoints import CheckpointFolder
-from dropanchor_service.supervision import Supervision
-from dropanchor_service.whole_state import WholeState
-from dropanchor_service.zenoh_answers import ZenohAnswers
-from dropanchor_service.zenoh_intake import ZenohIntake
-from dropanchor_service.zenoh_link import ZenohLink
-from dropanchor_service.zenoh_poses import ZenohPoses
+from dropanchor_service.zenoh_io.exposure import refuse_exposure
+from dropanchor_service.zenoh_io.intake import ZenohIntake
+from dropanchor_service.zenoh_io.link import ZenohLink
+from dropanchor_service.zenoh_io.publishers import ZenohPoses
+from dropanchor_service.zenoh_io.queryables import ZenohAnswers
 
 HTTP_STOP_S = 1.5
 

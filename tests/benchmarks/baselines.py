@@ -9,10 +9,11 @@ import numpy as np
 from benchmarks.motion import MESSAGE_S, SAMPLES_PER_MESSAGE, STEP_NS, Track, message, tracks
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed
-from dropanchor_service.decode import decode
-from dropanchor_service.engine import create_engine, tag_columns
+from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.estimation.batch import ANCHOR, RANGE, SampleBatch
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.ingest.decode import decode
+from dropanchor_service.settings.engine_columns import tag_columns
+from dropanchor_service.settings.sources import load_settings
 
 T0_NS = 1_800_000_000_000_000_000
 WARM_UP = 15  # messages of each tag before the measurement

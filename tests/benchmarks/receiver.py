@@ -9,8 +9,8 @@ from typing import Any
 import zenoh
 
 from dropanchor_schemas.keys import all_tags
-from dropanchor_service.received import received
-from dropanchor_service.zenoh_intake import GATHER_S, WAITING
+from dropanchor_service.zenoh_io.channel import received
+from dropanchor_service.zenoh_io.intake import GATHER_S, WAITING
 from support.zenoh_router import connected_session
 
 

@@ -10,8 +10,8 @@ import pytest
 from dropanchor_schemas import keys
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, encode_json, encode_packed
 from dropanchor_service.cli import main
-from dropanchor_service.engine import create_engine
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.settings.sources import load_settings
 from support.service import running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
 

@@ -11,9 +11,10 @@ import zenoh
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.site import StartPose, TagSettings
-from dropanchor_service.engine import create_engine, tag_columns
+from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.evaluation.replay import Samples, Track, anchors_of, replay, samples_of, track_of
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.settings.engine_columns import tag_columns
+from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client.recording import read_recording
 from support.recordings import recording_or_skip, write_square
 from support.service import environment, running_service

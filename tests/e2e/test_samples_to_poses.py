@@ -13,8 +13,8 @@ from dropanchor_schemas import Pose, keys
 from dropanchor_schemas.answers import PoseFrame
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encode_json, encode_packed
-from dropanchor_service.engine import create_engine
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
 from support.ingest import Bench
 from support.service import Running, running_service, settings_file, straight_north

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from dropanchor_service.commands import serve
-from dropanchor_service.spare_memory import SpareMemory
-from dropanchor_service.systemd import Systemd
+from dropanchor_service.runtime.memory import SpareMemory
+from dropanchor_service.runtime.systemd import Systemd
 from support.service import environment
 from support.zenoh_router import free_endpoint
 

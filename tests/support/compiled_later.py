@@ -8,10 +8,10 @@ from typing import Any
 
 from numba.core.dispatcher import Dispatcher
 
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.checkpoints.files import CheckpointFolder
+from dropanchor_service.engines.warm_up import warm_up, warm_up_answers
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.kernels import warm_up, warm_up_answers
-from dropanchor_service.store.answers import Answers
-from dropanchor_service.store.checkpoints import CheckpointFolder
 from support.ingest import Bench
 from support.traffic import Message, traffic
 

@@ -7,7 +7,7 @@ from threading import Event, Thread
 
 from starlette.types import ASGIApp
 
-from dropanchor_service.api.server import build_server, listen
+from dropanchor_service.api.http.server import build_server, listen
 
 
 @contextmanager

@@ -11,17 +11,17 @@ from prometheus_client.samples import Sample
 
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
-from dropanchor_service.admission import Admission
-from dropanchor_service.buffer import MessageBuffer
-from dropanchor_service.clock import UtcClock
+from dropanchor_service.checkpoints.snapshot import WholeState
+from dropanchor_service.engines.warm_up import warm_up_passes
 from dropanchor_service.estimation.batch import POSE, Array, Engine, PoseBatch, SampleBatch, State
-from dropanchor_service.estimators import Estimators
-from dropanchor_service.ingest import Ingest
-from dropanchor_service.kernels import warm_up_passes
-from dropanchor_service.metrics import Metrics
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.ingest.admission import Admission
+from dropanchor_service.ingest.buffer import MessageBuffer
+from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.turn import Ingest
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_service.settings.sources import load_settings
 from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
-from dropanchor_service.whole_state import WholeState
 
 
 @dataclass

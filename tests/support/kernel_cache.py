@@ -20,7 +20,11 @@ ROOT = Path(__file__).parents[2]
 def use_cache_of_these_sources() -> None:
     """Set NUMBA_CACHE_DIR, for this process and its children, unless somebody has."""
     package = ROOT / "service" / "dropanchor_service"
-    sources = [source for name in ("estimation/fleet", "passes") for source in sorted((package / name).glob("*.py"))]
+    sources = [
+        source
+        for name in ("estimation/fleet", "ingest/kernels", "answers/kernels")
+        for source in sorted((package / name).rglob("*.py"))
+    ]
     digest = hashlib.sha256(
         b"".join(source.read_bytes() for source in [*sources, *sorted(ROOT.glob("tests/support/*.py"))])
     )

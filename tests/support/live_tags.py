@@ -14,8 +14,8 @@ from typing import Any, Self
 import numpy as np
 
 from dropanchor_schemas.wire import Frame
-from dropanchor_service.engine import create_engine
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_poses, tag_name
 from dropanchor_tag_client.simulator.sensors import preset

@@ -9,22 +9,22 @@ from fastapi.openapi.utils import get_openapi
 from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.answers import PoseFrame, Problem
-from dropanchor_service.api.access import OPEN, Access
-from dropanchor_service.api.dashboard import DashboardMount
-from dropanchor_service.api.errors import Kind, add_error_handlers, problems
-from dropanchor_service.api.headers import SecurityHeaders
-from dropanchor_service.api.health import Impaired, Ready, health_router, metrics_router
-from dropanchor_service.api.limits import BodyLimit, EscapedPath
-from dropanchor_service.api.poses import poses_router
-from dropanchor_service.api.rates import Buckets
-from dropanchor_service.api.recordings import recordings_router
-from dropanchor_service.api.site import site_router
-from dropanchor_service.api.stream import stream_router
-from dropanchor_service.api.tags import tags_router
-from dropanchor_service.api.track import track_router
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.api.http.access import OPEN, Access
+from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
+from dropanchor_service.api.http.headers import SecurityHeaders
+from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
+from dropanchor_service.api.http.rates import Buckets
+from dropanchor_service.api.routes.dashboard import DashboardMount
+from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
+from dropanchor_service.api.routes.poses import poses_router
+from dropanchor_service.api.routes.recordings import recordings_router
+from dropanchor_service.api.routes.site import site_router
+from dropanchor_service.api.routes.stream import stream_router
+from dropanchor_service.api.routes.tags import tags_router
+from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Doorkeeper
-from dropanchor_service.store.answers import Answers
 
 PREFIX = "/api/v1"
 MAX_BODY_BYTES = 1_048_576

@@ -9,9 +9,9 @@ from prometheus_client import CollectorRegistry
 
 import dropanchor_schemas
 from dropanchor_schemas.site import Site
+from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
-from dropanchor_service.store.answers import Answers
 
 FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
 

@@ -2,11 +2,11 @@
 
 import argparse
 
-from dropanchor_service import logs
 from dropanchor_service.commands.options import add_log_option
-from dropanchor_service.engine import create_engine
-from dropanchor_service.kernels import warm_up_answers, warm_up_passes
-from dropanchor_service.settings import Settings
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_passes
+from dropanchor_service.runtime import logs
+from dropanchor_service.settings.model import Settings
 
 DESCRIPTION = """\
 Compiles the estimator and keeps the result, so that the first start of `dropanchor serve` is as fast as any other.

@@ -8,15 +8,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 from dropanchor_schemas.site import StartPose, TagSettings
-from dropanchor_service import logs
-from dropanchor_service.api.server import ListenError
+from dropanchor_service.api.http.server import ListenError
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.commands.recorded import recorded
+from dropanchor_service.runtime import logs
+from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.service import Service
-from dropanchor_service.settings import PaperSettings, Settings, ZenohSettings
-from dropanchor_service.settings_sources import SettingsError
-from dropanchor_service.signals import interrupts
-from dropanchor_service.zenoh_session import ZenohError
+from dropanchor_service.settings.model import PaperSettings, Settings, ZenohSettings
+from dropanchor_service.settings.sources import SettingsError
+from dropanchor_service.zenoh_io.session import ZenohError
 from dropanchor_tag_client.recording import RecordingError
 from dropanchor_tag_client.simulator.live import start_poses, tag_name
 

@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from dropanchor_service.settings import Settings
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.settings.model import Settings
+from dropanchor_service.settings.sources import load_settings
 
 
 def add_service_options(parser: argparse.ArgumentParser) -> None:

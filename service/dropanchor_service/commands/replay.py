@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.commands.replay_mcap import files_of, replay_files
-from dropanchor_service.engine import create_engine, tag_columns
+from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.estimation.batch import Engine, State
 from dropanchor_service.evaluation.accuracy import Accuracy, accuracy, share_of_time
 from dropanchor_service.evaluation.replay import (
@@ -26,7 +26,8 @@ from dropanchor_service.evaluation.replay import (
     truth_of,
 )
 from dropanchor_service.evaluation.track_plot import plot_track
-from dropanchor_service.settings_sources import SettingsError, load_settings
+from dropanchor_service.settings.engine_columns import tag_columns
+from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 
 DESCRIPTION = """\

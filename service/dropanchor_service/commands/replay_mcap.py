@@ -17,10 +17,10 @@ from tqdm import tqdm
 
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.evaluation.offline import OfflineService, settings_of
 from dropanchor_service.recording.mcap_file import SESSION
-from dropanchor_service.recording.offline import OfflineService, settings_of
 from dropanchor_service.recording.reading import RecordingReader, Turn
-from dropanchor_service.settings_sources import load_settings
+from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client.recording import RecordingError
 
 COLUMNS = ("tag", "t_ns", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")

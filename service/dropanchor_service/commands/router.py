@@ -4,13 +4,13 @@ import argparse
 import logging
 import sys
 
-from dropanchor_service import logs, open_files
 from dropanchor_service.commands.options import add_log_option, add_security_options, router_settings
-from dropanchor_service.credentials import credentials_of
-from dropanchor_service.exposure import refuse_exposure
-from dropanchor_service.settings_sources import SettingsError
-from dropanchor_service.signals import interrupts
-from dropanchor_service.zenoh_session import ZenohError, listening_at, open_session
+from dropanchor_service.runtime import logs, open_files
+from dropanchor_service.runtime.signals import interrupts
+from dropanchor_service.security.credentials import credentials_of
+from dropanchor_service.settings.sources import SettingsError
+from dropanchor_service.zenoh_io.exposure import refuse_exposure
+from dropanchor_service.zenoh_io.session import ZenohError, listening_at, open_session
 
 DESCRIPTION = "Runs a Zenoh router until Ctrl-C or SIGTERM. Tags and services connect to it."
 EPILOG = """\

@@ -5,15 +5,15 @@ import gc
 import sys
 from typing import Protocol
 
-from dropanchor_service import logs, open_files
-from dropanchor_service.api.server import ListenError
+from dropanchor_service.api.http.server import ListenError
 from dropanchor_service.commands.options import add_service_options, settings_of
+from dropanchor_service.runtime import logs, open_files
+from dropanchor_service.runtime.memory import SpareMemory
+from dropanchor_service.runtime.signals import interrupts
+from dropanchor_service.runtime.systemd import Systemd
 from dropanchor_service.service import Service
-from dropanchor_service.settings_sources import SettingsError
-from dropanchor_service.signals import interrupts
-from dropanchor_service.spare_memory import SpareMemory
-from dropanchor_service.systemd import Systemd
-from dropanchor_service.zenoh_session import ZenohError
+from dropanchor_service.settings.sources import SettingsError
+from dropanchor_service.zenoh_io.session import ZenohError
 
 DESCRIPTION = """\
 Runs the service until Ctrl-C or SIGTERM. Without settings: site `default`, a Zenoh router of its own on the loopback,

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropanchor_schemas.wire import anchor_number
-from dropanchor_service.decode import SCALAR, Decoded
 from dropanchor_service.estimation.batch import ANCHOR, HEADING, IMU, POSE, RANGE, Array, Engine, SampleBatch
 from dropanchor_service.estimation.fleet.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.trace import TracingEngine
 from dropanchor_service.evaluation.accuracy import Truth
-from dropanchor_service.passes.packed import FORM
-from dropanchor_service.screening import screen
+from dropanchor_service.ingest.decode import SCALAR, Decoded
+from dropanchor_service.ingest.kernels.packed import FORM
+from dropanchor_service.ingest.screening import screen
 from dropanchor_tag_client.recording import Recording
 
 STEP_S = 1.0

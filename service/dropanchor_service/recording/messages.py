@@ -6,13 +6,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_service.answers.answers import to_json
+from dropanchor_service.answers.columns import REASONS, STATES
+from dropanchor_service.answers.geodesy import lat_lon
+from dropanchor_service.answers.track_pages import ESTIMATED
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.recording import schemas
-from dropanchor_service.store.answers import to_json
-from dropanchor_service.store.columns import REASONS, STATES
-from dropanchor_service.store.geodesy import lat_lon
 from dropanchor_service.store.site import SiteDocument
-from dropanchor_service.store.track_answers import ESTIMATED
 
 FRAME = "site"
 SITE_TOPIC = "/site"

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_schemas.keys import chunk_from_id
-from dropanchor_service.background import BackgroundWriter
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.recording import folder as files
 from dropanchor_service.recording.folder import Limits, RecordedFile
 from dropanchor_service.recording.mcap_file import SESSION, McapFile
 from dropanchor_service.recording.output import End, Item, Messages, Output, Poses, Samples, SiteChange
+from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 from dropanchor_service.store.thinning import Thinning

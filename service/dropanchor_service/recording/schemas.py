@@ -8,7 +8,7 @@ that has no place in that is left out of the schema, not of the message.
 from collections.abc import Mapping
 from typing import Any
 
-from dropanchor_service.store.track_answers import ESTIMATED
+from dropanchor_service.answers.track_pages import ESTIMATED
 
 POSE = "foxglove.PoseInFrame"
 LOCATION = "foxglove.LocationFix"

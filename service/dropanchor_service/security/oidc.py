@@ -11,7 +11,7 @@ from typing import Any
 import jwt
 
 from dropanchor_service.security.identity import Identity, Scope, UnknownError
-from dropanchor_service.settings import OidcSettings, is_safe_url
+from dropanchor_service.settings.model import OidcSettings, is_safe_url
 
 SOURCE = "token"
 ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA")

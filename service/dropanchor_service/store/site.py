@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
-from dropanchor_service.store.atomic import write_atomically
+from dropanchor_service.runtime.atomic_file import write_atomically
 
 FILE_NAME = "site.json"
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { EventParser, eventsOf } from "../../../service/dropanchor_service/dashboard/js/events.js";
+import { EventParser, eventsOf } from "../../../service/dropanchor_service/dashboard/data/events.js";
 
 const TEXT = 'event: snapshot\ndata: {"tags":["ü"]}\n\n: alive\n\nevent: poses\ndata: {}\n\n';
 const EVENTS = [{ name: "snapshot", data: '{"tags":["ü"]}' }, { name: "poses", data: "{}" }];

@@ -1,13 +1,13 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Choice, countStates } from "../../../service/dropanchor_service/dashboard/js/choice.js";
-import { Fleet } from "../../../service/dropanchor_service/dashboard/js/fleet.js";
-import { follow } from "../../../service/dropanchor_service/dashboard/js/motion.js";
-import { Order } from "../../../service/dropanchor_service/dashboard/js/order.js";
-import { isFilled } from "../../../service/dropanchor_service/dashboard/js/shapes.js";
-import { STATES, staleness, stateNumber } from "../../../service/dropanchor_service/dashboard/js/states.js";
-import { Trails } from "../../../service/dropanchor_service/dashboard/js/trails.js";
+import { Choice, countStates } from "../../../service/dropanchor_service/dashboard/page/choice.js";
+import { Fleet } from "../../../service/dropanchor_service/dashboard/data/fleet.js";
+import { follow } from "../../../service/dropanchor_service/dashboard/data/motion.js";
+import { Order } from "../../../service/dropanchor_service/dashboard/data/order.js";
+import { isFilled } from "../../../service/dropanchor_service/dashboard/map/shapes.js";
+import { STATES, staleness, stateNumber } from "../../../service/dropanchor_service/dashboard/data/states.js";
+import { Trails } from "../../../service/dropanchor_service/dashboard/data/trails.js";
 
 /** @param {string[]} tags @param {Record<string, any[]>} columns @returns {any} */
 const frame = (tags, columns) => ({ t_ns: 0, tags, ...columns });

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import {
   age, compassPoint, coordinate, counted, degrees, distance, fixed, metres, percent, sigma, words,
-} from "../../../service/dropanchor_service/dashboard/js/format.js";
+} from "../../../service/dropanchor_service/dashboard/data/format.js";
 
 /** @param {(value: any) => string} format @param {[any, string][]} cases */
 function gives(format, cases) {

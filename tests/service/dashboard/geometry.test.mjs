@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { distancesTo, horizontal } from "../../../service/dropanchor_service/dashboard/js/geometry.js";
+import { distancesTo, horizontal } from "../../../service/dropanchor_service/dashboard/map/geometry.js";
 
 const square = { left: 0, right: 4, bottom: 0, top: 3 };
 

@@ -1,11 +1,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { countCells } from "../../../service/dropanchor_service/dashboard/js/density.js";
-import { Fleet } from "../../../service/dropanchor_service/dashboard/js/fleet.js";
-import { follow } from "../../../service/dropanchor_service/dashboard/js/motion.js";
-import { alike, nearest, rowsInView } from "../../../service/dropanchor_service/dashboard/js/scene.js";
-import { View } from "../../../service/dropanchor_service/dashboard/js/view.js";
+import { countCells } from "../../../service/dropanchor_service/dashboard/map/density.js";
+import { Fleet } from "../../../service/dropanchor_service/dashboard/data/fleet.js";
+import { follow } from "../../../service/dropanchor_service/dashboard/data/motion.js";
+import { alike, nearest, rowsInView } from "../../../service/dropanchor_service/dashboard/map/scene.js";
+import { View } from "../../../service/dropanchor_service/dashboard/map/view.js";
 
 const view = Object.assign(new View(), { x: 0, y: 0, scale: 10, width: 400, height: 400 });
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { MAX_SCALE, View, boundsAround, multiples, roundStep } from "../../../service/dropanchor_service/dashboard/js/view.js";
+import { MAX_SCALE, View, boundsAround, multiples, roundStep } from "../../../service/dropanchor_service/dashboard/map/view.js";
 
 function view() {
   return Object.assign(new View(), { x: 3, y: -2, scale: 50, width: 800, height: 600 });

@@ -12,10 +12,10 @@ from cryptography import x509
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from dropanchor_service.cli import main
-from dropanchor_service.credentials import credentials_of
 from dropanchor_service.security.access_control import ROLES
+from dropanchor_service.security.credentials import credentials_of
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
-from dropanchor_service.settings import SecuritySettings, Settings
+from dropanchor_service.settings.model import SecuritySettings, Settings
 from dropanchor_tag_client import read_credentials
 from support.commands import environment
 from support.secured import secured_site

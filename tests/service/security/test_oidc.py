@@ -15,7 +15,7 @@ from pydantic import ValidationError
 
 from dropanchor_service.security.identity import Scope, UnknownError
 from dropanchor_service.security.oidc import RETRY_S, OidcTokens, SigningKeys
-from dropanchor_service.settings import OidcSettings
+from dropanchor_service.settings.model import OidcSettings
 
 AUDIENCE = "dropanchor-yard"
 

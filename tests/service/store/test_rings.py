@@ -3,7 +3,7 @@
 import numpy as np
 
 from dropanchor_service.estimation.batch import POSE
-from dropanchor_service.store.history import SPACING_NS, PoseHistory
+from dropanchor_service.store.pose_history import SPACING_NS, PoseHistory
 from dropanchor_service.store.rings import RowRings
 
 RECORD = np.dtype([("row", "i4"), ("value", "i8")])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from dropanchor_schemas import StartPose, TagSettings
-from dropanchor_service.engine import tag_columns
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.estimation.fleet.configure import (
     CRAB_KNOWN_STD,
@@ -19,6 +18,7 @@ from dropanchor_service.estimation.fleet.layout import COMMON, STEADY, make_work
 from dropanchor_service.estimation.fleet.node import DERIVED_HEADING, NODE
 from dropanchor_service.estimation.fleet.start import choose_model, second_class
 from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.settings.engine_columns import tag_columns
 
 
 def row_of(settings: TagSettings) -> Array:

@@ -1,0 +1,217 @@
+"""Rows of the store as the answers of the contract; REST, the stream and Zenoh all read here.
+
+Answers are plain dictionaries and columns that `to_json` writes: at ten thousand tags a model object per tag would
+cost more than all the rest. Unknown floats are NaN in them, null in JSON.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import orjson
+
+from dropanchor_service.answers.columns import PoseColumns, columns_of, ellipse_95, with_age
+from dropanchor_service.answers.json_template import Filled
+from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
+from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
+from dropanchor_service.answers.track_pages import pose_in_tracks
+from dropanchor_service.estimation.batch import POSE, Array, State
+from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.store.latest_poses import LatestPoses
+from dropanchor_service.store.pending_tags import Newcomers
+from dropanchor_service.store.site import SiteStore
+from dropanchor_service.store.tags import Tag, TagTable
+
+Answer = dict[str, Any]
+
+_AMBIGUOUS = State.AMBIGUOUS.name.lower()
+
+
+def to_json(answer: Any) -> bytes:
+    """Floats in their shortest form that reads back equal; NaN and infinity as null."""
+    return orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+class Answers:
+    """Reads only; any thread may ask."""
+
+    def __init__(
+        self,
+        site: SiteStore,
+        tags: TagTable,
+        latest: LatestPoses,
+        now_ns: Callable[[], int] = time.time_ns,
+        tracks: Tracks | None = None,
+        newcomers: Newcomers | None = None,
+    ) -> None:
+        """tracks: where poses are kept for long, None for nowhere. newcomers: tags that have no row yet."""
+        self.site = site
+        self.tags = tags
+        self.latest = latest
+        self.now_ns = now_ns
+        self.tracks = tracks
+        self.newcomers = Newcomers(0) if newcomers is None else newcomers
+
+    def pose_of(self, tag: Tag) -> Answer | None:
+        """`Pose`, None before the tag's first one."""
+        row = self.latest.row(tag.row)
+        return None if row is None else self.poses_of(row[None], self.now_ns())[0]
+
+    def pose_at(self, name: str, t_ns: int, from_disk: bool = True) -> Answer | None:
+        """`Pose` of a tag at a time, None when there never was one. Raises NoPoseThenError.
+
+        from_disk: look into the history too, which takes a millisecond.
+        """
+        tracks = self.tracks if from_disk else None
+        tag = self.tags.find(name)
+        latest = None if tag is None else self.latest.row(tag.row)
+        now_ns = self.now_ns()
+        try:
+            pose = None if latest is None else self._pose_in_memory(latest, t_ns, now_ns)
+        except BeforeMemoryError:
+            if tracks is None:
+                raise
+            pose = None
+        if pose is None and tracks is not None:
+            memory = np.empty(0, POSE) if tag is None or latest is None else self._memory(latest)
+            pose = pose_in_tracks(tracks, self.site, name, memory, t_ns)
+        if pose is None:
+            return None
+        return self._poses(pose[None], now_ns, then=True, names=[name])[0] | {"hypotheses": []}
+
+    def _pose_in_memory(self, latest: Array, t_ns: int, now_ns: int) -> Array:
+        aged = with_age(latest[None], (now_ns - latest["t_ns"][None]) * 1e-9)[0]
+        return pose_at(self.latest.history(int(latest["row"])), latest if t_ns <= latest["t_ns"] else aged, t_ns)
+
+    def _memory(self, latest: Array) -> Array:
+        return np.append(self.latest.history(int(latest["row"])), latest)
+
+    def pose_list(self, tags: Sequence[Tag] | None = None) -> Answer:
+        """`PoseList` of these tags, or of all, as far as they have a pose."""
+        now_ns = self.now_ns()
+        return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
+
+    def pose_list_json(self, tags: Sequence[Tag] | None = None) -> Iterator[bytes | memoryview]:
+        """The JSON of `pose_list`, in chunks and without an object per tag."""
+        now_ns = self.now_ns()
+        return list_json(now_ns, (filled for _, filled in self._filled(self.rows(tags), now_ns)))
+
+    def pose_jsons(self, poses: Array, now_ns: int) -> Iterator[tuple[str, bytes]]:
+        """Tag, and JSON of its `Pose`, for each of the POSE rows, which are the latest."""
+        for names, filled in self._filled(poses, now_ns):
+            yield from zip(names, filled.each, strict=True)
+
+    def _filled(self, poses: Array, now_ns: int) -> Iterator[tuple[list[str], Filled]]:
+        """Tags, and JSON of their poses, in chunks."""
+        for begin in range(0, len(poses), CHUNK):
+            columns = columns_of(poses[begin : begin + CHUNK], self.site, self.tags, now_ns)
+            yield columns.tags, poses_json(columns, self._hypotheses_json(columns.poses))
+
+    def _hypotheses_json(self, poses: Array) -> list[bytes]:
+        """Of those of the POSE rows that are ambiguous."""
+        rows = poses["row"][poses["state"] == State.AMBIGUOUS]
+        return hypotheses_json(*self.latest.hypotheses_of(rows)) if len(rows) else []
+
+    def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
+        """`Pose` for each of the POSE rows, which are the latest."""
+        answers = self._poses(poses, now_ns)
+        for answer, row in zip(answers, poses["row"].tolist(), strict=True):
+            answer["hypotheses"] = self._hypotheses_of(row, answer["state"]) or []
+        return answers
+
+    def _poses(self, poses: Array, now_ns: int, then: bool = False, names: Sequence[str] | None = None) -> list[Answer]:
+        """`Pose` for each of the POSE rows, without hypotheses."""
+        columns = columns_of(poses, self.site, self.tags, now_ns, then, names)
+        return [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
+
+    def frame_of(self, poses: Array, now_ns: int) -> Answer:
+        """`PoseFrame` of the POSE rows: columns, for many tags many times a second."""
+        columns = columns_of(poses, self.site, self.tags, now_ns)
+        frame: Answer = {
+            "t_ns": now_ns,
+            "tags": columns.tags,
+            "online": columns.online.tolist(),
+            "state": columns.states,
+            "reason": columns.reasons,
+            "hint": columns.hints,
+            "anchor": columns.anchors,
+            "age_s": np.round(columns.age_s, 3),
+        }
+        for name, field in _FRAME_FIELDS.items():
+            frame[name] = np.round(columns.poses[field], 4)
+        frame["semi_major_m"] = np.round(columns.semi_major_m, 4)
+        frame["semi_minor_m"] = np.round(columns.semi_minor_m, 4)
+        frame["angle_rad"] = np.round(columns.angle_rad, 4)
+        modes = map(orjson.Fragment, self._hypotheses_json(columns.poses))
+        ambiguous = columns.poses["state"] == State.AMBIGUOUS
+        frame["hypotheses"] = [next(modes) if several else None for several in ambiguous.tolist()]
+        if columns.lat is not None and columns.lon is not None:
+            frame["lat"], frame["lon"] = np.round(columns.lat, 9), np.round(columns.lon, 9)
+        return frame
+
+    def rows(self, tags: Sequence[Tag] | None = None) -> Array:
+        """POSE of these tags, or of all, as far as they have one."""
+        if tags is None:
+            return self.latest.since()[1]
+        return self.latest.of(np.array([tag.row for tag in tags], np.int64))
+
+    def _hypotheses_of(self, row: int, state: str) -> list[Answer] | None:
+        """The modes of a tag that is ambiguous, None of another."""
+        return _hypotheses(self.latest.hypotheses(row)) if state == _AMBIGUOUS else None
+
+
+_FRAME_FIELDS = {
+    "x": "x",
+    "y": "y",
+    "heading_rad": "heading",
+    "speed_mps": "speed",
+    "yaw_rate_radps": "yaw_rate",
+    "range_m": "range",
+    "p_mode": "p_mode",
+    "sigma_pos_m": "sigma_pos",
+    "sigma_obs_m": "sigma_obs",
+}
+
+_POSE_NAMES = (
+    *("tag", "t_ns", "age_s", "state", "reason", "hint"),
+    *("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps"),
+    *("covariance", "ellipse_95", "p_mode", "sigma_pos_m", "sigma_obs_m", "range_m", "anchor"),
+    *("hypotheses", "lat", "lon", "online"),
+)
+
+
+def _pose_values(columns: PoseColumns) -> tuple[Sequence[Any], ...]:
+    """One sequence per name in _POSE_NAMES."""
+    poses = columns.poses
+    known = np.isfinite(poses["cov"]).all(axis=(1, 2))
+    nowhere = [None] * len(poses)
+    return (
+        *(columns.tags, poses["t_ns"].tolist(), columns.age_s.tolist(), columns.states, columns.reasons, columns.hints),
+        *(poses[field].tolist() for field in ("x", "y", "heading", "speed", "yaw_rate")),
+        [cov if finite else None for cov, finite in zip(poses["cov"].tolist(), known.tolist(), strict=True)],
+        _ellipses(columns.semi_major_m, columns.semi_minor_m, columns.angle_rad),
+        *(poses[field].tolist() for field in ("p_mode", "sigma_pos", "sigma_obs", "range")),
+        columns.anchors,
+        nowhere,
+        nowhere if columns.lat is None else columns.lat.tolist(),
+        nowhere if columns.lon is None else columns.lon.tolist(),
+        columns.online.tolist(),
+    )
+
+
+def _ellipses(major: Array, minor: Array, angle: Array) -> list[Answer | None]:
+    """`Ellipse` for each, None where it is NaN."""
+    return [
+        {"semi_major_m": a, "semi_minor_m": b, "angle_rad": c} if a == a else None
+        for a, b, c in zip(major.tolist(), minor.tolist(), angle.tolist(), strict=True)
+    ]
+
+
+def _hypotheses(modes: Array) -> list[Answer]:
+    """`Hypothesis` for each HYPOTHESIS."""
+    fields = zip(*(modes[name].tolist() for name in ("weight", "x", "y", "heading", "speed")), strict=True)
+    return [
+        {"weight": weight, "x": x, "y": y, "heading_rad": heading, "speed_mps": speed, "ellipse_95": ellipse}
+        for (weight, x, y, heading, speed), ellipse in zip(fields, _ellipses(*ellipse_95(modes["cov"])), strict=True)
+    ]

@@ -1,0 +1,75 @@
+"""Why the latest pose of a tag is what it is: the answer `Explanation`."""
+
+import numpy as np
+
+from dropanchor_schemas.explain import MeasurementKind as KindName
+from dropanchor_service.answers.answers import Answer, Answers
+from dropanchor_service.estimation.batch import Array, MeasurementKind
+from dropanchor_service.store.tags import Tag
+
+RATE_NS = 2_000_000_000  # over which the rate of the ranges is taken
+FEWEST = 4  # ranges that make a rate
+MINUTE_NS = 60_000_000_000
+
+_KINDS = [KindName[kind.name].value for kind in MeasurementKind]
+
+
+def explanation_of(answers: Answers, tag: Tag, last: int) -> Answer | None:
+    """`Explanation` with the last innovations, None before the tag's first pose."""
+    pose = answers.pose_of(tag)
+    if pose is None:
+        return None
+    innovations = answers.latest.innovations(tag.row)
+    history = answers.latest.history(tag.row)
+    minute = history[history["t_ns"] > pose["t_ns"] - MINUTE_NS]
+    shown = innovations[-last:]
+    return {
+        "pose": pose,
+        "hypotheses": pose["hypotheses"],
+        "speed": {"speed_mps": pose["speed_mps"]} | _rates(innovations),
+        "speed_track": {"t_ns": minute["t_ns"].tolist(), "speed_mps": minute["speed"].tolist()},
+        "innovations": _innovations(shown, [anchor.id for anchor in answers.site.anchors_by_index()]),
+        "refused": int(np.count_nonzero(~shown["fused"])),
+        "samples": dict(tag.samples),
+        "rejected": dict(tag.rejected),
+    }
+
+
+def _innovations(records: Array, anchors: list[str]) -> list[Answer]:
+    """`Innovation` for each INNOVATION."""
+    return [
+        {
+            "t_ns": t_ns,
+            "kind": _KINDS[kind],
+            "anchor": anchors[anchor] if 0 <= anchor < len(anchors) else None,
+            "measured": measured,
+            "predicted": predicted,
+            "innovation": y,
+            "variance": S,
+            "nis": y * y / S,
+            "p_outlier": p_outlier,
+            "fused": fused,
+        }
+        for _, t_ns, kind, anchor, measured, predicted, y, S, p_outlier, fused in records.tolist()
+    ]
+
+
+def _rates(innovations: Array) -> Answer:
+    """Slopes over the last ranges to the anchor of the last one."""
+    ranges = innovations[innovations["kind"] == MeasurementKind.RANGE]
+    if len(ranges):
+        newest = ranges[-1]
+        ranges = ranges[(ranges["anchor"] == newest["anchor"]) & (ranges["t_ns"] > newest["t_ns"] - RATE_NS)]
+    return {
+        "range_rate_mps": _slope(ranges["t_ns"], ranges["measured"]),
+        "predicted_range_rate_mps": _slope(ranges["t_ns"], ranges["predicted"]),
+    }
+
+
+def _slope(t_ns: Array, values: Array) -> float | None:
+    """Of the straight line of least squares, per second."""
+    if len(t_ns) < FEWEST or t_ns[0] == t_ns[-1]:
+        return None
+    t = (t_ns - t_ns[0]) * 1e-9
+    t = t - t.mean()
+    return float(t @ values / (t @ t))

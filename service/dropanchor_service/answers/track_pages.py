@@ -1,0 +1,108 @@
+"""What is kept on disk, as answers: a page of a track, or the pose at a time long ago."""
+
+import sqlite3
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.answers.columns import REASONS, STATES
+from dropanchor_service.answers.geodesy import lat_lon
+from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.history.track_file import Stored
+from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.store.site import SiteStore
+
+
+@dataclass(frozen=True)
+class TrackPage:
+    """Some poses of one tag in order of time, as columns of `TrackPose`; next_ns: where the next page begins, None
+    after the last."""
+
+    columns: dict[str, list[Any]]
+    next_ns: int | None
+
+    def __len__(self) -> int:
+        return len(self.columns["t_ns"])
+
+    def rows(self) -> list[dict[str, Any]]:
+        names = list(self.columns)
+        return [dict(zip(names, row, strict=True)) for row in zip(*self.columns.values(), strict=True)]
+
+
+def track_page(tracks: Tracks, site: SiteStore, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
+    """The first `limit` poses from `from_ns` to `to_ns`, both included. Raises sqlite3.Error."""
+    found = tracks.poses(tag, from_ns, to_ns, limit + 1)
+    next_ns = int(found.poses["t_ns"][limit]) if len(found.poses) > limit else None
+    return TrackPage(_columns(Stored(found.poses[:limit], found.anchors[:limit]), site), next_ns)
+
+
+def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_ns: int) -> Array | None:
+    """POSE (0-d) at a time, from the kept poses before it and after it; None of a tag that was never kept.
+
+    memory: POSE, poses that may not have been written yet. Raises NoPoseThenError.
+    """
+    try:
+        before = tracks.poses(tag, max(0, t_ns - FAR_NS), t_ns, 1, newest_first=True)
+        after = tracks.poses(tag, t_ns, t_ns + FAR_NS, 1)
+        if len(memory) == len(before.poses) == len(after.poses) == 0 and not tracks.knows(tag):
+            return None
+    except sqlite3.Error as error:
+        raise NoPoseThenError(f"the history cannot be read ({error})") from error
+    earlier = [*_indexed(before, site), *memory[memory["t_ns"] <= t_ns][-1:]]
+    later = [*_indexed(after, site), *memory[memory["t_ns"] >= t_ns][:1]]
+    return pose_between(
+        max(earlier, key=lambda pose: int(pose["t_ns"]), default=None),
+        min(later, key=lambda pose: int(pose["t_ns"]), default=None),
+        t_ns,
+    )
+
+
+def _indexed(stored: Stored, site: SiteStore) -> Array:
+    """POSE with the index that the site has for the anchor of each."""
+    index = {anchor.id: number for number, anchor in enumerate(site.anchors_by_index())}
+    stored.poses["anchor"] = [-1 if anchor is None else index.get(anchor, -1) for anchor in stored.anchors]
+    return stored.poses
+
+
+def _columns(stored: Stored, site: SiteStore) -> dict[str, list[Any]]:
+    """Rounded to what was stored: float32."""
+    poses = stored.poses
+    known = np.isfinite(poses["cov"]).all(axis=(1, 2)).tolist()
+    covariances = _short(poses["cov"].reshape(-1)).reshape(-1, 3, 3).tolist()
+    columns: dict[str, list[Any]] = {
+        "t_ns": poses["t_ns"].tolist(),
+        "state": [STATES[state] for state in poses["state"].tolist()],
+        "reason": [REASONS[reason] for reason in poses["reason"].tolist()],
+        **{name: _short(poses[field]).tolist() for name, field in ESTIMATED.items()},
+        "covariance": [cov if finite else None for cov, finite in zip(covariances, known, strict=True)],
+        "anchor": list(stored.anchors),
+    }
+    origin = site.site.georeference
+    if origin is not None:
+        lat, lon = lat_lon(origin, poses["x"], poses["y"])
+        columns["lat"], columns["lon"] = np.round(lat, 9).tolist(), np.round(lon, 9).tolist()
+    return columns
+
+
+ESTIMATED = {
+    "x": "x",
+    "y": "y",
+    "heading_rad": "heading",
+    "speed_mps": "speed",
+    "yaw_rate_radps": "yaw_rate",
+    "p_mode": "p_mode",
+    "sigma_pos_m": "sigma_pos",
+    "sigma_obs_m": "sigma_obs",
+    "range_m": "range",
+}
+"""Numbers of an estimate, and the fields of POSE that they come from."""
+
+
+def _short(values: Array) -> Array:
+    """float64 with no more digits than the float32 had that they come from."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        digits = 7 - np.ceil(np.log10(np.abs(values)))
+    scale = 10.0 ** np.where(np.isfinite(digits), digits, 0.0)
+    return np.round(values * scale) / scale

@@ -1,0 +1,98 @@
+"""A page of a track as JSON, GeoJSON, CSV or GPX."""
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterator, Mapping
+from datetime import UTC, datetime
+from typing import Any
+from xml.sax.saxutils import escape
+
+from fastapi import Request
+
+from dropanchor_service.answers.answers import to_json
+from dropanchor_service.answers.track_pages import TrackPage
+from dropanchor_service.api.formats import geojson
+from dropanchor_service.api.http.errors import Kind, ProblemError
+
+JSON, GEOJSON, CSV, GPX = "json", "geojson", "csv", "gpx"
+MEDIA_TYPES = {JSON: "application/json", GEOJSON: "application/geo+json", CSV: "text/csv", GPX: "application/gpx+xml"}
+GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX"}
+GAP_NS = 10_000_000_000  # a longer one begins a new segment of a GPX track
+
+_PLACED = ("tracking", "coasting", "degraded")
+_COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
+
+Head = Mapping[str, Any]
+"""The members of `Track` beside its poses."""
+
+
+def chosen(request: Request, asked: str | None) -> str:
+    """The format that was asked for by name, else the one that the client would rather have. Raises ProblemError."""
+    if asked is not None:
+        return asked
+    accept = request.headers.get("accept", "*/*")
+    best = max(MEDIA_TYPES, key=lambda name: geojson.quality(accept, MEDIA_TYPES[name]))  # the first of equals
+    if geojson.quality(accept, MEDIA_TYPES[best]) == 0:
+        raise ProblemError(Kind.NOT_ACCEPTABLE, f"{', '.join(MEDIA_TYPES.values())} are offered.")
+    return best
+
+
+def written(page: TrackPage, head: Head, form: str) -> bytes:
+    return _WRITERS[form](page, head)
+
+
+def _json(page: TrackPage, head: Head) -> bytes:
+    return to_json({**head, "poses": page.rows()})
+
+
+def _geojson(page: TrackPage, head: Head) -> bytes:
+    return to_json({"type": "FeatureCollection", **head, "features": [_feature(pose) for pose in page.rows()]})
+
+
+def _feature(pose: dict[str, Any]) -> dict[str, Any]:
+    lat, lon = pose.pop("lat"), pose.pop("lon")
+    geometry = {"type": "Point", "coordinates": [lon, lat]} if math.isfinite(lat) else None
+    return {"type": "Feature", "geometry": geometry, "properties": pose}
+
+
+def _csv(page: TrackPage, head: Head) -> bytes:  # noqa: ARG001 - a table has no place for it
+    names = [name for name in page.columns if name != "covariance"]
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow([*names, *_COVARIANCES])
+    for pose in page.rows():
+        cov = pose["covariance"]
+        spread = ["" if cov is None else cov[i][j] for i, j in _COVARIANCES.values()]
+        writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *spread])
+    return text.getvalue().encode()
+
+
+def _gpx(page: TrackPage, head: Head) -> bytes:
+    """GPX 1.1. It has no place for an uncertainty: `type` is the state of the pose, and tags that may have been
+    somewhere else are left out."""
+    return "".join(_gpx_lines(page, head["tag"])).encode()
+
+
+def _gpx_lines(page: TrackPage, tag: str) -> Iterator[str]:
+    yield '<?xml version="1.0" encoding="UTF-8"?>\n'
+    yield '<gpx version="1.1" creator="Dropanchor" xmlns="http://www.topografix.com/GPX/1/1">\n'
+    yield f"<trk><name>{escape(tag)}</name><trkseg>\n"
+    last_ns = None
+    for pose in page.rows():
+        if pose["state"] not in _PLACED or not math.isfinite(pose["lat"]):
+            continue
+        if last_ns is not None and pose["t_ns"] - last_ns > GAP_NS:
+            yield "</trkseg><trkseg>\n"
+        last_ns = pose["t_ns"]
+        yield f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}"><time>{_utc(last_ns)}</time>'
+        yield f"<type>{pose['state']}</type></trkpt>\n"
+    yield "</trkseg></trk></gpx>\n"
+
+
+def _utc(t_ns: int) -> str:
+    seconds, rest = divmod(t_ns, 1_000_000_000)
+    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1_000_000:03d}Z"
+
+
+_WRITERS: Mapping[str, Callable[[TrackPage, Head], bytes]] = {JSON: _json, GEOJSON: _geojson, CSV: _csv, GPX: _gpx}

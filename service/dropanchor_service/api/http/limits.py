@@ -1,0 +1,124 @@
+"""What one client can take from the others: nothing. Bodies have a size, requests and reading have a deadline."""
+
+import asyncio
+from typing import Any
+
+import h11
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from dropanchor_service.api.http.errors import Kind, ProblemError, problem_response
+
+
+class BodyLimit:
+    """ASGI: a request body of more than max_bytes is answered with 413, as soon as it is announced or too long."""
+
+    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+        self._app = app
+        self._max_bytes = max_bytes
+        self._detail = f"A request body holds at most {max_bytes} bytes."
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        announced = Headers(scope=scope).get("content-length", "0")
+        if announced.isdigit() and int(announced[:20]) > self._max_bytes:
+            response = problem_response(Request(scope), Kind.BODY_TOO_LARGE, self._detail)
+            await response(scope, receive, send)
+            return
+        await self._app(scope, self._counted(receive), send)
+
+    def _counted(self, receive: Receive) -> Receive:
+        received = 0
+
+        async def counted() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            if received > self._max_bytes:
+                raise ProblemError(Kind.BODY_TOO_LARGE, self._detail)
+            return message
+
+        return counted
+
+
+class EscapedPath:
+    """ASGI: paths of the interface reach the routes as they were sent, so that an id may hold an escaped slash."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        raw = scope.get("raw_path") or b""
+        if raw.startswith(b"/api/"):
+            scope = {**scope, "path": raw.decode("latin-1")}
+        await self._app(scope, receive, send)
+
+
+class GuardedProtocol(H11Protocol):
+    """HTTP/1.1 with the two deadlines that uvicorn lacks: a request has to be complete in time, and a client that
+    does not take what it asked for is cut."""
+
+    request_s = 10.0
+    stalled_s = 10.0
+    stalled_at_shutdown_s = 0.5
+
+    _deadline: asyncio.TimerHandle | None = None
+    _stall: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        # Nothing waits in this process: whatever the kernel does not take at once pauses the writer. (1: with 0 even an
+        # empty buffer counts as full in asyncio's TLS transport.)
+        transport.set_write_buffer_limits(high=1)
+        self._deadline = self.loop.call_later(self.request_s, self._cut)
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        incomplete = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
+        if not incomplete:
+            self._deadline = _cancelled(self._deadline)
+        elif self._deadline is None:
+            self._deadline = self.loop.call_later(self.request_s, self._cut)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._watch_stall()
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._stall = _cancelled(self._stall)
+
+    def shutdown(self) -> None:
+        super().shutdown()
+        if self.flow.write_paused:
+            self.stalled_s = self.stalled_at_shutdown_s
+            _cancelled(self._stall)
+            self._watch_stall()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._deadline = _cancelled(self._deadline)
+        self._stall = _cancelled(self._stall)
+        super().connection_lost(exc)
+
+    def _watch_stall(self) -> None:
+        waiting = self.transport.get_write_buffer_size()
+        self._stall = self.loop.call_later(self.stalled_s, self._cut_if_stalled, waiting)
+
+    def _cut_if_stalled(self, waiting_then: int) -> None:
+        if self.transport.get_write_buffer_size() >= waiting_then:
+            self._cut()
+        else:
+            self._watch_stall()
+
+    def _cut(self) -> None:
+        self.transport.abort()
+
+
+def _cancelled(timer: asyncio.TimerHandle | None) -> Any:
+    """None, for the place where the timer was."""
+    if timer is not None:
+        timer.cancel()

@@ -1,0 +1,91 @@
+"""The HTTP server: uvicorn with limits that uvicorn does not set by itself."""
+
+import asyncio
+import errno
+import socket
+import ssl
+from threading import Event
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from dropanchor_service.api.http.limits import GuardedProtocol
+from dropanchor_service.security.certificate import Certificate
+
+GRACE_S = 1  # for requests under way; clients that are stuck take all of it
+_SEND_BUFFER_BYTES = 262_144  # what a client that stops reading can hold back in the kernel
+_MAX_HEADER_BYTES = 16_384
+
+
+class ListenError(OSError):
+    """The address cannot be listened on. The message says why and what to do."""
+
+
+class Server(uvicorn.Server):
+    """Sets `stopping` before it waits for open requests, so that streams end by themselves, and cuts what is left."""
+
+    def __init__(self, config: uvicorn.Config, stopping: Event) -> None:
+        super().__init__(config)
+        self._stopping = stopping
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        self._stopping.set()
+        await super().shutdown(sockets)
+        for connection in list(self.server_state.connections):
+            connection.transport.abort()
+        await asyncio.sleep(0)  # the sockets are closed in the loop's next round
+
+
+def build_server(
+    app: ASGIApp,
+    stopping: Event,
+    protocol: type[GuardedProtocol] = GuardedProtocol,
+    certificate: Certificate | None = None,
+) -> Server:
+    """A server for `await server.serve(sockets=[listen(host, port)])`. stopping: the event that `app` was made with.
+    Raises ListenError when the certificate cannot be used."""
+    config = uvicorn.Config(
+        app,
+        http=protocol,
+        ws="none",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=GRACE_S,
+        h11_max_incomplete_event_size=_MAX_HEADER_BYTES,
+        ssl_certfile=None if certificate is None else certificate.certificate,
+        ssl_keyfile=None if certificate is None else certificate.key,
+    )
+    try:
+        config.load()
+    except (OSError, ssl.SSLError) as error:
+        raise ListenError(f"cannot serve HTTPS: certificate {config.ssl_certfile}: {error}") from error
+    return Server(config, stopping)
+
+
+def listen(host: str, port: int) -> socket.socket:
+    """A socket bound to this address; port 0 takes a free one. Raises ListenError."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+    except socket.gaierror as error:
+        raise ListenError(f"cannot listen on {host}: {error.strerror}") from error
+    bound = socket.socket(family, kind, protocol)
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+        bound.bind(address)
+    except OSError as error:
+        bound.close()
+        raise ListenError(f"cannot listen on {host} port {port}: {_cause(error)}") from error
+    return bound
+
+
+def _cause(error: OSError) -> str:
+    match error.errno:
+        case errno.EADDRINUSE:
+            return "another program uses it; stop that one or choose another port"
+        case errno.EACCES:
+            return "ports below 1024 are reserved; choose a higher one"
+        case errno.EADDRNOTAVAIL:
+            return "this machine does not have the address"
+    return error.strerror or str(error)

@@ -1,0 +1,61 @@
+"""Health for supervisors, metrics for Prometheus."""
+
+from collections.abc import Callable, Sequence
+
+from fastapi import APIRouter, Request
+from prometheus_client import CollectorRegistry
+from prometheus_client.exposition import choose_encoder
+from starlette.responses import Response
+
+from dropanchor_schemas.answers import Health
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes.parameters import NO_QUERY, json_response
+
+Ready = Callable[[], tuple[bool, Sequence[str]]]
+Impaired = Callable[[], Sequence[str]]
+
+
+def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
+    router = APIRouter(tags=["health"], dependencies=[NO_QUERY])
+
+    @router.get(
+        "/health/live",
+        operation_id="get_live",
+        summary="Whether the service answers at all",
+        response_model=Health,
+        responses=problems(Kind.INVALID_REQUEST),
+    )
+    async def get_live() -> Response:
+        return json_response({"status": "live"})
+
+    @router.get(
+        "/health/ready",
+        operation_id="get_ready",
+        summary="Whether the service can do its work",
+        response_model=Health,
+        responses=problems(Kind.INVALID_REQUEST, Kind.NOT_READY),
+    )
+    def get_ready() -> Response:
+        ok, reasons = ready()
+        if not ok:
+            raise ProblemError(Kind.NOT_READY, "; ".join(reasons), reasons=list(reasons))
+        return json_response({"status": "ready", "impaired": list(impaired())})
+
+    return router
+
+
+def metrics_router(registry: CollectorRegistry) -> APIRouter:
+    router = APIRouter(tags=["health"])
+
+    @router.get(
+        "/metrics",
+        operation_id="get_metrics",
+        summary="Metrics for Prometheus",
+        response_class=Response,
+        responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+    )
+    def get_metrics(request: Request) -> Response:
+        encode, content_type = choose_encoder(request.headers.get("accept", ""))
+        return Response(encode(registry), headers={"content-type": content_type, "cache-control": "no-store"})
+
+    return router

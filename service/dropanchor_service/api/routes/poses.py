@@ -1,0 +1,154 @@
+"""Poses: one, or many."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
+from fastapi.routing import APIRoute
+from starlette.responses import Response, StreamingResponse
+
+from dropanchor_schemas.explain import Explanation
+from dropanchor_schemas.pose import Pose, PoseList
+from dropanchor_service.answers.answers import Answer, Answers
+from dropanchor_service.answers.explain import explanation_of
+from dropanchor_service.answers.pose_at_time import NoPoseThenError, TooFarAheadError
+from dropanchor_service.api.formats import geojson
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import (
+    AtTime,
+    LastInnovations,
+    TagFilter,
+    TagId,
+    id_of,
+    json_response,
+    shown,
+)
+from dropanchor_service.store.tags import Tag
+
+PIECE_BYTES = 400_000  # sent at once: what the kernel does not take is copied, again and again
+
+_NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
+
+
+def poses_router(answers: Answers) -> APIRouter:
+    router = APIRouter(tags=["poses"])
+
+    async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
+        as_geojson = geojson.wanted(request, answers)
+        if query.at is None:
+            pose = _pose_of(answers, tag)
+        else:  # may have to read from disk
+            pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
+        return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
+
+    router.add_api_route(
+        "/tags/{tag}/pose",
+        get_pose,
+        methods=["GET"],
+        route_class_override=PlainPose,
+        operation_id="get_pose",
+        summary="The latest pose of a tag, or its pose at a time",
+        response_model=Pose,
+        responses=_offers(examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the place is unknown.")
+        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
+    )
+
+    @router.get(
+        "/tags/{tag}/explain",
+        operation_id="explain_pose",
+        summary="Why the latest pose of a tag is what it is",
+        response_model=Explanation,
+        responses=shown(examples.EXPLANATION) | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
+    )
+    async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()]) -> Response:
+        explanation = explanation_of(answers, _known(answers, tag), query.last)
+        if explanation is None:
+            raise _no_pose_yet(tag)
+        return json_response(explanation)
+
+    @router.get(
+        "/poses",
+        operation_id="list_poses",
+        summary="The latest poses of all tags, or of some",
+        response_model=PoseList,
+        responses=_offers(examples.POSE_LIST, "A GeoJSON FeatureCollection (RFC 7946).") | problems(*_NEGOTIATION),
+    )
+    async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
+        as_geojson = geojson.wanted(request, answers)
+        found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
+        wanted = found if query.tags else None
+        if as_geojson:
+            return _response(geojson.collection_of(answers.pose_list(wanted)), geojson.MEDIA_TYPE)
+        headers = {"cache-control": "no-store", "vary": "accept"}
+        return StreamingResponse(_in_turn(answers.pose_list_json(wanted)), media_type=geojson.JSON, headers=headers)
+
+    return router
+
+
+class PlainPose(APIRoute):
+    """Where nothing but a tag is asked for, its id is all that has to be found out: solving the declared parameters,
+    none of which is there, would take longer than the answer."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        with_parameters = super().get_route_handler()
+        nothing = AtTime()
+
+        async def handle(request: Request) -> Response:
+            if request.scope["query_string"]:
+                return await with_parameters(request)
+            answer: Response = await self.endpoint(id_of(request.path_params["tag"]), nothing, request)
+            return answer
+
+        return handle
+
+
+async def _in_turn(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
+    """Other answers have their turn between two chunks."""
+    for chunk in chunks:
+        for begin in range(0, len(chunk), PIECE_BYTES):
+            yield chunk[begin : begin + PIECE_BYTES]
+        await asyncio.sleep(0)
+
+
+def _known(answers: Answers, name: str) -> Tag:
+    tag = answers.tags.find(name)
+    if tag is None:
+        raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {name!r} has been heard or configured.")
+    return tag
+
+
+def _no_pose_yet(name: str) -> ProblemError:
+    return ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet.")
+
+
+def _pose_of(answers: Answers, name: str) -> Answer:
+    pose = answers.pose_of(_known(answers, name))
+    if pose is None:
+        raise _no_pose_yet(name)
+    return pose
+
+
+def _pose_at(answers: Answers, name: str, at_ns: int) -> Answer:
+    try:
+        pose = answers.pose_at(name, at_ns)
+    except TooFarAheadError as error:
+        raise ProblemError(Kind.TOO_FAR_AHEAD, f"Tag {name!r}: {error}.") from error
+    except NoPoseThenError as error:
+        raise ProblemError(Kind.NO_POSE_THEN, f"Tag {name!r}: {error}.") from error
+    if pose is None:
+        raise _no_pose_yet(_known(answers, name).name)
+    return pose
+
+
+def _response(answer: Answer, media_type: str) -> Response:
+    response = json_response(answer, media_type)
+    response.headers["vary"] = "accept"
+    return response
+
+
+def _offers(example: Answer, as_geojson: str) -> dict[int | str, dict[str, Any]]:
+    schema = {"schema": {"type": "object", "description": as_geojson}}
+    return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: schema}}}

@@ -1,0 +1,124 @@
+"""Recordings: started, stopped, listed and fetched."""
+
+import os
+from collections.abc import Iterator
+from typing import Annotated, Any, BinaryIO
+
+from fastapi import APIRouter, Body, Path
+from starlette.responses import Response, StreamingResponse
+
+from dropanchor_schemas.recordings import RecordingList, RecordingRequest, RecordingState
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, saving, shown
+from dropanchor_service.recording.recorder import Recorder
+
+MEDIA_TYPE = "application/octet-stream"
+CHUNK_BYTES = 262_144
+FileName = Annotated[str, Path(description="As the list names it.", examples=["yard-20270115T080000-000000Z.mcap"])]
+
+
+def recordings_router(recorder: Recorder | None) -> APIRouter:
+    router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
+
+    @router.get(
+        "/recordings",
+        operation_id="list_recordings",
+        summary="What is recorded, and the files",
+        response_model=RecordingList,
+        responses=shown(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
+    )
+    def list_recordings() -> Response:
+        found = _required(recorder)
+        files = [
+            {"name": file.name, "bytes": file.size, "changed_ns": file.changed_ns, "finished": file.finished}
+            for file in found.files()
+        ]
+        return json_response(_state(found) | {"files": files})
+
+    @router.post(
+        "/recordings",
+        operation_id="start_recording",
+        summary="Record raw samples and poses from now on",
+        status_code=201,
+        response_model=RecordingState,
+        responses=shown(examples.RECORDING, 201)
+        | problems(
+            *(Kind.NO_RECORDER, Kind.RECORDS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
+        ),
+    )
+    def start_recording(request: Annotated[RecordingRequest, Body(examples=[{"tags": None}])]) -> Response:
+        found = _required(recorder)
+        with saving():
+            found.prepare()
+        if not found.start(request.tags):
+            raise ProblemError(Kind.RECORDS_ALREADY, "Stop it first, with POST /api/v1/recordings/stop.")
+        return json_response(_state(found), status=201)
+
+    @router.post(
+        "/recordings/stop",
+        operation_id="stop_recording",
+        summary="Record no longer",
+        response_model=RecordingState,
+        responses=shown(examples.NO_RECORDING) | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
+    )
+    def stop_recording() -> Response:
+        found = _required(recorder)
+        if not found.stop():
+            raise ProblemError(Kind.RECORDS_NOTHING, "Nothing is being recorded.")
+        return json_response(_state(found))
+
+    @router.get(
+        "/recordings/{name}",
+        operation_id="get_recording",
+        summary="A file, to open in Foxglove or Lichtblick, or to replay",
+        response_class=StreamingResponse,
+        responses=_file() | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.INVALID_REQUEST),
+    )
+    def get_recording(name: FileName) -> Response:
+        path = _required(recorder).path_of(name)
+        try:
+            file = None if path is None else path.open("rb")
+        except FileNotFoundError:  # pruned meanwhile
+            file = None
+        if file is None:
+            raise ProblemError(Kind.UNKNOWN_RECORDING, "GET /api/v1/recordings names those that there are.")
+        return _download(file, name)
+
+    return router
+
+
+def _download(file: BinaryIO, name: str) -> Response:
+    """As much of the file as there is now: it may be growing."""
+    size = os.fstat(file.fileno()).st_size
+    headers = {
+        "cache-control": "no-store",
+        "content-disposition": f'attachment; filename="{name}"',
+        "content-length": str(size),
+    }
+    return StreamingResponse(_chunks(file, size), media_type=MEDIA_TYPE, headers=headers)
+
+
+def _chunks(file: BinaryIO, size: int) -> Iterator[bytes]:
+    with file:
+        while size > 0 and (chunk := file.read(min(size, CHUNK_BYTES))):
+            size -= len(chunk)
+            yield chunk
+
+
+def _required(recorder: Recorder | None) -> Recorder:
+    if recorder is None:
+        raise ProblemError(Kind.NO_RECORDER, "Set `data_dir`: recordings are kept there.")
+    return recorder
+
+
+def _state(recorder: Recorder) -> dict[str, Any]:
+    running = recorder.running
+    if running is None:
+        return {"recording": False, "since_ns": None, "tags": None, "file": recorder.open_name}
+    tags = None if running.tags is None else list(running.tags)
+    return {"recording": True, "since_ns": running.since_ns, "tags": tags, "file": recorder.open_name}
+
+
+def _file() -> dict[int | str, dict[str, Any]]:
+    return {200: {"content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}}}

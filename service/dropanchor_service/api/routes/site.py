@@ -1,0 +1,108 @@
+"""The site and its anchors."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body
+from starlette.responses import Response
+
+from dropanchor_schemas.answers import AnchorList
+from dropanchor_schemas.site import Anchor, Site
+from dropanchor_schemas.wire import anchor_number
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import NO_QUERY, AnchorId, json_response, saving, shown
+from dropanchor_service.store.site import SiteStore
+
+_BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
+
+
+def site_router(store: SiteStore) -> APIRouter:
+    router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+    _add_site_routes(router, store)
+    _add_anchor_routes(router, store)
+    return router
+
+
+def _add_site_routes(router: APIRouter, store: SiteStore) -> None:
+    @router.get(
+        "/site",
+        operation_id="get_site",
+        summary="The site: its frame, georeference and anchors",
+        response_model=Site,
+        responses=shown(examples.SITE) | problems(Kind.INVALID_REQUEST),
+    )
+    async def get_site() -> Response:
+        return json_response(store.site.model_dump())
+
+    @router.put(
+        "/site",
+        operation_id="put_site",
+        summary="Replace the site's frame, georeference and anchors",
+        response_model=Site,
+        responses=shown(examples.SITE) | problems(Kind.SITE_ID_FIXED, *_BAD_CHANGE),
+    )
+    def put_site(site: Annotated[Site, Body(examples=[examples.SITE])]) -> Response:
+        with saving():
+            try:
+                store.set_site(site)
+            except ValueError as error:
+                raise ProblemError(Kind.SITE_ID_FIXED, str(error)) from error
+        return json_response(site.model_dump())
+
+
+def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
+    @router.get(
+        "/anchors",
+        operation_id="list_anchors",
+        summary="The anchors of the site",
+        response_model=AnchorList,
+        responses=shown({"anchors": [examples.ANCHOR]}) | problems(Kind.INVALID_REQUEST),
+    )
+    async def list_anchors() -> Response:
+        return json_response({"anchors": [anchor.model_dump() for anchor in store.site.anchors]})
+
+    @router.get(
+        "/anchors/{anchor}",
+        operation_id="get_anchor",
+        summary="One anchor",
+        response_model=Anchor,
+        responses=shown(examples.ANCHOR) | problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST),
+    )
+    async def get_anchor(anchor: AnchorId) -> Response:
+        for known in store.site.anchors:
+            if known.number == anchor_number(anchor):
+                return json_response(known.model_dump())
+        raise _unknown(anchor)
+
+    @router.put(
+        "/anchors/{anchor}",
+        operation_id="put_anchor",
+        summary="Place an anchor, new or known",
+        response_model=Anchor,
+        responses=shown(examples.ANCHOR) | problems(Kind.ANCHOR_ID_DIFFERS, *_BAD_CHANGE),
+    )
+    def put_anchor(anchor: AnchorId, body: Annotated[Anchor, Body(examples=[examples.ANCHOR])]) -> Response:
+        if body.id != anchor:
+            raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The path says {anchor!r}, the body {body.id!r}.")
+        with saving():
+            store.set_anchor(body)
+        return json_response(body.model_dump())
+
+    @router.delete(
+        "/anchors/{anchor}",
+        operation_id="delete_anchor",
+        summary="Take an anchor out of the site",
+        status_code=204,
+        responses=problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+    )
+    def delete_anchor(anchor: AnchorId) -> Response:
+        with saving():
+            try:
+                store.remove_anchor(anchor)
+            except KeyError as error:
+                raise _unknown(anchor) from error
+        return Response(status_code=204)
+
+
+def _unknown(anchor: str) -> ProblemError:
+    return ProblemError(Kind.UNKNOWN_ANCHOR, f"The site has no anchor {anchor!r}.")

@@ -1,0 +1,140 @@
+"""Poses as server-sent events: first a snapshot, then what has changed, never faster than the client asked for.
+
+Every client reads the store at its own pace: what it missed is overwritten there, so nothing waits for it anywhere.
+"""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from threading import Event
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Query
+from numpy.typing import NDArray
+from pydantic import Field
+from starlette.responses import Response, StreamingResponse
+
+from dropanchor_service.answers.answers import Answer, Answers, to_json
+from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import TagFilter
+
+Array = NDArray[Any]  # POSE rows of the store
+
+MEDIA_TYPE = "text/event-stream"
+HEARTBEAT_S = 5.0
+SWEEP_S = 0.5
+_NAP_S = 0.2
+
+_DESCRIPTION = """\
+Server-sent events. `snapshot` comes first and names every tag that has a pose; `poses` then name the tags that have
+changed since. The data of both is a `PoseFrame`. A client that reads slowly is sent the newest poses when it is ready
+again; one that stops reading is cut. A comment is sent when there is nothing to say."""
+
+
+class StreamQuery(TagFilter):
+    max_hz: float = Field(
+        default=10.0, ge=0.1, le=30, allow_inf_nan=False, description="At most so many events a second."
+    )
+
+
+def stream_router(answers: Answers, stopping: Event) -> APIRouter:
+    router = APIRouter(tags=["poses"])
+
+    @router.get(
+        "/stream",
+        operation_id="stream_poses",
+        summary="Poses as they change",
+        description=_DESCRIPTION,
+        response_class=StreamingResponse,
+        responses=_event_stream() | problems(Kind.INVALID_REQUEST),
+    )
+    async def stream_poses(query: Annotated[StreamQuery, Query()]) -> Response:
+        events = _events(Changes(answers, query.tags), 1 / query.max_hz, stopping)
+        headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+        return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
+
+    return router
+
+
+class Changes:
+    """What one client has not seen yet."""
+
+    def __init__(self, answers: Answers, names: list[str]) -> None:
+        self._answers = answers
+        self._names = names
+        self._version = 0
+        self._shown: dict[str, tuple[str, bool]] = {}  # tag → (state, online)
+        self._swept_s = time.monotonic()
+
+    def snapshot(self) -> Answer:
+        return self._frame(self._newer())
+
+    def next(self) -> Answer | None:
+        """A frame of the tags that have changed, None when there is none."""
+        poses = self._newer()
+        if time.monotonic() - self._swept_s >= SWEEP_S:
+            self._swept_s = time.monotonic()
+            poses = self._silent_changes(poses)
+        return self._frame(poses) if len(poses) else None
+
+    def _newer(self) -> Array:
+        self._version, poses = self._answers.latest.since(self._version)
+        return self._chosen(poses)
+
+    def _silent_changes(self, newer: Array) -> Array:
+        """`newer`, and the tags whose age or liveliness says something else now: nobody writes a pose for that."""
+        everyone = self._chosen(self._answers.latest.since()[1])
+        frame = self._answers.frame_of(everyone, self._answers.now_ns())
+        changed = [
+            self._shown.get(tag) != (state, online)
+            for tag, state, online in zip(frame["tags"], frame["state"], frame["online"], strict=True)
+        ]
+        return everyone[np.array(changed, bool) | np.isin(everyone["row"], newer["row"])]
+
+    def _chosen(self, poses: Array) -> Array:
+        if not self._names:
+            return poses
+        rows = [tag.row for tag in map(self._answers.tags.find, self._names) if tag is not None]
+        return poses[np.isin(poses["row"], rows)]
+
+    def _frame(self, poses: Array) -> Answer:
+        frame = self._answers.frame_of(poses, self._answers.now_ns())
+        said = zip(frame["state"], frame["online"], strict=True)
+        self._shown.update(zip(frame["tags"], said, strict=True))
+        return frame
+
+
+async def _events(changes: Changes, period_s: float, stopping: Event) -> AsyncIterator[bytes]:
+    yield _event("snapshot", changes.snapshot())
+    said_s = time.monotonic()
+    while not await _stopped_within(period_s, stopping):
+        frame = changes.next()
+        if frame is not None:
+            yield _event("poses", frame)
+        elif time.monotonic() - said_s >= HEARTBEAT_S:
+            yield b": alive\n\n"
+        else:
+            continue
+        said_s = time.monotonic()
+
+
+async def _stopped_within(period_s: float, stopping: Event) -> bool:
+    """Sleep for the period, but notice within _NAP_S that the service stops."""
+    end_s = time.monotonic() + period_s
+    while not stopping.is_set():
+        left_s = end_s - time.monotonic()
+        if left_s <= 0:
+            return False
+        await asyncio.sleep(min(left_s, _NAP_S))
+    return True
+
+
+def _event(name: str, frame: Answer) -> bytes:
+    return b"event: " + name.encode() + b"\ndata: " + to_json(frame) + b"\n\n"
+
+
+def _event_stream() -> dict[int | str, dict[str, Any]]:
+    example = (_event("snapshot", examples.POSE_FRAME) + b": alive\n\n").decode()
+    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}

@@ -1,0 +1,119 @@
+"""The track of a tag: where it was, page by page."""
+
+import sqlite3
+from typing import Annotated, Any, Literal
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import Response
+
+from dropanchor_schemas.track import Track
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.answers.track_pages import TrackPage, track_page
+from dropanchor_service.api.formats import geojson
+from dropanchor_service.api.formats import track as track_formats
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import TagId
+from dropanchor_service.history.tracks import Tracks
+
+HOUR_NS = 3_600_000_000_000
+MOST_NS = 31 * 24 * HOUR_NS
+MOST_POSES = 10_000
+
+_DESCRIPTION = """\
+Poses that were kept, in order of time: thinned, as the service's settings say, and written about two seconds after
+they were made. A page ends after `limit` poses; `next` (and the header `Link` with rel="next") leads to the next one.
+GeoJSON and GPX need a georeferenced site; GPX holds the poses that are `tracking`, `coasting` or `degraded`, which it
+says in `type`."""
+
+
+class TrackQuery(BaseModel):
+    """Which part of a track, and in which form."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+    from_ns: int | None = Field(
+        default=None, alias="from", ge=0, lt=2**62, description="UTC, ns; an hour before `to` if left out."
+    )
+    to_ns: int | None = Field(
+        default=None, alias="to", ge=0, lt=2**62, description="UTC, ns, at most 31 days after `from`; now if left out."
+    )
+    limit: int = Field(default=1000, ge=1, le=MOST_POSES, description="At most so many poses.")
+    cursor: int | None = Field(default=None, ge=0, lt=2**62, description="`next` of the page before this one.")
+    format: Literal["json", "geojson", "csv", "gpx"] | None = Field(
+        default=None, description="If left out, what the header `Accept` says."
+    )
+
+
+def track_router(answers: Answers) -> APIRouter:
+    router = APIRouter(tags=["poses"])
+
+    @router.get(
+        "/tags/{tag}/track",
+        operation_id="get_track",
+        summary="Where a tag was",
+        description=_DESCRIPTION,
+        response_model=Track,
+        responses=_offers()
+        | problems(
+            *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED),
+            *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+        ),
+    )
+    def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Request) -> Response:
+        form = track_formats.chosen(request, query.format)
+        if form in track_formats.GEOREFERENCED:
+            geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
+        from_ns, to_ns = _window(query, answers.now_ns())
+        page = _page(answers, tag, max(from_ns, query.cursor or 0), to_ns, query.limit)
+        following = None if page.next_ns is None else str(page.next_ns)
+        head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": following}
+        headers = {"cache-control": "no-store", "vary": "accept"}
+        if following is not None:
+            headers["link"] = _link({"from": from_ns, "to": to_ns, "limit": query.limit, "cursor": following}, form)
+        media_type = track_formats.MEDIA_TYPES[form]
+        return Response(track_formats.written(page, head, form), media_type=media_type, headers=headers)
+
+    return router
+
+
+def _window(query: TrackQuery, now_ns: int) -> tuple[int, int]:
+    to_ns = now_ns if query.to_ns is None else query.to_ns
+    from_ns = max(0, to_ns - HOUR_NS) if query.from_ns is None else query.from_ns
+    if from_ns > to_ns:
+        raise ProblemError(Kind.INVALID_REQUEST, "query.from: lies after `to`")
+    if to_ns - from_ns > MOST_NS:
+        raise ProblemError(Kind.INVALID_REQUEST, "query.from: lies more than 31 days before `to`")
+    return from_ns, to_ns
+
+
+def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
+    tracks = answers.tracks
+    if tracks is None:
+        raise ProblemError(Kind.NO_HISTORY, "Set `data_dir`, and do not set `history.enabled` to false.")
+    try:
+        _require_known(answers, tracks, tag)
+        return track_page(tracks, answers.site, tag, from_ns, to_ns, limit)
+    except sqlite3.Error as error:
+        raise ProblemError(Kind.HISTORY_UNREADABLE, f"The file of the history cannot be read: {error}.") from error
+
+
+def _require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
+    """A tag that has not been heard since the start may have been heard before."""
+    if answers.tags.find(tag) is None and not tracks.knows(tag):
+        raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {tag!r} has been heard or configured.")
+
+
+def _link(query: dict[str, Any], form: str) -> str:
+    return f'<?{urlencode(query | {"format": form})}>; rel="next"'
+
+
+def _offers() -> dict[int | str, dict[str, Any]]:
+    content: dict[str, Any] = {
+        media_type: {"schema": {"type": "string"}} for media_type in track_formats.MEDIA_TYPES.values()
+    }
+    content["application/json"] = {"example": examples.TRACK}
+    content["application/geo+json"] = {"schema": {"type": "object", "description": "A FeatureCollection (RFC 7946)."}}
+    return {200: {"content": content}}

@@ -1,0 +1,68 @@
+"""All that a restarted service must know to go on as if it had not been away: what a checkpoint holds."""
+
+import numpy as np
+
+from dropanchor_schemas.site import Anchor
+from dropanchor_service.checkpoints.files import Snapshot, layout_of
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.publishers import Publishers
+from dropanchor_service.runtime.kernel_cache import sources_digest
+from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.records import put
+
+
+class WholeState:
+    """Owned by the ingest thread while it runs."""
+
+    def __init__(
+        self, site: SiteStore, tags: TagTable, latest: LatestPoses, estimators: Estimators, publishers: Publishers
+    ) -> None:
+        self._site = site
+        self._tags = tags
+        self._latest = latest
+        self._estimators = estimators
+        self._publishers = publishers
+        self._buffers: dict[str, Array] = {}
+        self.template = self.snapshot()
+        self.layout = layout_of(self.template, meaning=sources_digest())
+
+    @property
+    def messages(self) -> int:
+        """How many have come in: nothing else changes the state."""
+        return int(self._tags.copy_counts()["messages"].sum())
+
+    def snapshot(self) -> Snapshot:
+        """Copies: what comes in later does not change them. The next snapshot does, for it uses the same memory: pages
+        that are fresh from the operating system cost ten times as much as copying into them."""
+        arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns}
+        arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
+        arrays |= {f"engine.{name}": array for name, array in self._estimators.state().items()}
+        anchors = [anchor.model_dump() for anchor in self._site.anchors_by_index()]
+        document = {"site": self._site.site.id, "anchors": anchors, "tags": [tag.name for tag in self._tags.all()]}
+        return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, document)
+
+    def keep_buffers_apart(self) -> None:
+        """The next snapshot leaves the last one as it is."""
+        self._buffers = {}
+
+    def _copied(self, name: str, array: Array) -> Array:
+        buffer = self._buffers.get(name)
+        if buffer is None or len(buffer) < len(array):
+            spare = len(array) // 8 if buffer is not None else 0
+            buffer = self._buffers[name] = np.empty((len(array) + spare, *array.shape[1:]), array.dtype)
+        put(buffer, slice(len(array)), array)
+        return buffer[: len(array)]
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Take over a snapshot of this layout, before anything has come in."""
+        self._site.remember([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
+        self._tags.restore(snapshot.document["tags"], snapshot.arrays["counts"])
+        self._publishers.columns = snapshot.arrays["publishers"]
+        self._latest.restore(_part(snapshot, "latest"))
+        self._estimators.restore(_part(snapshot, "engine"))
+
+
+def _part(snapshot: Snapshot, part: str) -> dict[str, Array]:
+    prefix = f"{part}."
+    return {name.removeprefix(prefix): a for name, a in snapshot.arrays.items() if name.startswith(prefix)}

@@ -1,0 +1,174 @@
+/** What is not known: ellipses, hypotheses, rings at the range; and where the tags have been. */
+
+import { horizontal } from "./geometry.js";
+import { percent } from "../data/format.js";
+import { haloText, traceRing } from "./draw_site.js";
+import { hasGhosts, markerRadius, traceTick } from "./draw_tags.js";
+import { FADE, alike } from "./scene.js";
+import { AMBIGUOUS, STATES, staleness } from "../data/states.js";
+import { TRAIL_S } from "../data/trails.js";
+
+/** @typedef {import("./scene.js").Scene} Scene */
+
+const ELLIPSES_UP_TO = 1500;
+const TRAILS_UP_TO = 300;
+const RINGS_UP_TO = 12;
+const GHOSTS_UP_TO = 300;
+
+/** The 95 % ellipses: solid only around a pose that can be trusted. @param {Scene} scene */
+export function drawEllipses(scene) {
+  const { ctx, palette } = scene;
+  if (scene.rows.length > ELLIPSES_UP_TO) return;
+  for (const { state, stale, rows } of alike(scene)) {
+    ctx.beginPath();
+    for (const row of rows) if (hasEllipse(scene, row)) traceRowEllipse(scene, row);
+    paintEllipses(ctx, palette.state[state], STATES[state].trusted && stale === 0, FADE[stale]);
+  }
+}
+
+/** A tag whose place is not known has one only while it is selected. @param {Scene} scene @param {number} row */
+const hasEllipse = ({ fleet, selected }, row) =>
+  STATES[fleet.state[row]].placed || (row === selected && !hasGhosts(fleet, row));
+
+/** @param {CanvasRenderingContext2D} ctx @param {string} colour @param {boolean} trusted @param {number} alpha */
+function paintEllipses(ctx, colour, trusted, alpha) {
+  ctx.fillStyle = ctx.strokeStyle = colour;
+  ctx.lineWidth = 1.25;
+  ctx.globalAlpha = 0.13 * alpha;
+  if (trusted) ctx.fill();
+  ctx.globalAlpha = 0.8 * alpha;
+  ctx.setLineDash(trusted ? [] : [5, 4]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+}
+
+/** @param {Scene} scene @param {number} row */
+function traceRowEllipse({ ctx, view, fleet }, row) {
+  const { semi_major_m: major, semi_minor_m: minor, angle_rad: angle } = fleet.number;
+  traceEllipse(ctx, view, fleet.drawnX[row], fleet.drawnY[row], major[row], minor[row], angle[row]);
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {import("./view.js").View} view @param {number} x @param {number} y
+ * @param {number} major @param {number} minor @param {number} angle */
+function traceEllipse(ctx, view, x, y, major, minor, angle) {
+  if (!(major > 0)) return;
+  const [px, py, a, b] = [view.screenX(x), view.screenY(y), major * view.scale, minor * view.scale];
+  ctx.moveTo(px + a * Math.cos(angle), py - a * Math.sin(angle));
+  ctx.ellipse(px, py, a, b, -angle, 0, 2 * Math.PI);
+}
+
+/** Every place where an ambiguous tag may be, fainter the less likely it is. @param {Scene} scene
+ * @param {(row: number) => boolean} wanted */
+export function drawGhosts(scene, wanted) {
+  const { fleet, ctx } = scene;
+  let left = GHOSTS_UP_TO;
+  for (let row = 0; row < fleet.size && left > 0; row++) {
+    if (!hasGhosts(fleet, row) || !wanted(row)) continue;
+    for (const ghost of fleet.value.hypotheses[row] ?? []) drawGhost(scene, row, ghost, left--);
+  }
+  ctx.globalAlpha = 1;
+  ctx.setLineDash([]);
+}
+
+/** @param {Scene} scene @param {number} row @param {import("../data/fleet.js").Hypothesis} ghost @param {number} left */
+function drawGhost({ ctx, view, palette, rows, selected }, row, ghost, left) {
+  const [x, y] = [view.screenX(ghost.x), view.screenY(ghost.y)];
+  const radius = markerRadius(rows.length);
+  if (left <= 0 || x < -20 || x > view.width + 20 || y < -20 || y > view.height + 20) return;
+  ctx.globalAlpha = 0.35 + 0.65 * ghost.weight;
+  ctx.strokeStyle = palette.state[AMBIGUOUS];
+  ctx.lineWidth = 1.75;
+  ctx.setLineDash([3, 2.5]);
+  ctx.beginPath();
+  ctx.arc(x, y, radius, 0, 2 * Math.PI);
+  traceTick(ctx, x, y, ghost.heading_rad, radius);
+  const shape = row === selected ? ghost.ellipse_95 : null;
+  if (shape) traceEllipse(ctx, view, ghost.x, ghost.y, shape.semi_major_m, shape.semi_minor_m, shape.angle_rad);
+  ctx.stroke();
+  if (row === selected) labelGhost(ctx, palette, percent(ghost.weight), x, y + 16);
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {import("./palette.js").Palette} palette @param {string} text
+ * @param {number} x @param {number} y */
+function labelGhost(ctx, palette, text, x, y) {
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+  ctx.font = `11px ${palette.font}`;
+  ctx.textAlign = "center";
+  ctx.textBaseline = "middle";
+  haloText(ctx, palette, text, x, y, palette.state[AMBIGUOUS]);
+}
+
+/** A range says on which ring a tag is: drawn for the selected tag, and for those whose place is not known.
+ * @param {Scene} scene @param {(row: number) => boolean} wanted */
+export function drawRangeRings(scene, wanted) {
+  const { fleet } = scene;
+  let left = RINGS_UP_TO;
+  for (let row = 0; row < fleet.size && left > 0; row++) {
+    if (STATES[fleet.state[row]].placed || row === scene.selected || !wanted(row)) continue;
+    if (strokeRangeRing(scene, row, 0.45)) left--;
+  }
+  if (scene.selected >= 0) strokeRangeRing(scene, scene.selected, 0.9);
+}
+
+/** @param {Scene} scene @param {number} row @param {number} alpha */
+function strokeRangeRing({ ctx, view, palette, fleet, roster, anchors, selected, now_ms }, row, alpha) {
+  const anchor = anchors.find((other) => other.id === fleet.value.anchor[row]);
+  const range = fleet.number.range_m[row];
+  const stale = staleness(fleet.age(row, now_ms));
+  if (!anchor || Number.isNaN(range) || (stale === 2 && row !== selected)) return false;
+  const state = fleet.state[row];
+  ctx.beginPath();
+  traceRing(ctx, view, anchor.x, anchor.y, horizontal(range, anchor.z - roster.height(fleet.names[row])));
+  ctx.globalAlpha = alpha * FADE[stale];
+  ctx.strokeStyle = palette.state[state];
+  ctx.lineWidth = 1.25;
+  ctx.setLineDash(STATES[state].trusted ? [1, 3] : [6, 5]);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+  return true;
+}
+
+/** @param {Scene} scene */
+export function drawTrails(scene) {
+  const rows = scene.rows.length <= TRAILS_UP_TO ? [...scene.rows] : [];
+  if (scene.selected >= 0 && !rows.includes(scene.selected)) rows.push(scene.selected);
+  for (const row of rows) drawTrail(scene, row);
+  scene.ctx.globalAlpha = 1;
+  scene.ctx.setLineDash([]);
+}
+
+/** In a few pieces that fade with age; dashed where the pose could not be trusted. @param {Scene} scene
+ * @param {number} row */
+function drawTrail({ ctx, view, palette, fleet, trails, selected, now_ms }, row) {
+  const trail = trails.of(fleet.names[row]);
+  if (!trail || trail.length < 2) return;
+  ctx.strokeStyle = palette.state[fleet.state[row]];
+  ctx.lineWidth = row === selected ? 2.25 : 1.5;
+  ctx.lineJoin = "round";
+  for (let from = 0; from < trail.length - 1; from += 15) {
+    const to = Math.min(trail.length - 1, from + 15);
+    const share = 1 - (now_ms - trail.time[trail.at(to)]) / (TRAIL_S * 1000);
+    if (share <= 0) continue;
+    ctx.globalAlpha = (row === selected ? 0.85 : 0.5) * share;
+    ctx.setLineDash(trail.trusted[trail.at(to)] ? [] : [2, 4]);
+    strokePiece(ctx, view, trail, from, to);
+  }
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {import("./view.js").View} view
+ * @param {NonNullable<ReturnType<import("../data/trails.js").Trails["of"]>>} trail @param {number} from @param {number} to */
+function strokePiece(ctx, view, trail, from, to) {
+  let down = false;
+  ctx.beginPath();
+  for (let i = from; i <= to; i++) {
+    const at = trail.at(i);
+    if (Number.isNaN(trail.x[at])) down = false;
+    else if (down) ctx.lineTo(view.screenX(trail.x[at]), view.screenY(trail.y[at]));
+    else ctx.moveTo(view.screenX(trail.x[at]), view.screenY(trail.y[at]));
+    down = !Number.isNaN(trail.x[at]);
+  }
+  ctx.stroke();
+}

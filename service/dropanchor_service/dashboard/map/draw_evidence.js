@@ -1,0 +1,61 @@
+/** Why the selected tag is where it is: rings of all anchors that it heard, and how well its heading is known. */
+
+import { headingSigma, rangesHeard } from "../data/evidence.js";
+import { horizontal } from "./geometry.js";
+import { metres } from "../data/format.js";
+import { haloText, traceRing } from "./draw_site.js";
+import { hasGhosts } from "./draw_tags.js";
+
+/** @typedef {import("./scene.js").Scene} Scene @typedef {import("../data/evidence.js").Explanation} Explanation */
+
+const WEDGE_PX = 62;
+const WIDEST = Math.PI / 2; // a heading that is known no better points nowhere
+
+/** @param {Scene} scene @param {Explanation | null} explanation */
+export function drawEvidence(scene, explanation) {
+  if (scene.selected < 0 || explanation === null) return;
+  for (const [id, range] of rangesHeard(explanation)) drawHeard(scene, id, range);
+  drawWedge(scene, headingSigma(explanation));
+  scene.ctx.globalAlpha = 1;
+}
+
+/** The ring of an anchor; that of the last range of all is drawn with the tags, as fresh as the stream.
+ * @param {Scene} scene @param {string} id @param {number} range */
+function drawHeard({ ctx, view, palette, fleet, roster, anchors, selected }, id, range) {
+  const anchor = anchors.find((other) => other.id === id);
+  if (!anchor) return;
+  const radius = horizontal(range, anchor.z - roster.height(fleet.names[selected]));
+  const colour = palette.state[fleet.state[selected]];
+  if (id !== fleet.value.anchor[selected]) {
+    ctx.beginPath();
+    traceRing(ctx, view, anchor.x, anchor.y, radius);
+    ctx.globalAlpha = 0.6;
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = 1.25;
+    ctx.setLineDash([1, 3]);
+    ctx.stroke();
+    ctx.setLineDash([]);
+  }
+  ctx.globalAlpha = 1;
+  ctx.font = `11px ${palette.font}`;
+  ctx.textAlign = "center";
+  ctx.textBaseline = "bottom";
+  haloText(ctx, palette, metres(range), view.screenX(anchor.x), view.screenY(anchor.y + radius) - 3, colour);
+}
+
+/** One standard deviation of the heading to either side. @param {Scene} scene @param {number} sigma rad */
+function drawWedge({ ctx, view, palette, fleet, selected }, sigma) {
+  const heading = fleet.number.heading_rad[selected];
+  if (!(sigma < WIDEST) || Number.isNaN(heading) || hasGhosts(fleet, selected)) return;
+  const [x, y] = [view.screenX(fleet.drawnX[selected]), view.screenY(fleet.drawnY[selected])];
+  ctx.beginPath();
+  ctx.moveTo(x, y);
+  ctx.arc(x, y, WEDGE_PX, -heading - sigma, -heading + sigma);
+  ctx.closePath();
+  ctx.fillStyle = ctx.strokeStyle = palette.state[fleet.state[selected]];
+  ctx.globalAlpha = 0.22;
+  ctx.fill();
+  ctx.globalAlpha = 0.7;
+  ctx.lineWidth = 1;
+  ctx.stroke();
+}

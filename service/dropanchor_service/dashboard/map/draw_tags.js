@@ -1,0 +1,136 @@
+/** Dots, heading ticks and names of the tags. */
+
+import { age } from "../data/format.js";
+import { haloText } from "./draw_site.js";
+import { FADE, alike } from "./scene.js";
+import { dashOf, isFilled, traceMarker } from "./shapes.js";
+import { AMBIGUOUS, STATES, staleness } from "../data/states.js";
+
+/** @typedef {import("./scene.js").Scene} Scene */
+
+const LABELS_UP_TO = 80;
+const TICK_PX = 9;
+
+/** @param {number} count dots on the screen */
+export const markerRadius = (count) => (count <= 200 ? 5.5 : count <= 1500 ? 4 : 3);
+
+/** @param {Scene} scene */
+export function drawMarkers(scene) {
+  const radius = markerRadius(scene.rows.length);
+  for (const group of alike(scene)) {
+    const rows = group.rows.filter((row) => !hasGhosts(scene.fleet, row));
+    scene.ctx.globalAlpha = FADE[group.stale];
+    scene.ctx.strokeStyle = scene.palette.state[group.state];
+    strokeHeadings(scene, group.state, rows, radius);
+    paintMarkers(scene, group, rows, radius);
+  }
+  scene.ctx.globalAlpha = 1;
+}
+
+/** Whether the tag is drawn as its hypotheses instead of as one dot. @param {import("../data/fleet.js").Fleet} fleet
+ * @param {number} row */
+export const hasGhosts = (fleet, row) => fleet.state[row] === AMBIGUOUS && !!fleet.value.hypotheses[row]?.length;
+
+/** @param {Scene} scene @param {{state: number, stale: number}} group @param {number[]} rows @param {number} radius */
+function paintMarkers({ ctx, view, palette, fleet }, group, rows, radius) {
+  ctx.beginPath();
+  for (const row of rows) {
+    traceMarker(ctx, group.state, view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), radius);
+  }
+  const filled = isFilled(group.state, group.stale);
+  ctx.fillStyle = filled ? palette.state[group.state] : palette.map;
+  if (STATES[group.state].shape !== "cross") ctx.fill();
+  ctx.strokeStyle = filled ? palette.map : palette.state[group.state];
+  ctx.lineWidth = filled ? 1.25 : 2;
+  ctx.setLineDash(dashOf(group.state));
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
+/** @param {Scene} scene @param {number} state @param {number[]} rows @param {number} radius */
+function strokeHeadings({ ctx, view, fleet }, state, rows, radius) {
+  if (!STATES[state].placed) return;
+  ctx.beginPath();
+  for (const row of rows) {
+    const heading = fleet.number.heading_rad[row];
+    if (Number.isNaN(heading)) continue;
+    traceTick(ctx, view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), heading, radius);
+  }
+  ctx.lineWidth = radius > 4 ? 2.5 : 1.5;
+  ctx.lineCap = "round";
+  ctx.stroke();
+  ctx.lineCap = "butt";
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {number} x @param {number} y @param {number} heading
+ * @param {number} radius */
+export function traceTick(ctx, x, y, heading, radius) {
+  const [cos, sin] = [Math.cos(heading), -Math.sin(heading)];
+  const length = radius + (radius * TICK_PX) / 5.5;
+  ctx.moveTo(x + radius * cos, y + radius * sin);
+  ctx.lineTo(x + length * cos, y + length * sin);
+}
+
+/** Names beside the dots as far as they cover neither each other nor dots; the selected and the hovered one always.
+ * @param {Scene} scene */
+export function drawLabels(scene) {
+  const { ctx, palette } = scene;
+  const first = [scene.selected, scene.hovered].filter((row) => row >= 0);
+  const rest = scene.rows.length <= LABELS_UP_TO ? [...scene.rows].filter((row) => !first.includes(row)) : [];
+  ctx.textAlign = "left";
+  ctx.textBaseline = "middle";
+  /** @type {number[][]} */
+  const taken = scene.rows.length <= LABELS_UP_TO ? [...scene.rows].map((row) => dotBox(scene, row)) : [];
+  for (const row of new Set([...first, ...rest])) {
+    const important = first.includes(row);
+    ctx.font = `${important ? 600 : 400} 12px ${palette.font}`;
+    drawLabel(scene, row, important, taken);
+  }
+}
+
+/** The ground that a dot needs for itself. @param {Scene} scene @param {number} row */
+function dotBox({ view, fleet }, row) {
+  const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
+  return [x - 7, y - 4, x + 7, y + 4];
+}
+
+/** @param {Scene} scene @param {number} row @param {boolean} important @param {number[][]} taken */
+function drawLabel({ ctx, view, palette, fleet, now_ms }, row, important, taken) {
+  const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
+  if (Number.isNaN(x + y)) return;
+  const text = labelOf(fleet, row, now_ms);
+  const width = ctx.measureText(text).width;
+  const places = [[x + 13, y - 12], [x + 13, y + 13], [x - 13 - width, y - 12], [x - 13 - width, y + 13]];
+  const boxes = places.map(([left, middle]) => [left, middle - 8, left + width, middle + 8]);
+  const box = boxes.find((one) => inside(one, view) && !taken.some((other) => overlap(one, other))) ?? (important ? boxes[0] : null);
+  if (!box) return;
+  taken.push(box);
+  haloText(ctx, palette, text, box[0], box[1] + 8, important ? palette.ink : palette["ink-2"]);
+}
+
+/** The name, and what keeps the dot from being a good one. @param {import("../data/fleet.js").Fleet} fleet
+ * @param {number} row @param {number} now_ms */
+function labelOf(fleet, row, now_ms) {
+  const seconds = fleet.age(row, now_ms);
+  if (staleness(seconds)) return `${fleet.names[row]} · ${age(seconds)} ago`;
+  return fleet.state[row] === AMBIGUOUS ? `${fleet.names[row]} ?` : fleet.names[row];
+}
+
+/** @param {number[]} box @param {import("./view.js").View} view */
+const inside = (box, view) => box[0] >= 4 && box[1] >= 4 && box[2] <= view.width - 4 && box[3] <= view.height - 4;
+
+/** @param {number[]} a @param {number[]} b left, top, right, bottom */
+const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+
+/** @param {Scene} scene */
+export function drawSelection({ ctx, view, palette, fleet, selected, hovered, rows }) {
+  const radius = markerRadius(rows.length);
+  for (const [row, width] of [[hovered, 1.5], [selected, 2.5]]) {
+    if (row < 0 || Number.isNaN(fleet.drawnX[row])) continue;
+    ctx.beginPath();
+    ctx.arc(view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), radius + 6, 0, 2 * Math.PI);
+    ctx.lineWidth = width;
+    ctx.strokeStyle = palette.accent;
+    ctx.stroke();
+  }
+}

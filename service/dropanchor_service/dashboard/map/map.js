@@ -1,0 +1,218 @@
+/** The live map: one canvas that is drawn again only when something changed. */
+
+import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
+import { drawEvidence } from "./draw_evidence.js";
+import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
+import { drawLabels, drawMarkers, drawSelection } from "./draw_tags.js";
+import { DENSITY_ABOVE, drawDensity } from "./density.js";
+import { follow } from "../data/motion.js";
+import { readPalette } from "./palette.js";
+import { nearest, rowsInView } from "./scene.js";
+import { View, boundsAround } from "./view.js";
+
+const SMOOTH_UP_TO = 1000;
+const SMALLEST_FIT_M = 6;
+const FIT_PADDING_PX = 64;
+const REACH_PX = 18;
+const GLIDE_MS = 90;
+
+export class LiveMap extends EventTarget {
+  view = new View();
+  palette = readPalette();
+  /** @type {readonly import("./draw_site.js").Anchor[]} */
+  anchors = [];
+  hovered = -1;
+  /** Keep everything in view until somebody moves the map. */
+  autoFit = true;
+  /** For tests and the curious: what the last drawing did. */
+  stats = { drawings: 0, ms: 0, visible: 0, density: false };
+  #ctx;
+  #rows = new Int32Array(0);
+  #asked = false;
+  #last = 0;
+  /** @type {{x: number, y: number, scale: number} | null} */
+  #goal = null;
+  #calm = matchMedia("(prefers-reduced-motion: reduce)");
+
+  /** @param {HTMLCanvasElement} canvas @param {import("../data/fleet.js").Fleet} fleet
+   * @param {import("../data/trails.js").Trails} trails @param {import("../data/roster.js").Roster} roster
+   * @param {import("../page/choice.js").Choice} choice @param {import("../data/evidence.js").Evidence} evidence */
+  constructor(canvas, fleet, trails, roster, choice, evidence) {
+    super();
+    this.canvas = canvas;
+    this.fleet = fleet;
+    this.trails = trails;
+    this.roster = roster;
+    this.choice = choice;
+    this.evidence = evidence;
+    this.#ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    new ResizeObserver(() => this.#resize()).observe(canvas);
+    choice.addEventListener("change", () => this.redraw());
+    evidence.addEventListener("change", () => this.redraw());
+  }
+
+  /** Nothing waits to be drawn or glides: what is on the screen is what is known. */
+  get still() {
+    return !this.#asked && this.#goal === null;
+  }
+
+  /** @param {readonly import("./draw_site.js").Anchor[]} anchors */
+  setAnchors(anchors) {
+    if (JSON.stringify(anchors) === JSON.stringify(this.anchors)) return;
+    this.anchors = anchors;
+    if (this.autoFit) this.#aimAtAll();
+    this.redraw();
+  }
+
+  redraw() {
+    if (this.#asked) return;
+    this.#asked = true;
+    requestAnimationFrame((now_ms) => this.#frame(now_ms));
+  }
+
+  /** After the colours of the page have changed. */
+  recolour() {
+    this.palette = readPalette();
+    this.redraw();
+  }
+
+  /** The user takes over: the map stays where it is put. */
+  takeOver() {
+    this.autoFit = false;
+    this.#goal = null;
+    this.choice.follow = false;
+    this.dispatchEvent(new Event("view"));
+    this.redraw();
+  }
+
+  fitAll() {
+    this.autoFit = true;
+    this.choice.follow = false;
+    this.#aimAtAll();
+    this.dispatchEvent(new Event("view"));
+    this.redraw();
+  }
+
+  /** @param {number} factor @param {number} [px] @param {number} [py] */
+  zoom(factor, px = this.view.width / 2, py = this.view.height / 2) {
+    this.autoFit = false;
+    this.#goal = null;
+    this.view.zoomAt(factor, px, py);
+    this.dispatchEvent(new Event("view"));
+    this.redraw();
+  }
+
+  /** Bring a tag into view if it is not. @param {number} row */
+  reveal(row) {
+    const [x, y] = [this.fleet.number.x[row], this.fleet.number.y[row]];
+    const seen = this.view.bounds(-40);
+    if (this.autoFit || Number.isNaN(x + y) || (x > seen.left && x < seen.right && y > seen.bottom && y < seen.top)) return;
+    this.#goal = { x, y, scale: this.view.scale };
+    this.redraw();
+  }
+
+  /** The row of the tag at a place on the screen, −1: none. @param {number} px @param {number} py */
+  tagAt(px, py) {
+    return nearest(this.fleet, this.view, this.#rows, px, py, REACH_PX);
+  }
+
+  #resize() {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.view.width = Math.max(1, clientWidth);
+    this.view.height = Math.max(1, clientHeight);
+    this.canvas.width = Math.round(clientWidth * devicePixelRatio);
+    this.canvas.height = Math.round(clientHeight * devicePixelRatio);
+    if (this.autoFit) this.#aimAtAll();
+    this.redraw();
+  }
+
+  /** @param {number} now_ms */
+  #frame(now_ms) {
+    const begun = performance.now();
+    this.#asked = false;
+    const elapsed_ms = Math.min(100, now_ms - this.#last);
+    this.#last = now_ms;
+    const smooth = !this.#calm.matches && this.fleet.size <= SMOOTH_UP_TO;
+    const moving = follow(this.fleet, elapsed_ms, smooth);
+    const gliding = this.#moveView(elapsed_ms);
+    this.#draw(performance.now());
+    this.stats = { ...this.stats, drawings: this.stats.drawings + 1, ms: performance.now() - begun };
+    if (moving || gliding) this.redraw();
+  }
+
+  /** @param {number} elapsed_ms */
+  #moveView(elapsed_ms) {
+    const row = this.fleet.row(this.choice.selected);
+    if (this.choice.follow && row >= 0 && !Number.isNaN(this.fleet.drawnX[row])) {
+      this.#goal = { x: this.fleet.drawnX[row], y: this.fleet.drawnY[row], scale: this.view.scale };
+    } else if (this.autoFit && this.#somethingOutside()) {
+      this.#aimAtAll();
+    }
+    if (!this.#goal) return false;
+    const share = this.#calm.matches ? 1 : 1 - Math.exp(-elapsed_ms / GLIDE_MS);
+    const far = Math.hypot(this.#goal.x - this.view.x, this.#goal.y - this.view.y) * this.view.scale;
+    const arrived = share === 1 || (far < 0.5 && Math.abs(Math.log(this.#goal.scale / this.view.scale)) < 0.002);
+    const step = arrived ? 1 : share;
+    this.view.x += step * (this.#goal.x - this.view.x);
+    this.view.y += step * (this.#goal.y - this.view.y);
+    this.view.scale *= (this.#goal.scale / this.view.scale) ** step;
+    if (arrived) this.#goal = null;
+    return !arrived;
+  }
+
+  #somethingOutside() {
+    const seen = this.view.bounds(-12);
+    for (const [x, y] of this.#places()) {
+      if (x < seen.left || x > seen.right || y < seen.bottom || y > seen.top) return true;
+    }
+    return false;
+  }
+
+  #aimAtAll() {
+    const bounds = boundsAround(this.#places(), SMALLEST_FIT_M);
+    const padding = Math.min(FIT_PADDING_PX, this.view.width / 6, this.view.height / 6);
+    this.#goal = this.view.fitted(bounds ?? { left: -5, right: 5, bottom: -5, top: 5 }, padding);
+  }
+
+  /** @returns {Generator<[number, number]>} */
+  *#places() {
+    for (const anchor of this.anchors) yield [anchor.x, anchor.y];
+    const { x, y } = this.fleet.number;
+    for (let row = 0; row < this.fleet.size; row++) if (this.choice.shows(this.fleet, row)) yield [x[row], y[row]];
+  }
+
+  /** @param {number} now_ms */
+  #draw(now_ms) {
+    const { view, palette, fleet, choice } = this;
+    const shown = (/** @type {number} */ row) => choice.shows(fleet, row);
+    this.#rows = rowsInView(fleet, view, shown);
+    const scene = {
+      ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
+      rows: this.#rows, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
+    };
+    this.#ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    this.#ctx.clearRect(0, 0, view.width, view.height);
+    drawGrid(this.#ctx, view, palette);
+    const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
+    if (centre) drawRings(this.#ctx, view, palette, centre);
+    this.#drawTags(scene, shown);
+    drawScaleBar(this.#ctx, view, palette);
+  }
+
+  /** @param {import("./scene.js").Scene} scene @param {(row: number) => boolean} shown */
+  #drawTags(scene, shown) {
+    const density = scene.rows.length > DENSITY_ABOVE;
+    this.stats = { ...this.stats, visible: scene.rows.length, density };
+    drawRangeRings(scene, shown);
+    if (density) drawDensity(scene);
+    else drawEllipses(scene);
+    drawEvidence(scene, this.evidence.of(this.choice.selected));
+    drawTrails(scene);
+    drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
+    drawGhosts(scene, shown);
+    const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
+    drawSelection(apart);
+    drawLabels(apart);
+    drawMarkers(apart);
+  }
+}

@@ -1,0 +1,77 @@
+/** What the user has chosen: a tag, whether to follow it, and which tags to see. */
+
+import { STATES } from "../data/states.js";
+
+export class Choice extends EventTarget {
+  /** @type {string | null} */
+  #selected = null;
+  #follow = false;
+  #text = "";
+  /** @type {Set<number>} */
+  hiddenStates = new Set();
+
+  get selected() {
+    return this.#selected;
+  }
+
+  /** @param {string | null} tag */
+  select(tag) {
+    if (tag === this.#selected) return;
+    this.#selected = tag;
+    if (tag === null) this.#follow = false;
+    this.#changed();
+  }
+
+  get follow() {
+    return this.#follow;
+  }
+
+  set follow(on) {
+    const follow = on && this.#selected !== null;
+    if (follow === this.#follow) return;
+    this.#follow = follow;
+    this.#changed();
+  }
+
+  get text() {
+    return this.#text;
+  }
+
+  set text(text) {
+    this.#text = text.trim().toLowerCase();
+    this.#changed();
+  }
+
+  /** @param {number} state */
+  toggleState(state) {
+    if (!this.hiddenStates.delete(state)) this.hiddenStates.add(state);
+    this.#changed();
+  }
+
+  showAll() {
+    this.#text = "";
+    this.hiddenStates.clear();
+    this.#changed();
+  }
+
+  get narrows() {
+    return this.#text !== "" || this.hiddenStates.size > 0;
+  }
+
+  /** @param {import("../data/fleet.js").Fleet} fleet @param {number} row */
+  shows(fleet, row) {
+    if (this.hiddenStates.size > 0 && this.hiddenStates.has(fleet.state[row])) return false;
+    return this.#text === "" || fleet.names[row].toLowerCase().includes(this.#text);
+  }
+
+  #changed() {
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** Tags per state. @param {import("../data/fleet.js").Fleet} fleet @returns {number[]} */
+export function countStates(fleet) {
+  const counts = STATES.map(() => 0);
+  for (let row = 0; row < fleet.size; row++) counts[fleet.state[row]]++;
+  return counts;
+}

@@ -1,0 +1,139 @@
+/** Wiring: the stream fills the fleet; map, table and panel show it. */
+
+import { Choice } from "./choice.js";
+import { StateChips } from "../panel/chips.js";
+import { Connection } from "../data/connection.js";
+import { Detail } from "../panel/detail.js";
+import { Evidence } from "../data/evidence.js";
+import { Fleet } from "../data/fleet.js";
+import { fixed } from "../data/format.js";
+import { listen } from "../map/gestures.js";
+import { LiveMap } from "../map/map.js";
+import { Notices } from "../panel/notices.js";
+import { Roster } from "../data/roster.js";
+import { STATES } from "../data/states.js";
+import { TagTable } from "../panel/table.js";
+import { installTheme } from "./theme.js";
+import { Trails } from "../data/trails.js";
+
+const PANELS_MS = 250;
+
+/** @template {HTMLElement} T @param {string} id @returns {T} */
+const byId = (id) => /** @type {T} */ (document.getElementById(id));
+
+const fleet = new Fleet();
+const trails = new Trails();
+const roster = new Roster(fleet);
+const choice = new Choice();
+const connection = new Connection();
+const evidence = new Evidence();
+const map = new LiveMap(byId("map"), fleet, trails, roster, choice, evidence);
+const chips = new StateChips(byId("chips"), fleet, choice);
+const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
+const notices = new Notices(connection, fleet);
+const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
+
+/** @param {string | null} tag */
+function select(tag) {
+  choice.select(tag);
+  if (tag === null) return;
+  map.reveal(fleet.row(tag));
+  table.reveal(tag);
+  byId("detail").scrollIntoView({ block: "nearest" });
+  announce(tag);
+}
+
+/** The panel has grown by the plots: keep the line of the tag in sight, once. */
+let grownFor = /** @type {string | null} */ (null);
+evidence.addEventListener("change", () => {
+  if (choice.selected !== null && choice.selected !== grownFor) table.reveal(choice.selected);
+  grownFor = choice.selected;
+});
+
+/** For those who hear the page. @param {string} tag */
+function announce(tag) {
+  const row = fleet.row(tag);
+  const { x, y } = fleet.number;
+  const place = `x ${fixed(x[row], 1)} m, y ${fixed(y[row], 1)} m`;
+  byId("spoken").textContent = `${tag} selected: ${STATES[fleet.state[row]].label}, ${place}`;
+}
+
+/** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} take @returns {(event: Event) => void} */
+function receiver(take) {
+  return (event) => {
+    const now_ms = performance.now();
+    const frame = /** @type {CustomEvent} */ (event).detail;
+    const membership = fleet.membership;
+    take(frame, now_ms);
+    trails.note(fleet, frame.tags, now_ms);
+    if (membership === fleet.membership) map.redraw();
+    else updatePanels();
+  };
+}
+
+connection.addEventListener("snapshot", receiver((frame, now_ms) => {
+  fleet.replace(frame, now_ms);
+  trails.prune(fleet);
+  connection.slowDownFor(fleet.size);
+}));
+connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
+connection.addEventListener("site", (event) => {
+  const site = /** @type {CustomEvent} */ (event).detail;
+  map.setAnchors(site.anchors);
+  byId("site").textContent = site.name || site.id;
+});
+
+/** The panels need no more than a few updates a second; ages go on while nothing comes in. */
+function updatePanels() {
+  if (document.hidden) return;
+  table.update();
+  chips.update();
+  detail.update();
+  notices.update();
+  byId("crowd").hidden = !map.stats.density;
+  map.redraw();
+}
+
+const filter = byId("filter");
+filter.addEventListener("input", () => (choice.text = /** @type {HTMLInputElement} */ (filter).value));
+byId("show-all").addEventListener("click", () => {
+  /** @type {HTMLInputElement} */ (filter).value = "";
+  choice.showAll();
+});
+choice.addEventListener("change", () => (byId("show-all").hidden = !choice.narrows));
+byId("zoom-in").addEventListener("click", () => map.zoom(1.6));
+byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.6));
+byId("fit").addEventListener("click", () => map.fitAll());
+map.addEventListener("view", () => byId("fit").setAttribute("aria-pressed", String(map.autoFit)));
+map.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
+  byId("cursor").textContent = `${fixed(map.view.worldX(offsetX), 2)}, ${fixed(map.view.worldY(offsetY), 2)} m`;
+});
+document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape") select(null);
+  if (event.key !== "/" || event.target === filter) return;
+  event.preventDefault();
+  filter.focus();
+});
+
+listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
+installTheme(byId("theme"), () => map.recolour());
+setInterval(updatePanels, PANELS_MS);
+connection.start();
+roster.start();
+
+/** Read-only, for tests and the curious. */
+Object.defineProperty(window, "dropanchor", {
+  value: Object.freeze({
+    status: () => connection.status,
+    received: () => ({ ...connection.stats }),
+    drawing: () => ({ ...map.stats, still: map.still }),
+    tags: () => fleet.names.map((tag, row) => ({
+      tag,
+      state: STATES[fleet.state[row]].name,
+      x: fleet.number.x[row],
+      y: fleet.number.y[row],
+      pixel: [map.view.screenX(fleet.drawnX[row]), map.view.screenY(fleet.drawnY[row])],
+      semiMajor: fleet.number.semi_major_m[row],
+    })),
+  }),
+});

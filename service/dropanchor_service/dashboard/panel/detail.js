@@ -1,0 +1,142 @@
+/** Everything about the selected tag. */
+
+import { hasKey } from "../data/access.js";
+import { api } from "../data/connection.js";
+import { UNKNOWN, age, compassPoint, degrees, fixed, metres, percent, sigma, words } from "../data/format.js";
+import { AMBIGUOUS, STATES } from "../data/states.js";
+import { Plots } from "./plots.js";
+import { symbol } from "../map/symbols.js";
+
+/** @typedef {import("../data/fleet.js").Fleet} Fleet */
+
+export class Detail {
+  /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("../data/roster.js").Roster} roster
+   * @param {import("../page/choice.js").Choice} choice @param {import("../data/evidence.js").Evidence} evidence */
+  constructor(panel, fleet, roster, choice, evidence) {
+    this.panel = panel;
+    this.fleet = fleet;
+    this.roster = roster;
+    this.choice = choice;
+    this.evidence = evidence;
+    this.plots = new Plots(this.#part("plots"));
+    this.follow = /** @type {HTMLButtonElement} */ (this.#part("follow"));
+    this.follow.addEventListener("click", () => (choice.follow = !choice.follow));
+    this.#part("close").addEventListener("click", () => choice.select(null));
+    choice.addEventListener("change", () => this.update());
+    evidence.addEventListener("change", () => this.#explain());
+    this.update();
+  }
+
+  update() {
+    const row = this.fleet.row(this.choice.selected);
+    this.panel.hidden = row < 0;
+    if (row < 0) return;
+    if (this.fleet.hasPose(row)) this.evidence.ask(this.fleet.names[row]);
+    this.#head(row);
+    this.#numbers(row);
+    this.#hypotheses(row);
+    if (!this.#explanation) this.#explain();
+  }
+
+  get #explanation() {
+    return this.evidence.of(this.choice.selected);
+  }
+
+  #explain() {
+    const row = this.fleet.row(this.choice.selected);
+    if (row < 0) return;
+    this.plots.update(this.#explanation);
+    const status = this.#explanation ?? this.roster.of(this.fleet.names[row]);
+    countsInto(this.#part("samples"), "Used", status?.samples);
+    countsInto(this.#part("rejected"), "Not used", status?.rejected);
+  }
+
+  /** @param {string} name */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
+  }
+
+  /** @param {number} row */
+  #head(row) {
+    const state = STATES[this.fleet.state[row]];
+    const name = this.fleet.names[row];
+    this.panel.dataset.state = state.name;
+    put(this.#part("name"), name);
+    put(this.#part("state"), state.label);
+    this.#part("symbol").replaceChildren(symbol(state.name).svg);
+    const reason = this.fleet.value.reason[row];
+    put(this.#part("meaning"), state.meaning);
+    put(this.#part("reason"), reason ? words(reason) : "");
+    const hint = this.fleet.value.hint[row] ?? "";
+    put(this.#part("hint"), hint);
+    this.#part("hint").hidden = hint === "";
+    this.follow.setAttribute("aria-pressed", String(this.choice.follow));
+    this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
+    this.#part("json").hidden = hasKey() || !this.fleet.hasPose(row); // a link carries no key
+  }
+
+  /** @param {number} row */
+  #numbers(row) {
+    const number = (/** @type {keyof Fleet["number"]} */ name) => this.fleet.number[name][row];
+    const heading = number("heading_rad");
+    const anchor = this.fleet.value.anchor[row];
+    /** @type {Record<string, string>} */
+    const texts = {
+      x: metres(number("x")),
+      y: metres(number("y")),
+      sigma: `± ${sigma(number("sigma_pos_m"))} m`,
+      ellipse: `${fixed(number("semi_major_m"), 2)} × ${fixed(number("semi_minor_m"), 2)} m`,
+      heading: Number.isNaN(heading) ? UNKNOWN : `${degrees(heading)} ${compassPoint(heading)}`,
+      speed: `${fixed(number("speed_mps"), 2)} m/s`,
+      turn: turnRate(number("yaw_rate_radps")),
+      range: metres(number("range_m")),
+      anchor: anchor ?? UNKNOWN,
+      mode: percent(number("p_mode")),
+      sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : `± ${sigma(number("sigma_obs_m"))} m`,
+      age: age(this.fleet.age(row, performance.now())),
+      online: this.fleet.online[row] ? "Online" : "Offline",
+    };
+    for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
+  }
+
+  /** @param {number} row */
+  #hypotheses(row) {
+    const list = this.#part("hypotheses");
+    const ghosts = this.fleet.state[row] === AMBIGUOUS ? (this.fleet.value.hypotheses[row] ?? []) : [];
+    list.hidden = ghosts.length === 0;
+    const likely = [...ghosts].sort((a, b) => b.weight - a.weight).slice(0, 6);
+    list.replaceChildren(...likely.map(hypothesisLine));
+  }
+}
+
+/** @param {import("../data/fleet.js").Hypothesis} ghost */
+function hypothesisLine(ghost) {
+  const line = document.createElement("li");
+  const bar = document.createElement("meter");
+  bar.max = 1;
+  bar.value = ghost.weight;
+  bar.setAttribute("aria-label", "probability");
+  const place = document.createElement("span");
+  place.textContent = `${fixed(ghost.x, 1)}, ${fixed(ghost.y, 1)} m`;
+  const weight = document.createElement("span");
+  weight.textContent = percent(ghost.weight);
+  line.append(place, bar, weight);
+  return line;
+}
+
+/** @param {HTMLElement} list @param {string} title @param {Record<string, number> | undefined} byName */
+function countsInto(list, title, byName) {
+  const counts = Object.entries(byName ?? {}).sort((a, b) => b[1] - a[1]);
+  list.hidden = counts.length === 0;
+  const texts = list.hidden ? [] : [title, ...counts.map(([name, count]) => `${words(name)} ${count.toLocaleString("en")}`)];
+  if (list.textContent === texts.join("")) return;
+  list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+}
+
+/** @param {number} radps */
+const turnRate = (radps) => (Number.isNaN(radps) ? UNKNOWN : `${fixed((radps * 180) / Math.PI, 0)} °/s`);
+
+/** @param {HTMLElement} element @param {string} text */
+function put(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

@@ -1,0 +1,64 @@
+/** What the page says about itself: connecting, connection lost, no tags yet. */
+
+import { hasKey, keepKey } from "../data/access.js";
+import { age } from "../data/format.js";
+
+/** @param {string} id */
+const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+export class Notices {
+  /** @param {import("../data/connection.js").Connection} connection @param {import("../data/fleet.js").Fleet} fleet */
+  constructor(connection, fleet) {
+    this.connection = connection;
+    this.fleet = fleet;
+    byId("retry").addEventListener("click", () => connection.retry());
+    for (const button of document.querySelectorAll("button[data-copies]")) installCopy(button);
+    connection.addEventListener("status", () => this.update());
+    byId("locked").addEventListener("submit", (event) => this.#unlock(event));
+    if (!["localhost", "127.0.0.1", "[::1]"].includes(location.hostname)) {
+      byId("command").textContent += ` --connect tcp/${location.hostname}:7447`;
+    }
+    this.update();
+  }
+
+  update() {
+    const { status, lostAt } = this.connection;
+    const label = { connecting: "Connecting", live: "Live", lost: "Disconnected", locked: "Locked" }[status];
+    byId("status").dataset.status = status;
+    write(byId("status-text"), label);
+    byId("lost").hidden = status !== "lost";
+    write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
+    byId("locked").hidden = status !== "locked";
+    byId("refused").hidden = !hasKey();
+    byId("empty").hidden = status !== "live" || this.connection.stats.frames === 0 || this.fleet.size > 0;
+  }
+
+  /** @param {Event} event */
+  #unlock(event) {
+    event.preventDefault();
+    const field = /** @type {HTMLInputElement} */ (byId("key"));
+    keepKey(field.value.trim());
+    field.value = "";
+    this.connection.retry();
+  }
+}
+
+/** @param {HTMLElement} element @param {string} text */
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** @param {Element} button */
+function installCopy(button) {
+  button.addEventListener("click", async () => {
+    const source = byId(/** @type {HTMLElement} */ (button).dataset.copies ?? "");
+    try {
+      await navigator.clipboard.writeText(source.textContent ?? "");
+      button.textContent = "Copied";
+    } catch {
+      getSelection()?.selectAllChildren(source);
+      button.textContent = "Press Ctrl-C";
+    }
+    setTimeout(() => (button.textContent = "Copy"), 1600);
+  });
+}

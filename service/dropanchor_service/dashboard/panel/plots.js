@@ -1,0 +1,112 @@
+/** What the last measurements say, beside what was expected of them. */
+
+import { leastSpeeds } from "../data/evidence.js";
+import { UNKNOWN, fixed, metres } from "../data/format.js";
+import { Plot } from "./plot.js";
+
+/** @typedef {import("../data/evidence.js").Explanation} Explanation @typedef {import("../data/evidence.js").Innovation} Innovation
+ * @typedef {import("./plot.js").Point} Point */
+
+const FEWEST_S = 5;
+const USUAL = 1.96; // standard deviations: 19 of 20 innovations lie within, where the model is right
+const MOST = 6;
+
+export class Plots {
+  /** @param {HTMLElement} panel */
+  constructor(panel) {
+    this.panel = panel;
+    const plot = (/** @type {string} */ name) => new Plot(/** @type {HTMLElement} */ (panel.querySelector(`[data-plot="${name}"]`)));
+    this.range = plot("range");
+    this.innovation = plot("innovation");
+    this.speed = plot("speed");
+  }
+
+  /** @param {Explanation | null} explanation */
+  update(explanation) {
+    this.panel.hidden = !explanation?.innovations.length;
+    if (!explanation || this.panel.hidden) return;
+    const { innovations } = explanation;
+    const end = innovations[innovations.length - 1].t_ns;
+    const span = Math.max(FEWEST_S, (end - innovations[0].t_ns) / 1e9);
+    const before = (/** @type {number} */ t_ns) => (t_ns - end) / 1e9;
+    const ranges = innovations.filter(({ kind }) => kind === "range");
+    this.#ranges(ranges, span, before);
+    this.#innovations(innovations, span, before);
+    this.#speeds(explanation, ranges, span, before);
+    this.#put("span", `The last ${fixed(span, 0)} s`);
+  }
+
+  /** @param {Innovation[]} ranges @param {number} span @param {(t_ns: number) => number} before */
+  #ranges(ranges, span, before) {
+    const measured = ranges.map(({ t_ns, measured: value, fused }) => ({ t: before(t_ns), value, fused }));
+    this.range.begin(span, ranges.flatMap((one) => [one.measured, one.predicted]), 1);
+    const anchors = [...new Set(ranges.map(({ anchor }) => anchor))];
+    for (const anchor of anchors) this.#expected(ranges.filter((one) => one.anchor === anchor), before, anchors.length > 1);
+    this.#mark(this.range, measured);
+    const last = ranges.at(-1);
+    this.#put("range", last ? `${metres(last.measured)}, expected ${metres(last.predicted)}` : UNKNOWN);
+    this.range.label = `Ranges: ${ranges.length}, of which ${refused(ranges)} refused`;
+  }
+
+  /** Two standard deviations around what was expected of the ranges to one anchor. @param {Innovation[]} ranges
+   * @param {(t_ns: number) => number} before @param {boolean} named */
+  #expected(ranges, before, named) {
+    const line = (/** @type {number} */ sigmas) => ranges.map(({ t_ns, predicted, variance }) => (
+      { t: before(t_ns), value: predicted + sigmas * Math.sqrt(variance) }
+    ));
+    this.range.band("band", line(USUAL), line(-USUAL));
+    this.range.line("expected", line(0));
+    const last = line(0).at(-1);
+    if (named && last) this.range.write(ranges[0].anchor ?? "", last);
+  }
+
+  /** @param {Innovation[]} innovations @param {number} span @param {(t_ns: number) => number} before */
+  #innovations(innovations, span, before) {
+    const points = innovations.map(({ t_ns, innovation, variance, fused }) => (
+      { t: before(t_ns), value: Math.max(-MOST, Math.min(MOST, innovation / Math.sqrt(variance))), fused }
+    ));
+    this.innovation.begin(span, [...points.map(({ value }) => value), -3, 3], 6);
+    const edge = (/** @type {number} */ value) => [{ t: -span, value }, { t: 0, value }];
+    this.innovation.band("band", edge(USUAL), edge(-USUAL));
+    this.innovation.line("zero", edge(0));
+    this.#mark(this.innovation, points);
+    const within = points.filter(({ value }) => Math.abs(value) <= USUAL).length;
+    const share = points.length ? `${Math.round((100 * within) / points.length)} %` : UNKNOWN;
+    this.#put("innovation", `${share} in the band, ${refused(innovations)} of ${innovations.length} refused`);
+    this.innovation.label = `Normalised innovations: ${share} within 1.96 standard deviations`;
+  }
+
+  /** @param {Explanation} explanation @param {Innovation[]} ranges @param {number} span
+   * @param {(t_ns: number) => number} before */
+  #speeds({ pose, speed, speed_track: track }, ranges, span, before) {
+    const speeds = track.t_ns
+      .map((t_ns, i) => ({ t: before(t_ns), value: track.speed_mps[i] ?? NaN }))
+      .filter(({ t, value }) => t >= -span && t <= 0 && !Number.isNaN(value));
+    const anchor = ranges.at(-1)?.anchor;
+    const used = ranges.filter((one) => one.fused && one.anchor === anchor);
+    const least = leastSpeeds(used).map(({ t_ns, value }) => ({ t: before(t_ns), value }));
+    this.speed.begin(span, [0, ...[...speeds, ...least].map(({ value }) => value)], 1);
+    this.speed.band("least", least, least.map(({ t }) => ({ t, value: 0 })));
+    this.speed.line("estimate", speeds);
+    const rate = speed.range_rate_mps;
+    const proof = rate === null ? "" : `, its range changes by ${fixed(rate, 2)} m/s`;
+    this.#put("speed", `${fixed(pose.speed_mps, 2)} m/s${proof}`);
+    this.speed.label = `Speed ${fixed(pose.speed_mps, 2)} m/s${proof}`;
+  }
+
+  /** Full dots for what was used, crosses for what was refused. @param {Plot} plot
+   * @param {(Point & {fused: boolean})[]} points */
+  #mark(plot, points) {
+    plot.dots("measured", points.filter(({ fused }) => fused));
+    plot.crosses("refused", points.filter(({ fused }) => !fused));
+  }
+
+  /** @param {string} name @param {string} text */
+  #put(name, text) {
+    const element = /** @type {HTMLElement} */ (this.panel.querySelector(`[data-text="${name}"]`));
+    if (element.textContent !== text) element.textContent = text;
+  }
+}
+
+/** @param {readonly Innovation[]} innovations */
+const refused = (innovations) => innovations.filter(({ fused }) => !fused).length;

@@ -1,0 +1,183 @@
+/** All tags as a table. Only the rows that are on the screen exist in the document, so ten thousand tags are fine. */
+
+import { age, coordinate, counted, fixed, sigma } from "../data/format.js";
+import { Order } from "../data/order.js";
+import { STATES, staleness } from "../data/states.js";
+import { symbol } from "../map/symbols.js";
+
+/** @typedef {import("../data/fleet.js").Fleet} Fleet */
+/** @typedef {{element: HTMLTableRowElement, cells: HTMLTableCellElement[], use: SVGUseElement}} Line */
+
+const ROW_PX = 32;
+const SPARE = 4;
+const COLUMNS = ["tag", "state", "x", "y", "sigma", "speed", "age", "online"];
+
+export class TagTable {
+  /** @type {import("../data/order.js").Sort} */
+  #sort = { column: "tag", descending: false };
+  #order = new Order();
+  /** @type {number[]} */
+  #rows = [];
+  /** @type {Line[]} */
+  #lines = [];
+  #active = "";
+
+  /** @param {HTMLElement} box scrolls and holds the table @param {HTMLElement} count @param {Fleet} fleet
+   * @param {import("../page/choice.js").Choice} choice @param {(tag: string) => void} chosen */
+  constructor(box, count, fleet, choice, chosen) {
+    this.box = box;
+    this.count = count;
+    this.fleet = fleet;
+    this.choice = choice;
+    this.chosen = chosen;
+    this.body = /** @type {HTMLTableSectionElement} */ (box.querySelector("tbody"));
+    this.body.addEventListener("click", (event) => this.#onClick(event));
+    box.addEventListener("scroll", () => this.#paint(), { passive: true });
+    box.addEventListener("keydown", (event) => this.#onKey(event));
+    for (const button of box.querySelectorAll("button[data-column]")) this.#listenToHead(button);
+    new ResizeObserver(() => this.#paint()).observe(box);
+    choice.addEventListener("change", () => this.update());
+  }
+
+  /** Sort and paint with what is known now. */
+  update() {
+    const wanted = (/** @type {number} */ row) => this.choice.shows(this.fleet, row);
+    this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now());
+    const all = counted(this.fleet.size, "tag");
+    this.count.textContent = this.choice.narrows ? `${this.#rows.length.toLocaleString("en")} of ${all}` : all;
+    this.#paint();
+  }
+
+  /** Scroll to a tag. @param {string} tag */
+  reveal(tag) {
+    const place = this.#rows.indexOf(this.fleet.row(tag));
+    this.#active = tag;
+    if (place < 0) return;
+    const [top, height] = [place * ROW_PX, this.box.clientHeight - this.#headHeight()];
+    if (top < this.box.scrollTop) this.box.scrollTop = top;
+    else if (top + ROW_PX > this.box.scrollTop + height) this.box.scrollTop = top + ROW_PX - height;
+    this.#paint();
+  }
+
+  #headHeight() {
+    return /** @type {HTMLElement} */ (this.box.querySelector("thead")).offsetHeight;
+  }
+
+  #paint() {
+    const shown = Math.ceil(this.box.clientHeight / ROW_PX) + SPARE;
+    const last = Math.max(0, this.#rows.length - shown);
+    const first = Math.min(last, Math.max(0, Math.floor(this.box.scrollTop / ROW_PX) - SPARE / 2));
+    const rows = this.#rows.slice(first, first + shown);
+    this.body.style.setProperty("--before", `${first * ROW_PX}px`);
+    this.body.style.setProperty("--after", `${Math.max(0, this.#rows.length - first - rows.length) * ROW_PX}px`);
+    while (this.#lines.length < rows.length) this.#addLine();
+    const now_ms = performance.now();
+    this.#lines.forEach((line, i) => {
+      line.element.hidden = i >= rows.length;
+      if (i < rows.length) this.#fill(line, rows[i], first + i, now_ms);
+    });
+    this.box.setAttribute("aria-rowcount", String(this.#rows.length + 1));
+    this.#pointAtActive();
+  }
+
+  #addLine() {
+    const element = document.createElement("tr");
+    element.id = `row-${this.#lines.length}`;
+    element.setAttribute("role", "row");
+    const cells = COLUMNS.map((column) => {
+      const cell = element.insertCell();
+      cell.className = `c-${column}`;
+      cell.setAttribute("role", "gridcell");
+      return cell;
+    });
+    const { svg, use } = symbol("initialising");
+    const name = document.createElement("span");
+    cells[0].append(svg, name);
+    this.body.append(element);
+    this.#lines.push({ element, cells, use });
+  }
+
+  /** @param {Line} line @param {number} row @param {number} place @param {number} now_ms */
+  #fill(line, row, place, now_ms) {
+    const { fleet } = this;
+    const { x, y, sigma_pos_m, speed_mps } = fleet.number;
+    const state = STATES[fleet.state[row]];
+    const seconds = fleet.age(row, now_ms);
+    const name = fleet.names[row];
+    set(line.element.dataset, "tag", name);
+    set(line.element.dataset, "state", state.name);
+    set(line.element.dataset, "stale", String(staleness(seconds)));
+    attribute(line.element, "aria-rowindex", String(place + 2));
+    attribute(line.element, "aria-selected", String(name === this.choice.selected));
+    attribute(line.use, "href", `#s-${state.name}`);
+    const texts = [
+      name, state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
+      age(seconds), fleet.online[row] ? "online" : "offline",
+    ];
+    texts.forEach((value, i) => text(i === 0 ? /** @type {Element} */ (line.cells[0].lastElementChild) : line.cells[i], value));
+    attribute(line.cells[0], "title", name);
+    line.cells[7].classList.toggle("yes", fleet.online[row] === 1);
+  }
+
+  #pointAtActive() {
+    const line = this.#lines.find(({ element }) => !element.hidden && element.dataset.tag === this.#active);
+    for (const { element } of this.#lines) element.classList.toggle("active", element === line?.element);
+    if (line) this.box.setAttribute("aria-activedescendant", line.element.id);
+    else this.box.removeAttribute("aria-activedescendant");
+  }
+
+  /** @param {Element} button */
+  #listenToHead(button) {
+    const column = /** @type {HTMLElement} */ (button).dataset.column ?? "tag";
+    button.addEventListener("click", () => {
+      this.#sort = { column, descending: this.#sort.column === column && !this.#sort.descending };
+      for (const head of this.box.querySelectorAll("th")) head.removeAttribute("aria-sort");
+      button.closest("th")?.setAttribute("aria-sort", this.#sort.descending ? "descending" : "ascending");
+      this.update();
+    });
+  }
+
+  /** @param {MouseEvent} event */
+  #onClick(event) {
+    const tag = /** @type {HTMLElement} */ (event.target).closest("tr")?.dataset.tag;
+    if (tag === undefined) return;
+    this.#active = tag;
+    this.chosen(tag);
+  }
+
+  /** @param {KeyboardEvent} event */
+  #onKey(event) {
+    if (event.target !== this.box) return;
+    const page = Math.max(1, Math.floor(this.box.clientHeight / ROW_PX) - 2);
+    const steps = { ArrowDown: 1, ArrowUp: -1, PageDown: page, PageUp: -page, Home: -Infinity, End: Infinity };
+    const step = steps[/** @type {keyof typeof steps} */ (event.key)];
+    if (step !== undefined) this.#moveActive(step);
+    else if ((event.key === "Enter" || event.key === " ") && this.fleet.row(this.#active) >= 0) this.chosen(this.#active);
+    else return;
+    event.preventDefault();
+  }
+
+  /** @param {number} step */
+  #moveActive(step) {
+    if (this.#rows.length === 0) return;
+    const from = this.#rows.indexOf(this.fleet.row(this.#active));
+    const to = from < 0 && step === 1 ? 0 : Math.max(0, Math.min(this.#rows.length - 1, from + step));
+    this.reveal(this.fleet.names[this.#rows[to]]);
+  }
+}
+
+/** Write only what differs: most cells stay as they are. @param {DOMStringMap} data @param {string} name
+ * @param {string} value */
+function set(data, name, value) {
+  if (data[name] !== value) data[name] = value;
+}
+
+/** @param {Element} element @param {string} value */
+function text(element, value) {
+  if (element.textContent !== value) element.textContent = value;
+}
+
+/** @param {Element} element @param {string} name @param {string} value */
+function attribute(element, name, value) {
+  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
+}

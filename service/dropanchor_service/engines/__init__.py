@@ -1,0 +1,1 @@
+"""Choosing an engine and compiling it before it is needed."""

@@ -1,0 +1,21 @@
+"""Build the engine that the settings choose."""
+
+from dropanchor_service.engines.warm_up import warm_up
+from dropanchor_service.estimation.batch import Engine
+from dropanchor_service.runtime.kernel_cache import keep_compiled
+from dropanchor_service.settings.model import Settings
+
+
+def create_engine(settings: Settings) -> Engine:
+    """Each engine is imported when it is chosen: filterpy alone costs seconds, compiling the kernels a minute, once."""
+    match settings.engine:
+        case "paper":
+            from dropanchor_service.estimation.paper import PaperEngine
+
+            return PaperEngine(settings.paper.values())
+        case "fleet":
+            keep_compiled()
+            from dropanchor_service.estimation.fleet.engine import FleetEngine
+
+            warm_up(FleetEngine())
+            return FleetEngine()

@@ -1,0 +1,104 @@
+"""A recording through the same ingest and engine as live, turn by turn, as fast as it goes."""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+
+from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.site import TagSettings
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.ingest.admission import Admission
+from dropanchor_service.ingest.buffer import MessageBuffer
+from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.observers import Taps
+from dropanchor_service.ingest.turn import MESSAGES_PER_TURN, Ingest
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.recording.reading import Turn
+from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_service.settings.model import Settings
+from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
+from dropanchor_service.store.site import SiteDocument
+
+SETTLE_NS = 1_000_000_000  # what may still wait for messages before it comes out within that
+_BUFFER_BYTES = 2**30
+_MOST_TAGS = 1_000_000
+
+
+class RecordedClock(UtcClock):
+    """Shows the time of the turn that is replayed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.t_ns = 0
+
+    def now_ns(self) -> int:
+        return self.t_ns
+
+
+class OfflineService:
+    """What lies between the network and the store, fed by hand. metrics: what was counted, as live."""
+
+    def __init__(self, settings: Settings, document: SiteDocument) -> None:
+        self.tags = TagTable()
+        self.site = SiteStore(document.site, dict(document.tags))
+        self.metrics = Metrics()
+        self._clock = RecordedClock()
+        self._buffer = MessageBuffer(_BUFFER_BYTES)
+        self._poses: list[Array] = []
+        settings = settings.model_copy(
+            update={"unknown_tags": "accept", "max_tags": _MOST_TAGS, "unproven_tags": _MOST_TAGS}
+        )
+        self._ingest = Ingest(
+            self._buffer,
+            Admission(settings, self.site, self.tags, Newcomers(0)),
+            Estimators(create_engine(settings), self.site, self.tags, self.metrics),
+            self.site,
+            self.tags,
+            LatestPoses(),
+            self.metrics,
+            self._clock,
+            taps=Taps(poses=self._poses.append),
+            reorder_ns=round(settings.ingest.reorder_ms * 1e6),
+        )
+
+    def poses_of(self, turns: Iterable[Turn]) -> Iterator[tuple[Turn, Array]]:
+        """Each turn with the POSE that come out of it, and one more turn for what still waited."""
+        last_ns = 0
+        for turn in turns:
+            last_ns = turn.t_ns
+            yield turn, self._take(turn)
+        end = Turn(last_ns + SETTLE_NS)
+        yield end, self._take(end)
+
+    def _take(self, turn: Turn) -> Array:
+        self._clock.t_ns = turn.t_ns
+        if turn.site is not None:
+            self._adopt(turn.site)
+        self._ingest.turn()  # what was held back long enough came out while nothing came in
+        for start in range(0, len(turn.messages), MESSAGES_PER_TURN):
+            for tag, payload, encoding, arrival_ns in turn.messages[start : start + MESSAGES_PER_TURN]:
+                self._buffer.append(samples_key(self.site.site.id, tag), payload, encoding, arrival_ns)
+            self._ingest.turn()
+        poses, self._poses[:] = np.concatenate([np.empty(0, POSE), *self._poses]), []
+        return poses
+
+    def _adopt(self, document: SiteDocument) -> None:
+        """The site as it was from this turn on."""
+        if document.site != self.site.site:
+            self.site.set_site(document.site)
+        for tag, settings in _changes(self.site.document, document):
+            self.site.set_tag(tag, settings)
+
+
+def settings_of(about: Mapping[str, str], given: Settings, engine: str | None) -> Settings:
+    """Those of the recording where nothing else was asked for."""
+    update: dict[str, object] = {"engine": engine or about.get("engine", given.engine)}
+    for name in ("paper", "ingest"):
+        if name in about:
+            update[name] = type(getattr(given, name)).model_validate_json(about[name])
+    return given.model_copy(update=update)
+
+
+def _changes(before: SiteDocument, after: SiteDocument) -> list[tuple[str, TagSettings]]:
+    return [(tag, settings) for tag, settings in after.tags.items() if before.tags.get(tag) != settings]

@@ -1,0 +1,1 @@
+"""Tracks of the past, on disk."""

@@ -1,0 +1,1 @@
+"""From messages to poses: buffer, order, decode, screen, fuse, store."""

@@ -1,0 +1,210 @@
+"""The engine, kept in step with the site and guarded: one row's fault stays its own."""
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_schemas.site import TagSettings
+from dropanchor_service.estimation.batch import (
+    POSE,
+    TAG_SETTINGS,
+    Array,
+    Engine,
+    PoseBatch,
+    Restorable,
+    SampleBatch,
+    State,
+    StateReason,
+)
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.settings.engine_columns import anchor_columns, tag_columns
+from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_service.store.records import enlarged
+
+FAULTS_BEFORE_QUARANTINE = 3
+QUARANTINE_NS = 10_000_000_000
+
+
+class _Configured(NamedTuple):
+    tag: TagSettings
+    declination_rad: float
+
+
+class _Faults(NamedTuple):
+    times: int
+    until_ns: int
+
+
+class Estimators:
+    """Owned by one thread."""
+
+    def __init__(self, engine: Engine, site: SiteStore, tags: TagTable, metrics: Metrics) -> None:
+        self._log = RareLog(logging.getLogger(__name__))
+        self._engine = engine
+        self._site = site
+        self._tags = tags
+        self._metrics = metrics
+        self._version = 0
+        self._anchors = anchor_columns([])
+        self._numbers = np.zeros(0, np.int64)  # of the anchors, ascending, and their indices
+        self._indices = np.zeros(0, np.int32)
+        self._configured: dict[int, _Configured] = {}
+        self._settings = np.zeros(0, TAG_SETTINGS)  # what each row was configured with
+        self._has_configured = np.zeros(0, bool)  # by row
+        self._faults: dict[int, _Faults] = {}
+
+    @property
+    def keeps_state(self) -> bool:
+        """Whether the engine can go on after a restart."""
+        return isinstance(self._engine, Restorable)
+
+    def state(self) -> dict[str, Array]:
+        """The engine's state and what it was made with, to be copied. Empty where the engine keeps none."""
+        if not isinstance(self._engine, Restorable):
+            return {}
+        settings = self._settings[: len(self._tags)]
+        return {"anchors": self._anchors, "settings": settings} | self._engine.state()
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Take over what `state` gave. Rows start afresh where an anchor has moved or their settings differ since."""
+        assert isinstance(self._engine, Restorable)
+        self.follow_site()
+        anchors, settings = state.pop("anchors"), state.pop("settings")
+        if (self._anchors[: len(anchors)] != anchors).any():
+            return
+        self._engine.restore(state)
+        self._settings = settings
+        for row, known in enumerate(settings):
+            wanted = self._wanted(row)
+            if tag_columns(wanted.tag, wanted.declination_rad).tobytes() == known.tobytes():
+                self._configured[row] = wanted
+        self._has_configured = np.zeros(len(settings), bool)
+        self._has_configured[list(self._configured)] = True
+
+    def follow_site(self) -> bool:
+        """Take over what changed in the site since the last call; True when something did.
+
+        An anchor that moved makes every track wrong, so all start afresh; so does a tag whose settings changed.
+        """
+        if self._version == self._site.version:
+            return False
+        self._version = self._site.version
+        anchors = anchor_columns(self._site.anchors_by_index())
+        moved = bool((anchors[: len(self._anchors)] != self._anchors).any())
+        self._anchors = anchors
+        self._engine.set_anchors(anchors)
+        indices = {anchor.number: self._site.anchor_index(anchor.number) for anchor in self._site.site.anchors}
+        known = sorted((number, index) for number, index in indices.items() if index is not None)
+        self._numbers = np.array([number for number, _ in known], np.int64)
+        self._indices = np.array([index for _, index in known], np.int32)
+        for row, configured in list(self._configured.items()):
+            if moved or configured != self._wanted(row):
+                self._configure(row)
+        return True
+
+    def anchor_indices(self, numbers: Array) -> Array:
+        """The engine's index for each anchor number, -1 where the site has no such anchor."""
+        if not len(self._numbers):
+            return np.full(len(numbers), -1, np.int32)
+        place = np.minimum(np.searchsorted(self._numbers, numbers), len(self._numbers) - 1)
+        indices: Array = np.where(self._numbers[place] == numbers, self._indices[place], np.int32(-1))
+        return indices
+
+    def any_quarantined(self, now_ns: int) -> bool:
+        return any(faults.until_ns > now_ns for faults in self._faults.values())
+
+    def quarantined(self, rows: Array, now_ns: int) -> Array:
+        """Which of the rows are left alone for a while, because their samples made the engine fail again and again."""
+        shut = [row for row, faults in self._faults.items() if faults.until_ns > now_ns]
+        return np.isin(rows, shut) if shut else np.zeros(len(rows), bool)
+
+    def make_ready(self, row: int) -> None:
+        """Configure a row before anything is heard of it, so that nobody waits for that then."""
+        if row not in self._configured:
+            self._reach(row + 1)
+            self._configure(row)
+
+    def process(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
+        """The poses of all rows but those that fail, which start afresh."""
+        for row in self._new_rows(samples):
+            self._configure(row)
+        yield from self._bisected(samples, now_ns)
+
+    def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
+        rows = [column["row"] for column in _columns(samples)]
+        self._reach(max(int(column.max(initial=-1)) for column in rows) + 1)
+        return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
+
+    def _reach(self, rows: int) -> None:
+        missing = rows - len(self._has_configured)
+        if missing > 0:
+            spare = max(missing, len(self._has_configured))
+            self._has_configured = np.concatenate([self._has_configured, np.zeros(spare, bool)])
+
+    def _bisected(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
+        try:
+            poses = self._engine.process(samples)
+        except Exception as error:
+            rows = _rows(samples)
+            if len(rows) == 1:
+                poses = self._fault(int(rows[0]), samples, error, now_ns)
+            else:
+                middle = rows[len(rows) // 2]
+                yield from self._bisected(_selected(samples, lambda row: row < middle), now_ns)
+                yield from self._bisected(_selected(samples, lambda row: row >= middle), now_ns)
+                return
+        yield poses
+
+    def _fault(self, row: int, samples: SampleBatch, error: Exception, now_ns: int) -> PoseBatch:
+        self._metrics.faults.labels("estimator").inc()
+        self._log.exception(f"estimator of tag {self._tags.at(row).name}", error)
+        times = self._faults.get(row, _Faults(0, 0)).times + 1
+        shut = times % FAULTS_BEFORE_QUARANTINE == 0
+        self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if shut else 0)
+        self._configure(row, start_known=False)
+        t_ns = max(int(column["t_ns"].max()) for column in _columns(samples) if len(column))
+        return PoseBatch(poses=_lost(row, t_ns))
+
+    def _configure(self, row: int, start_known: bool = True) -> None:
+        wanted = self._wanted(row)
+        self._configured[row] = wanted
+        self._has_configured[row] = True
+        # After a fault the tag is no longer where it started.
+        tag = wanted.tag if start_known else wanted.tag.model_copy(update={"start": None})
+        self._engine.configure(row, tag_columns(tag, wanted.declination_rad))
+        self._keep_settings(row, tag_columns(wanted.tag, wanted.declination_rad))
+
+    def _keep_settings(self, row: int, settings: Array) -> None:
+        if row >= len(self._settings):
+            self._settings = enlarged(self._settings, max(row + 1, 2 * len(self._settings)))
+        self._settings[row] = settings
+
+    def _wanted(self, row: int) -> _Configured:
+        return _Configured(self._site.tag_settings(self._tags.at(row).name), self._site.site.declination_rad)
+
+
+def _lost(row: int, t_ns: int) -> Array:
+    """POSE (1) of a row whose numbers are gone."""
+    pose = np.zeros(1, POSE)
+    for name in POSE.names or ():
+        if pose[name].dtype.kind == "f":
+            pose[name] = np.nan
+    pose["row"], pose["t_ns"], pose["anchor"] = row, t_ns, -1
+    pose["state"], pose["reason"] = State.LOST, StateReason.FAULT
+    return pose
+
+
+def _columns(samples: SampleBatch) -> tuple[Array, Array, Array, Array]:
+    return samples.imu, samples.ranges, samples.headings, samples.bearings
+
+
+def _rows(samples: SampleBatch) -> Array:
+    return np.unique(np.concatenate([column["row"] for column in _columns(samples)]))
+
+
+def _selected(samples: SampleBatch, wanted: Callable[[Array], Array]) -> SampleBatch:
+    imu, ranges, headings, bearings = (column[wanted(column["row"])] for column in _columns(samples))
+    return SampleBatch(imu, ranges, headings, bearings)

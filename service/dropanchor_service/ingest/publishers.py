@@ -1,0 +1,111 @@
+"""What is known of each publisher of a tag: which of its messages have come, in which order, and its clock."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_service.estimation.batch import Array
+from dropanchor_service.ingest.kernels import clocks, sequences
+from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW
+from dropanchor_service.ingest.kernels.values import newest_times
+from dropanchor_service.store.records import enlarged
+
+
+@dataclass(frozen=True)
+class Sequenced:
+    """Indices of messages. due: to be fused now, in this order; held: to be put in again, before newer ones, until
+    they are due. missing: messages that are given up. slots: the publisher of each message, -1 without one."""
+
+    due: Array
+    held: Array
+    duplicates: Array
+    missing: int
+    slots: Array
+
+
+class Passed(NamedTuple):
+    """next: the number that is expected; seen: bit n % WINDOW is set when the message n has come."""
+
+    next: int
+    seen: int
+
+    def ahead(self, sequence: int) -> int:
+        """How many numbers lie from the expected one to this one; negative when it is behind."""
+        return (sequence - self.next + 2**31) % 2**32 - 2**31
+
+    def has(self, sequence: int) -> bool:
+        """Whether this message was fused already, or is older than what is remembered."""
+        behind = -self.ahead(sequence)
+        return behind > 0 and (behind > WINDOW or bool(self.seen >> sequence % WINDOW & 1))
+
+
+class Publishers:
+    """The last few publishers of every tag; memory is bounded whatever boot ids a tag makes up.
+
+    `columns` is all there is to know: a checkpoint is a copy of it. One that was restored expects the number after the
+    last that passed, so what is fetched from caches meanwhile fills the gap, as long as the window that `sequence` is
+    called with is wide enough to wait for it.
+    """
+
+    def __init__(self) -> None:
+        self._columns = np.zeros(0, PUBLISHER)
+
+    @property
+    def columns(self) -> Array:
+        """PUBLISHER, PER_TAG for each row of a tag."""
+        return self._columns
+
+    @columns.setter
+    def columns(self, columns: Array) -> None:
+        self._columns = columns.copy()
+
+    def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int) -> Sequenced:
+        """Put messages (FORM, row of their tag, ns of arrival; earlier arrivals first) into their publishers' order.
+        Nobody waits any longer for what is missing before a message that arrived until `due_ns`."""
+        self._grow(rows)
+        n = len(rows)
+        slots, distances, verdicts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
+        held = sequences.pass_in_order(forms, rows, arrivals, self._columns, slots, distances, verdicts)
+        due = np.flatnonzero(verdicts == sequences.PASS)
+        missing = 0
+        if held:
+            behind = np.flatnonzero(verdicts == sequences.HELD)
+            ordered = behind[np.lexsort((distances[behind], slots[behind]))]
+            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_ns, verdicts)
+            due = np.concatenate([due, ordered[verdicts[ordered] == sequences.PASS]])
+        again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.HELD))
+        return Sequenced(due, waiting, again, missing, slots)
+
+    def passed(self, row: int) -> dict[int, Passed]:
+        """By boot id, of this tag's publishers."""
+        of_tag = self._columns[row * PER_TAG : (row + 1) * PER_TAG]
+        return {
+            int(publisher["boot_id"]): Passed(
+                int(publisher["next"]), int.from_bytes(publisher["seen"].astype("<u8").tobytes(), "little")
+            )
+            for publisher in of_tag[of_tag["status"] == sequences.RUNNING]
+        }
+
+    def excuse(self, rows: Array) -> None:
+        """Messages of these rows were shed before they got here: nobody need wait for them."""
+        known = rows[(rows + 1) * PER_TAG <= len(self._columns)]
+        self._columns["excused"].reshape(-1, PER_TAG)[known] = True
+
+    def utc_offsets(
+        self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]
+    ) -> tuple[Array, int]:
+        """UTC minus the clock of each message's publisher, ns, empty when all have UTC; and how many clocks jumped.
+
+        samples: of each kind the index of the message and the time of every sample.
+        """
+        newest, offsets = np.full(len(forms), -1, np.int64), np.zeros(len(forms), np.int64)
+        for messages, t_ns in samples:
+            newest_times(t_ns, messages, newest)
+        jumps = clocks.utc_offsets(forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, offsets)
+        return offsets if offsets.any() else np.zeros(0, np.int64), jumps
+
+    def _grow(self, rows: Array) -> None:
+        needed = (int(rows.max(initial=-1)) + 1) * PER_TAG
+        if needed > len(self._columns):
+            self._columns = enlarged(self._columns, max(needed, 2 * len(self._columns)))

@@ -1,0 +1,158 @@
+"""From messages of admitted tags to samples that an engine can take: decode, put in order, screen, map clocks."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.estimation.batch import BEARING, HEADING, RANGE, Array, SampleBatch
+from dropanchor_service.ingest.buffer import Message
+from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
+from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.kernels.values import shift_times
+from dropanchor_service.ingest.publishers import Publishers
+from dropanchor_service.ingest.rejections import Losses
+from dropanchor_service.ingest.reorder_buffer import HeldMessages
+from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
+from dropanchor_service.store import SiteStore
+from dropanchor_service.store.rings import rank_in_row
+
+HELD_BYTES = 2**26
+
+
+class Preparation:
+    """Owned by one thread.
+
+    window_ns: so long a message waits for those that its publisher numbered before it.
+    """
+
+    def __init__(self, site: SiteStore, estimators: Estimators, losses: Losses, window_ns: int) -> None:
+        self.window_ns = window_ns
+        self.publishers = Publishers()
+        self._site = site
+        self._estimators = estimators
+        self._losses = losses
+        self._held = HeldMessages(HELD_BYTES)
+
+    @property
+    def holds(self) -> int:
+        """Messages that wait for one before them."""
+        return len(self._held)
+
+    def batches_of(self, fresh: list[Message], now_ns: int) -> Iterator[SampleBatch]:
+        """Those of the fresh messages and of ones held before that are due, at most one of each tag in a batch: what
+        becomes of a message does not depend on which others of its tag came in with it."""
+        due_ns = self._due_ns(fresh, now_ns)
+        messages = [*self._held.wake(fresh, due_ns), *fresh] if self.holds else fresh
+        if not messages:
+            return
+        rows, payloads, encodings, arrivals = zip(*messages, strict=True)
+        read = self._forms(payloads, encodings)
+        of_row, arrived = np.array(rows, np.int32), np.array(arrivals, np.int64)
+        for reason in {reason for _, reason in read.rejected}:
+            self._losses.reject(reason, of_row[[index for index, why in read.rejected if why == reason]])
+        sequenced = self.publishers.sequence(read.forms, of_row, arrived, due_ns)
+        self._losses.give_up(sequenced.missing)
+        self._held.hold([messages[index] for index in sequenced.held.tolist()])
+        self._losses.reject(Reason.DUPLICATE, of_row[sequenced.duplicates])
+        for due in _one_of_each(sequenced.due, of_row):
+            decoded, rejected = screen(read_samples(read, due))
+            in_part = replace(sequenced, due=due)
+            offsets, jumps = self.publishers.utc_offsets(read.forms, in_part, arrived, _times(decoded))
+            self._losses.clocks_jumped(jumps)
+            yield self._batch(_in_utc(decoded, offsets, rejected), rejected, of_row)
+
+    def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
+        """What arrived until then has waited long enough. The window counts in arrivals: where messages have lain in a
+        backlog, one that came soon after those behind the gap may still lie there."""
+        if self._held.is_full:
+            return now_ns
+        return min(now_ns, max((message[3] for message in fresh), default=now_ns)) - self.window_ns
+
+    def _forms(self, payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
+        """A payload that the decoder fails on, which is an error of ours, costs nothing but itself."""
+        try:
+            return read_forms(payloads, encodings)
+        except Exception as error:
+            self._losses.decoder_failed(error)
+            return read_forms([_if_readable(*pair) for pair in zip(payloads, encodings, strict=True)], encodings)
+
+    def _batch(self, decoded: Decoded, rejected: list[Rejected], of_row: Array) -> SampleBatch:
+        self._bind_first_anchor(decoded)
+        ranges = self._anchored(decoded.ranges, rejected)
+        bearings = self._anchored(decoded.bearings, rejected)
+        for entry in rejected:
+            self._losses.reject(entry.reason, of_row[entry.messages])
+        decoded.imu["row"] = of_row[decoded.imu["row"]]
+        return SampleBatch(
+            imu=decoded.imu,
+            ranges=_columns(ranges, RANGE, "range", of_row),
+            headings=_columns(decoded.headings, HEADING, "heading", of_row),
+            bearings=_columns(bearings, BEARING, "bearing", of_row),
+        )
+
+    def _bind_first_anchor(self, decoded: Decoded) -> None:
+        """A site without anchors takes the first one that is heard as its origin."""
+        if self._site.site.anchors or len(decoded.ranges) == 0:
+            return
+        number = int(decoded.ranges["anchor"][0])
+        if self._site.bind_first(decoded.anchor_names.get(number, str(number))):
+            self._estimators.follow_site()
+
+    def _anchored(self, samples: Array, rejected: list[Rejected]) -> Array:
+        """The samples of anchors that the site has, with the engine's index of the anchor in `anchor`."""
+        if not len(samples):
+            return samples
+        indices = self._estimators.anchor_indices(samples["anchor"])
+        unknown = indices < 0
+        kept = keep(samples, samples["message"], unknown, Reason.ANCHOR_UNKNOWN, rejected)
+        kept["anchor"] = indices[~unknown]
+        return kept
+
+
+def _if_readable(payload: bytes, encoding: str) -> bytes:
+    """Nothing, which is refused by name, in the place of a payload that the decoder fails on."""
+    try:
+        read_forms([payload], [encoding])
+    except Exception:
+        return b""
+    return payload
+
+
+def _one_of_each(due: Array, of_row: Array) -> list[Array]:
+    """The indices `due` in parts that have no row twice, each row's in their order."""
+    ranks = rank_in_row(of_row[due])
+    return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]
+
+
+def _in_utc(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Decoded:
+    """The samples whose time, moved by the offset of their message, can be one."""
+    if not sum(shift_times(t_ns, messages, offsets) for messages, t_ns in _times(decoded)):
+        return decoded
+    imu, ranges, headings, bearings = (
+        keep(samples, messages, ~within_time(samples["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected)
+        for messages, samples in (
+            (decoded.imu["row"], decoded.imu),
+            *((samples["message"], samples) for samples in (decoded.ranges, decoded.headings, decoded.bearings)),
+        )
+    )
+    return replace(decoded, imu=imu, ranges=ranges, headings=headings, bearings=bearings)
+
+
+def _times(decoded: Decoded) -> list[tuple[Array, Array]]:
+    """The index of the payload and the time of each sample, of every kind."""
+    scalars = (decoded.ranges, decoded.headings, decoded.bearings)
+    return [(decoded.imu["row"], decoded.imu["t_ns"]), *((column["message"], column["t_ns"]) for column in scalars)]
+
+
+def _columns(scalars: Array, dtype: "np.dtype[np.void]", value: str, of_row: Array) -> Array:
+    """Screened SCALAR as the columns of an engine."""
+    batch = np.empty(len(scalars), dtype)
+    if not len(scalars):
+        return batch
+    batch["row"], batch["t_ns"] = of_row[scalars["message"]], scalars["t_ns"]
+    batch[value], batch["std"] = scalars["value"], scalars["std"]
+    if "anchor" in (dtype.names or ()):
+        batch["anchor"] = scalars["anchor"]
+    return batch

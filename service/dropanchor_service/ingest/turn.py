@@ -1,0 +1,171 @@
+"""From messages to poses: admit, prepare, fuse, store, and count whatever is lost."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.estimation.batch import Array, PoseBatch, SampleBatch
+from dropanchor_service.ingest.admission import Admission
+from dropanchor_service.ingest.buffer import Message, MessageBuffer, Stranger
+from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.observers import NO_TAPS, Taps
+from dropanchor_service.ingest.rejections import Losses
+from dropanchor_service.ingest.samples import Preparation
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_service.store import LatestPoses, SiteStore, Tag, TagTable
+
+MESSAGES_PER_TURN = 1000
+
+
+class Ingest:
+    """Owned by one thread, except for `announce`."""
+
+    def __init__(
+        self,
+        buffer: MessageBuffer,
+        admission: Admission,
+        estimators: Estimators,
+        site: SiteStore,
+        tags: TagTable,
+        latest: LatestPoses,
+        metrics: Metrics,
+        clock: UtcClock,
+        taps: Taps = NO_TAPS,
+        reorder_ns: int = 250_000_000,
+    ) -> None:
+        self._losses = Losses(tags, metrics)
+        self.preparation = Preparation(site, estimators, self._losses, reorder_ns)
+        self._buffer = buffer
+        self._admission = admission
+        self._site = site
+        self._known_tags = 0  # rows whose keys the buffer knows
+        self._estimators = estimators
+        self._tags = tags
+        self._latest = latest
+        self._metrics = metrics
+        self._clock = clock
+        self._taps = taps
+        self._announced: deque[str] = deque(maxlen=1024)
+
+    def announce(self, name: str) -> None:
+        """A tag has said that it is alive. From any thread."""
+        self._announced.append(name)
+
+    @property
+    def holds(self) -> bool:
+        """Whether a message waits for one before it, so that a turn may be due although nothing comes in."""
+        return self.preparation.holds > 0
+
+    def turn(self, most: int = MESSAGES_PER_TURN) -> int:
+        """So many of the messages that wait, at most. Returns how many of tags that are known were taken."""
+        if self._estimators.follow_site():
+            self._admission.register_listed()
+        self._admission.review()
+        while self._announced:
+            self._admission.by_name(self._announced.popleft())
+        waited = list(self._know_new_tags())
+        fresh, strangers = self._buffer.drain(most, self._clock.now_ns())
+        self._count_shed()
+        known = [*waited, *fresh, *self._admitted(strangers)]
+        if known:
+            self._tell(self._taps.messages, known)
+            self._metrics.messages.inc(len(known))
+            self._tags.count_messages(np.array([message[0] for message in known], np.int32), known[-1][3])
+        if known or self.holds:
+            self._fuse(known)
+        return len(fresh)
+
+    def _know_new_tags(self) -> Iterator[Message]:
+        """Messages of tags that have a row already wait neither among those of strangers nor for their estimator.
+        Returns what waited of tags that others gave a row."""
+        for tag in self._tags.all()[self._known_tags :] if len(self._tags) > self._known_tags else ():
+            self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
+            self._estimators.make_ready(tag.row)
+            self._known_tags = tag.row + 1
+            yield from self._waited(tag)
+
+    def _admitted(self, strangers: Sequence[Stranger]) -> Iterator[Message]:
+        for stranger in strangers:
+            key, payload, encoding, arrival_ns = stranger
+            row = self._buffer.row_of(key)
+            if row is None:
+                tag = self._admission.hear(stranger)
+                if isinstance(tag, Reason):
+                    self._losses.refuse(tag, key)
+                if not isinstance(tag, Tag):
+                    continue
+                self._buffer.admit(key, tag.row)
+                yield from self._waited(tag)
+                row = tag.row
+            yield row, payload, encoding, arrival_ns
+
+    def _waited(self, tag: Tag) -> Iterator[Message]:
+        for payload, encoding, arrival_ns in self._admission.waited(tag):
+            yield tag.row, payload, encoding, arrival_ns
+
+    def _fuse(self, messages: list[Message]) -> None:
+        now_ns = self._clock.now_ns()
+        for samples in self.preparation.batches_of(messages, now_ns):
+            self._fuse_batch(self._outside_quarantine(samples, now_ns), now_ns)
+        if messages:
+            self._metrics.delay_seconds.observe((self._clock.now_ns() - messages[0][3]) * 1e-9)
+
+    def _fuse_batch(self, samples: SampleBatch, now_ns: int) -> None:
+        for kind, column in _by_kind(samples):
+            if len(column):
+                self._tags.count_samples(kind, column["row"])
+                self._metrics.samples.labels(kind).inc(len(column))
+        if not any(len(column) for _, column in _by_kind(samples)):
+            return
+        started = time.perf_counter()
+        for poses in self._estimators.process(samples, now_ns):
+            self._store(poses)
+        self._metrics.estimator_seconds.observe(time.perf_counter() - started)
+
+    def _outside_quarantine(self, samples: SampleBatch, now_ns: int) -> SampleBatch:
+        if not self._estimators.any_quarantined(now_ns):
+            return samples
+        free: dict[str, Array] = {}
+        for kind, column in _by_kind(samples):
+            shut = self._estimators.quarantined(column["row"], now_ns)
+            self._losses.reject(Reason.ESTIMATOR_FAULT, column["row"][shut])
+            free[kind] = column[~shut] if shut.any() else column
+        return SampleBatch(free["imu"], free["range"], free["heading"], free["bearing"])
+
+    def _store(self, batch: PoseBatch) -> None:
+        self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
+        self._metrics.poses.inc(len(batch.poses))
+        for reason, count in batch.rejected.items():
+            self._metrics.rejected.labels(reason).inc(count)
+        self._tell(self._taps.poses, batch.poses)
+
+    def _tell(self, tap: Callable[..., None], *what: object) -> None:
+        """What only listens must not cost a sample."""
+        try:
+            tap(*what)
+        except Exception as error:
+            self._losses.tap_failed(error)
+
+    def _count_shed(self) -> None:
+        by_row, samples, strangers = self._buffer.take_shed()
+        self._losses.lose_strangers(Reason.SHED, strangers)
+        self._losses.lose_strangers(Reason.TAG_UNPROVEN, self._admission.waited_in_vain())
+        if by_row:
+            rows = np.fromiter(by_row, np.int64, len(by_row))
+            times = np.fromiter(by_row.values(), np.int64, len(by_row))
+            self._losses.shed(np.repeat(rows, times), samples)
+            self.preparation.publishers.excuse(rows)
+
+
+def _by_kind(samples: SampleBatch) -> tuple[tuple[str, Array], ...]:
+    return (
+        ("imu", samples.imu),
+        ("range", samples.ranges),
+        ("heading", samples.headings),
+        ("bearing", samples.bearings),
+    )

@@ -1,0 +1,113 @@
+"""What the service counts, for Prometheus."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.answers.columns import STATES, with_age
+from dropanchor_service.store.latest_poses import LatestPoses
+from dropanchor_service.store.pending_tags import Newcomers
+from dropanchor_service.store.tags import KINDS, TagTable
+
+_SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
+
+
+class Metrics:
+    """A registry of its own, so that several services fit into one process."""
+
+    def __init__(self) -> None:
+        self.registry = CollectorRegistry()
+        ProcessCollector(registry=self.registry)
+        self.messages = Counter("dropanchor_messages", "Messages of tags.", registry=self.registry)
+        self.samples = Counter(
+            "dropanchor_samples", "Samples handed to the estimators.", ["kind"], registry=self.registry
+        )
+        self.rejected = Counter(
+            "dropanchor_rejected", "Messages and samples that were not used.", ["reason"], registry=self.registry
+        )
+        self.shed_samples = Counter(
+            "dropanchor_shed_samples", "Samples of packed messages that were shed.", registry=self.registry
+        )
+        self.poses = Counter("dropanchor_poses", "Poses that the estimators gave.", registry=self.registry)
+        self.misses = Counter(
+            "dropanchor_missed_messages",
+            "Messages that a publisher numbered and nobody has any more.",
+            registry=self.registry,
+        )
+        self.given_up = Counter(
+            "dropanchor_given_up_messages",
+            "Messages that were waited for behind a gap in their publisher's numbers, and did not come in time.",
+            registry=self.registry,
+        )
+        self.faults = Counter("dropanchor_faults", "Errors of our own, by place.", ["where"], registry=self.registry)
+        self.estimator_seconds = Histogram(
+            "dropanchor_estimator_seconds", "Time to fuse one batch.", buckets=_SECONDS, registry=self.registry
+        )
+        self.delay_seconds = Histogram(
+            "dropanchor_pose_delay_seconds",
+            "From the arrival of the oldest message of a batch to the poses in the store.",
+            buckets=_SECONDS,
+            registry=self.registry,
+        )
+        self.clock_jumps = Counter(
+            "dropanchor_clock_jumps", "Clocks of tags that were set while they ran.", registry=self.registry
+        )
+        self.caught_up = Counter(
+            "dropanchor_caught_up_messages",
+            "Messages that went on after the caches of their tag had been asked.",
+            registry=self.registry,
+        )
+        self.checkpoints = Counter("dropanchor_checkpoints", "Checkpoints.", ["outcome"], registry=self.registry)
+        self.checkpoint_age = Gauge(
+            "dropanchor_checkpoint_age_seconds",
+            "How much of the past a killed service would have to make up for.",
+            registry=self.registry,
+        )
+        self.checkpoint_bytes = Gauge(
+            "dropanchor_checkpoint_bytes", "Size of the newest checkpoint.", registry=self.registry
+        )
+        for outcome in ("written", "failed"):
+            self.checkpoints.labels(outcome)
+        for kind in KINDS:
+            self.samples.labels(kind)
+        for reason in Reason:
+            self.rejected.labels(reason)
+
+    def watch(self, collector: Collector) -> None:
+        """Ask this one too, at every scrape."""
+        self.registry.register(collector)
+
+
+class FleetGauges(Collector):
+    """Gauges that are read from the store when they are asked for."""
+
+    def __init__(
+        self,
+        tags: TagTable,
+        newcomers: Newcomers,
+        latest: LatestPoses,
+        now_ns: Callable[[], int],
+        queue_depth: Callable[[], int],
+    ) -> None:
+        self._tags = tags
+        self._newcomers = newcomers
+        self._latest = latest
+        self._now_ns = now_ns
+        self._queue_depth = queue_depth
+
+    def collect(self) -> Iterable[Metric]:
+        poses = self._latest.since()[1]
+        shown = with_age(poses, (self._now_ns() - poses["t_ns"]) * 1e-9)
+        by_state = np.bincount(shown["state"], minlength=len(STATES))
+        tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
+        for state, count in zip(STATES, by_state, strict=True):
+            tags.add_metric([state], count)
+        yield tags
+        yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that have a row.", len(self._tags))
+        yield GaugeMetricFamily("dropanchor_newcomers", "Tags that were heard and have no row.", len(self._newcomers))
+        yield GaugeMetricFamily("dropanchor_tags_online", "Tags whose token is present.", self._tags.online_names)
+        yield GaugeMetricFamily("dropanchor_queue_messages", "Messages that wait to be fused.", self._queue_depth())

@@ -1,0 +1,12 @@
+"""The certificate that the HTTP server shows."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A certificate chain and its private key, as PEM files."""
+
+    certificate: Path
+    key: Path

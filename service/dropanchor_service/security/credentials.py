@@ -1,0 +1,52 @@
+"""What the settings say about credentials, as objects."""
+
+import logging
+from datetime import timedelta
+
+from dropanchor_service.security import api_keys, oidc
+from dropanchor_service.security.access_control import SERVICE
+from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
+from dropanchor_service.security.certificate import Certificate
+from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_service.security.identity import Doorkeeper, Register
+from dropanchor_service.settings.model import HttpSettings, SecuritySettings, Settings
+from dropanchor_service.settings.sources import SettingsError
+
+SOON = timedelta(days=30)
+
+_log = logging.getLogger(__name__)
+
+
+def credentials_of(settings: Settings) -> SecurityFolder | None:
+    """Raises SettingsError when there is a folder that cannot be used."""
+    if settings.security.folder is None:
+        return None
+    try:
+        folder = SecurityFolder.open(settings.security.folder)
+    except SecurityError as error:
+        raise SettingsError(f"security.folder: {error}") from error
+    for sentence in folder.expiring(SOON):
+        _log.warning("%s; dropanchor security renew and dropanchor tag add --renew make new ones", sentence)
+    return folder
+
+
+def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -> Certificate | None:
+    """None for plain HTTP."""
+    if not settings.tls:
+        return None
+    if settings.certificate is not None and settings.key is not None:
+        return Certificate(settings.certificate, settings.key)
+    return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
+
+
+def doorkeeper_of(settings: SecuritySettings) -> Doorkeeper | None:
+    """None when nobody is asked. Raises SettingsError."""
+    registers: dict[str, Register] = {}
+    try:
+        if settings.folder is not None:
+            registers[api_keys.SOURCE] = ApiKeys(settings.folder)
+    except ApiKeyError as error:
+        raise SettingsError(f"security.folder: {error}") from error
+    if settings.oidc is not None:
+        registers[oidc.SOURCE] = oidc.OidcTokens(settings.oidc)
+    return Doorkeeper(registers) if registers else None

@@ -1,0 +1,43 @@
+"""Turn what an operator knows of tags and anchors into the columns of an engine."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from dropanchor_schemas.site import Anchor, TagSettings
+from dropanchor_service.estimation.batch import ANCHOR, Array, HeadingSource, default_settings
+
+
+def anchor_columns(anchors: Sequence[Anchor]) -> Array:
+    """ANCHOR, one per anchor."""
+    return np.array([(anchor.x, anchor.y, anchor.z) for anchor in anchors], ANCHOR)
+
+
+def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
+    """TAG_SETTINGS (0-d)."""
+    columns = default_settings()
+    columns["height"] = tag.height_m
+    columns["range_std"] = _or_nan(tag.range_std_m)
+    columns["range_bias"] = tag.range_bias_m
+    columns["range_bias_std"] = _or_nan(tag.range_bias_std_m)
+    columns["range_scale"] = tag.range_scale
+    columns["mount_angle"] = _or_nan(tag.mount_angle_rad)
+    columns["mount_angle_std"] = _or_nan(tag.mount_angle_std_rad)
+    columns["lever_x"], columns["lever_y"] = tag.lever_forward_m, tag.lever_left_m
+    columns["slip_std"] = _or_nan(tag.slip_std_rad)
+    columns["speed_max"] = _or_nan(tag.speed_max_mps)
+    columns["reverse_allowed"] = tag.reverse_allowed
+    columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
+    columns["heading_std"] = _or_nan(tag.heading_std_rad)
+    columns["declination"] = declination_rad
+    if tag.start is not None:
+        columns["start_known"] = True
+        columns["start_x"], columns["start_y"] = tag.start.x, tag.start.y
+        columns["start_heading"] = _or_nan(tag.start.heading_rad)
+        columns["start_std"] = tag.start.std_m
+    return columns
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -1,0 +1,119 @@
+"""Reads the settings: one TOML file, environment variables over it, command-line options over both."""
+
+import difflib
+import json
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from dropanchor_schemas.site import Typed
+from dropanchor_service.settings.model import Settings
+
+ENVIRONMENT_PREFIX = "DROPANCHOR_"
+ENVIRONMENT_DELIMITER = "__"
+
+
+class SettingsError(ValueError):
+    """Settings that cannot be used. The message names the place, the key, and what is expected."""
+
+
+def load_settings(
+    file: Path | None = None,
+    options: Mapping[str, Any] | None = None,
+    environment: Mapping[str, str] = os.environ,
+) -> Settings:
+    """The settings of this file, these environment variables and these (nested) options; the later wins.
+
+    Raises SettingsError.
+    """
+    layers = [
+        (str(file), _from_file(file)),
+        ("the environment", _from_environment(environment)),
+        ("the command line", dict(options or {})),
+    ]
+    merged: dict[str, Any] = {}
+    for _, layer in layers:
+        merged = _merged(merged, layer)
+    try:
+        return Settings.model_validate(merged)
+    except ValidationError as error:
+        raise SettingsError("\n".join(_sentence(entry, layers) for entry in error.errors())) from error
+
+
+def _from_file(file: Path | None) -> dict[str, Any]:
+    if file is None:
+        return {}
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"{file}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{file}: is not a text file in UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{file}: is not TOML: {error}") from error
+
+
+def _from_environment(environment: Mapping[str, str]) -> dict[str, Any]:
+    """`DROPANCHOR_HTTP__PORT=8081` is `port` in `[http]`; lists and tables are given as JSON.
+
+    Other variables with the prefix are left alone, unless they look like one section's key and are not.
+    """
+    found: dict[str, Any] = {}
+    for variable, text in environment.items():
+        if not variable.startswith(ENVIRONMENT_PREFIX):
+            continue
+        path = variable.removeprefix(ENVIRONMENT_PREFIX).lower().split(ENVIRONMENT_DELIMITER)
+        if len(path) > 1 or path[0] in Settings.model_fields:
+            found = _merged(found, _nested(path, _value(variable, text)))
+    return found
+
+
+def _value(variable: str, text: str) -> Any:
+    if not text.lstrip().startswith(("[", "{")):
+        return Typed(text)
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise SettingsError(f"environment variable {variable}: is not JSON: {error}") from error
+
+
+def _nested(path: list[str], value: Any) -> dict[str, Any]:
+    return {path[0]: _nested(path[1:], value) if len(path) > 1 else value}
+
+
+def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(below)
+    for key, value in above.items():
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merged(merged[key], value) if both else value
+    return merged
+
+
+def _sentence(error: Any, layers: list[tuple[str, dict[str, Any]]]) -> str:
+    """Where it stands, which key, what is expected; the value is left out, it may be a secret."""
+    path = [str(part) for part in error["loc"]]
+    place, _ = max(reversed([entry for entry in layers if entry[1]]), key=lambda entry: _depth(entry[1], path))
+    key = ".".join(path) or "all together"
+    if error["type"] == "extra_forbidden":
+        return f"{place}: {key} is not a setting{_suggestion(path)}"
+    return f"{place}: {key}: {error['msg'].removeprefix('Value error, ')}"
+
+
+def _depth(layer: Any, path: list[str]) -> int:
+    """How far the layer goes along the path."""
+    if not path or not isinstance(layer, Mapping) or path[0] not in layer:
+        return 0
+    return 1 + _depth(layer[path[0]], path[1:])
+
+
+def _suggestion(path: list[str]) -> str:
+    model: Any = Settings
+    for part in path[:-1]:
+        field = getattr(model, "model_fields", {}).get(part)
+        model = None if field is None else field.annotation
+    close = difflib.get_close_matches(path[-1], getattr(model, "model_fields", {}), 1)
+    return f"; did you mean {close[0]}?" if close else ""

@@ -1,0 +1,90 @@
+"""Beyond the loopback the service listens only where it knows who connects, unless it is told that anybody may."""
+
+import ipaddress
+import json
+import socket
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import zenoh
+
+from dropanchor_service.security.credentials import certificate_of
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.settings.model import Settings, ZenohSettings
+from dropanchor_service.settings.sources import SettingsError
+
+_LOCAL_LINKS = ("unixsock-stream", "unixpipe", "serial", "vsock")
+_ENCRYPTED_LINKS = ("tls", "quic")
+
+_WHAT_TO_DO = """\
+Either make credentials, and give the folder to the router and to the service:
+  dropanchor security init --security security --host NAME_OR_ADDRESS_OF_THIS_MACHINE
+  and add: --security security
+or, on a network where everybody is trusted, let anybody in:
+  add: --insecure      (settings: insecure = true, environment: DROPANCHOR_INSECURE=true)"""
+
+
+def refuse_exposure(settings: Settings, credentials: SecurityFolder | None) -> None:
+    """Raises SettingsError, which says what to do, when anybody beyond this machine could connect."""
+    if settings.insecure:
+        return
+    doors = list(_open_zenoh(settings.zenoh, credentials))
+    if not is_loopback(settings.http.host) and not _is_guarded(settings, credentials):
+        doors.insert(0, f"HTTP at {settings.http.host}")
+    if doors:
+        them = " and ".join(doors)
+        raise SettingsError(f"{them} could be reached by anybody on the network without credentials.\n{_WHAT_TO_DO}")
+
+
+def _is_guarded(settings: Settings, credentials: SecurityFolder | None) -> bool:
+    """Whether REST asks who it is, and nobody else hears the answer."""
+    asks = credentials is not None or settings.security.oidc is not None
+    return asks and certificate_of(settings.http, credentials) is not None
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches it. A name that means nothing is let pass: nobody can listen there."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        pass
+    try:
+        found = socket.getaddrinfo(host, None)
+    except (socket.gaierror, UnicodeError):
+        return True
+    return all(ipaddress.ip_address(str(address[0]).partition("%")[0]).is_loopback for *_, address in found)
+
+
+def _open_zenoh(settings: ZenohSettings, credentials: SecurityFolder | None) -> Iterator[str]:
+    if settings.config_file is not None:
+        yield from _open_by_file(settings)
+    elif credentials is None and not settings.connect:
+        yield from (f"Zenoh at {endpoint}" for endpoint in settings.listen if _is_reachable(endpoint))
+
+
+def _open_by_file(settings: ZenohSettings) -> Iterator[str]:
+    """A configuration of the operator's own has to ask for certificates, or for passwords over TLS."""
+    try:
+        config = zenoh.Config.from_file(str(settings.config_file))
+    except zenoh.ZError:
+        return  # opening the session says what is wrong with it
+    mode = json.loads(config.get_json("mode")) or "peer"
+    listen = json.loads(config.get_json("listen/endpoints")) if mode != "client" else []
+    asks = _has(config, "transport/link/tls/enable_mtls") or _has(config, "transport/auth/usrpwd/dictionary_file")
+    for endpoint in _endpoints(listen.get(mode, []) if isinstance(listen, dict) else listen):
+        if _is_reachable(endpoint) and not (asks and endpoint.startswith(_ENCRYPTED_LINKS)):
+            yield f"Zenoh at {endpoint} (by {settings.config_file})"
+
+
+def _has(config: zenoh.Config, key: str) -> bool:
+    return bool(json.loads(config.get_json(key)))
+
+
+def _endpoints(listed: Any) -> Iterable[str]:
+    return [listed] if isinstance(listed, str) else listed
+
+
+def _is_reachable(endpoint: str) -> bool:
+    protocol, _, address = endpoint.partition("/")
+    host = address.partition("#")[0].partition("?")[0].rpartition(":")[0]
+    return protocol not in _LOCAL_LINKS and not is_loopback(host.strip("[]"))

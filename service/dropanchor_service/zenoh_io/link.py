@@ -1,0 +1,83 @@
+"""The Zenoh side of the service: opened at once with a router of its own, else as soon as the router is there."""
+
+import logging
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
+from types import TracebackType
+from typing import Self
+
+import zenoh
+
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.settings.model import ZenohSettings
+from dropanchor_service.zenoh_io.session import ATTEMPT_S, ZenohError, open_session
+
+PAUSE_S = 0.2
+
+_log = logging.getLogger(__name__)
+
+
+class ZenohLink:
+    """While it is open there is a session, or one is being tried for; the parts are opened with it.
+
+    Raises ZenohError, when it is opened, where trying again would not help.
+    """
+
+    def __init__(
+        self,
+        settings: ZenohSettings,
+        parts: Callable[[zenoh.Session], list[AbstractContextManager[object]]],
+        credentials: SecurityFolder | None = None,
+    ) -> None:
+        self._settings = settings
+        self._credentials = credentials
+        self._parts = parts
+        self._opened = ExitStack()
+        self._session: zenoh.Session | None = None
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._try, name="zenoh link", daemon=True)
+
+    def __enter__(self) -> Self:
+        if self._settings.connect:
+            self._thread.start()
+        else:
+            self._open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join(2 * ATTEMPT_S)
+        self._opened.close()
+
+    @property
+    def problem(self) -> str | None:
+        """Why nothing can come in over Zenoh at this moment; None when it can."""
+        if self._session is None or (self._settings.connect and not self._session.info.routers_zid()):
+            return "there is no connection to the Zenoh router"
+        return None
+
+    def _open(self) -> None:
+        with ExitStack() as opening:
+            session = opening.enter_context(open_session(self._settings, self._credentials))
+            for part in self._parts(session):
+                opening.enter_context(part)
+            self._opened = opening.pop_all()
+        self._session = session
+
+    def _try(self) -> None:
+        told = False
+        while not self._stop.is_set():
+            try:
+                self._open()
+            except ZenohError as error:
+                if not told:
+                    _log.warning("%s Still trying.", error)
+                told = True
+                self._stop.wait(PAUSE_S)
+            else:
+                _log.info("connected to the Zenoh router at %s", ", ".join(self._settings.connect))
+                return

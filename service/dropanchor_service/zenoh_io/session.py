@@ -1,0 +1,95 @@
+"""The Zenoh session of the service: a router of its own, or a client of one; with what not to leave at its default."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from dropanchor_service.security.access_control import SERVICE
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.security.router import LINK, QUIET, router_transport
+from dropanchor_service.settings.model import ZenohSettings
+
+ATTEMPT_S = 1.0
+
+
+class ZenohError(Exception):
+    """The session could not be opened; the message says what to check."""
+
+
+def open_session(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> zenoh.Session:
+    """Raises ZenohError."""
+    try:
+        return zenoh.open(_config(settings, credentials))
+    except zenoh.ZError as error:
+        raise ZenohError(_sentence(settings, str(error))) from error
+
+
+def listening_at(settings: ZenohSettings, credentials: SecurityFolder | None) -> tuple[str, ...]:
+    """The endpoints of a router of ours."""
+    if credentials is None or "listen" in settings.model_fields_set:
+        return settings.listen
+    return credentials.table.listen
+
+
+def configuration(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> dict[str, Any]:
+    """The Zenoh configuration of these endpoints, unless a file gives one."""
+    if settings.connect:
+        return _client(settings, credentials) | QUIET
+    listen = listening_at(settings, credentials)
+    if credentials is not None:
+        return credentials.router_configuration(listen)
+    return {"mode": "router", "listen": {"endpoints": list(listen)}, "transport": router_transport()} | QUIET
+
+
+def _client(settings: ZenohSettings, credentials: SecurityFolder | None) -> dict[str, Any]:
+    return {
+        "mode": "client",
+        "connect": {
+            "endpoints": list(settings.connect),
+            # An endless attempt inside Zenoh could not be interrupted; a finite one still reconnects for ever.
+            "timeout_ms": round(ATTEMPT_S * 1000),
+            "exit_on_failure": True,
+            "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
+        },
+        "transport": {"shared_memory": {"enabled": False}, "link": LINK | _tls(credentials)},
+    }
+
+
+def _tls(credentials: SecurityFolder | None) -> dict[str, Any]:
+    if credentials is None:
+        return {}
+    return {
+        "tls": {
+            "root_ca_certificate": str(credentials.certificate("ca")),
+            "enable_mtls": True,
+            "connect_certificate": str(credentials.certificate(SERVICE)),
+            "connect_private_key": str(credentials.key(SERVICE)),
+            "verify_name_on_connect": True,
+            "close_link_on_expiration": True,
+        }
+    }
+
+
+def _config(settings: ZenohSettings, credentials: SecurityFolder | None) -> zenoh.Config:
+    if settings.config_file is None:
+        return zenoh.Config.from_json5(json.dumps(configuration(settings, credentials)))
+    try:
+        return zenoh.Config.from_json5(Path(settings.config_file).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ZenohError(f"zenoh.config_file: {settings.config_file} cannot be read: {error.strerror}") from error
+
+
+def _sentence(settings: ZenohSettings, text: str) -> str:
+    if settings.config_file is not None:
+        return f"Zenoh does not start with {settings.config_file}: {text}"
+    endpoints = ", ".join(settings.connect or settings.listen)
+    if settings.connect:
+        return (
+            f"Zenoh cannot connect to {endpoints}: check the address, that a router runs there, and whether it wants "
+            f"a certificate (--security). ({text})"
+        )
+    if "address already in use" in text.lower() or "os error 98" in text.lower():
+        return f"Zenoh cannot listen on {endpoints}: the port is taken. Choose another one with --zenoh-listen."
+    return f"Zenoh cannot listen on {endpoints}: {text}"

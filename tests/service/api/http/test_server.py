@@ -1,0 +1,301 @@
+"""A real uvicorn on loopback: the stream, and clients that would harm the others if they could."""
+
+import asyncio
+import json
+import socket
+import statistics
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from typing import Any
+
+import httpx
+import pytest
+
+from api_house import House, kind_of, make_house
+from dropanchor_schemas.answers import PoseFrame
+from dropanchor_service.api.app import MAX_BODY_BYTES
+from dropanchor_service.api.http.limits import GuardedProtocol
+from dropanchor_service.api.http.server import ListenError, build_server, listen
+from dropanchor_service.api.routes import stream
+
+PATIENCE_S = 10.0
+
+
+class Impatient(GuardedProtocol):
+    request_s = 0.5
+    stalled_s = 0.5
+
+
+class Fair(GuardedProtocol):
+    request_s = 2.0
+    stalled_s = 2.0
+
+
+@contextmanager
+def serving(house: House, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
+    """The port of a server that has ended, with its streams, when the block has."""
+    server = build_server(house.app(), house.stopping, protocol)
+    bound = listen("127.0.0.1", 0)
+    port = int(bound.getsockname()[1])
+    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
+    thread.start()
+    try:
+        _wait_for(lambda: server.started)
+        yield port
+    finally:
+        server.should_exit = True
+        thread.join(PATIENCE_S)
+    assert not thread.is_alive()
+
+
+@contextmanager
+def streaming(port: int, query: str = "max_hz=30") -> Iterator[Iterator[tuple[str, Any]]]:
+    """The events of a stream: name and frame; comments have no name."""
+    url = f"http://127.0.0.1:{port}/api/v1/stream?{query}"
+    with httpx.Client(timeout=PATIENCE_S, trust_env=False) as client, client.stream("GET", url) as response:
+        assert response.headers["content-type"].startswith("text/event-stream")
+        yield _events(response)
+
+
+def _events(response: httpx.Response) -> Iterator[tuple[str, Any]]:
+    name = ""
+    for line in response.iter_lines():
+        if line.startswith("event: "):
+            name = line[7:]
+        elif line.startswith("data: "):
+            yield name, json.loads(line[6:])
+        elif line.startswith(":"):
+            yield "", line
+
+
+def _wait_for(happened: Any) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not happened():
+        assert time.monotonic() < end_s, "it did not happen"
+        time.sleep(0.01)
+
+
+def _get(port: int, path: str = "/api/v1/health/live") -> httpx.Response:
+    return httpx.get(f"http://127.0.0.1:{port}{path}", timeout=PATIENCE_S, trust_env=False)
+
+
+def _connected(port: int, *sent: bytes) -> socket.socket:
+    client = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
+    for data in sent:
+        client.sendall(data)
+    return client
+
+
+def _answer(client: socket.socket) -> bytes:
+    """Head and body of an answer in JSON, which may come in several pieces."""
+    answer = b""
+    while not answer.endswith(b"}"):
+        received = client.recv(65536)
+        assert received, f"the connection has ended after {answer!r}"
+        answer += received
+    return answer
+
+
+def _ended(client: socket.socket) -> bool:
+    """Whether the server has closed the connection, reading what it still sent."""
+    end_s = time.monotonic() + PATIENCE_S
+    try:
+        while client.recv(65536):
+            assert time.monotonic() < end_s, "the connection is still open"
+    except ConnectionResetError:
+        pass
+    return True
+
+
+def test_a_stream_begins_with_everything_and_goes_on_with_what_changes() -> None:
+    house = make_house()
+    house.move("a", "b", x=1.0)
+    with serving(house) as port, streaming(port) as events:
+        name, frame = next(events)
+        assert (name, frame["tags"], frame["x"]) == ("snapshot", ["a", "b"], [1.0, 1.0])
+        PoseFrame.model_validate(frame)
+        house.move("b", x=2.0)
+        name, frame = next(events)
+        assert (name, frame["tags"], frame["x"]) == ("poses", ["b"], [2.0])
+        house.move("c", x=3.0)
+        assert next(events)[1]["tags"] == ["c"]
+
+
+def test_a_stream_of_nothing_begins_with_an_empty_snapshot() -> None:
+    with serving(make_house()) as port, streaming(port) as events:
+        name, frame = next(events)
+        assert (name, frame["tags"]) == ("snapshot", [])
+
+
+def test_a_stream_of_some_tags_leaves_the_others_out_and_takes_late_ones_in() -> None:
+    house = make_house()
+    house.move("a", "b")
+    with serving(house) as port, streaming(port, "max_hz=30&tags=b,late") as events:
+        assert next(events)[1]["tags"] == ["b"]
+        house.move("a")
+        house.move("late")
+        assert next(events)[1]["tags"] == ["late"]
+
+
+def test_a_client_gets_the_newest_poses_and_no_more_events_than_it_asked_for() -> None:
+    house = make_house()
+    house.move("a", x=0.0)
+    with serving(house) as port, streaming(port, "max_hz=5") as events:
+        next(events)
+        begun_s = time.monotonic()
+        seen: list[float] = []
+        for count in range(1, 101):
+            house.move("a", x=float(count))
+            time.sleep(0.01)
+        while not seen or seen[-1] != 100.0:
+            seen.append(next(events)[1]["x"][0])
+        assert len(seen) <= (time.monotonic() - begun_s) * 5 + 1
+        assert seen == sorted(set(seen))
+
+
+def test_a_tag_that_falls_silent_or_offline_is_said_though_nobody_writes() -> None:
+    house = make_house()
+    house.move("a", "b")
+    house.answers.tags.set_online("b", True)
+    with serving(house) as port, streaming(port) as events:
+        assert next(events)[1]["online"] == [False, True]
+        house.answers.tags.set_online("b", False)
+        frame = next(events)[1]
+        assert (frame["tags"], frame["online"]) == (["b"], [False])
+        house.now_ns += 2_000_000_000
+        assert next(events)[1]["state"] == ["coasting", "coasting"]
+
+
+def test_a_quiet_stream_shows_that_it_lives(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stream, "HEARTBEAT_S", 0.1)
+    with serving(make_house()) as port, streaming(port) as events:
+        next(events)
+        assert next(events) == ("", ": alive")
+
+
+@pytest.mark.parametrize("query", ["max_hz=nan", "max_hz=inf", "max_hz=0.09", "max_hz=30.1", "max_hz=fast", "hz=1"])
+def test_a_stream_that_cannot_be_is_a_problem(query: str) -> None:
+    with serving(make_house()) as port:
+        assert kind_of(_get(port, f"/api/v1/stream?{query}")) == "invalid-request"
+
+
+def test_streams_end_by_themselves_when_the_server_stops() -> None:
+    house = make_house()
+    with serving(house) as port, streaming(port, "max_hz=0.1") as events:
+        next(events)
+        house.stopping.set()
+        begun_s = time.monotonic()
+        assert list(events) == []
+        assert time.monotonic() - begun_s < 8.0
+
+
+def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
+    house = make_house()
+    house.move(*(f"tag-{number}" for number in range(2000)))
+    with serving(house) as port:
+        client = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
+        for _ in range(10):
+            house.move(*(f"tag-{number}" for number in range(2000)))
+            time.sleep(0.05)
+        begun_s = time.monotonic()
+    assert time.monotonic() - begun_s < 20.0
+    client.close()
+
+
+def test_a_client_that_stops_reading_is_cut_and_harms_nobody() -> None:
+    house = make_house()
+    names = [f"tag-{number}" for number in range(2000)]
+    house.move(*names)
+    with serving(house, Impatient) as port, streaming(port) as events:
+        next(events)
+        stuck = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
+        gaps_s, end_s = [], time.monotonic() + 3.0
+        while time.monotonic() < end_s:
+            house.move(*names)
+            begun_s = time.monotonic()
+            next(events)
+            gaps_s.append(time.monotonic() - begun_s)
+        assert statistics.median(gaps_s) < 2.0
+        with closing(stuck):
+            received = stuck.recv(2**26, socket.MSG_WAITALL)
+            assert received.startswith(b"HTTP/1.1 200")
+            assert _ended(stuck)
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"",
+        b"G",
+        b"GET /api/v1/health/live HTTP/1.1\r\nhost:",
+        b"PUT /api/v1/site HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{",
+    ],
+)
+def test_half_a_request_is_cut(sent: bytes) -> None:
+    with serving(make_house(), Impatient) as port:
+        clients = [_connected(port, sent) for _ in range(50)]
+        assert _get(port).status_code == 200
+        begun_s = time.monotonic()
+        assert all(_ended(client) for client in clients)
+        assert time.monotonic() - begun_s < 30.0
+        for client in clients:
+            client.close()
+
+
+def test_half_a_second_request_is_cut_too() -> None:
+    with (
+        serving(make_house(), Impatient) as port,
+        closing(_connected(port, b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n")) as client,
+    ):
+        assert _answer(client).startswith(b"HTTP/1.1 200")
+        begun_s = time.monotonic()
+        client.sendall(b"G")
+        assert _ended(client)
+        assert time.monotonic() - begun_s < 30.0
+
+
+def test_a_slow_but_honest_request_and_a_long_stream_are_left_alone() -> None:
+    house = make_house()
+    with serving(house, Fair) as port, streaming(port) as events:
+        next(events)
+        request = b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n"
+        client = _connected(port, request[:20])
+        time.sleep(0.3)
+        client.sendall(request[20:])
+        with closing(client):
+            assert _answer(client).startswith(b"HTTP/1.1 200")
+            time.sleep(2.1)
+            client.sendall(request)
+            assert _answer(client).startswith(b"HTTP/1.1 200")
+        house.move("a")
+        assert next(events)[1]["tags"] == ["a"]
+
+
+def test_a_large_body_is_refused_before_it_is_sent() -> None:
+    head = f"PUT /api/v1/site HTTP/1.1\r\nhost: x\r\ncontent-length: {MAX_BODY_BYTES + 1}\r\n\r\n"
+    with serving(make_house()) as port, closing(_connected(port, head.encode())) as client:
+        answer = _answer(client)
+        assert answer.startswith(b"HTTP/1.1 413")
+        assert b"application/problem+json" in answer
+
+
+def test_junk_and_endless_headers_are_refused_and_the_service_lives() -> None:
+    with serving(make_house()) as port:
+        for sent in (b"\x16\x03\x01" * 100, b"GET / HTTP/1.1\r\n" + b"x: y\r\n" * 20_000):
+            with closing(_connected(port, sent)) as client:
+                assert _ended(client)
+        assert _get(port).status_code == 200
+
+
+def test_a_port_that_is_taken_is_said_in_a_sentence() -> None:
+    with closing(listen("127.0.0.1", 0)) as first:
+        first.listen()
+        with pytest.raises(ListenError, match="another program uses it"):
+            listen("127.0.0.1", first.getsockname()[1])
+
+
+def test_an_address_of_another_machine_is_said_in_a_sentence() -> None:
+    with pytest.raises(ListenError, match="does not have the address"):
+        listen("192.0.2.1", 0)

@@ -1,0 +1,156 @@
+"""Tracks over REST, and poses of long ago."""
+
+import csv
+import io
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from api_house import T_NS, House, ask, kind_of, make_house
+from dropanchor_schemas.pose import Pose
+from dropanchor_schemas.site import Anchor, Georeference, Site
+from dropanchor_schemas.track import Track
+from dropanchor_service.estimation.batch import State
+from dropanchor_service.history.tracks import Retention
+from dropanchor_service.store import LatestPoses
+
+SECOND = 1_000_000_000
+KEEPING = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
+GEOREFERENCED = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4))
+SECONDS = 600
+
+
+def driven(folder: Path, site: Site | None = None) -> House:
+    """A tag that drove east at 2 m/s for ten minutes; only the history remembers."""
+    house = make_house(site, folder, KEEPING)
+    for second in range(SECONDS + 1):
+        house.now_ns = T_NS - (SECONDS - second) * SECOND
+        house.move("a", x=2.0 * second, speed=2.0, sigma_pos=0.2, anchor=0)
+    house.keep()
+    house.answers.latest = LatestPoses()
+    return house
+
+
+def track(house: House, query: str = "") -> Track:
+    response = ask(house.app(), "GET", f"/api/v1/tags/a/track?{query}")
+    assert response.status_code == 200, response.text
+    return Track.model_validate(response.json())
+
+
+def test_a_track_is_the_last_hour_unless_asked_otherwise(tmp_path: Path) -> None:
+    house = driven(tmp_path)
+    everything = track(house)
+    assert (len(everything.poses), everything.next) == (SECONDS + 1, None)
+    assert everything.to_ns - everything.from_ns == 3600 * SECOND
+    some = track(house, f"from={T_NS - 20 * SECOND}&to={T_NS - 10 * SECOND}")
+    assert [(pose.t_ns - T_NS) // SECOND for pose in some.poses] == list(range(-20, -9))
+    last = some.poses[-1]
+    assert (last.x, last.speed_mps, last.anchor, last.state) == (1180.0, 2.0, "17", "tracking")
+    assert last.covariance == [[0.04, 0, 0], [0, 0.01, 0], [0, 0, 0.001]]
+
+
+def test_pages_follow_each_other_without_a_gap_by_cursor_and_by_link(tmp_path: Path) -> None:
+    house = driven(tmp_path)
+    found, path = [], f"/api/v1/tags/a/track?to={T_NS}&limit=250"
+    while path:
+        response = ask(house.app(), "GET", path)
+        page = Track.model_validate(response.json())
+        found += [pose.t_ns for pose in page.poses]
+        link = response.headers.get("link", "")
+        assert (page.next is None) == (link == "")
+        path = "/api/v1/tags/a/track" + link.partition(">")[0].strip("<") if link else ""
+    assert found == [T_NS - second * SECOND for second in range(SECONDS, -1, -1)]
+
+
+def test_a_table_has_every_number_and_latitudes_only_where_there_are_any(tmp_path: Path) -> None:
+    house = driven(tmp_path)
+    response = ask(house.app(), "GET", "/api/v1/tags/a/track", headers={"accept": "text/csv"})
+    rows = list(csv.DictReader(io.StringIO(response.text)))
+    assert response.headers["content-type"].startswith("text/csv")
+    assert (len(rows), rows[5]["x"], rows[5]["var_x"], rows[5]["state"]) == (SECONDS + 1, "10.0", "0.04", "tracking")
+    assert "lat" not in rows[0]
+
+
+@pytest.mark.parametrize("form", ["geojson", "gpx"])
+def test_what_holds_latitudes_needs_a_georeference(tmp_path: Path, form: str) -> None:
+    assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?format={form}")) == "not-georeferenced"
+
+
+def test_gpx_and_geojson_show_where_on_the_earth(tmp_path: Path) -> None:
+    house = driven(tmp_path, GEOREFERENCED)
+    gpx = ask(house.app(), "GET", "/api/v1/tags/a/track?format=gpx")
+    points = list(ElementTree.fromstring(gpx.text).iter("{http://www.topografix.com/GPX/1/1}trkpt"))
+    assert (gpx.headers["content-type"], len(points)) == ("application/gpx+xml", SECONDS + 1)
+    assert points[-1][0].text == "2027-01-15T08:00:00.000Z"
+    metres = (float(points[-1].attrib["lon"]) - 13.4) * math.radians(1) * 6_378_137 * math.cos(math.radians(52.5))
+    assert metres == pytest.approx(2.0 * SECONDS, rel=5e-3)
+    accept = {"accept": "application/geo+json"}
+    features = ask(house.app(), "GET", "/api/v1/tags/a/track", headers=accept).json()["features"]
+    assert features[-1]["geometry"]["coordinates"][0] == pytest.approx(float(points[-1].attrib["lon"]))
+    assert features[-1]["properties"]["covariance"][0][0] == 0.04
+
+
+def test_gpx_leaves_out_where_a_tag_only_may_have_been(tmp_path: Path) -> None:
+    house = driven(tmp_path, GEOREFERENCED)
+    house.now_ns = T_NS + SECOND
+    house.move("a", x=0.0, state=State.AMBIGUOUS)
+    house.keep()
+    text = ask(house.app(), "GET", "/api/v1/tags/a/track?format=gpx").text
+    assert text.count("<trkpt") == SECONDS + 1
+
+
+@pytest.mark.parametrize(
+    "query", ["from=2&to=1", "limit=0", "limit=10001", "from=-1", "cursor=x", "format=kml", "form=csv", "from=0"]
+)
+def test_a_question_that_is_none_is_refused(tmp_path: Path, query: str) -> None:
+    assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?{query}")) == "invalid-request"
+
+
+def test_unknown_tags_no_history_and_a_broken_one_are_different_problems(tmp_path: Path) -> None:
+    house = driven(tmp_path)
+    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/track")) == "unknown-tag"
+    assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/track")) == "no-history"
+    for file in tmp_path.glob("history.sqlite*"):
+        file.write_bytes(b"torn " * 1000)
+    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/a/track")) == "history-unreadable"
+
+
+def pose_at(house: House, offset_s: float) -> Pose:
+    response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
+    assert response.status_code == 200, response.text
+    return Pose.model_validate(response.json())
+
+
+def test_a_pose_of_long_ago_lies_between_its_neighbours_and_says_how_far_the_tag_can_have_strayed(
+    tmp_path: Path,
+) -> None:
+    house = driven(tmp_path)
+    exactly, between = pose_at(house, -300.0), pose_at(house, -299.5)
+    assert (exactly.x, between.x) == (600.0, 601.0)
+    assert exactly.covariance is not None
+    assert between.covariance is not None
+    assert exactly.covariance[0][0] == pytest.approx(0.04)
+    assert between.covariance[0][0] == pytest.approx(0.04 + 0.125**2)  # 1 m/s² over half a gap of 1 s
+    assert (between.anchor, between.age_s, between.hypotheses) == ("17", 299.5, [])
+
+
+def test_a_pose_of_long_ago_is_refused_where_nothing_near_was_kept(tmp_path: Path) -> None:
+    house = driven(tmp_path)
+    house.now_ns = T_NS + 60 * SECOND
+    house.move("a", x=1200.0)
+    house.keep()
+    for offset_s in (-SECONDS - 1.0, 30.0):
+        response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
+        assert kind_of(response) == "no-pose-then", response.text
+    assert kind_of(ask(house.app(), "GET", f"/api/v1/tags/b/pose?at={T_NS}")) == "unknown-tag"
+
+
+def test_memory_and_history_meet_without_a_gap(tmp_path: Path) -> None:
+    house = driven(tmp_path)
+    for tenth in range(5, 60):
+        house.now_ns = T_NS + tenth * SECOND // 10
+        house.move("a", x=1200.0 + 0.2 * tenth, speed=2.0, sigma_pos=0.2)  # not written yet
+    assert pose_at(house, 0.25).x == pytest.approx(1200.5)
+    assert pose_at(house, 5.05).x == pytest.approx(1210.1)

@@ -1,0 +1,65 @@
+"""The ingest thread survives errors, gathers messages, and tells when it does not run."""
+
+import threading
+
+import pytest
+
+from dropanchor_schemas.wire import Frame, RangeSample
+from dropanchor_service.ingest import thread as ingest_thread
+from dropanchor_service.ingest.thread import IngestThread
+from support.ingest import Bench
+from support.zenoh_router import wait_until
+
+T = 1_760_000_000_000_000_000
+
+
+def frame(value: float) -> Frame:
+    return Frame(ranges=[RangeSample(T, 7, value)])
+
+
+def thread_of(bench: Bench) -> IngestThread:
+    return IngestThread(bench.ingest, bench.buffer, bench.metrics, period_s=0.001)
+
+
+def test_messages_become_poses_without_being_asked_for() -> None:
+    bench = Bench()
+    thread = thread_of(bench)
+    thread.start()
+    bench.put("a", frame(4.0))
+    wait_until(lambda: bench.x_of("a") == [4.0])
+    assert thread.problem is None
+    thread.stop()
+    assert not thread.is_alive
+
+
+def test_an_error_of_ours_is_counted_and_the_thread_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench()
+    turn, failures = bench.ingest.turn, 3
+
+    def failing(most: int) -> int:
+        nonlocal failures
+        if failures:
+            failures -= 1
+            raise RuntimeError("a bug")
+        return turn(most)
+
+    monkeypatch.setattr(bench.ingest, "turn", failing)
+    thread = thread_of(bench)
+    thread.start()
+    bench.put("a", frame(4.0))
+    wait_until(lambda: bench.x_of("a") == [4.0])
+    thread.stop()
+    assert bench.metrics.faults.labels("ingest")._value.get() == 3
+
+
+def test_a_thread_that_does_not_run_or_is_stuck_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench()
+    thread = thread_of(bench)
+    assert thread.problem == "the ingest thread does not run"
+    release = threading.Event()
+    monkeypatch.setattr(bench.ingest, "turn", lambda _: release.wait(5.0))
+    monkeypatch.setattr(ingest_thread, "SILENT_S", 0.05)
+    thread.start()
+    wait_until(lambda: "stuck" in (thread.problem or ""))
+    release.set()
+    thread.stop()

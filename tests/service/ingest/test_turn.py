@@ -1,0 +1,407 @@
+"""From messages to poses: admission, anchors, duplicates, clocks; every loss is counted, and no fault spreads."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dropanchor_schemas import Anchor, StartPose, TagSettings
+from dropanchor_schemas.wire import (
+    ENCODING_JSON,
+    Frame,
+    HeadingSample,
+    ImuSample,
+    RangeSample,
+    anchor_number,
+    encode_json,
+    encode_packed,
+)
+from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
+from dropanchor_service.ingest import samples as prepare
+from dropanchor_service.ingest.buffer import STRANGERS_PER_TURN
+from dropanchor_service.ingest.decode import Forms, read_forms
+from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
+from support.ingest import Bench
+
+T = 1_760_000_000_000_000_000
+S = 1_000_000_000
+IMU = ImuSample(T, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0))
+
+
+def ranges(*values: float, anchor: int = 7, sequence: int | None = None, boot_id: int | None = None) -> Frame:
+    samples = [RangeSample(T + i * 1_000_000, anchor, value) for i, value in enumerate(values)]
+    return Frame(ranges=samples, sequence=sequence, boot_id=boot_id)
+
+
+def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_come_back_as_poses() -> None:
+    bench = Bench()
+    bench.put("a", ranges(1.0, 2.0))
+    bench.put("b", Frame(ranges=[RangeSample(T, 7, 5.0)], imu=[IMU, IMU], headings=[HeadingSample(T, 1.0)]))
+    bench.ingest.turn()
+    assert len(bench.engine.batches) == 1
+    assert bench.x_of("ab") == [2.0, 5.0]
+    b = bench.tags.find("b")
+    assert b is not None
+    assert b.samples == {"imu": 2, "range": 1, "heading": 1}
+    assert b.messages == 1
+    assert bench.rejected() == {}
+
+
+def test_json_and_packed_messages_do_the_same() -> None:
+    bench = Bench()
+    bench.put("a", encode_json(ranges(3.0)), ENCODING_JSON)
+    bench.put("b", ranges(3.0))
+    bench.ingest.turn()
+    assert bench.x_of("ab") == [3.0, 3.0]
+
+
+def test_the_first_anchor_that_is_heard_becomes_the_origin_and_others_are_unknown() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0, anchor=7), ranges(2.0, anchor=8), ranges(3.0, anchor=7))
+    assert bench.site.site.anchors == [Anchor(id="7")]
+    assert bench.engine.anchors is not None
+    assert bench.engine.anchors.tolist() == [(0.0, 0.0, 0.0)]
+    assert bench.rejected() == {"anchor_unknown": 1}
+    assert bench.x_of("a") == [3.0]
+
+
+def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
+    bench = Bench()
+    frame = ranges(1.0, anchor=anchor_number("gate"))
+    frame.anchor_names = {anchor_number("gate"): "gate"}
+    bench.put("a", encode_json(frame), ENCODING_JSON)
+    bench.ingest.turn()
+    assert [anchor.id for anchor in bench.site.site.anchors] == ["gate"]
+
+
+def test_a_bad_range_does_not_bind_an_anchor() -> None:
+    bench = Bench()
+    bench.send("a", ranges(-1.0, anchor=9), ranges(1.0, anchor=7))
+    assert [anchor.id for anchor in bench.site.site.anchors] == ["7"]
+
+
+def test_good_samples_of_a_frame_are_kept_beside_bad_ones_which_are_counted_for_their_tag() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0, -1.0, float("nan"), 9000.0, 2.0))
+    tag = bench.tags.find("a")
+    assert tag is not None
+    assert tag.samples == {"range": 2}
+    assert tag.rejected == {"range_negative": 1, "not_finite": 1, "range_absurd": 1}
+    assert bench.rejected() == tag.rejected
+    assert bench.x_of("a") == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding", "reason"),
+    [
+        (b"", "application/vnd.dropanchor.samples", "payload_empty"),
+        (b"\x01", "application/vnd.dropanchor.samples", "header_truncated"),
+        (b"\x02" + bytes(31), "application/vnd.dropanchor.samples", "version_unknown"),
+        (b"\x01\x80" + bytes(30), "application/vnd.dropanchor.samples", "flags_unknown"),
+        (b"\x01" + bytes(31), "application/vnd.dropanchor.samples", "no_samples"),
+        (b"\x01" + bytes(40), "application/vnd.dropanchor.samples", "length_mismatch"),
+        (bytes(70_000), "application/vnd.dropanchor.samples", "payload_too_large"),
+        (b"{", "application/json", "json_syntax"),
+        (b"[]", "application/json", "json_schema"),
+        (b"{}", "application/json", "no_samples"),
+        (b'{"version":2}', "application/json", "version_unknown"),
+        (b"x", "zenoh/bytes", "encoding_unknown"),
+    ],
+)
+def test_a_bad_payload_is_counted_for_its_tag_and_its_neighbours_pass(
+    payload: bytes, encoding: str, reason: str
+) -> None:
+    bench = Bench()
+    bench.put("good", ranges(1.0))
+    bench.put("bad", payload, encoding)
+    bench.put("good", ranges(2.0))
+    bench.ingest.turn()
+    tag = bench.tags.find("bad")
+    assert tag is not None
+    assert tag.rejected == {reason: 1}
+    assert bench.rejected() == {reason: 1}
+    assert bench.x_of(["good"]) == [2.0]
+
+
+@pytest.mark.parametrize(
+    "key", ["dropanchor/@v1/default/tag/%zz/samples", "elsewhere", "dropanchor/@v1/default/tag/a%2d/samples"]
+)
+def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
+    bench = Bench()
+    bench.buffer.append(key, encode_packed(ranges(1.0)), "application/vnd.dropanchor.samples", T)
+    bench.ingest.turn()
+    assert bench.rejected() == {"key_invalid": 1}
+    assert len(bench.tags) == 0
+
+
+def test_unknown_tags_are_refused_when_the_settings_say_so_and_listed_ones_are_not() -> None:
+    bench = Bench(unknown_tags="refuse", tags={"listed": {}})
+    bench.send("listed", ranges(1.0))
+    bench.send("stranger", ranges(2.0))
+    assert bench.rejected() == {"tag_unknown": 1}
+    assert bench.x_of(["listed", "stranger"]) == [1.0, None]
+    bench.site.set_tag("stranger", TagSettings())
+    bench.send("stranger", ranges(3.0))
+    assert bench.x_of(["stranger"]) == [3.0]
+
+
+def test_no_more_tags_than_max_tags_are_registered() -> None:
+    bench = Bench(max_tags=2)
+    for name in "abcd":
+        bench.send(name, ranges(1.0))
+    assert [tag.name for tag in bench.tags.all()] == ["a", "b"]
+    assert bench.rejected() == {"tags_full": 2}
+
+
+def test_a_message_that_comes_twice_is_fused_once() -> None:
+    bench = Bench()
+    first, second = ranges(1.0, sequence=0, boot_id=5), ranges(2.0, sequence=1, boot_id=5)
+    bench.send("a", first, second, first)
+    bench.send("a", second, first)
+    assert sum(len(batch.ranges) for batch in bench.engine.batches) == 2
+    assert bench.rejected() == {"duplicate": 3}
+
+
+def test_a_gap_waits_for_what_came_soon_after_it_however_long_both_have_lain_in_a_backlog() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0, sequence=0, boot_id=1))
+    now_ns = bench.clock.now_ns()
+    for sequence, ago_ns in ((2, 900_000_000), (1, 800_000_000), (4, 700_000_000)):
+        bench.put("a", ranges(1.0, sequence=sequence, boot_id=1), at_ns=now_ns - ago_ns)
+    passed = []
+    for _ in range(4):
+        bench.ingest.turn(most=1)
+        passed.append(bench.total(bench.metrics.samples))
+    assert passed == [1, 3, 3, 4]
+    assert bench.total(bench.metrics.given_up) == 1
+
+
+def test_two_publishers_of_one_tag_and_two_tags_count_on_their_own() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0, sequence=0, boot_id=5), ranges(1.0, sequence=0, boot_id=6))
+    bench.send("b", ranges(1.0, sequence=0, boot_id=5))
+    assert sum(len(batch.ranges) for batch in bench.engine.batches) == 3
+    assert bench.rejected() == {}
+
+
+def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
+    bench = Bench()
+    second = 1_000_000_000
+    for number, tag_s, arrival_s in ((0, 1.0, 101.0), (1, 2.0, 102.5), (2, 3.0, 103.0)):
+        frame = Frame(ranges=[RangeSample(int(tag_s * second), 7, 1.0)], boot_clock=True, boot_id=9, sequence=number)
+        bench.put("a", frame, at_ns=T + int(arrival_s * second))
+    bench.ingest.turn()
+    times = [int(batch.ranges["t_ns"][0]) - T for batch in bench.engine.batches]
+    assert times == [101 * second, 102 * second, 103 * second]
+
+
+def test_settings_of_a_tag_reach_the_engine_before_it_is_heard_and_when_they_change() -> None:
+    bench = Bench(tags={"a": {"height_m": 1.5}})
+    bench.ingest.turn()
+    assert list(bench.engine.configured) == [0]
+    bench.send("a", ranges(1.0))
+    bench.send("b", ranges(1.0))
+    bench.site.set_tag("a", TagSettings(height_m=2.5))
+    bench.ingest.turn()
+    assert [float(settings["height"]) for settings in bench.engine.configured[0]] == [1.5, 2.5]
+    assert len(bench.engine.configured[1]) == 1
+
+
+def test_a_new_anchor_starts_nothing_afresh_but_one_that_moves_does() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0))
+    bench.site.set_anchor(Anchor(id="8", x=5.0))
+    bench.ingest.turn()
+    assert len(bench.engine.configured[0]) == 1
+    bench.site.set_anchor(Anchor(id="7", x=1.0))
+    bench.ingest.turn()
+    assert len(bench.engine.configured[0]) == 2
+    assert bench.engine.anchors is not None
+    assert bench.engine.anchors["x"].tolist() == [1.0, 5.0]
+
+
+def poison_row(row: int) -> Callable[[SampleBatch], bool]:
+    def poisoned(samples: SampleBatch) -> bool:
+        return row in samples.ranges["row"]
+
+    return poisoned
+
+
+def test_a_row_that_makes_the_engine_fail_stops_nobody_else_and_is_shown_as_lost() -> None:
+    bench = Bench(tags={"2": {"start": StartPose(x=1.0, y=1.0).model_dump()}})
+    names = [str(i) for i in range(8)]
+    for name in names:
+        bench.send(name, ranges(1.0))
+    poisoned = bench.tags.find("2")
+    assert poisoned is not None
+    bench.engine.poisoned = poison_row(poisoned.row)
+    for name in names:
+        bench.put(name, ranges(2.0))
+    bench.ingest.turn()
+    others = [name for name in names if name != "2"]
+    assert bench.x_of(others) == [2.0] * 7
+    pose = bench.latest.row(poisoned.row)
+    assert pose is not None
+    assert [pose["state"].item(), pose["reason"].item()] == [State.LOST, StateReason.FAULT]
+    assert np.isnan(pose["x"])
+    first, afresh = bench.engine.configured[poisoned.row]
+    assert first["start_known"]
+    assert not afresh["start_known"]
+
+
+def test_a_row_that_fails_again_and_again_is_left_alone_and_counted() -> None:
+    bench = Bench()
+    bench.send("a", ranges(1.0))
+    bench.engine.poisoned = poison_row(0)
+    for _ in range(FAULTS_BEFORE_QUARANTINE + 4):
+        bench.send("a", ranges(1.0))
+    assert bench.rejected() == {"estimator_fault": 4}
+    assert bench.metrics.faults.labels("estimator")._value.get() == FAULTS_BEFORE_QUARANTINE
+
+
+def test_a_payload_that_the_decoder_fails_on_costs_nothing_but_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(payloads: list[bytes], encodings: list[str]) -> Forms:
+        if b"poison" in payloads:
+            raise RuntimeError("a bug")
+        return read_forms(payloads, encodings)
+
+    monkeypatch.setattr(prepare, "read_forms", fails)
+    bench = Bench()
+    bench.send("a", ranges(1.0), b"poison", ranges(2.0))
+    assert bench.x_of("a") == [2.0]
+    assert bench.rejected() == {"payload_empty": 1}
+
+
+def test_a_flood_of_unknown_tags_is_bounded_and_known_tags_are_unharmed() -> None:
+    bench = Bench(max_tags=10)
+    bench.send("known", ranges(1.0))
+    for number in range(50_000):
+        bench.put(f"stranger{number}", ranges(1.0))
+    bench.send("known", ranges(2.0))
+    assert bench.x_of(["known"]) == [2.0]
+    take_turns(bench)
+    assert len(bench.tags) == 10
+    rejected = bench.rejected()
+    assert rejected["shed"] > 0
+    assert rejected["shed"] + rejected["tags_full"] == 50_000 - 9
+
+
+def take_turns(bench: Bench) -> None:
+    while bench.buffer.depth:
+        bench.ingest.turn()
+
+
+def fused(bench: Bench) -> list[float]:
+    return [value for batch in bench.engine.batches for value in batch.ranges["range"].tolist()]
+
+
+def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses_neither() -> None:
+    bench = Bench(unproven_tags=1)
+    bench.send("quick", ranges(1.0))
+    bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["quick"]
+    assert len(bench.newcomers) == 1
+    bench.put("slow", ranges(3.0, sequence=1, boot_id=5), at_ns=T + S)
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["quick", "slow"]
+    assert fused(bench) == [1.0, 2.0, 3.0]
+    assert len(bench.newcomers) == 0
+    assert bench.rejected() == {}
+
+
+def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
+    bench = Bench(unproven_tags=0)
+    for _ in range(3):
+        bench.put("doubled", ranges(1.0), at_ns=T)
+    for second in range(3):
+        bench.put("junk", b"junk", at_ns=T + second * S)
+    bench.ingest.turn()
+    assert len(bench.tags) == 0
+    assert bench.rejected() == {"version_unknown": 3}
+    assert [newcomer.name for newcomer in bench.newcomers.all()] == ["doubled"]
+
+
+def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
+    bench = Bench(unproven_tags=1)
+    bench.put("first", ranges(1.0), at_ns=T)
+    bench.put("waits", ranges(2.0), at_ns=T)
+    bench.ingest.turn()
+    bench.put("first", ranges(3.0), at_ns=T + S)
+    bench.ingest.turn()
+    bench.put("at-once", ranges(4.0), at_ns=T + S)
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["first", "at-once"]
+
+
+def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_counted() -> None:
+    bench = Bench(max_tags=100, unproven_tags=10)
+    for number in range(5_000):
+        bench.put(f"stranger{number}", ranges(1.0))
+        if number % 200 == 0:
+            bench.ingest.turn()
+    take_turns(bench)
+    bench.ingest.turn()
+    assert len(bench.tags) == 10
+    assert len(bench.newcomers) == 100
+    assert bench.rejected() == {"tag_unproven": 5_000 - 10 - 100}
+
+
+def test_a_tag_in_quarantine_is_listed_and_comes_in_once_somebody_has_put_its_settings() -> None:
+    bench = Bench(unknown_tags="quarantine", tags={"listed": {}})
+    bench.send("listed", ranges(1.0))
+    for value in (2.0, 3.0):
+        bench.send("stranger", ranges(value))
+    assert fused(bench) == [1.0]
+    assert [(newcomer.name, newcomer.messages) for newcomer in bench.newcomers.all()] == [("stranger", 2)]
+    assert bench.rejected() == {"tag_quarantined": 2}
+    bench.site.set_tag("stranger", TagSettings())
+    bench.send("stranger", ranges(4.0))
+    assert fused(bench) == [1.0, 4.0]
+    assert len(bench.newcomers) == 0
+
+
+def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
+    bench = Bench(unproven_tags=0)
+    bench.put("a", ranges(1.0), at_ns=T)
+    bench.ingest.turn()
+    bench.tags.register("a")  # as REST does
+    bench.ingest.turn()
+    assert fused(bench) == [1.0]
+
+
+def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
+    names = [f"listed-{number}" for number in range(STRANGERS_PER_TURN + 500)]
+    bench = Bench(tags={name: {} for name in names})
+    bench.ingest.turn()
+    for name in names:
+        bench.put(name, ranges(1.0))
+    while bench.buffer.depth:
+        bench.ingest.turn()
+    assert bench.rejected() == {}
+    assert bench.x_of(names) == [1.0] * len(names)
+
+
+def test_shed_messages_are_counted_for_their_tag() -> None:
+    bench = Bench(capacity=100_000)
+    bench.send("busy", ranges(1.0))
+    bench.send("quiet", ranges(1.0))
+    bench.put("quiet", ranges(2.0))
+    for _ in range(1000):
+        bench.put("busy", ranges(3.0))
+    bench.ingest.turn()
+    bench.ingest.turn()
+    busy, quiet = bench.tags.find("busy"), bench.tags.find("quiet")
+    assert busy is not None
+    assert quiet is not None
+    assert busy.rejected["shed"] + busy.messages == 1001
+    assert busy.rejected["shed"] > 0
+    assert quiet.messages == 2
+
+
+def test_a_listed_tag_has_a_row_before_it_is_heard_and_an_announced_one_too(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, tags={"listed": {}})
+    bench.ingest.announce("alive")
+    bench.ingest.turn()
+    assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]

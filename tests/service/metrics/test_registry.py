@@ -1,0 +1,53 @@
+"""What Prometheus sees."""
+
+import numpy as np
+from prometheus_client import generate_latest
+
+from dropanchor_schemas.wire import Frame, RangeSample, Reason
+from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State
+from dropanchor_service.metrics.registry import FleetGauges, Metrics
+from dropanchor_service.store import LatestPoses, Newcomers, TagTable
+from support.ingest import Bench
+
+S = 1_000_000_000
+
+
+def lines(metrics: Metrics) -> dict[str, float]:
+    text = generate_latest(metrics.registry).decode()
+    return {key: float(value) for key, value in (line.rsplit(" ", 1) for line in text.splitlines() if line[0] != "#")}
+
+
+def test_samples_rejections_and_times_are_counted() -> None:
+    bench = Bench()
+    bench.send("a", Frame(ranges=[RangeSample(S, 7, 1.0), RangeSample(S, 7, -1.0)]))
+    found = lines(bench.metrics)
+    assert found['dropanchor_samples_total{kind="range"}'] == 1
+    assert found['dropanchor_rejected_total{reason="range_negative"}'] == 1
+    assert found["dropanchor_messages_total"] == found["dropanchor_poses_total"] == 1
+    assert found["dropanchor_estimator_seconds_count"] == found["dropanchor_pose_delay_seconds_count"] == 1
+
+
+def test_every_reason_is_there_from_the_start_so_that_a_rate_can_be_taken() -> None:
+    found = lines(Metrics())
+    assert all(found[f'dropanchor_rejected_total{{reason="{reason}"}}'] == 0 for reason in Reason)
+
+
+def test_tags_are_counted_by_the_state_that_is_shown_not_by_the_one_that_was_stored() -> None:
+    tags, latest, metrics = TagTable(), LatestPoses(), Metrics()
+    poses = np.zeros(3, POSE)
+    poses["row"], poses["state"] = [0, 1, 2], State.TRACKING
+    poses["t_ns"] = [100 * S, 97 * S, 50 * S]
+    latest.write(poses, np.empty(0, HYPOTHESIS))
+    for name in "abcd":
+        tags.register(name)
+    tags.set_online("a", True)
+    newcomers = Newcomers(10)
+    newcomers.hear("e", 100 * S)
+    metrics.watch(FleetGauges(tags, newcomers, latest, lambda: 100 * S, lambda: 5))
+    found = lines(metrics)
+    states = {state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("tracking", "coasting", "lost")}
+    assert states == {"tracking": 1, "coasting": 1, "lost": 1}
+    assert found["dropanchor_tags_registered"] == 4
+    assert found["dropanchor_newcomers"] == 1
+    assert found["dropanchor_tags_online"] == 1
+    assert found["dropanchor_queue_messages"] == 5

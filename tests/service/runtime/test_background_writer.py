@@ -1,0 +1,65 @@
+"""The thread that writes what others put down."""
+
+from collections.abc import Sequence
+
+from dropanchor_service.runtime.background_writer import BackgroundWriter
+from support.zenoh_router import wait_until
+
+
+class Disk:
+    """Where the items go, unless the disk is full."""
+
+    def __init__(self) -> None:
+        self.items: list[int] = []
+        self.error: Exception | None = None
+
+    def write(self, items: Sequence[int]) -> None:
+        if self.error is not None:
+            raise self.error
+        self.items.extend(items)
+
+
+def test_what_is_put_is_written_in_order_and_the_rest_at_the_stop() -> None:
+    disk = Disk()
+    writer = BackgroundWriter("test", disk.write, 0.01, 1000)
+    writer.start()
+    for item in range(5):
+        writer.put(item, 1)
+    wait_until(lambda: disk.items == [0, 1, 2, 3, 4])
+    writer.stop()
+    assert not writer.is_alive
+    slow = BackgroundWriter("test", disk.write, 3600.0, 1000)
+    slow.start()
+    slow.put(5, 1)
+    slow.stop()
+    assert disk.items == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_full_disk_costs_only_what_does_not_fit_into_the_queue() -> None:
+    disk = Disk()
+    disk.error = OSError(28, "No space left on device")
+    writer = BackgroundWriter("test", disk.write, 0.01, 100)
+    writer.put(0, 50, count=7)
+    assert not writer.turn()
+    assert "No space left" in (writer.problem or "")
+    writer.put(1, 50, count=7)
+    writer.put(2, 50, count=7)
+    assert (writer.dropped, writer.waiting_bytes) == (7, 100)
+    disk.error = None
+    assert writer.turn()
+    assert disk.items == [0, 1]
+    assert (writer.problem, writer.errors, writer.waiting_bytes) == (None, 1, 0)
+
+
+def test_a_mistake_of_ours_costs_what_was_to_be_written_and_not_the_thread() -> None:
+    disk = Disk()
+    disk.error = ZeroDivisionError("ours")
+    writer = BackgroundWriter("test", disk.write, 0.01, 1000)
+    writer.start()
+    writer.put(0, 1, count=3)
+    wait_until(lambda: writer.dropped == 3)
+    disk.error = None
+    writer.put(1, 1)
+    wait_until(lambda: disk.items == [1])
+    assert writer.is_alive
+    writer.stop()
