@@ -52,6 +52,7 @@ check: install
 	@$(BIN)/lint-imports --no-cache
 	@$(BIN)/python -m dropanchor_schemas.export --check
 	@$(BIN)/python -m dropanchor_service.api.export --check
+	@$(BIN)/python -m dropanchor_service.reference.export --check
 
 bench: install chromium
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)

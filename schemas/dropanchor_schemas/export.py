@@ -1,4 +1,4 @@
-"""Writes the JSON Schemas of the contract into `json/`, or with --check says whether they are current."""
+"""Write the JSON Schemas and the AsyncAPI document of the contract; with --check say whether they are current."""
 
 import json
 import sys
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
+from dropanchor_schemas import asyncapi
 from dropanchor_schemas.answers import PoseFrame
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseList
@@ -13,6 +14,7 @@ from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 
 FOLDER = Path(__file__).parent / "json"
+ASYNCAPI = "asyncapi.json"
 MODELS: dict[str, type[BaseModel]] = {
     "samples": SamplesMessage,
     "pose": Pose,
@@ -26,10 +28,11 @@ MODELS: dict[str, type[BaseModel]] = {
 
 
 def schemas() -> dict[Path, str]:
-    """The text of every exported file, by path."""
+    """Return the text of every exported file, by path."""
+    documents = {f"{name}.schema.json": model.model_json_schema() for name, model in MODELS.items()}
+    documents[ASYNCAPI] = asyncapi.document()
     return {
-        FOLDER / f"{name}.schema.json": json.dumps(model.model_json_schema(), indent=2, ensure_ascii=False) + "\n"
-        for name, model in MODELS.items()
+        FOLDER / name: json.dumps(document, indent=2, ensure_ascii=False) + "\n" for name, document in documents.items()
     }
 
 

@@ -32,7 +32,7 @@ def test_every_schema_is_valid(name: str) -> None:
 
 def test_every_schema_is_current_and_no_other_lies_beside_them() -> None:
     assert export.main(["--check"]) == 0
-    assert sorted(export.FOLDER.glob("*.schema.json")) == sorted(export.schemas())
+    assert sorted(export.FOLDER.glob("*.json")) == sorted(export.schemas())
 
 
 def test_drift_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

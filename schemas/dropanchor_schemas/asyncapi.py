@@ -1,0 +1,159 @@
+"""The AsyncAPI 3 document of the Zenoh contract: which key carries what, and who may put it there.
+
+AsyncAPI has no binding for Zenoh, so what only Zenoh knows (queryables, liveliness tokens) stands in `x-zenoh`.
+"""
+
+from typing import Any
+
+from pydantic import BaseModel
+
+from dropanchor_schemas import keys
+from dropanchor_schemas.answers import PoseFrame
+from dropanchor_schemas.pose import Pose
+from dropanchor_schemas.samples import SamplesMessage
+from dropanchor_schemas.site import Anchor
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER, MAX_PAYLOAD_BYTES
+
+_MODELS: tuple[type[BaseModel], ...] = (SamplesMessage, Pose, PoseFrame, Anchor)
+_PARAMETERS = {
+    "site": "Id of the site; `default` unless the settings say otherwise.",
+    "tag": "Id of the tag.",
+    "anchor": "Id of the anchor.",
+    "service": "Id of the running service; a new one at every start.",
+}
+_ESCAPING = "1 to 64 printable characters; all but A-Z a-z 0-9 . _ - are percent-escaped as UTF-8."
+
+
+def document() -> dict[str, Any]:
+    """Return the AsyncAPI 3.0 document, ready for JSON."""
+    return {
+        "asyncapi": "3.0.0",
+        "info": {
+            "title": "Dropanchor over Zenoh",
+            "version": "1",
+            "description": "Tags put raw samples, the service answers with poses. SI units; the site frame is ENU "
+            "with x east; times are UTC in ns unless a message says that its clock counts from boot.",
+            "license": {"name": "Apache-2.0"},
+        },
+        "defaultContentType": ENCODING_JSON,
+        "servers": {
+            "router": {
+                "host": "{router}:7447",
+                "protocol": "zenoh",
+                "description": "A Zenoh router: the service's own, or one that stands by itself.",
+                "variables": {"router": {"default": "127.0.0.1"}},
+            }
+        },
+        "channels": {name: _channel(*channel) for name, channel in _channels().items()},
+        "operations": _operations(),
+        "components": {"messages": _messages(), "schemas": _schemas()},
+    }
+
+
+def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
+    """Return for each channel its key, its messages, its description and what Zenoh adds."""
+    return {
+        "samples": (
+            _readable(keys.samples_key("{site}", "{tag}")),
+            ["samplesJson", "samplesPacked"],
+            "Batches of raw samples. Several publishers may feed one tag.",
+            {"kind": "put", "congestionControl": "drop", "cache": "AdvancedPublisher, recommended"},
+        ),
+        "tagAlive": (
+            _readable(keys.tag_alive_key("{site}", "{tag}")),
+            [],
+            "Liveliness token of a tag: present means online.",
+            {"kind": "liveliness"},
+        ),
+        "pose": (
+            _readable(keys.pose_key("{site}", "{tag}")),
+            ["pose"],
+            "The latest pose of one tag. A query may ask `?at=<t_ns>` for the pose at another time.",
+            {"kind": ["queryable", "put"], "put": "on change, at most 20 Hz, while somebody subscribes"},
+        ),
+        "poses": (
+            _readable(keys.poses_key("{site}")),
+            ["poseFrame"],
+            "The poses of all tags in columns.",
+            {"kind": "put", "put": "at most 10 Hz, while somebody subscribes"},
+        ),
+        "anchor": (
+            _readable(keys.anchor_key("{site}", "{anchor}")),
+            ["anchor"],
+            "The position of one anchor.",
+            {"kind": "queryable"},
+        ),
+        "serviceAlive": (
+            _readable(keys.service_alive_key("{site}", "{service}")),
+            [],
+            "Liveliness token of the service.",
+            {"kind": "liveliness"},
+        ),
+    }
+
+
+def _readable(key: str) -> str:
+    """Return the key with its placeholders, whose braces `keys` has escaped."""
+    return key.replace("%7B", "{").replace("%7D", "}")
+
+
+def _channel(address: str, messages: list[str], description: str, zenoh: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "address": address,
+        "description": description,
+        "messages": {name: {"$ref": f"#/components/messages/{name}"} for name in messages},
+        "parameters": {
+            name: {"description": f"{text} {_ESCAPING}"}
+            for name, text in _PARAMETERS.items()
+            if f"{{{name}}}" in address
+        },
+        "x-zenoh": zenoh,
+    }
+
+
+def _operations() -> dict[str, Any]:
+    """Return what the service does: it receives what tags send, and sends poses."""
+    received = ("samples", "tagAlive")
+    sent = ("pose", "poses", "anchor", "serviceAlive")
+    return {
+        f"{action}{name[0].upper()}{name[1:]}": {"action": action, "channel": {"$ref": f"#/channels/{name}"}}
+        for action, names in (("receive", received), ("send", sent))
+        for name in names
+    }
+
+
+def _messages() -> dict[str, Any]:
+    return {
+        "samplesJson": _json_message(SamplesMessage, "The canonical form: anyone can send it from anything."),
+        "samplesPacked": {
+            "contentType": ENCODING_PACKED,
+            "summary": "Packed little-endian records, for microcontrollers and for speed.",
+            "payload": {
+                "type": "string",
+                "format": "binary",
+                "minLength": HEADER.size,
+                "maxLength": MAX_PAYLOAD_BYTES,
+                "description": "The README of dropanchor-schemas gives the layout byte by byte.",
+            },
+        },
+        "pose": _json_message(Pose, "One pose with its state, reason and covariance."),
+        "poseFrame": _json_message(PoseFrame, "Entry i of every column belongs to tag i."),
+        "anchor": _json_message(Anchor, "One anchor in the site frame."),
+    }
+
+
+def _json_message(model: type[BaseModel], summary: str) -> dict[str, Any]:
+    return {
+        "contentType": ENCODING_JSON,
+        "summary": summary,
+        "payload": {"$ref": f"#/components/schemas/{model.__name__}"},
+    }
+
+
+def _schemas() -> dict[str, Any]:
+    """Return the JSON Schemas of all models, with shared parts once."""
+    schemas: dict[str, Any] = {}
+    for model in _MODELS:
+        schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
+        schemas |= schema.pop("$defs", {}) | {model.__name__: schema}
+    return schemas

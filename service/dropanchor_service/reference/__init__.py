@@ -1,0 +1,1 @@
+"""The reference pages in `service/docs/reference`, generated from what they describe."""

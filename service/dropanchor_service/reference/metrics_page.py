@@ -1,0 +1,29 @@
+"""The page of metrics, from the collectors themselves."""
+
+from collections.abc import Iterable
+
+from prometheus_client.core import Metric
+from prometheus_client.registry import CollectorRegistry
+
+from dropanchor_service.reference.markdown import table
+
+_INTRODUCTION = """\
+# Metrics
+
+`GET /metrics` answers in Prometheus' format. `deploy/` has alert rules and a Grafana dashboard for them. Counters end
+in `_total`. No metric has a label per tag; `GET /api/v1/tags/{tag}` counts per tag.
+"""
+
+
+def page(registry: CollectorRegistry) -> str:
+    """Return the page as Markdown. registry: with everything that the service registers."""
+    families = sorted(registry.collect(), key=lambda family: family.name)
+    return f"{_INTRODUCTION}\n{table(('metric', 'type', 'labels', 'meaning'), _rows(families))}"
+
+
+def _rows(families: Iterable[Metric]) -> Iterable[tuple[str, str, str, str]]:
+    for family in families:
+        if family.name.startswith("dropanchor_"):
+            labels = sorted({label for sample in family.samples for label in sample.labels if label != "le"})
+            name = f"{family.name}_total" if family.type == "counter" else family.name
+            yield f"`{name}`", family.type, ", ".join(f"`{label}`" for label in labels), family.documentation

@@ -1,0 +1,36 @@
+"""The generated reference: current, complete, and right in samples."""
+
+import pytest
+
+from dropanchor_schemas.pose import StateReason, TrackingState
+from dropanchor_schemas.rejections import REASONS_EXPLAINED
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.reference import export, settings_page
+
+
+def test_the_pages_are_current() -> None:
+    assert export.main(["--check"]) == 0
+
+
+def test_an_edited_page_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: object) -> None:
+    monkeypatch.setattr(export, "FOLDER", tmp_path)
+    assert export.main([]) == 0
+    assert export.main(["--check"]) == 0
+    (export.FOLDER / "settings.md").write_text("edited")
+    assert export.main(["--check"]) == 1
+
+
+def test_settings_have_type_unit_default_and_meaning() -> None:
+    lines = settings_page.page().splitlines()
+    (port,) = [line for line in lines if line.startswith("| `port`")]
+    assert port == "| `port` | integer, ≥ 0, ≤ 65535 |  | `8080` | 0: any free port. |"
+    (reorder,) = [line for line in lines if line.startswith("| `reorder_ms`")]
+    assert "| number, ≥ 0, ≤ 10000 | ms | `250.0` |" in reorder
+    assert "## `[tags.<id>]`" in lines
+    assert "## `[tags.<id>.start]`" in lines
+
+
+def test_every_reason_and_state_is_explained() -> None:
+    assert set(REASONS_EXPLAINED) == set(Reason)
+    states = export.pages()["pose-states.md"]
+    assert all(f"`{name}`" in states for name in [*TrackingState, *StateReason])
