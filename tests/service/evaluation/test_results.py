@@ -1,0 +1,67 @@
+"""Tables in documents: written between markers, and checked for age and for edits by hand."""
+
+from pathlib import Path
+
+import pytest
+
+from dropanchor_service.evaluation.results import Measured, NoPlaceError, problems, write
+
+PAGE = "# Results\n\n<!-- results speed -->\n<!-- end speed -->\n\nWhat it means.\n"
+CODE = '"""Doc."""\n\n\ndef twice(x):\n    """Double."""\n    return 2 * x  # why\n'
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    (tmp_path / "page.md").write_text(PAGE)
+    (tmp_path / "code.py").write_text(CODE)
+    return tmp_path
+
+
+def found(root: Path) -> list[str]:
+    return list(problems(root, [root / "page.md"]))
+
+
+def measure(root: Path, text: str = "| a |\n|---|\n| 1 |") -> None:
+    write(root, root / "page.md", "speed", text, Measured(["code.py"], seeds="0-9"))
+
+
+def test_a_place_without_figures_is_a_problem(root: Path) -> None:
+    assert found(root) == ["page.md, speed: nothing has been measured yet"]
+
+
+def test_a_written_table_is_current_and_says_where_it_comes_from(root: Path) -> None:
+    measure(root)
+    assert found(root) == []
+    text = (root / "page.md").read_text()
+    assert "| 1 |" in text
+    assert "seeds 0-9" in text
+    assert text.endswith("What it means.\n")
+
+
+def test_writing_again_replaces_the_table(root: Path) -> None:
+    measure(root)
+    measure(root, "| b |")
+    text = (root / "page.md").read_text()
+    assert "| b |" in text
+    assert "| 1 |" not in text
+    assert found(root) == []
+
+
+def test_an_edit_by_hand_is_noticed(root: Path) -> None:
+    measure(root)
+    page = root / "page.md"
+    page.write_text(page.read_text().replace("| 1 |", "| 0 |"))
+    assert found(root) == ["page.md, speed: the table was edited by hand; measure it again"]
+
+
+def test_a_change_of_the_code_makes_a_table_old_and_a_change_of_comments_does_not(root: Path) -> None:
+    measure(root)
+    (root / "code.py").write_text(CODE.replace("Double.", "Return the double.").replace("# why", "# because"))
+    assert found(root) == []
+    (root / "code.py").write_text(CODE.replace("2 * x", "3 * x"))
+    assert found(root) == ["page.md, speed: code.py changed since; measure it again"]
+
+
+def test_a_page_without_a_place_is_an_error(root: Path) -> None:
+    with pytest.raises(NoPlaceError, match=r"page\.md has no place for height"):
+        write(root, root / "page.md", "height", "", Measured(["code.py"]))
