@@ -1,4 +1,4 @@
-"""What an operator knows: the site, its anchors, and settings per tag."""
+"""What an operator knows of the site, its anchors and each tag."""
 
 from typing import Annotated, Literal
 
@@ -21,7 +21,7 @@ Id = Annotated[str, Field(min_length=1, max_length=64, json_schema_extra=ID_SCHE
 
 
 class Typed(str):
-    """Text in which a number may stand, such as that of an environment variable. In JSON and TOML none does."""
+    """Text that may hold a number, as an environment variable does. In JSON and TOML a number is no text."""
 
 
 def _of_its_own_type(value: object) -> object:
@@ -50,86 +50,96 @@ class _Settings(BaseModel):
 
 
 class Anchor(_Settings):
-    """A dropped UWB anchor. Position in the site frame, m."""
+    """A dropped UWB anchor and its position in the site frame."""
 
-    id: Id = Field(description="As the tags send it: a number in decimal, or a text.")
-    x: Number = 0.0
-    y: Number = 0.0
-    z: Number = Field(default=0.0, description="Height above the plane from which tag heights are counted.")
+    id: Id = Field(description="Id as the tags send it: a decimal number, or text.")
+    x: Number = Field(default=0.0, description="Position along the site's x axis.")
+    y: Number = Field(default=0.0, description="Position along the site's y axis.")
+    z: Number = Field(default=0.0, description="Height above the plane from which tag heights count.")
 
     @property
     def number(self) -> int:
-        """The u32 of this anchor in packed payloads."""
+        """The number (u32) that names this anchor in packed payloads."""
         return anchor_number(self.id)
 
 
 class Georeference(_Settings):
     """Where the origin of the site frame lies on the Earth (WGS 84)."""
 
-    lat: Annotated[FiniteFloat, Field(ge=-90, le=90), _Own]
-    lon: Annotated[FiniteFloat, Field(ge=-180, le=180), _Own]
-    rotation_rad: Number = Field(default=0.0, description="Direction of the x axis, counter-clockwise from east.")
+    lat: Annotated[FiniteFloat, Field(ge=-90, le=90, description="Latitude of the origin, degrees."), _Own]
+    lon: Annotated[FiniteFloat, Field(ge=-180, le=180, description="Longitude of the origin, degrees."), _Own]
+    rotation_rad: Number = Field(
+        default=0.0, description="Direction of the site's x axis, counter-clockwise from east."
+    )
 
 
 class StartPose(_Settings):
     """Where a tag is when it is first heard."""
 
-    x: Number
-    y: Number
-    heading_rad: Number | None = Field(default=None, description="Leave out when the IMU has a magnetometer.")
+    x: Number = Field(description="Position along the site's x axis.")
+    y: Number = Field(description="Position along the site's y axis.")
+    heading_rad: Number | None = Field(
+        default=None, description="Heading, counter-clockwise from east. Leave it out when the IMU has a magnetometer."
+    )
     std_m: Positive = Field(default=0.1, description="Standard deviation of x and of y.")
 
 
 class TagSettings(_Settings):
-    """What an operator knows about a tag: measured range = range_scale · distance + range_bias_m."""
+    """What an operator knows about a tag. Its measured range is range_scale · distance + range_bias_m."""
 
-    height_m: Number = Field(default=0.0, description="Height of the tag's antenna, on the anchors' z axis.")
-    range_std_m: Positive | None = Field(default=None, description="Of one range; null: the engine's default.")
-    range_bias_m: Number = 0.0
-    range_bias_std_m: NotNegative | None = Field(
-        default=None, description="How well that is known; 0: exactly, null: not calibrated, the engine's default."
+    height_m: Number = Field(default=0.0, description="Height of the tag's antenna, along the anchors' z axis.")
+    range_std_m: Positive | None = Field(
+        default=None, description="Standard deviation of one range; null: the engine's default."
     )
-    range_scale: Positive = 1.0
+    range_bias_m: Number = Field(default=0.0, description="What a range is too long by, after the scale.")
+    range_bias_std_m: NotNegative | None = Field(
+        default=None,
+        description="Standard deviation of the bias; 0: exact, null: not calibrated, the engine's default.",
+    )
+    range_scale: Positive = Field(default=1.0, description="Measured length per metre of distance.")
     mount_angle_rad: Number | None = Field(
-        default=None, description="Direction of travel minus body x axis, counter-clockwise; null: not known."
+        default=None, description="Direction of travel minus direction of body x, counter-clockwise; null: not known."
     )
     mount_angle_std_rad: NotNegative | None = Field(
-        default=None, description="How well that is known; 0: exactly, null: the engine's default."
+        default=None, description="Standard deviation of the mounting angle; 0: exact, null: the engine's default."
     )
     lever_forward_m: Number = Field(
         default=0.0,
-        description="How far antenna and IMU sit before the point that follows the course (rear axle, feet of whoever "
-        "carries the tag), along body x axis.",
+        description="How far the tag sits in front of the point that follows the course (the rear axle, the feet of "
+        "whoever carries it), along body x.",
     )
-    lever_left_m: Number = Field(default=0.0, description="How far to the left of it, along body y axis.")
+    lever_left_m: Number = Field(
+        default=0.0, description="How far the tag sits to the left of that point, along body y."
+    )
     slip_std_rad: NotNegative | None = Field(
         default=None,
-        description="Of the direction of travel about body x axis plus mounting angle: slip of what drives, sway of "
-        "what is carried; 0: none, null: the engine's default.",
+        description="Standard deviation of the direction of travel about body x plus mounting angle: slip of a "
+        "vehicle, sway of a carrier; 0: none, null: the engine's default.",
     )
     speed_max_mps: Positive | None = Field(
-        default=None, description="It never moves faster; null: not told, the engine's default."
+        default=None, description="Top speed of the tag; null: not known, the engine's default."
     )
     reverse_allowed: Truth = Field(default=False, description="Whether the tag may move backwards.")
     heading_source: Literal["auto", "imu", "platform"] = Field(
-        default="auto", description="auto: the IMU where it is sent, else the platform's heading."
+        default="auto",
+        description="Where the heading comes from; auto: the IMU where its samples come, otherwise the platform.",
     )
     heading_std_rad: NotNegative | None = Field(
         default=None,
-        description="Constant or slow error of the platform's heading, which then does not drift; 0: only noise, null: "
-        "not known, it may drift.",
+        description="Constant or slow error of a platform's heading that does not drift; 0: only noise, null: not "
+        "known, it may drift.",
     )
-    start: StartPose | None = None
+    start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
 
 
 class Site(_Settings):
-    """One site: its frame and its anchors. An empty list of anchors binds the first anchor heard to the origin."""
+    """One site: its frame and its anchors. Without anchors, the first one that is heard becomes the origin."""
 
-    id: Id = "default"
-    name: str = ""
-    declination_rad: Number = Field(default=0.0, description="True minus magnetic north, positive east.")
+    id: Id = Field(default="default", description="Id of the site in Zenoh keys.")
+    name: str = Field(default="", description="Name for people.")
+    declination_rad: Number = Field(default=0.0, description="Declination: true minus magnetic north, positive east.")
     georeference: Georeference | None = None
-    anchors: list[Anchor] = []
+    anchors: list[Anchor] = Field(default=[], description="The anchors of the site.")
 
     @model_validator(mode="after")
     def _anchors_are_distinct(self) -> "Site":

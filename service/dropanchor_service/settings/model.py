@@ -1,4 +1,4 @@
-"""The settings of the service. `settings_sources` reads them; they are built once and passed down."""
+"""The settings of the service. `sources` reads them; they are built once and passed down."""
 
 import difflib
 from collections.abc import Mapping
@@ -30,7 +30,7 @@ def _is_tag_id(name: str) -> str:
 
 
 def _as_list(value: Any) -> Any:
-    """One endpoint, or several with commas between: what fits into an environment variable."""
+    """Split text at commas, so that an environment variable can hold several endpoints."""
     return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
 
 
@@ -47,17 +47,23 @@ class _Section(BaseModel):
 class HttpSettings(_Section):
     """Where the page and the REST interface are served."""
 
-    host: str = Field(default="127.0.0.1", min_length=1)
-    port: Port = Field(default=8080, description="0: any free port.")
+    host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
+    port: Port = Field(default=8080, description="Port to listen on; 0 takes any free one.")
     tls: bool = Field(
-        default=True, description="False: plain HTTP although there is a certificate; a proxy is before it."
+        default=True, description="Serve HTTPS where there is a certificate. Turn it off behind a proxy that ends TLS."
     )
-    certificate: Path | None = Field(default=None, description="PEM, with its chain; else that of the credentials.")
-    key: Path | None = Field(default=None, description="PEM, of the certificate.")
+    certificate: Path | None = Field(
+        default=None, description="PEM file with its chain; without it, the certificate of `security.folder`."
+    )
+    key: Path | None = Field(default=None, description="PEM file with the private key of the certificate.")
     requests_per_s: Annotated[float, Field(ge=0.1, le=1e6)] = Field(
-        default=200.0, description="Of one key, token or address. On the loopback without credentials: no limit."
+        default=200.0,
+        description="Requests that one key, token or address may make per second, on average. There is no limit on the "
+        "loopback without credentials.",
     )
-    burst: Annotated[int, Field(ge=1, le=1_000_000)] = Field(default=400, description="So many at once.")
+    burst: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
+        default=400, description="Requests that it may make at once."
+    )
 
     @model_validator(mode="after")
     def _certificate_has_a_key(self) -> "HttpSettings":
@@ -67,17 +73,19 @@ class HttpSettings(_Section):
 
 
 class ZenohSettings(_Section):
-    """Either a router of our own that listens, or a session that connects to one."""
+    """Either the service opens a router that listens, or it connects to one."""
 
     listen: Endpoints = Field(
-        default=("tcp/127.0.0.1:7447",), description="With credentials: those endpoints unless others are given here."
+        default=("tcp/127.0.0.1:7447",),
+        description="Endpoints of the service's own router. With credentials, those of its configuration unless "
+        "you set others here.",
     )
-    connect: Endpoints = Field(default=(), description="Endpoints of a router; then `listen` is not used.")
-    config_file: Path | None = Field(default=None, description="A Zenoh configuration (JSON5): TLS, access control.")
+    connect: Endpoints = Field(default=(), description="Endpoints of a router to connect to; `listen` is then ignored.")
+    config_file: Path | None = Field(default=None, description="A Zenoh configuration (JSON5) to use instead.")
 
 
 def is_safe_url(url: str) -> str:
-    """Raises ValueError where others could change what comes from there."""
+    """Return the URL. Raise ValueError where others could change what comes from there."""
     if not url.startswith(("https://", "http://127.0.0.1:", "http://localhost:")):
         raise ValueError("an address that begins with https:// was expected")
     return url
@@ -87,23 +95,26 @@ SafeUrl = Annotated[str, AfterValidator(is_safe_url)]
 
 
 class OidcSettings(_Section):
-    """An OpenID Connect provider whose access tokens are taken over REST."""
+    """An OpenID Connect provider whose access tokens REST accepts."""
 
-    issuer: SafeUrl
-    audience: str = Field(min_length=1, description="What `aud` of a token has to name.")
-    jwks_url: SafeUrl | None = Field(default=None, description="Else it is asked for at the issuer (discovery).")
-    scope_claim: str = Field(default="scope", description="Where a token says its scopes; dots lead into objects.")
+    issuer: SafeUrl = Field(description="The provider's address, as its tokens name it.")
+    audience: str = Field(min_length=1, description="What the claim `aud` of a token must name.")
+    jwks_url: SafeUrl | None = Field(
+        default=None, description="Where the provider's keys are; without it, the issuer is asked."
+    )
+    scope_claim: str = Field(default="scope", description="The claim that holds the scopes; dots lead into objects.")
     scopes: dict[Literal["read", "write", "admin"], str] = Field(
         default={"read": "dropanchor:read", "write": "dropanchor:write", "admin": "dropanchor:admin"},
-        description="What the provider calls ours.",
+        description="The provider's names of our scopes.",
     )
 
 
 class SecuritySettings(_Section):
-    """Who is let in. With neither, anybody is, and then only on the loopback unless `insecure` is set."""
+    """Who is let in. With neither of these anybody is, and the service listens on the loopback only."""
 
     folder: Path | None = Field(
-        default=None, description="Made by `dropanchor security init`: certificates, access control, API keys."
+        default=None,
+        description="The folder that `dropanchor security init` made: certificates, access control, API keys.",
     )
     oidc: OidcSettings | None = None
 
@@ -112,55 +123,64 @@ class IngestSettings(_Section):
     """How samples come in."""
 
     period_ms: Annotated[float, Field(gt=0, le=1000)] = Field(
-        default=20.0, description="Samples that come in within so long are fused together."
+        default=20.0, description="Period of the ingest: samples that arrive within it are fused together."
     )
     reorder_ms: Annotated[float, Field(ge=0, le=10_000)] = Field(
-        default=250.0, description="A message waits at most so long for those that its publisher numbered before it."
+        default=250.0, description="How long a message waits for missing ones that its publisher numbered before it."
     )
     max_wait_ms: Annotated[float, Field(ge=10, le=60_000)] = Field(
         default=500.0,
-        description="When live messages wait longer than this, and ever longer, the older ones of each tag are shed.",
+        description="When live messages wait longer than this, and longer and longer, each tag loses its oldest ones.",
     )
     buffer_mib: Annotated[float, Field(gt=0, le=4096)] = Field(
-        default=64.0, description="Messages that may wait; beyond it the oldest of the busiest tags are shed."
+        default=64.0,
+        description="Memory for waiting messages. When it is full, the busiest tags lose their oldest ones.",
     )
 
 
 class HistorySettings(_Section):
-    """Which poses are kept in `data_dir`, and for how long."""
+    """Which poses the history in `data_dir` keeps, and for how long."""
 
-    enabled: bool = Field(default=True, description="Without a `data_dir` there is no history.")
-    period_s: Annotated[float, Field(gt=0, le=3600)] = Field(default=1.0, description="At most one pose in so long.")
+    enabled: bool = Field(default=True, description="Whether to keep a history. It needs a `data_dir`.")
+    period_s: Annotated[float, Field(gt=0, le=3600)] = Field(
+        default=1.0, description="Keep at most one pose of a tag per period."
+    )
     distance_m: Annotated[float, Field(ge=0, le=1000)] = Field(
-        default=0.1, description="A pose nearer than this to the one before it, in the same state, is left out,"
+        default=0.1, description="Leave out a pose that is nearer than this to the one before and in the same state."
     )
     still_s: Annotated[float, Field(ge=0, le=3600)] = Field(
-        default=5.0, description="unless so long has passed. Beyond 10 s no pose at a past time can be given between."
+        default=5.0,
+        description="But keep one after this time, even of a tag that stands. Beyond 10 s, no pose can be "
+        "interpolated in between.",
     )
-    keep_days: Annotated[float, Field(gt=0, le=36_500)] = 30.0
-    most_mib: Annotated[float, Field(ge=1)] = Field(default=4096.0, description="The oldest poses make room.")
+    keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older poses.")
+    most_mib: Annotated[float, Field(ge=1)] = Field(
+        default=4096.0, description="Size of the history; the oldest poses make room."
+    )
 
 
 class RecordingSettings(_Section):
-    """What is recorded in `data_dir`/recordings, and for how long."""
+    """What to record in `data_dir`/recordings, and for how long to keep it."""
 
-    enabled: bool = Field(default=False, description="Record from the start; else when REST asks for it.")
-    tags: tuple[TagId, ...] = Field(default=(), description="Only these tags, when it records from the start.")
+    enabled: bool = Field(default=False, description="Record from the start; otherwise when REST asks for it.")
+    tags: tuple[TagId, ...] = Field(default=(), description="Record only these tags from the start; empty: all.")
     pose_period_s: Annotated[float, Field(gt=0, le=3600)] = Field(
-        default=0.2, description="At most one pose of a tag in so long; samples are recorded all."
+        default=0.2, description="Record at most one pose of a tag per period. All samples are recorded."
     )
-    file_mib: Annotated[float, Field(ge=0.01)] = Field(default=256.0, description="A file that is larger is finished.")
-    file_minutes: Annotated[float, Field(gt=0)] = Field(default=60.0, description="So is one that is older.")
-    keep_files: Annotated[int, Field(ge=1)] = 10_000
-    keep_days: Annotated[float, Field(gt=0, le=36_500)] = 30.0
-    most_mib: Annotated[float, Field(ge=1)] = Field(default=16_384.0, description="The oldest files make room.")
+    file_mib: Annotated[float, Field(ge=0.01)] = Field(default=256.0, description="Finish a file that is larger.")
+    file_minutes: Annotated[float, Field(gt=0)] = Field(default=60.0, description="Finish a file that is older.")
+    keep_files: Annotated[int, Field(ge=1)] = Field(default=10_000, description="Number of files to keep.")
+    keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older files.")
+    most_mib: Annotated[float, Field(ge=1)] = Field(
+        default=16_384.0, description="Size of all files; the oldest make room."
+    )
 
 
 class PaperSettings(_Section):
-    """Parameters of the engine `paper`; names, units and sources stand in `estimation/paper_parameters.py`."""
+    """Parameters of the engine `paper`; `estimation/paper_parameters.py` gives names, units and sources."""
 
     preset: Literal["published", "tuned"] = Field(
-        default="published", description="The paper's and its authors' values, or ours for realistic noise."
+        default="published", description="The values of the paper and its authors, or values for realistic noise."
     )
     parameters: dict[str, float] = Field(default={}, description="Single parameters that differ from the preset.")
     attitude: dict[str, float] = Field(default={}, description="The same for the attitude filter.")
@@ -171,7 +191,7 @@ class PaperSettings(_Section):
         return self
 
     def values(self) -> PaperParameters:
-        """Raises ValueError for a name that is no parameter."""
+        """Return the parameters of the engine. Raise ValueError for an unknown name."""
         preset = {"published": PaperParameters(), "tuned": TUNED}[self.preset]
         attitude = _replaced(preset.attitude, self.attitude)
         return replace(_replaced(preset, self.parameters), attitude=attitude)
@@ -191,30 +211,35 @@ def _replaced(preset: Parameters, changes: Mapping[str, float]) -> Parameters:
 
 
 class Settings(_Section):
-    """Everything that can be set. Built once, at the start, and passed down."""
+    """Keys outside of any section."""
 
     engine: Literal["fleet", "paper"] = Field(
-        default="fleet", description="The estimator: ours, or Algorithm 1 as published."
+        default="fleet", description="The estimator: the default, or Algorithm 1 as published."
     )
     data_dir: Path | None = Field(
         default=None,
-        description="Where changes made over REST, tracks and checkpoints are kept; without it a restart forgets all.",
+        description="Folder for changes made over REST, history, recordings and checkpoints. Without it, a restart "
+        "forgets everything.",
     )
     checkpoint_s: Annotated[float, Field(gt=0, le=3600)] = Field(
-        default=0.5, description="From one checkpoint to the next: what a killed service has to make up for."
+        default=0.5, description="Time between checkpoints: what a killed service has to fetch again."
     )
     unknown_tags: Literal["accept", "quarantine", "refuse"] = Field(
         default="accept",
-        description="Whether a tag that is not listed here gets a row when it is heard; quarantine: once somebody has "
-        "put its settings, until then it is listed under newcomers.",
+        description="What to do with a tag that is not listed here. In quarantine it waits, listed under newcomers, "
+        "until somebody puts its settings.",
     )
     unproven_tags: Annotated[int, Field(ge=0, le=1_000_000)] = Field(
         default=200,
-        description="So many accepted tags may have a row that were heard no more than once; if there are more, a tag "
-        "gets one with its second message.",
+        description="How many unlisted tags may have an estimator after one message. Beyond that, a new tag gets one "
+        "with its second message.",
     )
-    max_tags: Annotated[int, Field(ge=1, le=1_000_000)] = 20_000
-    insecure: bool = Field(default=False, description="Listen beyond the loopback although anybody may then connect.")
+    max_tags: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
+        default=20_000, description="Tags that may be admitted."
+    )
+    insecure: bool = Field(
+        default=False, description="Listen on the network without credentials: anybody may then connect."
+    )
     http: HttpSettings = HttpSettings()
     zenoh: ZenohSettings = ZenohSettings()
     security: SecuritySettings = SecuritySettings()
