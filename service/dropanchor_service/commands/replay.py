@@ -98,13 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"with --smooth: only from samples up to S seconds after the pose ({LAG_S:g})",
     )
     add("--out", type=Path, metavar="CSV", help=f"write the poses: {','.join(COLUMNS)}")
-    add(
-        "--plot",
-        type=Path,
-        metavar="PNG",
-        help="write the picture here (default: replay-RECORDING-ANCHOR.png, with truth)",
-    )
-    add("--no-plot", action="store_true", help="write no picture")
+    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth where there is one")
     add("--config", type=Path, metavar="FILE", help="settings file of the service, for parameters of the engine")
 
 
@@ -133,7 +127,7 @@ def _refuse_what_the_files_know(arguments: argparse.Namespace) -> None:
     add_arguments(parser)
     defaults = parser.parse_args([str(arguments.recording)])
     for name, default in vars(defaults).items():
-        if name not in ("engine", "out", "config", "no_plot") and getattr(arguments, name) != default:
+        if name not in ("engine", "out", "config") and getattr(arguments, name) != default:
             raise SettingsError(f"--{name.replace('_', '-')}: an MCAP recording knows that by itself")
 
 
@@ -201,12 +195,11 @@ def _conclude(
             print(f"no accuracy: {error}{_advice(arguments)}")
     for line in _report(track, result, samples):
         print(line)
-    picture = arguments.plot or (truth is not None and Path(f"replay-{recording.name}-{'+'.join(anchors)}.png"))
-    if picture and not arguments.no_plot:
+    if arguments.plot:
         title = f"{recording.name}, anchor {', '.join(anchors)}" + (f": RMSE {result.rmse:.2f} m" if result else "")
         used = anchors_of(recording)[[recording.anchors.index(recording.anchor(anchor)) for anchor in anchors]]
-        plot_track(picture, title, track.t, track.poses, truth, used)
-        print(f"picture: {picture}")
+        plot_track(arguments.plot, title, track.t, track.poses, truth, used)
+        print(f"picture: {arguments.plot}")
     return 0
 
 
