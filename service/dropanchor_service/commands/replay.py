@@ -4,6 +4,7 @@ import argparse
 import csv
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -25,7 +26,6 @@ from dropanchor_service.evaluation.replay import (
     track_of,
     truth_of,
 )
-from dropanchor_service.evaluation.track_plot import plot_track
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
@@ -104,6 +104,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when it ran to the end, 2 when recording or options cannot be used, 130 on Ctrl-C."""
+    if arguments.plot:
+        import_module("dropanchor_service.evaluation.track_plot")  # what is missing is told before the work, not after
     try:
         files = files_of(arguments.recording)
         if files:
@@ -196,6 +198,8 @@ def _conclude(
     for line in _report(track, result, samples):
         print(line)
     if arguments.plot:
+        from dropanchor_service.evaluation.track_plot import plot_track
+
         title = f"{recording.name}, anchor {', '.join(anchors)}" + (f": RMSE {result.rmse:.2f} m" if result else "")
         used = anchors_of(recording)[[recording.anchors.index(recording.anchor(anchor)) for anchor in anchors]]
         plot_track(arguments.plot, title, track.t, track.poses, truth, used)
