@@ -26,6 +26,9 @@ _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service answers with poses over Zenoh and REST.
 """
+_EVALUATION = ("matplotlib", "scipy", "sympy")
+_EVALUATION_IS_MISSING = """\
+This needs the extra 'evaluation': pip install 'dropanchor-service[evaluation]' (in a clone: make install)"""
 _EPILOG = """\
 examples:
   dropanchor demo                          the service with simulated tags: look at it in a browser
@@ -37,7 +40,17 @@ examples:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The exit code."""
+    """Run the command and return its exit code."""
+    try:
+        return _run(arguments)
+    except ModuleNotFoundError as error:
+        if error.name not in _EVALUATION:
+            raise
+        print(_EVALUATION_IS_MISSING, file=sys.stderr)
+        return 2
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     words = _with_negative_values(sys.argv[1:] if arguments is None else arguments)
     parser = argparse.ArgumentParser(
         "dropanchor",

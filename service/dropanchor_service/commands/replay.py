@@ -4,6 +4,7 @@ import argparse
 import csv
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -25,7 +26,6 @@ from dropanchor_service.evaluation.replay import (
     track_of,
     truth_of,
 )
-from dropanchor_service.evaluation.track_plot import plot_track
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
@@ -98,18 +98,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"with --smooth: only from samples up to S seconds after the pose ({LAG_S:g})",
     )
     add("--out", type=Path, metavar="CSV", help=f"write the poses: {','.join(COLUMNS)}")
-    add(
-        "--plot",
-        type=Path,
-        metavar="PNG",
-        help="write the picture here (default: replay-RECORDING-ANCHOR.png, with truth)",
-    )
-    add("--no-plot", action="store_true", help="write no picture")
+    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth where there is one")
     add("--config", type=Path, metavar="FILE", help="settings file of the service, for parameters of the engine")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when it ran to the end, 2 when recording or options cannot be used, 130 on Ctrl-C."""
+    if arguments.plot:
+        import_module("dropanchor_service.evaluation.track_plot")  # what is missing is told before the work, not after
     try:
         files = files_of(arguments.recording)
         if files:
@@ -133,7 +129,7 @@ def _refuse_what_the_files_know(arguments: argparse.Namespace) -> None:
     add_arguments(parser)
     defaults = parser.parse_args([str(arguments.recording)])
     for name, default in vars(defaults).items():
-        if name not in ("engine", "out", "config", "no_plot") and getattr(arguments, name) != default:
+        if name not in ("engine", "out", "config") and getattr(arguments, name) != default:
             raise SettingsError(f"--{name.replace('_', '-')}: an MCAP recording knows that by itself")
 
 
@@ -201,12 +197,13 @@ def _conclude(
             print(f"no accuracy: {error}{_advice(arguments)}")
     for line in _report(track, result, samples):
         print(line)
-    picture = arguments.plot or (truth is not None and Path(f"replay-{recording.name}-{'+'.join(anchors)}.png"))
-    if picture and not arguments.no_plot:
+    if arguments.plot:
+        from dropanchor_service.evaluation.track_plot import plot_track
+
         title = f"{recording.name}, anchor {', '.join(anchors)}" + (f": RMSE {result.rmse:.2f} m" if result else "")
         used = anchors_of(recording)[[recording.anchors.index(recording.anchor(anchor)) for anchor in anchors]]
-        plot_track(picture, title, track.t, track.poses, truth, used)
-        print(f"picture: {picture}")
+        plot_track(arguments.plot, title, track.t, track.poses, truth, used)
+        print(f"picture: {arguments.plot}")
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import IO, Any, cast
 from mcap.writer import CompressionType, Writer
 
 from dropanchor_service.recording import schemas
+from dropanchor_service.runtime.atomic_file import sync_folder
 
 PROFILE = "dropanchor"
 METADATA = "dropanchor"
@@ -69,6 +70,7 @@ class McapFile:
             self._is_finished = True
         self.drain()
         os.fsync(self._fd)
+        sync_folder(self.path.parent)
         self.abandon()
 
     def abandon(self) -> None:

@@ -15,7 +15,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from dropanchor_service.security.files import PRIVATE, one_at_a_time, write_whole
+from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.security.files import PRIVATE, one_at_a_time
 from dropanchor_service.security.identity import Identity, Scope, UnknownError
 
 FILE = "api_keys.json"
@@ -136,7 +137,7 @@ class ApiKeys:
 
     def _write(self, keys: Mapping[str, ApiKey]) -> None:
         content = json.dumps(_KEYS.dump_python(dict(keys), mode="json"), indent=2, ensure_ascii=False)
-        write_whole(self._file, content.encode() + b"\n", PRIVATE)
+        write_atomically(self._file, [content.encode(), b"\n"], PRIVATE)
         self._keys, self._version = dict(keys), self._version_now()
 
 

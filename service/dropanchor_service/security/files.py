@@ -1,22 +1,11 @@
-"""Files of credentials: written whole or not at all, by one process at a time."""
+"""Files of credentials: their permissions, and a lock so that one process at a time changes them."""
 
 import fcntl
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 PRIVATE, PUBLIC = 0o600, 0o644
-
-
-def write_whole(file: Path, content: bytes, mode: int) -> None:
-    new = file.with_name(f".{file.name}.new")
-    new.unlink(missing_ok=True)
-    with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as opened:
-        opened.write(content)
-        opened.flush()
-        os.fsync(opened.fileno())
-    new.replace(file)
 
 
 @contextmanager

@@ -10,9 +10,10 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE
 from dropanchor_service.security.authority import Authority, Issued, expiry
-from dropanchor_service.security.files import PRIVATE, PUBLIC, one_at_a_time, write_whole
+from dropanchor_service.security.files import PRIVATE, PUBLIC, one_at_a_time
 from dropanchor_service.security.router import router_configuration
 
 TABLE = "issued.json"
@@ -108,10 +109,10 @@ class SecurityFolder:
             issued = self._authority().client(name, days)
             bundle = self.bundle(name)
             bundle.mkdir(parents=True, exist_ok=True, mode=0o700)
-            write_whole(bundle / "ca.pem", (self.path / "ca.pem").read_bytes(), PUBLIC)
-            write_whole(bundle / "tag.pem", issued.certificate, PUBLIC)
-            write_whole(bundle / "tag.key", issued.key, PRIVATE)
-            write_whole(bundle / "tag.json", _json(self._about(name)), PUBLIC)
+            write_atomically(bundle / "ca.pem", [(self.path / "ca.pem").read_bytes()], PUBLIC)
+            write_atomically(bundle / "tag.pem", [issued.certificate], PUBLIC)
+            write_atomically(bundle / "tag.key", [issued.key], PRIVATE)
+            write_atomically(bundle / "tag.json", [_json(self._about(name))], PUBLIC)
             entry = IssuedTag(serial=issued.serial, expires=issued.expires)
             self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: entry}}))
         return bundle
@@ -187,13 +188,13 @@ class SecurityFolder:
             raise SecurityError(f"the authority in {self.path} is damaged: {error}") from error
 
     def _keep(self, name: str, issued: Issued) -> None:
-        write_whole(self.path / f"{name}.pem", issued.certificate, PUBLIC)
-        write_whole(self.path / f"{name}.key", issued.key, PRIVATE)
+        write_atomically(self.path / f"{name}.pem", [issued.certificate], PUBLIC)
+        write_atomically(self.path / f"{name}.key", [issued.key], PRIVATE)
 
     def _save(self, table: Table) -> None:
         self.table = table
-        write_whole(self.path / TABLE, _json(table.model_dump(mode="json")), PUBLIC)
-        write_whole(self.path / ROUTER_FILE, _json(self.router_configuration()), PUBLIC)
+        write_atomically(self.path / TABLE, [_json(table.model_dump(mode="json"))], PUBLIC)
+        write_atomically(self.path / ROUTER_FILE, [_json(self.router_configuration())], PUBLIC)
 
     @contextmanager
     def _changing(self) -> Iterator[None]:

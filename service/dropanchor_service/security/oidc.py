@@ -1,10 +1,8 @@
 """Bearer tokens of an OpenID Connect provider: JWTs (RFC 9068) that its published keys (JWKS) have signed."""
 
-import json
 import logging
 import threading
 import time
-import urllib.request
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -19,7 +17,6 @@ LEEWAY_S = 30.0
 REFRESH_S = 300.0
 RETRY_S = 10.0  # whatever tokens say, the provider is asked no more often
 _TIMEOUT_S = 5.0
-_MAX_ANSWER_BYTES = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -70,7 +67,11 @@ class OidcTokens:
 
 
 class SigningKeys:
-    """The provider's keys, asked for again after a while or when a token names one that is not known."""
+    """The provider's keys, fetched again after a while or when a token names one that is not known.
+
+    PyJWKClient fetches and checks them. When to fetch stays here: that client waits under one lock for a provider that
+    hangs, asks a provider that fails again for every token, and forgets its keys when they are due.
+    """
 
     def __init__(self, issuer: str, jwks_url: str | None, clock: Callable[[], float] = time.monotonic) -> None:
         self._issuer = issuer
@@ -81,7 +82,7 @@ class SigningKeys:
         self._fetched_s = self._tried_s = -float("inf")
 
     def find(self, kid: str | None) -> jwt.PyJWK:
-        """Raises UnknownError."""
+        """Return the key of this id. Raises UnknownError."""
         if kid not in self._keys or self._clock() - self._fetched_s > REFRESH_S:
             self._refresh()
         if kid not in self._keys:
@@ -90,29 +91,26 @@ class SigningKeys:
         return self._keys[kid]
 
     def _refresh(self) -> None:
-        """Whoever comes while somebody else is asking already does not wait, unless nothing is known yet."""
+        """Fetch the keys, unless another thread is fetching them; wait for that thread only if no key is known yet."""
         if not self._lock.acquire(timeout=0 if self._keys else _TIMEOUT_S):
             return
         try:
             if self._clock() - self._tried_s >= RETRY_S:
                 self._tried_s = self._clock()
-                self._keys = {key.key_id: key for key in jwt.PyJWKSet.from_dict(self._document()).keys}
+                keys = _client(self._jwks_url or self._discovered()).get_jwk_set().keys
+                self._keys = {key.key_id: key for key in keys}
                 self._fetched_s = self._clock()
         except (OSError, ValueError, jwt.PyJWTError) as error:
             _log.warning("the keys of %s cannot be had: %s", self._issuer, error)
         finally:
             self._lock.release()
 
-    def _document(self) -> dict[str, Any]:
-        url = self._jwks_url
-        if url is None:
-            url = str(_got(f"{self._issuer.rstrip('/')}/.well-known/openid-configuration").get("jwks_uri"))
-        return _got(is_safe_url(url))
+    def _discovered(self) -> str:
+        """The address of the keys, as the issuer's metadata tells it (OpenID Connect Discovery 1.0, section 4)."""
+        metadata = _client(f"{self._issuer.rstrip('/')}/.well-known/openid-configuration").fetch_data()
+        return str(metadata.get("jwks_uri"))
 
 
-def _got(url: str) -> dict[str, Any]:
-    with urllib.request.urlopen(url, timeout=_TIMEOUT_S) as answer:
-        document = json.loads(answer.read(_MAX_ANSWER_BYTES))
-    if not isinstance(document, dict):
-        raise ValueError(f"{url} did not answer with an object")
-    return document
+def _client(url: str) -> jwt.PyJWKClient:
+    """A client that follows no redirect and keeps nothing. Raises ValueError unless the address is safe."""
+    return jwt.PyJWKClient(is_safe_url(url), cache_jwk_set=False, timeout=_TIMEOUT_S)

@@ -1,4 +1,4 @@
-"""Latitude and longitude against the textbook's other direction, which shares no code with ours."""
+"""Latitude and longitude against the textbook's other direction, which shares no code with what we call."""
 
 import numpy as np
 import pytest
@@ -37,6 +37,11 @@ def test_a_turned_site_turns_around_its_origin() -> None:
     straight = Georeference(lat=52.5, lon=13.4)
     one, none = np.array([100.0]), np.array([0.0])
     assert np.allclose(lat_lon(turned, one, none), lat_lon(straight, none, one), rtol=0, atol=1e-12)
+
+
+def test_across_the_date_line_the_longitude_changes_its_sign() -> None:
+    _, lon = lat_lon(Georeference(lat=0, lon=179.999), np.array([0.0, 1000.0]), np.zeros(2))
+    assert lon == pytest.approx([179.999, 179.999 + 1000 / 111_319.49 - 360], abs=1e-6)
 
 
 def test_an_unknown_position_stays_unknown() -> None:

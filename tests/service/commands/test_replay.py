@@ -44,13 +44,20 @@ def test_without_an_engine_named_it_is_fleet_which_needs_no_start(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "poses.csv"
-    assert call(write_square(tmp_path, range_std_m=0.05), "--anchor", "A", "--no-plot", "--out", out) == 0
+    assert call(write_square(tmp_path, range_std_m=0.05), "--anchor", "A", "--out", out) == 0
     assert "fleet on" in capsys.readouterr().err
     assert math.isfinite(float(rows(out)[-1]["x"]))
 
 
+def test_no_picture_is_written_unless_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert call(write_square(tmp_path), "--anchor", "A", "--engine", "paper", "--start=10,0,1.5708") == 0
+    assert list(Path.cwd().iterdir()) == []
+
+
 def test_without_a_start_the_paper_says_that_it_cannot_know(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(write_square(tmp_path), "--anchor", "A", "--engine", "paper", "--no-plot") == 0
+    assert call(write_square(tmp_path), "--anchor", "A", "--engine", "paper") == 0
     printed = capsys.readouterr().out
     assert "give --start X,Y,HEADING" in printed
     assert "ambiguous" in printed
@@ -81,7 +88,7 @@ def test_smoothed_poses_come_in_the_same_columns_and_with_a_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], lag: list[str]
 ) -> None:
     folder, filtered, smoothed = write_square(tmp_path, 0.05), tmp_path / "filtered.csv", tmp_path / "smoothed.csv"
-    options = ["--anchor", "A", "--engine", "fleet", "--start=10,0,1.5708", "--no-plot"]
+    options = ["--anchor", "A", "--engine", "fleet", "--start=10,0,1.5708"]
     assert call(folder, *options, "--out", filtered) == 0
     before = float(capsys.readouterr().out.split("RMSE ")[1].split()[0])
     assert call(folder, *options, "--smooth", *lag, "--out", smoothed) == 0
@@ -116,9 +123,8 @@ def test_values_may_begin_with_a_minus(tmp_path: Path) -> None:
         "-.1",
         "--out",
         str(out),
-        "--no-plot",
     ]
-    assert main(["replay", folder, "--anchor", "A", "--engine", "paper", *options, "--no-plot"]) == 0
+    assert main(["replay", folder, "--anchor", "A", "--engine", "paper", *options]) == 0
     assert float(rows(out)[0]["x"]) < -3.0
 
 
@@ -129,5 +135,5 @@ def test_values_may_begin_with_a_minus(tmp_path: Path) -> None:
 )
 def test_real_recordings_run_to_the_end(tmp_path: Path, name: str, anchor: str, start: str) -> None:
     folder, out = recording_or_skip(name), tmp_path / "poses.csv"
-    assert call(folder, "--anchor", anchor, "--engine", "paper", f"--start={start}", "--out", out, "--no-plot") == 0
+    assert call(folder, "--anchor", anchor, "--engine", "paper", f"--start={start}", "--out", out) == 0
     assert len(rows(out)) > 500

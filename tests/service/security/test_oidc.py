@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Thread
+from threading import Event, Thread
 from typing import Any
 
 import jwt
@@ -22,11 +22,12 @@ AUDIENCE = "dropanchor-yard"
 
 @dataclass
 class Provider:
-    """Publishes the keys that it signs with. asked: the paths that were asked for."""
+    """Publishes the keys that it signs with. asked: the paths that were asked for; moved_to: a redirect of all."""
 
     url: str = ""
     keys: dict[str, Any] = field(default_factory=dict)
     asked: list[str] = field(default_factory=list)
+    moved_to: str = ""
 
     def new_key(self, kid: str) -> None:
         self.keys[kid] = rsa.generate_private_key(65537, 2048)
@@ -54,7 +55,9 @@ def provider() -> Iterator[Provider]:
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             body = json.dumps(found.answer(self.path)).encode()
-            self.send_response(200)
+            self.send_response(302 if found.moved_to else 200)
+            if found.moved_to:
+                self.send_header("location", found.moved_to)
             self.send_header("content-length", str(len(body)))
             self.end_headers()
             self.wfile.write(body)
@@ -158,6 +161,45 @@ def test_a_provider_that_is_away_is_told_and_its_known_keys_still_count(provider
     provider.answer = lambda _path: {"keys": "none"}  # type: ignore[method-assign, assignment]
     now_s = 1e6
     assert keys.find("one")
+
+
+def test_no_token_waits_for_a_provider_that_hangs_while_its_keys_are_known(provider: Provider) -> None:
+    now_s = 0.0
+    keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
+    keys.find("one")
+    asked, release, answer = Event(), Event(), provider.answer
+
+    def hang(path: str) -> dict[str, Any]:
+        asked.set()
+        release.wait()
+        return answer(path)
+
+    provider.answer = hang  # type: ignore[method-assign]
+    now_s = 1e6
+    first = Thread(target=keys.find, args=["one"])
+    first.start()
+    assert asked.wait(10)
+    assert keys.find("one")
+    assert first.is_alive()
+    release.set()
+    first.join()
+
+
+def test_keys_come_from_the_address_that_was_set_and_from_no_other(provider: Provider) -> None:
+    provider.moved_to = f"{provider.url}/other"
+    with pytest.raises(UnknownError, match="does not answer"):
+        SigningKeys(provider.url, f"{provider.url}/keys").find("one")
+    assert provider.asked == ["/keys"]
+
+
+@pytest.mark.parametrize("jwks_uri", ["http://idp.example/keys", "file:///etc/passwd", None])
+def test_a_provider_whose_keys_others_could_replace_is_not_asked_for_them(
+    provider: Provider, jwks_uri: str | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    provider.answer = lambda _path: {"jwks_uri": jwks_uri}  # type: ignore[method-assign, assignment]
+    with pytest.raises(UnknownError, match="does not answer"):
+        SigningKeys(provider.url, None).find("one")
+    assert "an address that begins with https://" in caplog.text
 
 
 @pytest.mark.parametrize("url", ["http://idp.example", "file:///etc/passwd", "idp.example"])

@@ -1,0 +1,84 @@
+"""Files that are there whole, with their names, before anyone is told so."""
+
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from dropanchor_schemas.site import Anchor, Site
+from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot
+from dropanchor_service.recording.mcap_file import McapFile
+from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.security.api_keys import ApiKeys
+from dropanchor_service.security.folder import SecurityFolder, Table
+from dropanchor_service.security.identity import Scope
+from dropanchor_service.store import SiteStore
+
+
+def write_api_key(folder: Path) -> None:
+    ApiKeys(folder).add("dashboard", Scope.READ)
+
+
+def write_credentials(folder: Path) -> None:
+    SecurityFolder.make(folder, Table(site="yard", hosts=("localhost",), listen=("tls/[::]:7447",)), days=1)
+
+
+def write_site(folder: Path) -> None:
+    SiteStore(Site(), {}, folder).set_anchor(Anchor(id="7"))
+
+
+def write_checkpoint(folder: Path) -> None:
+    CheckpointFolder(folder, "layout", Snapshot()).write(Snapshot())
+
+
+def write_recording(folder: Path) -> None:
+    McapFile(folder / "yard.mcap", {}).finish()
+
+
+@pytest.mark.parametrize(
+    "write", [write_api_key, write_credentials, write_site, write_checkpoint, write_recording], ids=lambda f: f.__name__
+)
+def test_what_was_written_is_on_the_disk_with_its_name(
+    write: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        synced.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    write(tmp_path)
+    kept = [path for path in tmp_path.iterdir() if not path.name.startswith(".")]
+    assert {path.name for path in kept} == {path.name.removesuffix(".part") for path in synced} - {tmp_path.name}
+    assert synced[-1] == tmp_path
+
+
+def test_a_private_file_is_private_from_its_first_byte(tmp_path: Path) -> None:
+    path, part = tmp_path / "key", tmp_path / "key.part"
+    part.write_bytes(b"left by a killed writer")
+    part.chmod(0o666)
+    seen: list[int] = []
+
+    def content() -> bytes:
+        seen.append(stat.S_IMODE(part.stat().st_mode))
+        return b"secret"
+
+    write_atomically(path, (content() for _ in range(1)), 0o600)
+    assert seen == [stat.S_IMODE(path.stat().st_mode)] == [0o600]
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "site.json"
+    write_atomically(path, [b"old"])
+
+    def torn() -> bytes:
+        raise OSError("no space left")
+
+    with pytest.raises(OSError, match="no space"):
+        write_atomically(path, (part if part else torn() for part in (b"new", b"")))
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["site.json"]

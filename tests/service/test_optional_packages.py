@@ -1,0 +1,70 @@
+"""The service where the extra `evaluation`, and what only the engine `paper` needs, is not installed."""
+
+from pathlib import Path
+
+import pytest
+
+from support.commands import python
+from support.recordings import write_square
+
+EXTRA = ("matplotlib", "scipy", "sympy")
+SERVICE_AND_ENGINE = """
+import dropanchor_service.service
+from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_passes
+from dropanchor_service.settings.model import Settings
+create_engine(Settings(engine="fleet"))
+warm_up_passes()
+warm_up_answers()
+"""
+COMMAND = """
+from dropanchor_service.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def without(*packages: str) -> str:
+    """Code after which these packages are not to be found."""
+    return f"""
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {packages}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Absent())
+"""
+
+
+def test_the_service_with_the_engine_fleet_starts_without_them() -> None:
+    ended = python("-c", without(*EXTRA, "filterpy") + SERVICE_AND_ENGINE)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_installed() -> None:
+    """numba imports the package scipy itself, to compare versions, but nothing in it."""
+    loaded = "import sys; print(*{'filterpy', 'matplotlib', 'scipy.linalg', 'sympy'} & set(sys.modules))"
+    ended = python("-c", SERVICE_AND_ENGINE + loaded)
+    assert (ended.returncode, ended.stdout.split()) == (0, [])
+
+
+@pytest.mark.parametrize(
+    ("missing", "command"),
+    [
+        ("matplotlib", ["evaluate", "paper"]),
+        ("scipy", ["evaluate", "recordings"]),
+        ("sympy", ["evaluate", "paper"]),
+        ("matplotlib", ["replay", "a folder", "--plot=track.png"]),
+    ],
+)
+def test_a_command_that_needs_the_extra_says_how_to_install_it(missing: str, command: list[str]) -> None:
+    ended = python("-c", without(missing) + COMMAND, *command)
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines() == [
+        "This needs the extra 'evaluation': pip install 'dropanchor-service[evaluation]' (in a clone: make install)"
+    ]
+
+
+def test_a_replay_without_a_picture_needs_no_extra(tmp_path: Path) -> None:
+    ended = python("-c", without(*EXTRA, "filterpy") + COMMAND, "replay", str(write_square(tmp_path)), "--anchor=A")
+    assert ended.returncode == 0
+    assert "RMSE" in ended.stdout
