@@ -26,12 +26,22 @@ from support.service import Running
 class LiveTags:
     """Tags of the yard with known starts, published from when it is opened until `finish`.
 
+    boot_clock: their clocks count from half an hour earlier.
     samples: published so far, by tag and kind.
     """
 
-    def __init__(self, endpoint: str, tags: int, seed: int, cache_messages: int = 600, step_s: float = 0.1) -> None:
+    def __init__(
+        self,
+        endpoint: str,
+        tags: int,
+        seed: int,
+        cache_messages: int = 600,
+        step_s: float = 0.1,
+        boot_clock: bool = False,
+    ) -> None:
         self._endpoint = endpoint
         self._step_s = step_s
+        self._boot_clock = boot_clock
         self._stop = Event()
         self._cache_messages = cache_messages
         self._seed = seed
@@ -62,6 +72,7 @@ class LiveTags:
                     tag_name(index),
                     connect=self._endpoint,
                     cache_messages=self._cache_messages,
+                    clock="boot" if self._boot_clock else "utc",
                     batch_s=None,
                     connect_timeout_s=30.0,
                 )
@@ -69,6 +80,7 @@ class LiveTags:
             for index in range(self._tags)
         ]
         self._t0_ns = time.time_ns() // 1000 * 1000 + 200_000_000
+        self._booted_ns = self._t0_ns - 1_800_000_000_000 if self._boot_clock else 0
         self._thread.start()
 
     def __exit__(
@@ -109,9 +121,9 @@ class LiveTags:
     def _publish(self, delivery: Delivery) -> None:
         client = self._opened[delivery.tag]
         for imu in delivery.imu:
-            client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns)
+            client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns - self._booted_ns)
         for heard in delivery.ranges:
-            client.publish_range(heard.anchor, heard.range_m, t_ns=heard.t_ns, std_m=heard.std_m)
+            client.publish_range(heard.anchor, heard.range_m, t_ns=heard.t_ns - self._booted_ns, std_m=heard.std_m)
         client.flush()
         self._sent += 1
         self.samples[tag_name(delivery.tag)].update(imu=len(delivery.imu), range=len(delivery.ranges))

@@ -36,6 +36,7 @@ class WholeState:
         """Copies: what comes in later does not change them. The next snapshot does, for it uses the same memory: pages
         that are fresh from the operating system cost ten times as much as copying into them."""
         arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns}
+        arrays["times"] = self._publishers.times
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
         arrays |= {f"engine.{name}": array for name, array in self._estimators.state().items()}
         anchors = [anchor.model_dump() for anchor in self._site.anchors_by_index()]
@@ -59,6 +60,7 @@ class WholeState:
         self._site.remember([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
         self._tags.restore(snapshot.document["tags"], snapshot.arrays["counts"])
         self._publishers.columns = snapshot.arrays["publishers"]
+        self._publishers.times = snapshot.arrays["times"]
         self._latest.restore(_part(snapshot, "latest"))
         self._estimators.restore(_part(snapshot, "engine"))
 

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.batch import Array
-from dropanchor_service.ingest.kernels import clocks, sequences
+from dropanchor_service.ingest.kernels import sequences
+from dropanchor_service.ingest.kernels.clocks import TAG_TIME, time_offsets
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW
 from dropanchor_service.ingest.kernels.values import newest_times
 from dropanchor_service.store.records import enlarged
@@ -43,13 +44,14 @@ class Passed(NamedTuple):
 class Publishers:
     """The last few publishers of every tag; memory is bounded whatever boot ids a tag makes up.
 
-    `columns` is all there is to know: a checkpoint is a copy of it. One that was restored expects the number after the
-    last that passed, so what is fetched from caches meanwhile fills the gap, as long as the window that `sequence` is
-    called with is wide enough to wait for it.
+    `columns` and `times` are all there is to know: a checkpoint is a copy of them. One that was restored expects the
+    number after the last that passed, so what is fetched from caches meanwhile fills the gap, as long as the window
+    that `sequence` is called with is wide enough to wait for it.
     """
 
     def __init__(self) -> None:
         self._columns = np.zeros(0, PUBLISHER)
+        self._times = np.zeros(0, TAG_TIME)
 
     @property
     def columns(self) -> Array:
@@ -59,6 +61,15 @@ class Publishers:
     @columns.setter
     def columns(self, columns: Array) -> None:
         self._columns = columns.copy()
+
+    @property
+    def times(self) -> Array:
+        """TAG_TIME for each row of a tag."""
+        return self._times
+
+    @times.setter
+    def times(self, times: Array) -> None:
+        self._times = times.copy()
 
     def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int) -> Sequenced:
         """Put messages (FORM, row of their tag, ns of arrival; earlier arrivals first) into their publishers' order.
@@ -92,20 +103,30 @@ class Publishers:
         known = rows[(rows + 1) * PER_TAG <= len(self._columns)]
         self._columns["excused"].reshape(-1, PER_TAG)[known] = True
 
-    def utc_offsets(
+    def time_offsets(
         self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]
     ) -> tuple[Array, int]:
-        """UTC minus the clock of each message's publisher, ns, empty when all have UTC; and how many clocks jumped.
+        """Return the estimator's time minus the clock of each message's publisher, ns, empty when all are the same,
+        and how many clocks jumped.
 
         samples: of each kind the index of the message and the time of every sample.
         """
         newest, offsets = np.full(len(forms), -1, np.int64), np.zeros(len(forms), np.int64)
         for messages, t_ns in samples:
             newest_times(t_ns, messages, newest)
-        jumps = clocks.utc_offsets(forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, offsets)
+        jumps = time_offsets(
+            forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, self._times, offsets
+        )
         return offsets if offsets.any() else np.zeros(0, np.int64), jumps
+
+    def to_utc(self, outcomes: Array) -> None:
+        """Change the times of POSE or INNOVATION from the estimators' time to UTC."""
+        if self._times["correction_ns"].any():
+            known = outcomes["row"] < len(self._times)
+            outcomes["t_ns"][known] += self._times["correction_ns"][outcomes["row"][known]]
 
     def _grow(self, rows: Array) -> None:
         needed = (int(rows.max(initial=-1)) + 1) * PER_TAG
         if needed > len(self._columns):
             self._columns = enlarged(self._columns, max(needed, 2 * len(self._columns)))
+            self._times = enlarged(self._times, len(self._columns) // PER_TAG)

@@ -59,9 +59,9 @@ class Preparation:
         for due in _one_of_each(sequenced.due, of_row):
             decoded, rejected = screen(read_samples(read, due))
             in_part = replace(sequenced, due=due)
-            offsets, jumps = self.publishers.utc_offsets(read.forms, in_part, arrived, _times(decoded))
+            offsets, jumps = self.publishers.time_offsets(read.forms, in_part, arrived, _times(decoded))
             self._losses.clocks_jumped(jumps)
-            yield self._batch(_in_utc(decoded, offsets, rejected), rejected, of_row)
+            yield self._batch(_in_time(decoded, offsets, rejected), rejected, of_row)
 
     def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
         """What arrived until then has waited long enough. The window counts in arrivals: where messages have lain in a
@@ -126,7 +126,7 @@ def _one_of_each(due: Array, of_row: Array) -> list[Array]:
     return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]
 
 
-def _in_utc(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Decoded:
+def _in_time(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Decoded:
     """The samples whose time, moved by the offset of their message, can be one."""
     if not sum(shift_times(t_ns, messages, offsets) for messages, t_ns in _times(decoded)):
         return decoded

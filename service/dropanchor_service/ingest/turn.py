@@ -138,6 +138,8 @@ class Ingest:
         return SampleBatch(free["imu"], free["range"], free["heading"], free["bearing"])
 
     def _store(self, batch: PoseBatch) -> None:
+        for outcomes in (batch.poses, batch.innovations):
+            self.preparation.publishers.to_utc(outcomes)
         self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
         self._metrics.poses.inc(len(batch.poses))
         for reason, count in batch.rejected.items():

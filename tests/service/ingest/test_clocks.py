@@ -1,6 +1,8 @@
 """Clocks of tags that are wrong or jump: their samples go on at the time at which they were taken."""
 
+import random
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,24 +20,35 @@ T = 1_760_000_000 * S
 class Tag:
     """A publisher that sends ten messages a second over a network that delays them."""
 
-    def __init__(self, boot_clock: bool = False) -> None:
+    def __init__(self, boot_clock: bool = False, boot_id: int = 5) -> None:
         self._publishers = Publishers()
         self._boot_clock = boot_clock
+        self._boot_id = boot_id
         self._sequence = 0
         self.jumps = 0
+        self.estimator_ns = 0  # time of the last message for the estimator
+
+    def another(self, boot_id: int) -> "Tag":
+        """A second publisher of the same tag."""
+        other = Tag(self._boot_clock, boot_id)
+        other._publishers = self._publishers
+        return other
 
     def send(self, true_ns: int, error_ns: int, delay_ns: int = 20 * MS) -> int:
         """One message from a clock with this error; returns the error of the time that it gets."""
         form, zero = np.zeros(1, FORM), np.zeros(1, np.int32)
         form["accepted"] = form["numbered"] = True
-        form["boot_id"], form["sequence"], form["boot_clock"] = 5, self._sequence, self._boot_clock
+        form["boot_id"], form["sequence"], form["boot_clock"] = self._boot_id, self._sequence, self._boot_clock
         self._sequence += 1
         arrival = np.array([true_ns + delay_ns])
         sequenced = self._publishers.sequence(form, zero, arrival, 0)
         own_ns = true_ns + error_ns
-        offsets, jumps = self._publishers.utc_offsets(form, sequenced, arrival, [(zero, np.array([own_ns]))])
+        offsets, jumps = self._publishers.time_offsets(form, sequenced, arrival, [(zero, np.array([own_ns]))])
         self.jumps += jumps
-        return own_ns + int(offsets.sum()) - true_ns
+        self.estimator_ns = own_ns + int(offsets.sum())
+        pose = np.array([(0, self.estimator_ns)], [("row", "i4"), ("t_ns", "i8")])
+        self._publishers.to_utc(pose)
+        return int(pose["t_ns"][0]) - true_ns
 
     def errors(self, begin_s: float, end_s: float, error_ns: int) -> list[int]:
         delays = (5 * MS, 40 * MS, 15 * MS)
@@ -80,6 +93,82 @@ def test_a_boot_clock_that_starts_again_is_mapped_anew_at_once() -> None:
     tag = Tag(boot_clock=True)
     assert max(map(abs, tag.errors(0, 5, -T))) < 50 * MS
     assert max(map(abs, tag.errors(5, 8, -T - 5 * S))) < 50 * MS
+
+
+@pytest.mark.parametrize("ppm", [50, -50])
+def test_a_boot_clock_that_drifts_is_followed_within_milliseconds_and_its_intervals_stay(ppm: int) -> None:
+    tag, dice = Tag(boot_clock=True), random.Random(5)
+    errors, times = list[int](), list[int]()
+    for step in range(36_000):
+        own_ns = step * S // 10 + step * ppm * 100
+        delay_ns = dice.choice((5, 6, 40, 400)) * MS
+        errors.append(tag.send(T + step * S // 10, own_ns - T - step * S // 10, delay_ns))
+        times.append(tag.estimator_ns - own_ns)
+    assert max(abs(error - 5 * MS) for error in errors[2400:]) < 7 * MS
+    assert len(set(times)) == 1
+    assert tag.jumps == 0
+
+
+def test_a_first_message_that_came_late_is_corrected_little_by_little() -> None:
+    tag = Tag(boot_clock=True)
+    errors = [tag.send(T, -T, 200 * MS)]
+    errors += [tag.send(T + step * S // 10, -T, 5 * MS) for step in range(1, 1200)]
+    assert min(after - before for before, after in pairwise(errors)) == -MS
+    assert errors[0] == 200 * MS
+    assert errors[210] <= 26 * MS
+    assert errors[-1] == 8 * MS
+    assert tag.jumps == 0
+
+
+def test_another_boot_clock_of_the_tag_follows_in_the_time_of_the_first() -> None:
+    first = Tag(boot_clock=True)
+    second = first.another(boot_id=6)
+    first.send(T, -T, 100 * MS)
+    apart = []
+    for step in range(1, 6000):
+        true_ns = T + step * S // 10
+        first.send(true_ns, -T, 5 * MS)
+        second.send(true_ns, 7 * S - T, 5 * MS)
+        apart.append(second.estimator_ns - first.estimator_ns)
+    assert abs(apart[0]) <= 100 * MS
+    assert abs(apart[-1]) <= 3 * MS
+
+
+def test_a_boot_clock_that_falls_silent_leaves_the_time_to_another() -> None:
+    first = Tag(boot_clock=True)
+    second = first.another(boot_id=6)
+    first.send(T, -T)
+    second.send(T, 7 * S - T, 100 * MS)
+    times = []
+    for step in range(700, 2400):
+        error_ns = second.send(T + step * S // 10, 7 * S - T, 5 * MS)
+        times.append(second.estimator_ns - step * S // 10)
+    assert error_ns == 8 * MS
+    assert len(set(times)) == 1
+
+
+def test_a_first_message_that_came_very_late_is_forgotten_with_the_second() -> None:
+    tag = Tag(boot_clock=True)
+    assert tag.send(T, -T, 10 * S) == 10 * S
+    assert tag.send(T + S, -T, 5 * MS) == 5 * MS
+    assert tag.jumps == 1
+
+
+def test_a_boot_clock_that_stood_still_is_mapped_anew_within_two_minutes() -> None:
+    tag = Tag(boot_clock=True)
+    assert set(tag.errors(0, 100, -T)) == {5 * MS}
+    errors = tag.errors(120, 320, -T - 20 * S)
+    assert errors[0] == 5 * MS - 20 * S
+    assert set(errors[900:]) == {5 * MS}
+    assert tag.jumps == 1
+
+
+def test_a_backlog_that_shrinks_for_minutes_does_not_move_a_boot_clock() -> None:
+    tag = Tag(boot_clock=True)
+    first = tag.errors(0, 100, -T)
+    late = [tag.send(T + (1000 + step) * S // 10, -T, 300 * S - step * 90 * MS) for step in range(3000)]
+    assert {*first, *late} == {5 * MS}
+    assert tag.jumps == 0
 
 
 def test_steps_of_the_host_do_nothing_to_our_own_clock(monkeypatch: pytest.MonkeyPatch) -> None:

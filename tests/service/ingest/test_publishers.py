@@ -1,4 +1,4 @@
-"""Messages in the order of their publisher, each once; and clocks that count from the start of the tag."""
+"""Messages in the order of their publisher, each once."""
 
 import random
 from collections.abc import Sequence
@@ -144,30 +144,3 @@ def test_a_copy_of_the_columns_goes_on_where_the_first_stopped() -> None:
     assert again.duplicates.tolist() == [0, 1]
     assert again.due.tolist() == [2]
     assert passed(first, [50]) == [50]
-
-
-def offset_of(publishers: Publishers, newest_ns: int, arrival_ns: int) -> int:
-    forms = forms_of([0])
-    forms["numbered"], forms["boot_clock"] = False, True
-    arrivals = np.array([arrival_ns])
-    sequenced = publishers.sequence(forms, np.zeros(1, np.int32), arrivals, 0)
-    samples = [(np.zeros(1, np.int32), np.array([newest_ns]))]
-    return int(publishers.utc_offsets(forms, sequenced, arrivals, samples)[0][0])
-
-
-def test_a_boot_clock_is_mapped_by_the_message_with_the_least_delay() -> None:
-    publishers, boot_ns = Publishers(), 1_760_000_000 * S
-    dice = random.Random(5)
-    for i in range(300):
-        delay_ns = dice.choice((5_000_000, 80_000_000, 400_000_000))
-        offset_ns = offset_of(publishers, i * S // 10, boot_ns + i * S // 10 + delay_ns)
-    assert offset_ns == boot_ns + 5_000_000
-
-
-def test_the_mapping_follows_a_drifting_crystal() -> None:
-    publishers = Publishers()
-    for second in range(3600):
-        utc_ns = 1_760_000_000 * S + second * S
-        tag_ns = second * S - second * 50_000  # 50 ppm slow
-        offset_ns = offset_of(publishers, tag_ns, utc_ns)
-    assert abs(tag_ns + offset_ns - utc_ns) <= 61 * 50_000

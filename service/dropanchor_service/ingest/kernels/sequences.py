@@ -29,12 +29,12 @@ PUBLISHER: Final = np.dtype(
         ("status", "u1"),
         ("excused", "?"),  # what is missing next was shed here: nobody need wait for it
         ("used_ns", "i8"),  # last arrival
-        ("least_ns", "i8"),  # least delay of this epoch, and of the one before; NONE_NS: not yet
+        ("least_ns", "i8"),  # least arrival minus time of this epoch, and of the one before; NONE_NS: not yet
         ("previous_least_ns", "i8"),
         ("epoch_end_ns", "i8"),
         ("newest_ns", "i8"),  # on its own clock, of its last message, and when that one arrived; 0: none yet
         ("heard_ns", "i8"),
-        ("shift_ns", "i8"),  # what is added to a UTC that has jumped
+        ("shift_ns", "i8"),  # what is added to its times: to a UTC only when it has jumped
         ("seen", "u8", _LANES),  # bit n % WINDOW: the message n has come
     ],
     align=True,

@@ -1,0 +1,187 @@
+"""Publishers on clocks that count from their start: neither a kill nor the delays of a network change a pose."""
+
+import logging
+import random
+import struct
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.wire import ENCODING_PACKED, FLAG_BOOT_CLOCK, Frame, decode_packed, encode_packed
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
+from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.ingest.catch_up import CatchUp
+from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_tag_client.simulator.live import start_poses, tag_name
+from support.ingest import Bench
+from support.traffic import T0_NS, Message, traffic
+
+S = 1_000_000_000
+MS = 1_000_000
+TAGS, SECONDS, SEED = 3, 90.0, 3
+SHORTEST_NS = 5 * MS
+BOOTED_NS = T0_NS - 1000 * S
+KEYS = [samples_key("default", tag_name(index)) for index in range(TAGS)]
+
+_log = logging.getLogger(__name__)
+
+
+class SetClock(UtcClock):
+    """Shows what it is set to."""
+
+    t_ns = T0_NS
+
+    def now_ns(self) -> int:
+        return self.t_ns
+
+
+class Run:
+    """A service, from its start or from another's checkpoint, and the poses that it gave."""
+
+    def __init__(self, before: "Run | None" = None) -> None:
+        self.clock = SetClock()
+        starts = {
+            tag_name(index): {"start": {"x": pose.x, "y": pose.y, "heading_rad": pose.heading_rad}}
+            for index, pose in enumerate(start_poses(TAGS, SEED))
+        }
+        self.bench = Bench(engine=FleetEngine(), clock=self.clock, tags=starts)
+        self.given = [np.zeros(0, POSE)]
+        if before is not None:
+            self.bench.whole_state().restore(before.bench.whole_state().snapshot())
+            self.given = list(before.given)
+            self.bench.ingest.turn()  # from now on the buffer knows the tags
+
+    def hear(self, messages: Iterable[Message]) -> None:
+        """Fuse each message by itself, when it is due."""
+        for message in messages:
+            self.clock.t_ns = message.due_ns
+            self.bench.put(message.tag, message.payload, at_ns=message.due_ns)
+            self.turn()
+
+    def turn(self) -> None:
+        """Fuse one message."""
+        self.bench.ingest.turn(1)
+        self.given.append(self.bench.latest.since()[1].copy())
+
+    def catch_up(self, cached: Iterable[Message], live: Iterable[Message], asked_ns: int) -> None:
+        """Fetch what was missed from caches, which answer at `asked_ns`; what is live waits for that."""
+        publishers, tags = self.bench.ingest.preparation.publishers, self.bench.tags
+        passed = {samples_key("default", tag.name): publishers.passed(tag.row) for tag in tags.all()}
+        caught = CatchUp(self.bench.buffer, KEYS, lambda key: passed[key], lambda *_: None, 1000)
+        for message in live:
+            caught.hear(samples_key("default", message.tag), message.payload, ENCODING_PACKED, message.due_ns)
+        for message in cached:
+            caught.fetch(samples_key("default", message.tag), message.payload, ENCODING_PACKED, asked_ns)
+        caught.first_round_answered(10_000)
+        self.clock.t_ns = asked_ns + S
+        while self.bench.buffer.depth:
+            self.turn()
+
+    def poses(self) -> dict[int, Array]:
+        """Return the poses of each row, each once, in order of time."""
+        every = np.concatenate(self.given)
+        by_row = {int(row): every[every["row"] == row] for row in np.unique(every["row"])}
+        return {row: poses[np.unique(poses["t_ns"], return_index=True)[1]] for row, poses in by_row.items()}
+
+
+def on_boot_clocks(messages: Iterable[Message]) -> list[Message]:
+    return [message._replace(payload=on_boot_clock(message.payload)) for message in messages]
+
+
+def on_boot_clock(payload: bytes) -> bytes:
+    t0_ns = struct.unpack_from("<q", payload, 16)[0] - BOOTED_NS
+    return payload[:1] + bytes([FLAG_BOOT_CLOCK]) + payload[2:16] + struct.pack("<q", t0_ns) + payload[24:]
+
+
+def delivered(messages: Iterable[Message], seed: int, mean_ms: float = 10.0) -> list[Message]:
+    """Return when messages arrive over a network that delays each by a random time but keeps each tag's in order."""
+    dice, free = random.Random(seed), defaultdict[str, int](int)
+    late = []
+    for message in messages:
+        delay_ns = SHORTEST_NS + round(dice.expovariate(1 / mean_ms) * MS)
+        free[message.tag] = max(free[message.tag] + 1, message.due_ns + delay_ns)
+        late.append(message._replace(due_ns=free[message.tag]))
+    return sorted(late, key=lambda message: message.due_ns)
+
+
+def run(messages: Iterable[Message]) -> Run:
+    found = Run()
+    found.hear(messages)
+    return found
+
+
+def assert_the_same_but_for_a_shift(one: Run, other: Run, most_ns: int) -> None:
+    """Compare all fields bit for bit, but the times only to within `most_ns`."""
+    for row, poses in one.poses().items():
+        others = other.poses()[row]
+        assert len(poses) == len(others) > 400
+        shift_ns = np.abs(poses["t_ns"] - others["t_ns"])
+        assert shift_ns.max() < most_ns
+        for name in set(POSE.names or ()) - {"t_ns"}:
+            np.testing.assert_array_equal(poses[name], others[name], err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def messages() -> list[Message]:
+    return on_boot_clocks(traffic(TAGS, SECONDS, SEED))
+
+
+@pytest.fixture(scope="module")
+def undisturbed(messages: list[Message]) -> Run:
+    return run(delivered(messages, 1))
+
+
+@pytest.mark.parametrize("mean_ms", [3.0, 10.0, 40.0])
+def test_delays_of_the_network_change_no_pose_but_its_time(
+    messages: list[Message], undisturbed: Run, mean_ms: float
+) -> None:
+    other = run(delivered(messages, 2, mean_ms))
+    assert other.bench.rejected() == {}
+    assert_the_same_but_for_a_shift(undisturbed, other, 250 * MS)
+
+
+@pytest.mark.parametrize("down_s", [2, 40])
+def test_a_service_that_goes_on_from_a_checkpoint_and_from_caches_gives_the_same_poses(
+    messages: list[Message], undisturbed: Run, down_s: int
+) -> None:
+    every, killed_ns = delivered(messages, 1), T0_NS + 30 * S
+    back_ns, asked_ns = killed_ns + down_s * S, killed_ns + (down_s + 1) * S
+    before = run(message for message in every if message.due_ns <= killed_ns - S)
+    after = Run(before)
+    cached = [message for message in every if message.due_ns <= asked_ns]  # more than is missing, as caches tell
+    after.catch_up(cached, [message for message in cached if message.due_ns > back_ns], asked_ns)
+    after.hear(message for message in every if message.due_ns > asked_ns)
+    assert after.bench.rejected() == {}
+    assert_the_same_but_for_a_shift(undisturbed, after, 20 * MS)
+
+
+def by_two(messages: Iterable[Message]) -> list[Message]:
+    """Split messages: the inertial samples from one publisher, the ranges from another that started later."""
+    parts = []
+    for message in messages:
+        frame = decode_packed(message.payload)
+        assert isinstance(frame, Frame)
+        ranges = [sample._replace(t_ns=sample.t_ns - 77 * S) for sample in frame.ranges]
+        # Without numbers: not every message has a range.
+        for part in (replace(frame, ranges=[]), replace(frame, imu=[], ranges=ranges, boot_id=0)):
+            if part.imu or part.ranges:
+                parts.append(message._replace(payload=encode_packed(part)))
+    return parts
+
+
+def test_two_boot_clocks_of_a_tag_leave_its_poses_within_their_ellipses() -> None:
+    parts = by_two(on_boot_clocks(traffic(TAGS, SECONDS, SEED, step_s=0.1)))
+    one, other = (run(delivered(parts, seed)) for seed in (1, 2))
+    assert one.bench.rejected() == other.bench.rejected() == {}
+    for row, poses in one.poses().items():
+        others = other.poses()[row]
+        assert len(poses) == len(others) > 400
+        apart = np.stack([poses["x"] - others["x"], poses["y"] - others["y"]], axis=1)
+        outside = np.einsum("ki,kij,kj->k", apart, np.linalg.inv(poses["cov"][:, :2, :2]), apart)
+        _log.info("%.3g m apart at most, %.3g of chi squared", np.hypot(*apart.T).max(), outside.max())
+        assert outside.max() < CHI2_95_OF_2
