@@ -89,7 +89,7 @@ def test_dots_move_in_light_and_dark_and_nothing_is_asked_from_elsewhere(chromiu
             assert watched.origins == {url.rstrip("/")}
 
 
-def test_the_page_reconnects_when_the_service_comes_back(chromium: Browser, tmp_path: Path) -> None:
+def test_the_page_says_that_all_is_out_of_date_until_the_service_comes_back(chromium: Browser, tmp_path: Path) -> None:
     config, endpoint, port = tmp_path / "yard.toml", free_endpoint(), free_port()
     config.write_text(CONFIG)
     with ExitStack() as stack:
@@ -98,9 +98,11 @@ def test_the_page_reconnects_when_the_service_comes_back(chromium: Browser, tmp_
             stack.enter_context(driving_tag("cart", endpoint))
             page.page.locator("tr[data-tag='cart']").wait_for()
         page.page.locator("#lost").wait_for(state="visible")
+        assert page.page.locator("tr[data-tag='cart'] td.c-state").inner_text() == "Out of date"
+        assert page.tags()["cart"]["state"] == "outdated"
         with running_service("--config", str(config), "--port", str(port), endpoint=endpoint):
             page.wait_for("dropanchor.status() === 'live'", timeout_s=60)
             page.page.locator("#lost").wait_for(state="hidden")
             frames = page.page.evaluate("dropanchor.received().frames")
             page.wait_for(f"dropanchor.received().frames > {frames} + 5", timeout_s=60)
-            page.wait_for("dropanchor.tags().some((tag) => tag.tag === 'cart')")
+            page.wait_for("dropanchor.tags().some(({ tag, state }) => tag === 'cart' && state !== 'outdated')")

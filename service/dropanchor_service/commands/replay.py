@@ -63,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--start",
         type=_start,
         metavar="X,Y[,HEADING]",
-        help="where the tag is at first: m, m, rad; unknown if left out",
+        help="where the tag is at first: m, m, rad counter-clockwise from east; unknown if left out",
     )
     add(
         "--heading",

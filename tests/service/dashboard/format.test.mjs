@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
-  age, compassPoint, coordinate, counted, degrees, distance, fixed, metres, percent, sigma, words,
+  age, compass, coordinate, counted, distance, fixed, metres, percent, sigma, turnRate, words,
 } from "../../../service/dropanchor_service/dashboard/data/format.js";
 
 /** @param {(value: any) => string} format @param {[any, string][]} cases */
@@ -11,7 +11,7 @@ function gives(format, cases) {
 }
 
 test("what is not known is a dash, whatever it is", () => {
-  for (const format of [age, compassPoint, coordinate, degrees, metres, percent, sigma]) {
+  for (const format of [age, compass, coordinate, metres, percent, sigma, turnRate]) {
     gives(format, [[NaN, "–"], [null, "–"], [undefined, "–"], [Infinity, "–"]]);
   }
 });
@@ -25,9 +25,14 @@ test("coordinates lose decimals with distance", () => {
   gives(coordinate, [[-3.14159, "−3.14"], [123.456, "123.5"], [-9876.5, "−9877"]]);
 });
 
-test("headings are turned into one turn", () => {
-  gives(degrees, [[0, "0°"], [-Math.PI / 2, "270°"], [7 * Math.PI, "180°"], [-0.001, "0°"]]);
-  gives(compassPoint, [[0, "E"], [Math.PI / 2, "N"], [-Math.PI / 2, "S"], [Math.PI, "W"], [-Math.PI / 4, "SE"]]);
+test("people read a heading clockwise from north, with the compass point of the same direction", () => {
+  gives(compass, [[0, "90° E"], [Math.PI / 2, "0° N"], [-Math.PI / 2, "180° S"], [Math.PI, "270° W"]]);
+  gives(compass, [[(113 * Math.PI) / 180, "337° NNW"], [-Math.PI / 4, "135° SE"], [7 * Math.PI, "270° W"]]);
+  gives(compass, [[Math.PI / 2 + 0.001, "0° N"], [Math.PI / 2 - 0.001, "0° N"], [Math.PI / 2 + 0.02, "359° N"]]);
+});
+
+test("a turn is to the left or to the right", () => {
+  gives(turnRate, [[0.5, "29 °/s left"], [-0.5, "29 °/s right"], [0.001, "0 °/s"], [-0.001, "0 °/s"]]);
 });
 
 test("a share is never rounded up to certainty", () => {

@@ -51,6 +51,14 @@ test("what is fitted lies within the padding", () => {
   assert.ok(seen.screenY(9) >= 60 && seen.screenY(5) <= 540);
 });
 
+test("what is fitted lies beside the buttons", () => {
+  const seen = Object.assign(view(), { covered: 100 });
+  Object.assign(seen, seen.fitted({ left: -10, right: 30, bottom: 5, top: 9 }, 60));
+  assert.ok(Math.abs(seen.screenX(-10) - 60) < 1e-9);
+  assert.ok(Math.abs(seen.screenX(30) - 640) < 1e-9);
+  assert.ok(Math.abs(seen.screenX(seen.free(60).right) - 640) < 1e-9);
+});
+
 test("bounds leave unknown places out and are never too small", () => {
   assert.equal(boundsAround([[NaN, NaN]], 4), null);
   assert.deepEqual(boundsAround([[1, 1], [NaN, 90]], 4), { left: -1, right: 3, bottom: -1, top: 3 });

@@ -1,6 +1,6 @@
 /** The latest pose of every tag, in columns: one row per tag, rows given in order of appearance. */
 
-import { stateNumber } from "./states.js";
+import { OUT_OF_DATE, STATES, staleness, stateNumber } from "./states.js";
 
 /** Columns of numbers; unknown is NaN. Names as in the stream. */
 const NUMBERS = /** @type {const} */ ([
@@ -28,6 +28,8 @@ const VALUES = /** @type {const} */ (["reason", "hint", "anchor", "hypotheses"])
 
 export class Fleet {
   size = 0;
+  /** False once the connection is lost, until everything has been sent again. */
+  current = true;
   /** Grows whenever tags come or go. */
   membership = 0;
   /** @type {string[]} */
@@ -56,6 +58,16 @@ export class Fleet {
     return (now_ms - this.poseTime[row]) / 1000;
   }
 
+  /** How to speak of a tag. @param {number} row @returns {import("./states.js").StateStyle} */
+  style(row) {
+    return this.current ? STATES[this.state[row]] : OUT_OF_DATE;
+  }
+
+  /** 0 fresh, 1 stale, 2 old. @param {number} row @param {number} now_ms @returns {0 | 1 | 2} */
+  staleness(row, now_ms) {
+    return this.current ? staleness(this.age(row, now_ms)) : 2;
+  }
+
   /** @param {number} row */
   hasPose(row) {
     return row >= 0 && !Number.isNaN(this.poseTime[row]);
@@ -76,6 +88,7 @@ export class Fleet {
     const named = new Set(frame.tags);
     if (this.names.some((name) => !named.has(name))) this.#clear();
     this.apply(frame, now_ms);
+    this.current = true;
   }
 
   #clear() {

@@ -31,19 +31,21 @@ export function sigma(value) {
   return fixed(value, value < 10 ? 2 : value < 100 ? 1 : 0);
 }
 
-/** @param {number | null | undefined} rad counter-clockwise from east, shown as 0° to 360° */
-export function degrees(rad) {
+const POINTS = ["N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW"];
+
+/** A heading as on a compass: degrees clockwise from north and the nearest of 16 points, such as `337° NNW`.
+ * @param {number | null | undefined} rad counter-clockwise from east, as in the interfaces */
+export function compass(rad) {
   if (!known(rad)) return UNKNOWN;
-  const turned = Math.round((((rad * 180) / Math.PI) % 360) + 360) % 360;
-  return `${turned}°`;
+  const turned = (((90 - Math.round((rad * 180) / Math.PI)) % 360) + 360) % 360;
+  return `${turned}° ${POINTS[Math.round(turned / 22.5) % 16]}`;
 }
 
-const POINTS = ["E", "NE", "N", "NW", "W", "SW", "S", "SE"];
-
-/** @param {number | null | undefined} rad counter-clockwise from east */
-export function compassPoint(rad) {
-  if (!known(rad)) return UNKNOWN;
-  return POINTS[((Math.round(rad / (Math.PI / 4)) % 8) + 8) % 8];
+/** A turn as people say it. @param {number | null | undefined} radps counter-clockwise */
+export function turnRate(radps) {
+  if (!known(radps)) return UNKNOWN;
+  const turned = Math.round((radps * 180) / Math.PI);
+  return `${Math.abs(turned)} °/s${turned === 0 ? "" : turned > 0 ? " left" : " right"}`;
 }
 
 /** @param {number | null | undefined} share 0 to 1 */

@@ -20,6 +20,13 @@ export const STATES = Object.freeze([
   { name: "lost", label: "Lost", meaning: "The place is not known any more.", shape: "cross", placed: false, trusted: false },
 ]);
 
+/** How the page speaks of a tag once no newer pose can arrive: whatever its state was, it may be another by now.
+ * @type {Readonly<StateStyle>} */
+export const OUT_OF_DATE = Object.freeze({
+  name: "outdated", label: "Out of date", meaning: "No connection to the service: this is the last pose that arrived.",
+  shape: "dotted", placed: false, trusted: false,
+});
+
 const NUMBERS = new Map(STATES.map((state, number) => [state.name, number]));
 
 /**

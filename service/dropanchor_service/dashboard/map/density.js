@@ -1,6 +1,6 @@
 /** Too many dots to tell apart: cells that are stronger the more tags they hold. */
 
-import { STATES, staleness } from "../data/states.js";
+import { STATES } from "../data/states.js";
 
 export const DENSITY_ABOVE = 5000;
 const CELL_PX = 8;
@@ -27,7 +27,7 @@ export function countCells({ fleet, view, rows, now_ms }) {
     if (column < 0 || line < 0 || column >= columns || line >= lines) continue;
     const cell = line * columns + column;
     most = Math.max(most, ++total[cell]);
-    if (!STATES[fleet.state[row]].trusted || staleness(fleet.age(row, now_ms))) doubtful[cell]++;
+    if (!STATES[fleet.state[row]].trusted || fleet.staleness(row, now_ms)) doubtful[cell]++;
   }
   return { columns, lines, total, doubtful, most };
 }

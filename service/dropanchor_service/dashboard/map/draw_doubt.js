@@ -5,7 +5,7 @@ import { percent } from "../data/format.js";
 import { haloText, traceRing } from "./draw_site.js";
 import { hasGhosts, markerRadius, traceTick } from "./draw_tags.js";
 import { FADE, alike } from "./scene.js";
-import { AMBIGUOUS, STATES, staleness } from "../data/states.js";
+import { AMBIGUOUS, STATES } from "../data/states.js";
 import { TRAIL_S } from "../data/trails.js";
 
 /** @typedef {import("./scene.js").Scene} Scene */
@@ -116,7 +116,7 @@ export function drawRangeRings(scene, wanted) {
 function strokeRangeRing({ ctx, view, palette, fleet, roster, anchors, selected, now_ms }, row, alpha) {
   const anchor = anchors.find((other) => other.id === fleet.value.anchor[row]);
   const range = fleet.number.range_m[row];
-  const stale = staleness(fleet.age(row, now_ms));
+  const stale = fleet.staleness(row, now_ms);
   if (!anchor || Number.isNaN(range) || (stale === 2 && row !== selected)) return false;
   const state = fleet.state[row];
   ctx.beginPath();

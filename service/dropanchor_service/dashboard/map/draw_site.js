@@ -9,6 +9,8 @@ import { multiples, roundStep } from "./view.js";
 
 const GRID_PX = 26;
 const RING_PX = 88;
+/** Height of the scale bar with its text, from the lower edge of the map. */
+export const SCALE_BAR_PX = 40;
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette */
 export function drawGrid(ctx, view, palette) {

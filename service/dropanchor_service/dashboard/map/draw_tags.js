@@ -1,10 +1,11 @@
 /** Dots, heading ticks and names of the tags. */
 
 import { age } from "../data/format.js";
-import { haloText } from "./draw_site.js";
+import { SCALE_BAR_PX, haloText } from "./draw_site.js";
+import { shortened } from "../data/names.js";
 import { FADE, alike } from "./scene.js";
 import { dashOf, isFilled, traceMarker } from "./shapes.js";
-import { AMBIGUOUS, STATES, staleness } from "../data/states.js";
+import { AMBIGUOUS, STATES } from "../data/states.js";
 
 /** @typedef {import("./scene.js").Scene} Scene */
 
@@ -72,7 +73,7 @@ export function traceTick(ctx, x, y, heading, radius) {
 }
 
 /** Names beside the dots as far as they cover neither each other nor dots; the selected and the hovered one always.
- * @param {Scene} scene */
+ * Returns their boxes. @param {Scene} scene @returns {number[][]} left, top, right, bottom */
 export function drawLabels(scene) {
   const { ctx, palette } = scene;
   const first = [scene.selected, scene.hovered].filter((row) => row >= 0);
@@ -81,11 +82,13 @@ export function drawLabels(scene) {
   ctx.textBaseline = "middle";
   /** @type {number[][]} */
   const taken = scene.rows.length <= LABELS_UP_TO ? [...scene.rows].map((row) => dotBox(scene, row)) : [];
+  const dots = taken.length;
   for (const row of new Set([...first, ...rest])) {
     const important = first.includes(row);
     ctx.font = `${important ? 600 : 400} 12px ${palette.font}`;
     drawLabel(scene, row, important, taken);
   }
+  return taken.slice(dots);
 }
 
 /** The ground that a dot needs for itself. @param {Scene} scene @param {number} row */
@@ -98,26 +101,41 @@ function dotBox({ view, fleet }, row) {
 function drawLabel({ ctx, view, palette, fleet, now_ms }, row, important, taken) {
   const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
   if (Number.isNaN(x + y)) return;
-  const text = labelOf(fleet, row, now_ms);
-  const width = ctx.measureText(text).width;
+  const free = freeBox(view);
+  const widthOf = (/** @type {string} */ text) => ctx.measureText(text).width;
+  const { name, note } = labelOf(fleet, row, now_ms);
+  const text = shortened(name, free[2] - free[0] - widthOf(note), widthOf) + note;
+  const width = widthOf(text);
   const places = [[x + 13, y - 12], [x + 13, y + 13], [x - 13 - width, y - 12], [x - 13 - width, y + 13]];
   const boxes = places.map(([left, middle]) => [left, middle - 8, left + width, middle + 8]);
-  const box = boxes.find((one) => inside(one, view) && !taken.some((other) => overlap(one, other))) ?? (important ? boxes[0] : null);
+  const box = boxes.find((one) => inside(one, free) && !taken.some((other) => overlap(one, other)))
+    ?? (important && inside([x, y, x, y], [0, 0, view.width, view.height]) ? movedInto(boxes[0], free) : null);
   if (!box) return;
   taken.push(box);
   haloText(ctx, palette, text, box[0], box[1] + 8, important ? palette.ink : palette["ink-2"]);
 }
 
-/** The name, and what keeps the dot from being a good one. @param {import("../data/fleet.js").Fleet} fleet
- * @param {number} row @param {number} now_ms */
+/** The name, and a note of what keeps the dot from being a good one. @param {import("../data/fleet.js").Fleet} fleet
+ * @param {number} row @param {number} now_ms @returns {{name: string, note: string}} */
 function labelOf(fleet, row, now_ms) {
-  const seconds = fleet.age(row, now_ms);
-  if (staleness(seconds)) return `${fleet.names[row]} · ${age(seconds)} ago`;
-  return fleet.state[row] === AMBIGUOUS ? `${fleet.names[row]} ?` : fleet.names[row];
+  const name = fleet.names[row];
+  if (fleet.staleness(row, now_ms)) return { name, note: ` · ${age(fleet.age(row, now_ms))} ago` };
+  return { name, note: fleet.state[row] === AMBIGUOUS ? " ?" : "" };
 }
 
-/** @param {number[]} box @param {import("./view.js").View} view */
-const inside = (box, view) => box[0] >= 4 && box[1] >= 4 && box[2] <= view.width - 4 && box[3] <= view.height - 4;
+/** The part of the map that neither buttons nor the scale bar need. @param {import("./view.js").View} view */
+const freeBox = ({ width, height, covered }) => [4, 4, width - covered - 4, height - SCALE_BAR_PX];
+
+/** @param {number[]} box @param {number[]} free */
+const inside = (box, free) => box[0] >= free[0] && box[1] >= free[1] && box[2] <= free[2] && box[3] <= free[3];
+
+/** @param {number[]} box @param {number[]} free */
+function movedInto(box, free) {
+  const [width, height] = [box[2] - box[0], box[3] - box[1]];
+  const left = Math.max(free[0], Math.min(box[0], free[2] - width));
+  const top = Math.max(free[1], Math.min(box[1], free[3] - height));
+  return [left, top, left + width, top + height];
+}
 
 /** @param {number[]} a @param {number[]} b left, top, right, bottom */
 const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];

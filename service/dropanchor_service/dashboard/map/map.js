@@ -3,16 +3,18 @@
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
 import { drawEvidence } from "./draw_evidence.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
-import { drawLabels, drawMarkers, drawSelection } from "./draw_tags.js";
+import { drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
 import { follow } from "../data/motion.js";
-import { readPalette } from "./palette.js";
+import { readPalette, withoutStates } from "./palette.js";
 import { nearest, rowsInView } from "./scene.js";
 import { View, boundsAround } from "./view.js";
 
 const SMOOTH_UP_TO = 1000;
 const SMALLEST_FIT_M = 6;
 const FIT_PADDING_PX = 64;
+/** Of the padding: a tag that comes nearer to the edge than this makes the map show all of them again. */
+const FIT_AGAIN = 0.75;
 const REACH_PX = 18;
 const GLIDE_MS = 90;
 
@@ -25,7 +27,7 @@ export class LiveMap extends EventTarget {
   /** Keep everything in view until somebody moves the map. */
   autoFit = true;
   /** For tests and the curious: what the last drawing did. */
-  stats = { drawings: 0, ms: 0, visible: 0, density: false };
+  stats = { drawings: 0, ms: 0, visible: 0, density: false, labels: /** @type {number[][]} */ ([]) };
   #ctx;
   #rows = new Int32Array(0);
   #asked = false;
@@ -34,12 +36,14 @@ export class LiveMap extends EventTarget {
   #goal = null;
   #calm = matchMedia("(prefers-reduced-motion: reduce)");
 
-  /** @param {HTMLCanvasElement} canvas @param {import("../data/fleet.js").Fleet} fleet
+  /** @param {HTMLCanvasElement} canvas @param {HTMLElement} tools buttons on the right of it
+   * @param {import("../data/fleet.js").Fleet} fleet
    * @param {import("../data/trails.js").Trails} trails @param {import("../data/roster.js").Roster} roster
    * @param {import("../page/choice.js").Choice} choice @param {import("../data/evidence.js").Evidence} evidence */
-  constructor(canvas, fleet, trails, roster, choice, evidence) {
+  constructor(canvas, tools, fleet, trails, roster, choice, evidence) {
     super();
     this.canvas = canvas;
+    this.tools = tools;
     this.fleet = fleet;
     this.trails = trails;
     this.roster = roster;
@@ -120,6 +124,7 @@ export class LiveMap extends EventTarget {
     const { clientWidth, clientHeight } = this.canvas;
     this.view.width = Math.max(1, clientWidth);
     this.view.height = Math.max(1, clientHeight);
+    this.view.covered = clientWidth - this.tools.offsetLeft;
     this.canvas.width = Math.round(clientWidth * devicePixelRatio);
     this.canvas.height = Math.round(clientHeight * devicePixelRatio);
     if (this.autoFit) this.#aimAtAll();
@@ -161,7 +166,7 @@ export class LiveMap extends EventTarget {
   }
 
   #somethingOutside() {
-    const seen = this.view.bounds(-12);
+    const seen = this.view.free(FIT_AGAIN * this.#padding);
     for (const [x, y] of this.#places()) {
       if (x < seen.left || x > seen.right || y < seen.bottom || y > seen.top) return true;
     }
@@ -170,20 +175,29 @@ export class LiveMap extends EventTarget {
 
   #aimAtAll() {
     const bounds = boundsAround(this.#places(), SMALLEST_FIT_M);
-    const padding = Math.min(FIT_PADDING_PX, this.view.width / 6, this.view.height / 6);
-    this.#goal = this.view.fitted(bounds ?? { left: -5, right: 5, bottom: -5, top: 5 }, padding);
+    this.#goal = this.view.fitted(bounds ?? { left: -5, right: 5, bottom: -5, top: 5 }, this.#padding);
   }
 
-  /** @returns {Generator<[number, number]>} */
+  get #padding() {
+    return Math.min(FIT_PADDING_PX, this.view.width / 6, this.view.height / 6);
+  }
+
+  /** Where something is drawn: anchors, tags, and every place where an ambiguous tag may be.
+   * @returns {Generator<[number, number]>} */
   *#places() {
     for (const anchor of this.anchors) yield [anchor.x, anchor.y];
     const { x, y } = this.fleet.number;
-    for (let row = 0; row < this.fleet.size; row++) if (this.choice.shows(this.fleet, row)) yield [x[row], y[row]];
+    for (let row = 0; row < this.fleet.size; row++) {
+      if (!this.choice.shows(this.fleet, row)) continue;
+      if (hasGhosts(this.fleet, row)) for (const ghost of this.fleet.value.hypotheses[row] ?? []) yield [ghost.x, ghost.y];
+      else yield [x[row], y[row]];
+    }
   }
 
   /** @param {number} now_ms */
   #draw(now_ms) {
-    const { view, palette, fleet, choice } = this;
+    const { view, fleet, choice } = this;
+    const palette = fleet.current ? this.palette : withoutStates(this.palette);
     const shown = (/** @type {number} */ row) => choice.shows(fleet, row);
     this.#rows = rowsInView(fleet, view, shown);
     const scene = {
@@ -212,7 +226,7 @@ export class LiveMap extends EventTarget {
     drawGhosts(scene, shown);
     const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
     drawSelection(apart);
-    drawLabels(apart);
+    this.stats.labels = drawLabels(apart);
     drawMarkers(apart);
   }
 }

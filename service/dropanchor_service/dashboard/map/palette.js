@@ -6,6 +6,9 @@ const NAMES = /** @type {const} */ (["map", "grid", "grid-strong", "ink", "ink-2
 
 /** @typedef {Record<typeof NAMES[number], string> & {state: string[], font: string}} Palette */
 
+/** The same without the colours of the states: for what is out of date. @param {Palette} palette @returns {Palette} */
+export const withoutStates = (palette) => ({ ...palette, state: palette.state.map(() => palette["ink-3"]) });
+
 /** @returns {Palette} */
 export function readPalette() {
   const style = getComputedStyle(document.documentElement);

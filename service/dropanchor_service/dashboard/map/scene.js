@@ -1,7 +1,5 @@
 /** What one drawing of the map shows. */
 
-import { staleness } from "../data/states.js";
-
 /**
  * @typedef {object} Scene
  * @property {CanvasRenderingContext2D} ctx
@@ -49,7 +47,7 @@ export function alike(scene) {
   const groups = new Map();
   for (const row of scene.rows) {
     const state = scene.fleet.state[row];
-    const stale = staleness(scene.fleet.age(row, scene.now_ms));
+    const stale = scene.fleet.staleness(row, scene.now_ms);
     let group = groups.get(3 * state + stale);
     if (!group) groups.set(3 * state + stale, (group = { state, stale, rows: [] }));
     group.rows.push(row);

@@ -15,6 +15,8 @@ export class View {
   scale = 40;
   width = 1;
   height = 1;
+  /** pixels on the right that buttons cover */
+  covered = 0;
 
   /** @param {number} x */
   screenX(x) {
@@ -52,16 +54,22 @@ export class View {
   }
 
   /**
-   * Where the view would be to show all of `bounds`.
+   * Where the view would be to show all of `bounds` beside the buttons.
    * @param {Bounds} bounds
    * @param {number} padding pixels on every side
    * @returns {{x: number, y: number, scale: number}}
    */
   fitted(bounds, padding) {
-    const width = Math.max(1, this.width - 2 * padding);
+    const width = Math.max(1, this.width - this.covered - 2 * padding);
     const height = Math.max(1, this.height - 2 * padding);
-    const scale = Math.min(width / (bounds.right - bounds.left), height / (bounds.top - bounds.bottom));
-    return { x: (bounds.left + bounds.right) / 2, y: (bounds.bottom + bounds.top) / 2, scale: limited(scale) };
+    const scale = limited(Math.min(width / (bounds.right - bounds.left), height / (bounds.top - bounds.bottom)));
+    const x = (bounds.left + bounds.right + this.covered / scale) / 2;
+    return { x, y: (bounds.bottom + bounds.top) / 2, scale };
+  }
+
+  /** The part that nothing covers, `margin` pixels from its edge. @param {number} margin @returns {Bounds} */
+  free(margin) {
+    return { ...this.bounds(-margin), right: this.worldX(this.width - this.covered - margin) };
   }
 
   /** What is visible, grown by `margin` pixels. @param {number} margin @returns {Bounds} */

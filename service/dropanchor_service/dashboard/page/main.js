@@ -11,7 +11,6 @@ import { listen } from "../map/gestures.js";
 import { LiveMap } from "../map/map.js";
 import { Notices } from "../panel/notices.js";
 import { Roster } from "../data/roster.js";
-import { STATES } from "../data/states.js";
 import { TagTable } from "../panel/table.js";
 import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
@@ -27,7 +26,7 @@ const roster = new Roster(fleet);
 const choice = new Choice();
 const connection = new Connection();
 const evidence = new Evidence();
-const map = new LiveMap(byId("map"), fleet, trails, roster, choice, evidence);
+const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choice, evidence);
 const chips = new StateChips(byId("chips"), fleet, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const notices = new Notices(connection, fleet);
@@ -55,7 +54,7 @@ function announce(tag) {
   const row = fleet.row(tag);
   const { x, y } = fleet.number;
   const place = `x ${fixed(x[row], 1)} m, y ${fixed(y[row], 1)} m`;
-  byId("spoken").textContent = `${tag} selected: ${STATES[fleet.state[row]].label}, ${place}`;
+  byId("spoken").textContent = `${tag} selected: ${fleet.style(row).label}, ${place}`;
 }
 
 /** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} take @returns {(event: Event) => void} */
@@ -77,9 +76,16 @@ connection.addEventListener("snapshot", receiver((frame, now_ms) => {
   connection.slowDownFor(fleet.size);
 }));
 connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
+connection.addEventListener("status", () => {
+  if (connection.status === "live") return;
+  fleet.current = false;
+  byId("spoken").textContent = "";
+  updatePanels();
+});
 connection.addEventListener("site", (event) => {
   const site = /** @type {CustomEvent} */ (event).detail;
   map.setAnchors(site.anchors);
+  detail.rotation_rad = site.georeference?.rotation_rad ?? 0;
   byId("site").textContent = site.name || site.id;
 });
 
@@ -129,7 +135,7 @@ Object.defineProperty(window, "dropanchor", {
     drawing: () => ({ ...map.stats, still: map.still }),
     tags: () => fleet.names.map((tag, row) => ({
       tag,
-      state: STATES[fleet.state[row]].name,
+      state: fleet.style(row).name,
       x: fleet.number.x[row],
       y: fleet.number.y[row],
       pixel: [map.view.screenX(fleet.drawnX[row]), map.view.screenY(fleet.drawnY[row])],

@@ -1,45 +1,61 @@
-/** The states as a legend that counts and filters. */
+/** The states as a legend that counts and filters; without a connection one chip that says how old all of it is. */
 
 import { countStates } from "../page/choice.js";
-import { BEST_FIRST, STATES } from "../data/states.js";
+import { BEST_FIRST, OUT_OF_DATE, STATES } from "../data/states.js";
 import { symbol } from "../map/symbols.js";
 
 export class StateChips {
   /** @type {{button: HTMLButtonElement, count: HTMLElement}[]} */
   #chips;
+  #outdated = chip(document.createElement("span"), OUT_OF_DATE);
 
   /** @param {HTMLElement} box @param {import("../data/fleet.js").Fleet} fleet @param {import("../page/choice.js").Choice} choice */
   constructor(box, fleet, choice) {
     this.fleet = fleet;
     this.choice = choice;
     this.#chips = STATES.map((state, number) => this.#build(state, number));
-    box.append(...BEST_FIRST.map((number) => this.#chips[number].button));
+    box.append(...BEST_FIRST.map((number) => this.#chips[number].button), this.#outdated.element);
     choice.addEventListener("change", () => this.update());
     this.update();
   }
 
   update() {
     const counts = countStates(this.fleet);
+    this.#outdated.element.hidden = this.fleet.current;
+    write(this.#outdated.count, this.fleet.size);
     this.#chips.forEach(({ button, count }, state) => {
       const shown = !this.choice.hiddenStates.has(state);
+      button.hidden = !this.fleet.current;
       button.setAttribute("aria-pressed", String(shown));
       button.classList.toggle("none", counts[state] === 0);
-      const value = counts[state].toLocaleString("en");
-      if (count.textContent !== value) count.textContent = value;
+      write(count, counts[state]);
     });
   }
 
   /** @param {import("../data/states.js").StateStyle} state @param {number} number */
   #build(state, number) {
     const button = document.createElement("button");
-    const count = document.createElement("span");
+    const { count } = chip(button, state);
     button.type = "button";
-    button.className = "chip";
-    button.dataset.state = state.name;
     button.title = `${state.meaning} Press to hide or show.`;
-    count.className = "count";
-    button.append(symbol(state.name).svg, state.label, count);
     button.addEventListener("click", () => this.choice.toggleState(number));
     return { button, count };
   }
+}
+
+/** @param {HTMLElement} element @param {import("../data/states.js").StateStyle} state */
+function chip(element, state) {
+  const count = document.createElement("span");
+  element.className = "chip";
+  element.dataset.state = state.name;
+  element.title = state.meaning;
+  count.className = "count";
+  element.append(symbol(state.name).svg, state.label, count);
+  return { element, count };
+}
+
+/** @param {HTMLElement} element @param {number} count */
+function write(element, count) {
+  const text = count.toLocaleString("en");
+  if (element.textContent !== text) element.textContent = text;
 }

@@ -2,14 +2,17 @@
 
 import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
-import { UNKNOWN, age, compassPoint, degrees, fixed, metres, percent, sigma, words } from "../data/format.js";
-import { AMBIGUOUS, STATES } from "../data/states.js";
+import { UNKNOWN, age, compass, fixed, metres, percent, sigma, turnRate, words } from "../data/format.js";
+import { AMBIGUOUS } from "../data/states.js";
 import { Plots } from "./plots.js";
 import { symbol } from "../map/symbols.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
 
 export class Detail {
+  /** Direction of the x axis, counter-clockwise from east. */
+  #rotation_rad = 0;
+
   /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("../data/roster.js").Roster} roster
    * @param {import("../page/choice.js").Choice} choice @param {import("../data/evidence.js").Evidence} evidence */
   constructor(panel, fleet, roster, choice, evidence) {
@@ -25,6 +28,13 @@ export class Detail {
     choice.addEventListener("change", () => this.update());
     evidence.addEventListener("change", () => this.#explain());
     this.update();
+  }
+
+  /** @param {number} rad */
+  set rotation_rad(rad) {
+    this.#rotation_rad = rad;
+    put(this.#part("n-x"), rad === 0 ? "x (east)" : "x");
+    put(this.#part("n-y"), rad === 0 ? "y (north)" : "y");
   }
 
   update() {
@@ -58,16 +68,17 @@ export class Detail {
 
   /** @param {number} row */
   #head(row) {
-    const state = STATES[this.fleet.state[row]];
+    const state = this.fleet.style(row);
     const name = this.fleet.names[row];
     this.panel.dataset.state = state.name;
     put(this.#part("name"), name);
     put(this.#part("state"), state.label);
     this.#part("symbol").replaceChildren(symbol(state.name).svg);
-    const reason = this.fleet.value.reason[row];
+    const { current, value } = this.fleet;
+    const reason = current ? value.reason[row] : null;
     put(this.#part("meaning"), state.meaning);
     put(this.#part("reason"), reason ? words(reason) : "");
-    const hint = this.fleet.value.hint[row] ?? "";
+    const hint = (current ? value.hint[row] : null) ?? "";
     put(this.#part("hint"), hint);
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
@@ -78,7 +89,6 @@ export class Detail {
   /** @param {number} row */
   #numbers(row) {
     const number = (/** @type {keyof Fleet["number"]} */ name) => this.fleet.number[name][row];
-    const heading = number("heading_rad");
     const anchor = this.fleet.value.anchor[row];
     /** @type {Record<string, string>} */
     const texts = {
@@ -86,7 +96,7 @@ export class Detail {
       y: metres(number("y")),
       sigma: `± ${sigma(number("sigma_pos_m"))} m`,
       ellipse: `${fixed(number("semi_major_m"), 2)} × ${fixed(number("semi_minor_m"), 2)} m`,
-      heading: Number.isNaN(heading) ? UNKNOWN : `${degrees(heading)} ${compassPoint(heading)}`,
+      heading: compass(number("heading_rad") + this.#rotation_rad),
       speed: `${fixed(number("speed_mps"), 2)} m/s`,
       turn: turnRate(number("yaw_rate_radps")),
       range: metres(number("range_m")),
@@ -94,7 +104,7 @@ export class Detail {
       mode: percent(number("p_mode")),
       sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : `± ${sigma(number("sigma_obs_m"))} m`,
       age: age(this.fleet.age(row, performance.now())),
-      online: this.fleet.online[row] ? "Online" : "Offline",
+      online: !this.fleet.current ? UNKNOWN : this.fleet.online[row] ? "Online" : "Offline",
     };
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
   }
@@ -132,9 +142,6 @@ function countsInto(list, title, byName) {
   if (list.textContent === texts.join("")) return;
   list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
 }
-
-/** @param {number} radps */
-const turnRate = (radps) => (Number.isNaN(radps) ? UNKNOWN : `${fixed((radps * 180) / Math.PI, 0)} °/s`);
 
 /** @param {HTMLElement} element @param {string} text */
 function put(element, text) {

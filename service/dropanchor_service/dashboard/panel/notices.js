@@ -27,6 +27,7 @@ export class Notices {
     byId("status").dataset.status = status;
     write(byId("status-text"), label);
     byId("lost").hidden = status !== "lost";
+    document.title = status === "lost" ? "Connection lost · Dropanchor" : "Dropanchor";
     write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
     byId("locked").hidden = status !== "locked";
     byId("refused").hidden = !hasKey();

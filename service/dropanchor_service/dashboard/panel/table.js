@@ -1,8 +1,8 @@
 /** All tags as a table. Only the rows that are on the screen exist in the document, so ten thousand tags are fine. */
 
-import { age, coordinate, counted, fixed, sigma } from "../data/format.js";
+import { UNKNOWN, age, coordinate, counted, fixed, sigma } from "../data/format.js";
 import { Order } from "../data/order.js";
-import { STATES, staleness } from "../data/states.js";
+import { NameColumn } from "../data/names.js";
 import { symbol } from "../map/symbols.js";
 
 /** @typedef {import("../data/fleet.js").Fleet} Fleet */
@@ -10,6 +10,7 @@ import { symbol } from "../map/symbols.js";
 
 const ROW_PX = 32;
 const SPARE = 4;
+const NAME_LINES = 2;
 const COLUMNS = ["tag", "state", "x", "y", "sigma", "speed", "age", "online"];
 
 export class TagTable {
@@ -20,6 +21,7 @@ export class TagTable {
   #rows = [];
   /** @type {Line[]} */
   #lines = [];
+  #names = new NameColumn();
   #active = "";
 
   /** @param {HTMLElement} box scrolls and holds the table @param {HTMLElement} count @param {Fleet} fleet
@@ -71,6 +73,7 @@ export class TagTable {
     this.body.style.setProperty("--before", `${first * ROW_PX}px`);
     this.body.style.setProperty("--after", `${Math.max(0, this.#rows.length - first - rows.length) * ROW_PX}px`);
     while (this.#lines.length < rows.length) this.#addLine();
+    if (this.#lines.length > 0) this.#names.measure(nameOf(this.#lines[0]), NAME_LINES);
     const now_ms = performance.now();
     this.#lines.forEach((line, i) => {
       line.element.hidden = i >= rows.length;
@@ -92,6 +95,7 @@ export class TagTable {
     });
     const { svg, use } = symbol("initialising");
     const name = document.createElement("span");
+    name.className = "name";
     cells[0].append(svg, name);
     this.body.append(element);
     this.#lines.push({ element, cells, use });
@@ -101,22 +105,23 @@ export class TagTable {
   #fill(line, row, place, now_ms) {
     const { fleet } = this;
     const { x, y, sigma_pos_m, speed_mps } = fleet.number;
-    const state = STATES[fleet.state[row]];
+    const state = fleet.style(row);
     const seconds = fleet.age(row, now_ms);
     const name = fleet.names[row];
     set(line.element.dataset, "tag", name);
     set(line.element.dataset, "state", state.name);
-    set(line.element.dataset, "stale", String(staleness(seconds)));
+    set(line.element.dataset, "stale", String(fleet.staleness(row, now_ms)));
     attribute(line.element, "aria-rowindex", String(place + 2));
     attribute(line.element, "aria-selected", String(name === this.choice.selected));
     attribute(line.use, "href", `#s-${state.name}`);
     const texts = [
-      name, state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
-      age(seconds), fleet.online[row] ? "online" : "offline",
+      this.#names.of(name), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
+      age(seconds), !fleet.current ? UNKNOWN : fleet.online[row] ? "online" : "offline",
     ];
-    texts.forEach((value, i) => text(i === 0 ? /** @type {Element} */ (line.cells[0].lastElementChild) : line.cells[i], value));
+    texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));
     attribute(line.cells[0], "title", name);
-    line.cells[7].classList.toggle("yes", fleet.online[row] === 1);
+    attribute(line.cells[0], "aria-label", name);
+    line.cells[7].classList.toggle("yes", fleet.current && fleet.online[row] === 1);
   }
 
   #pointAtActive() {
@@ -165,6 +170,9 @@ export class TagTable {
     this.reveal(this.fleet.names[this.#rows[to]]);
   }
 }
+
+/** @param {Line} line */
+const nameOf = ({ cells }) => /** @type {HTMLElement} */ (cells[0].lastElementChild);
 
 /** Write only what differs: most cells stay as they are. @param {DOMStringMap} data @param {string} name
  * @param {string} value */

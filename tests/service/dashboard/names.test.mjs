@@ -1,0 +1,23 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { shortened } from "../../../service/dropanchor_service/dashboard/data/names.js";
+
+/** Every letter is one wide. @param {string} name @param {number} room */
+const within = (name, room) => shortened(name, room, (text) => [...text].length);
+
+test("a name that has room stays as it is", () => {
+  assert.equal(within("forklift-7", 10), "forklift-7");
+});
+
+test("a name without room keeps its begin and more of its end", () => {
+  assert.equal(within("warehouse-forklift-north-17", 11), "war…orth-17");
+});
+
+test("the least that is left of a name is its last letter", () => {
+  assert.equal(within("forklift-7", 0), "…7");
+});
+
+test("letters of two code units are not cut in two", () => {
+  assert.equal(within("🚜🚜🚜🚜🚜🚜", 3), "…🚜🚜");
+});

@@ -1,0 +1,80 @@
+"""What axe-core, an accessibility checker, says of every view of the page."""
+
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.estimation.batch import State
+from service.dashboard.place import Place, live_house
+from support.axe import axe_source, violations
+from support.browser import Scheme, Watched, watched_page
+from support.http_server import running_server
+
+pytestmark = pytest.mark.browser
+
+light_and_dark = pytest.mark.parametrize("scheme", ["light", "dark"])
+sizes = pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
+
+
+@pytest.fixture(scope="module")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return axe_source(tmp_path_factory.mktemp("axe"))
+
+
+def show_every_state(place: Place) -> None:
+    names = [state.name.lower() for state in State]
+    place.move(*names, x=np.arange(float(len(names))), y=1.0, state=list(State), sigma_pos=0.2, range=5.0)
+    place.house.answers.tags.register("heard")
+
+
+def is_clean(page: Watched, axe: str) -> None:
+    assert violations(page.page, axe) == []
+
+
+@light_and_dark
+@sizes
+def test_no_violation_without_a_tag(
+    chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
+) -> None:
+    with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+        page.page.locator("#empty").wait_for(state="visible")
+        is_clean(page, axe)
+
+
+@light_and_dark
+@sizes
+def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_selected(
+    chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
+) -> None:
+    with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+        show_every_state(place)
+        page.page.locator("tr[data-tag='lost']").wait_for()
+        is_clean(page, axe)
+        for state in ("ambiguous", "lost", "degraded", "tracking"):
+            show_every_state(place)
+            page.page.locator(f"tr[data-tag='{state}']").click()
+            is_clean(page, axe)
+        page.page.locator(".chip[data-state='lost']").click()
+        page.page.locator("tr[data-stale='2']").first.wait_for()
+        is_clean(page, axe)
+
+
+@light_and_dark
+@sizes
+def test_no_violation_after_the_connection_is_lost(
+    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int]
+) -> None:
+    house = live_house()
+    with ExitStack() as pages:
+        with running_server(house.app(DASHBOARD), house.stopping) as port:
+            place = Place(house, f"http://127.0.0.1:{port}/")
+            page = pages.enter_context(
+                watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce")
+            )
+            show_every_state(place)
+            page.page.locator("tr[data-tag='tracking']").click()
+        page.page.locator("#lost").wait_for(state="visible")
+        is_clean(page, axe)

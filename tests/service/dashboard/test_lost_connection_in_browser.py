@@ -1,0 +1,109 @@
+"""Once the connection is lost, nothing on the page says that a pose holds now."""
+
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from threading import Event
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.estimation.batch import State
+from service.dashboard.place import Place, live_house
+from support.browser import Watched, watched_page
+from support.http_server import running_server
+
+pytestmark = pytest.mark.browser
+
+CLAIM = re.compile(r"tracking|believed|\blive\b", re.IGNORECASE)
+EVERY_TEXT = """() => {
+    const texts = [document.title];
+    for (const element of document.body.querySelectorAll("*")) {
+        if (!element.checkVisibility()) continue;
+        for (const { name, value } of element.attributes) {
+            if (["title", "alt"].includes(name) || name.startsWith("aria-")) texts.push(value);
+        }
+        for (const node of element.childNodes) if (node.nodeType === Node.TEXT_NODE) texts.push(node.data);
+    }
+    return texts;
+}"""
+BLUE_PIXELS = """() => {
+    const map = document.getElementById("map");
+    const { data } = map.getContext("2d").getImageData(0, 0, map.width, map.height);
+    let count = 0;
+    for (let i = 0; i < data.length; i += 4) if (data[i] === 0 && data[i + 1] === 103 && data[i + 2] === 184) count++;
+    return count;
+}"""
+
+
+def claims(page: Watched) -> list[str]:
+    """The texts, also those that are only heard or shown on hover, that speak of poses as they are now."""
+    return [text for text in page.page.evaluate(EVERY_TEXT) if CLAIM.search(text)]
+
+
+@dataclass
+class Outage:
+    place: Place
+    page: Watched
+    port: int
+
+
+def show_six(place: Place, page: Watched) -> None:
+    place.move(*(f"cart-{i}" for i in range(6)), x=np.arange(6.0), y=1.0, cov=np.eye(3) * 1e-6)
+    page.wait_for_map(6)
+
+
+@contextmanager
+def outage(chromium: Browser) -> Iterator[Outage]:
+    """A page that tracked six tags, of which one is selected and announced, and whose service has just gone."""
+    house = live_house()
+    house.answers.tags.register("cart-0")
+    house.answers.tags.set_online("cart-0", True)
+    with ExitStack() as pages:
+        with running_server(house.app(DASHBOARD), house.stopping) as port:
+            place = Place(house, f"http://127.0.0.1:{port}/")
+            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
+            show_six(place, page)
+            page.page.locator("tr[data-tag='cart-0']").click()
+            show_six(place, page)
+            page.wait_for(f"({BLUE_PIXELS})() > 0")
+            assert len(claims(page)) > 6
+        page.page.locator("#lost").wait_for(state="visible")
+        yield Outage(place, page, port)
+
+
+def test_no_text_of_a_lost_connection_says_tracking_or_that_a_pose_can_be_believed(chromium: Browser) -> None:
+    with outage(chromium) as lost:
+        page = lost.page.page
+        assert claims(lost.page) == []
+        assert page.title() == "Connection lost · Dropanchor"
+        assert [chip.split() for chip in page.locator(".chip:visible").all_inner_texts()] == [
+            ["Out", "of", "date", "6"]
+        ]
+        assert set(page.locator("tbody tr:visible td.c-state").all_inner_texts()) == {"Out of date"}
+        assert page.locator("td.c-online.yes").count() == 0
+        assert page.locator("[data-part='state']").inner_text() == "Out of date"
+        assert page.locator("[data-part='meaning']").inner_text().startswith("No connection to the service")
+        assert page.locator("[data-part='v-online']").inner_text() == "–"
+        assert {tag["state"] for tag in lost.page.tags().values()} == {"outdated"}
+
+
+def test_the_map_of_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chromium: Browser) -> None:
+    with outage(chromium) as lost:
+        lost.page.wait_for("dropanchor.drawing().still")
+        assert lost.page.page.evaluate(BLUE_PIXELS) == 0
+
+
+def test_the_states_come_back_with_the_connection(chromium: Browser) -> None:
+    with outage(chromium) as lost:
+        lost.place.house.stopping = Event()
+        with running_server(lost.place.house.app(DASHBOARD), lost.place.house.stopping, lost.port):
+            lost.page.wait_for("dropanchor.status() === 'live'")
+            show_six(lost.place, lost.page)
+            lost.page.wait_for("dropanchor.tags().every((tag) => tag.state === 'tracking')")
+            lost.page.page.locator(".chip[data-state='tracking']", has_text="6").wait_for()
+            lost.page.page.locator("td.c-state", has_text=State.TRACKING.name.capitalize()).first.wait_for()
+            assert lost.page.page.title() == "Dropanchor"
