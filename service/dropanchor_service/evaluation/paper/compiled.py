@@ -1,7 +1,9 @@
 """Algorithm 1 compiled, for experiments with hundreds of runs: the same numbers as the engine `paper`.
 
 It covers what the simulations need: one anchor at the origin, a known start, headings as they come, no IMU. The engine
-in `estimation/` is the readable one; a test holds this one to it.
+in `estimation/` is the readable one; a test holds this one to it. The report needs both: its families alone are 10,400
+runs of the paper's filters, and a run of 10,000 instants takes 0.04 s here and 1.6 s in the engine, so that minutes
+would become hours. The vanilla EKF, which the engine does not offer, is a part of this one, too.
 """
 
 import math
