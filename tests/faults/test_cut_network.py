@@ -3,9 +3,10 @@
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 
 from support.commands import environment
-from support.lossy_link import HERE, LossyLink, lossy_link
+from support.lossy_link import LossyLink, lossy_link
 from support.service import Running, running_service
 from support.zenoh_router import free_port, wait_until
 
@@ -51,8 +52,10 @@ def bad_times(service: Running, link: LossyLink) -> None:
 
 
 def test_a_cut_of_eight_seconds_and_a_fifth_of_the_packets_lost_lose_no_sample() -> None:
-    endpoint = f"tcp/{HERE}:{free_port()}"
-    with lossy_link() as link, running_service("--insecure", "--zenoh-listen", endpoint) as service:
+    with ExitStack() as opened:
+        link = opened.enter_context(lossy_link())
+        endpoint = f"tcp/{link.here}:{free_port()}"
+        service = opened.enter_context(running_service("--insecure", "--zenoh-listen", endpoint))
         words = link.elsewhere(sys.executable, "-c", TAG, endpoint)
         with subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment()

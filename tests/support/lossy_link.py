@@ -11,21 +11,25 @@ import struct
 import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from ipaddress import IPv4Address
 from threading import Event, Thread
 
 import pytest
 
-HERE, THERE = "198.51.100.1", "198.51.100.2"  # TEST-NET-2, RFC 5737
+_NETWORK = IPv4Address("198.18.0.0")  # for tests between devices, RFC 2544: 2**17 addresses
 _TUNSETIFF = 0x400454CA
 _TUN_WITHOUT_HEADER = 0x1001
 _MTU = 1500
 
 
 class LossyLink:
-    """loss: the share of packets that are lost from now on, each way. carried, lost: packets so far."""
+    """here, there: the addresses of the two hosts, of this process alone. loss: the share of packets that are lost from
+    now on, each way. carried, lost: packets so far."""
 
     def __init__(self, namespace: str) -> None:
         self.namespace = namespace
+        first = _NETWORK + 2 * (os.getpid() % 2**16)
+        self.here, self.there = str(first), str(first + 1)
         self.loss = 0.0
         self.carried = self.lost = 0
 
@@ -62,9 +66,9 @@ def lossy_link() -> Iterator[LossyLink]:
         for device in devices:
             made.callback(os.close, device)
         link, stop = LossyLink(name), Event()
-        _address(f"da{os.getpid()}", HERE, THERE, [])
+        _address(f"da{os.getpid()}", link.here, link.there, [])
         _ip("link", "set", f"db{os.getpid()}", "netns", name)
-        _address(f"db{os.getpid()}", THERE, HERE, link.elsewhere())
+        _address(f"db{os.getpid()}", link.there, link.here, link.elsewhere())
         thread = Thread(target=link.forward, args=(devices, stop))
         thread.start()
         made.callback(thread.join)

@@ -51,10 +51,12 @@ class SecuredSite:
             yield session
 
 
-def secured_site(path: Path, *tags: str, site: str = "default") -> SecuredSite:
+def secured_site(
+    path: Path, *tags: str, site: str = "default", host: str = "localhost", address: str = "127.0.0.1"
+) -> SecuredSite:
     port = free_port()
-    table = Table(site=site, hosts=("localhost", "127.0.0.1"), listen=(f"tls/127.0.0.1:{port}",))
+    table = Table(site=site, hosts=(host, "127.0.0.1"), listen=(f"tls/{address}:{port}",))
     folder = SecurityFolder.make(path, table, days=30)
     for tag in tags:
         folder.add_tag(tag, days=30)
-    return SecuredSite(folder, f"tls/localhost:{port}")
+    return SecuredSite(folder, f"tls/{host}:{port}")

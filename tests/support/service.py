@@ -111,7 +111,7 @@ def running_router(*arguments: str) -> Iterator[None]:
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment()) as process:
         try:
             assert process.stderr is not None
-            assert "ready at" in process.stderr.readline()
+            assert any("ready at" in line for line in process.stderr)
             yield
         finally:
             process.send_signal(signal.SIGTERM)

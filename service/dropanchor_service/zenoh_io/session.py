@@ -10,6 +10,7 @@ from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.router import LINK, QUIET, router_transport
 from dropanchor_service.settings.model import ZenohSettings
+from dropanchor_service.zenoh_io import receive_threads
 
 ATTEMPT_S = 1.0
 
@@ -20,6 +21,8 @@ class ZenohError(Exception):
 
 def open_session(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> zenoh.Session:
     """Raises ZenohError."""
+    if not settings.connect:
+        receive_threads.have_enough()
     try:
         return zenoh.open(_config(settings, credentials))
     except zenoh.ZError as error:
