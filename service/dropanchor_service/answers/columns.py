@@ -115,13 +115,13 @@ def _hints(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> tuple[
     lacking = np.isin(poses["reason"], _LACK_OF_RANGES) if unknown else np.zeros(len(poses), bool)
     if not lacking.any():
         return HINTS, poses["reason"]
-    texts, hint = list(HINTS), poses["reason"].astype(np.int64)
+    hint = poses["reason"].astype(np.int64)
     places: dict[str, int] = {}
     for place in np.flatnonzero(lacking).tolist():
         name = unknown.get(int(poses["row"][place]))
         if name is not None:
             hint[place] = places.setdefault(name, len(HINTS) + len(places))
-    return [*texts, *map(hint_about, places)], hint
+    return [*HINTS, *map(hint_about, places)], hint
 
 
 def with_age(poses: Array, age_s: Array) -> Array:
