@@ -59,6 +59,7 @@ class House:
         max_tags: int = 1000,
         keeper: Doorkeeper | None = None,
         buckets: Buckets | None = None,
+        endpoints: tuple[str, ...] = (),
     ) -> FastAPI:
         return create_app(
             self.answers,
@@ -70,6 +71,7 @@ class House:
             dashboard=dashboard,
             keeper=keeper,
             buckets=buckets,
+            endpoints=endpoints,
         )
 
 

@@ -14,7 +14,9 @@ class PoseFrame(_Answer):
     """Poses of many tags in columns: entry i of every column belongs to tag i. Names and units as in a pose; metres
     and radians are rounded to 4 decimals, degrees to 9. `lat` and `lon` only where the site is georeferenced."""
 
-    t_ns: int = Field(description="UTC, ns: the moment of the frame; the pose of tag i is age_s[i] older.")
+    t_ns: int = Field(
+        description="UTC, ns: the moment of the frame; the pose of tag i, unless it is a replay, is age_s[i] older."
+    )
     tags: list[str]
     online: list[bool]
     state: list[TrackingState]
@@ -49,6 +51,10 @@ class TagStatus(_Answer):
     messages: int
     samples: dict[str, int] = Field(description="Samples that were used, by kind.")
     rejected: dict[str, int] = Field(description="Messages and samples that were not used, by reason.")
+    hint: str = Field(
+        description="What a human can do so that more of it is used, such as for an anchor that the site does not "
+        "have; empty when nothing is needed."
+    )
     settings: TagSettings
 
 
@@ -79,6 +85,17 @@ class AnchorList(_Answer):
     """The anchors of the site."""
 
     anchors: list[Anchor]
+
+
+class Connect(_Answer):
+    """How a tag connects to this site."""
+
+    endpoints: list[str] = Field(description="Of the Zenoh router, such as tcp/127.0.0.1:7447.")
+    credentials: bool = Field(description="Whether a tag needs the folder that `dropanchor tag add` makes for it.")
+    simulate: str = Field(
+        description="A command that starts a simulated tag. Whoever asks from the machine of the service gets it with "
+        "the path of the program."
+    )
 
 
 class Health(_Answer):

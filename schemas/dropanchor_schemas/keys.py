@@ -22,6 +22,15 @@ def chunk_from_id(identifier: str) -> str:
     return quote(identifier, safe="").replace("~", "%7E")
 
 
+def refuse_pattern(identifier: str) -> None:
+    """Raises InvalidKeyError for an id that looks like a pattern for several tags: settings know none."""
+    if "*" in identifier:
+        raise InvalidKeyError(
+            f"{identifier!r} would be the id of one tag, not a pattern: settings for all tags do not exist, give each "
+            "tag its own"
+        )
+
+
 def id_from_chunk(chunk: str) -> str:
     """The id of a key chunk. Raises InvalidKeyError unless the chunk is exactly what `chunk_from_id` makes of it."""
     try:

@@ -62,7 +62,9 @@ class Pose(_Answer):
 
     tag: str
     t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")
-    age_s: float = Field(description="Seconds from t_ns to the moment of the answer.")
+    age_s: float = Field(
+        description="Seconds from t_ns to the moment of the answer; of a replay, to where its recording has come to."
+    )
     state: TrackingState
     reason: StateReason = Field(description="Machine-readable cause of the state.")
     hint: str = Field(description="What a human can do about it; empty when nothing is needed.")

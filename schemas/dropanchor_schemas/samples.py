@@ -76,7 +76,7 @@ class SamplesMessage(_Message):
     model_config = ConfigDict(
         json_schema_extra={
             "examples": [
-                {"range": [{"t_ns": 1760000000000000000, "anchor": "7", "range_m": 12.34}]},
+                {"range": [{"t_ns": 1760000000000000000, "anchor": "1", "range_m": 12.34}]},
                 {
                     "version": 1,
                     "clock": "utc",
@@ -90,7 +90,7 @@ class SamplesMessage(_Message):
                             "mag": [0.0, 20.0, -44.0],
                         }
                     ],
-                    "range": [{"t_ns": 1760000000010000000, "anchor": 7, "range_m": 12.34, "std_m": 0.1}],
+                    "range": [{"t_ns": 1760000000010000000, "anchor": 1, "range_m": 12.34, "std_m": 0.1}],
                 },
             ]
         },
@@ -99,6 +99,10 @@ class SamplesMessage(_Message):
     version: int = Field(default=1, ge=1, le=1, description="Of this schema; decoders refuse what they do not know.")
     clock: Literal["utc", "boot"] = Field(
         default="utc", description="utc: ns since 1970; boot: ns since the tag's start."
+    )
+    replay: bool = Field(
+        default=False,
+        description="The samples are of a recording that is played now; ages count from where it has come to.",
     )
     sequence: int | None = Field(default=None, ge=0, lt=2**32, description="Counts the messages of one publisher.")
     boot_id: int | None = Field(default=None, ge=0, lt=2**32, description="Random per start of the publisher.")
@@ -154,6 +158,7 @@ def _frame(message: SamplesMessage) -> Frame:
         sequence=message.sequence,
         boot_id=message.boot_id,
         boot_clock=message.clock == "boot",
+        replay=message.replay,
         anchor_names={anchor_number(name): name for name in named if isinstance(name, str)},
     )
 

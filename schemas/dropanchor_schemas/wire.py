@@ -17,6 +17,8 @@ ENCODING_PACKED = "application/vnd.dropanchor.samples"
 ENCODING_JSON = "application/json"
 VERSION = 1
 FLAG_BOOT_CLOCK = 1
+FLAG_REPLAY = 2
+KNOWN_FLAGS = FLAG_BOOT_CLOCK | FLAG_REPLAY
 MAX_PAYLOAD_BYTES = 65_536
 MAX_T_NS = 2**62
 
@@ -111,6 +113,7 @@ class Frame:
 
     sequence: counts the messages of one publisher, None when it does not count.
     boot_id: random per start of the publisher; None or 0 when it has none, and then its messages are not numbered.
+    replay: the samples are of a recording, played now; their times are those of the recording.
     anchor_names: number → text of the anchors that the message named by text.
     """
 
@@ -121,6 +124,7 @@ class Frame:
     sequence: int | None = None
     boot_id: int | None = None
     boot_clock: bool = False
+    replay: bool = False
     anchor_names: dict[int, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -192,6 +196,7 @@ def decode_packed(payload: bytes) -> Frame | Rejection:
         sequence=sequence,
         boot_id=boot_id,
         boot_clock=bool(flags & FLAG_BOOT_CLOCK),
+        replay=bool(flags & FLAG_REPLAY),
     )
 
 
@@ -210,8 +215,8 @@ def read_header(payload: bytes) -> Header | Rejection:
         return Rejection(Reason.HEADER_TRUNCATED, f"{len(payload)} bytes, the header alone has {HEADER.size}")
     _, flags, *first, sequence, boot_id, t0_ns, last, zero16, zero32 = HEADER.unpack_from(payload)
     counts = (first[0], first[1], first[2], last)
-    if flags & ~FLAG_BOOT_CLOCK:
-        return Rejection(Reason.FLAGS_UNKNOWN, f"flags {flags:#04x}, this decoder knows {FLAG_BOOT_CLOCK:#04x}")
+    if flags & ~KNOWN_FLAGS:
+        return Rejection(Reason.FLAGS_UNKNOWN, f"flags {flags:#04x}, this decoder knows {KNOWN_FLAGS:#04x}")
     if zero16 or zero32:
         return Rejection(Reason.RESERVED_NOT_ZERO, "bytes 26 to 31 must be zero")
     if len(payload) != packed_size(*counts):
@@ -226,6 +231,8 @@ def read_header(payload: bytes) -> Header | Rejection:
 def encode_json(frame: Frame) -> bytes:
     """The JSON payload of a frame. Raises ValueError for values JSON cannot hold (NaN where a value is needed)."""
     message: dict[str, Any] = {"version": VERSION, "clock": "boot" if frame.boot_clock else "utc"}
+    if frame.replay:
+        message["replay"] = True
     if frame.sequence is not None:
         message["sequence"] = frame.sequence
     if frame.boot_id is not None:
@@ -250,7 +257,7 @@ def _packed(frame: Frame, t0_ns: int) -> bytes:
 
 
 def _pack_header(frame: Frame, t0_ns: int) -> bytes:
-    flags = FLAG_BOOT_CLOCK if frame.boot_clock else 0
+    flags = FLAG_BOOT_CLOCK * frame.boot_clock | FLAG_REPLAY * frame.replay
     counts = len(frame.imu), len(frame.ranges), len(frame.headings)
     ids = (frame.sequence or 0) % 2**32, frame.boot_id or 0
     return HEADER.pack(VERSION, flags, *counts, *ids, t0_ns, len(frame.bearings), 0, 0)

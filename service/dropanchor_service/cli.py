@@ -33,7 +33,7 @@ _EPILOG = """\
 examples:
   dropanchor demo                          the service with simulated tags: look at it in a browser
   dropanchor serve                         the service with a Zenoh router of its own, nothing to configure
-  dropanchor replay RECORDING --anchor 7   the same estimator on a recording, with its error
+  dropanchor replay RECORDING --anchor 1   the same estimator on a recording, with its error
   dropanchor evaluate paper --out report   the paper's experiments, its figures beside ours
   dropanchor COMMAND --help                everything about one command
 """

@@ -35,6 +35,7 @@ from dropanchor_service.security.credentials import certificate_of, credentials_
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
+from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
 from dropanchor_service.zenoh_io.intake import ZenohIntake
 from dropanchor_service.zenoh_io.link import ZenohLink
@@ -208,6 +209,8 @@ class Service:
             registry=self.metrics.registry,
             stopping=self._stopping,
             max_tags=self._settings.max_tags,
+            endpoints=endpoints_of(self._settings.zenoh, self._credentials),
+            credentials=self._credentials,
             keeper=self._keeper,
             buckets=Buckets(self._settings.http.requests_per_s, self._settings.http.burst),
         )

@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import shlex
 import signal
 import sys
 from importlib import import_module
@@ -16,15 +17,15 @@ _INTERRUPTED, _TERMINATED = 130, 143
 
 _EXAMPLES = """examples:
   dropanchor-tag simulate                                     tags that drive around the anchor
-  dropanchor-tag replay recordings/yard --anchor L0           a recording, in real time
+  dropanchor-tag replay recordings/yard --anchor 1            a recording, in real time
   dropanchor-tag replay recordings/yard --speed 10 --tag cart ten times as fast, as the tag "cart"
-  echo '{"anchor": 7, "range_m": 3.21}' | dropanchor-tag publish --tag cart
+  echo '{"anchor": 1, "range_m": 3.21}' | dropanchor-tag publish --tag cart
 
 `dropanchor-tag COMMAND --help` explains each of them.
 """
 _REPLAY = """Publishes a recording as if its tag were here, with the original spacing of its samples."""
 _REPLAY_EXAMPLES = """examples:
-  dropanchor-tag replay recordings/yard --anchor L0 --speed 10
+  dropanchor-tag replay recordings/yard --anchor 1 --speed 10
   dropanchor-tag replay recordings/yard --loop --connect tls/router.example:7447 --ca ca.pem
 
 A recording is a folder of CSV files, plain or gzipped: range.csv (t_s, anchor_id, range_m, perhaps std_m),
@@ -33,12 +34,12 @@ heading.csv (t_s, yaw_rad, perhaps std_rad).
 """
 _PUBLISH = """Reads one JSON object per line from standard input and publishes it: any script can be a tag."""
 _PUBLISH_EXAMPLES = """a line is one sample,
-  {"anchor": 7, "range_m": 3.21, "std_m": 0.1}
+  {"anchor": 1, "range_m": 3.21, "std_m": 0.1}
   {"acc": [0, 0, 9.81], "gyro": [0, 0, 0.1], "mag": [0, 20, -44]}
   {"heading_rad": 1.57}
-  {"anchor": "L0", "bearing_rad": 0.3}
+  {"anchor": 1, "bearing_rad": 0.3}
 or a samples message as in the protocol:
-  {"range": [{"t_ns": 1760000000000000000, "anchor": 7, "range_m": 3.21}]}
+  {"range": [{"t_ns": 1760000000000000000, "anchor": 1, "range_m": 3.21}]}
 
 Without t_ns the time is that of reading. A bad line is reported with its number and left out; the exit code is then 1.
 example:
@@ -65,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name != "numpy":
             raise
-        return _failed('the simulator needs numpy: pip install "dropanchor-tag-client[simulator]"')
+        return _failed(f"the simulator needs numpy: {shlex.quote(sys.executable)} -m pip install numpy")
     except (ConnectError, RecordingError, ValueError) as error:
         return _failed(str(error))
 

@@ -55,6 +55,8 @@ class TagClient:
         long. With batch_s=None no thread watches the time: call `flush`.
     cache_messages: messages kept for a service that missed them (a killed router or service loses nothing as long as
         they cover the gap); 0 publishes plainly.
+    replay: the samples are of a recording that is played now, at any speed; the service then counts ages from where
+        the recording has come to.
     wait_when_congested: publishing waits for a slow router instead of dropping; not for live data.
     connect_timeout_s: how long opening waits for the router before it raises ConnectError; None: for ever, and says so
         in the log. An open client reconnects by itself for ever; its publishing never blocks.
@@ -77,6 +79,7 @@ class TagClient:
         clock: Literal["utc", "boot"] = "utc",
         batch_samples: int = 20,
         batch_s: float | None = 0.1,
+        replay: bool = False,
         cache_messages: int = 600,
         wait_when_congested: bool = False,
         connect_timeout_s: float | None = None,
@@ -91,6 +94,7 @@ class TagClient:
         self._connect = SessionSettings(connect=connect) if isinstance(connect, str) else connect
         self._packed = encoding == "packed"
         self._boot_clock = clock == "boot"
+        self._replay = replay
         self._batch_s = batch_s
         self._cache_messages = cache_messages
         self._wait_when_congested = wait_when_congested
@@ -231,6 +235,7 @@ class TagClient:
         frame.sequence = self._sent.messages % 2**32
         frame.boot_id = self.boot_id
         frame.boot_clock = self._boot_clock
+        frame.replay = self._replay
         return encode_packed(frame) if self._packed else encode_json(frame)
 
     def _flush_in_time(self) -> None:

@@ -55,6 +55,33 @@ def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
             assert (float(row["x"]), float(row["y"])) == pytest.approx((pose["x"], pose["y"]), abs=1e-6)
 
 
+def test_a_recording_begun_while_tags_were_running_is_compared_where_both_have_a_position(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config = settings_file(tmp_path, [], "[recording]\npose_period_s = 0.01")
+    end_ns = time.time_ns() - 20 * S
+    with (
+        running_service("--config", str(config), "--data-dir", str(tmp_path)) as service,
+        connected_session(service.zenoh) as session,
+    ):
+
+        def send(step: int) -> None:
+            frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
+            session.put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
+            wait_until(lambda: service.metric("dropanchor_poses_total") >= 18 * (step + 1), 120.0)
+
+        for step in range(5):
+            send(step)
+        httpx.post(f"{service.url}/api/v1/recordings", json={"tags": None}).raise_for_status()
+        for step in range(5, 10):
+            send(step)
+        assert service.stop() == 0
+    assert main(["replay", str(tmp_path / "recordings")]) == 0
+    said = capsys.readouterr().out
+    assert "inf" not in said.replace("information", "")
+    assert "not compared, for their position is known either in the recording or in this replay only" in said
+
+
 def test_what_an_mcap_recording_knows_by_itself_cannot_be_given(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

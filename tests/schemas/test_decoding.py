@@ -88,7 +88,7 @@ PACKED = {
     Reason.PAYLOAD_TOO_LARGE: [header(ranges=4095) + ONE * 4095],
     Reason.HEADER_TRUNCATED: [b"\x01", header()[:31]],
     Reason.VERSION_UNKNOWN: [b"\x02", header(version=0) + ONE, header(version=2) + ONE],
-    Reason.FLAGS_UNKNOWN: [header(flags=2) + ONE, header(flags=0x81) + ONE],
+    Reason.FLAGS_UNKNOWN: [header(flags=4) + ONE, header(flags=0x81) + ONE],
     Reason.RESERVED_NOT_ZERO: [header(zero16=1) + ONE, header(zero32=1) + ONE],
     Reason.LENGTH_MISMATCH: [header(), header() + ONE[:-1], header() + ONE + b"\0", header(ranges=0) + ONE],
     Reason.NO_SAMPLES: [header(ranges=0)],

@@ -26,9 +26,9 @@ README = (Path(__file__).parents[2] / "schemas" / "README.md").read_text()
 T = 1_760_000_000_000_000_000
 EXAMPLE = Frame(
     imu=[ImuSample(T, (0.0, 0.0, 9.8125), (0.0, 0.0, 0.125), (0.0, 20.0, -44.0))],
-    ranges=[RangeSample(T + 10_000_000, 7, 12.25, 0.125), RangeSample(T + 12_500_000, anchor_number("L0"), 3.5)],
+    ranges=[RangeSample(T + 10_000_000, 1, 12.25, 0.125), RangeSample(T + 12_500_000, anchor_number("L0"), 3.5)],
     headings=[HeadingSample(T + 20_000_000, 1.5, 0.0625)],
-    bearings=[BearingSample(T + 30_000_000, 7, -0.5)],
+    bearings=[BearingSample(T + 30_000_000, 1, -0.5)],
     sequence=41,
     boot_id=0xDEADBEEF,
 )
@@ -67,7 +67,7 @@ def test_the_json_example_holds_the_same_samples() -> None:
 def test_the_shortest_tag_there_is_is_understood() -> None:
     decoded = decode_json(blocks("json")[0].encode())
     assert isinstance(decoded, Frame)
-    assert decoded.ranges[0][:3] == (T, 7, 12.34)
+    assert decoded.ranges[0][:3] == (T, 1, 12.34)
     assert keys.samples_key("default", "my-tag") in README
 
 
@@ -94,7 +94,7 @@ def one_range(payload: bytes) -> None:
     assert isinstance(frame, Frame), frame
     assert (frame.sequence, frame.boot_id, frame.boot_clock) == (41, 0xDEADBEEF, False)
     (sample,) = frame.ranges
-    assert sample.anchor == 7
+    assert sample.anchor == 1
     assert sample.range_m == 12.25
     assert math.isnan(sample.std_m)
 

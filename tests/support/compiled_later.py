@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _bench(folder: Path) -> Bench:
-    return Bench(folder, engine=FleetEngine(), site={"anchors": [{"id": "0"}]})
+    return Bench(folder, engine=FleetEngine(), site={"anchors": [{"id": "1"}]})
 
 
 def _send(bench: Bench, messages: list[Message]) -> None:

@@ -53,7 +53,7 @@ class LiveTags:
 
     def write_settings(self, folder: Path, *more: str) -> Path:
         """A settings file that knows the anchor and where each tag starts; more: lines at its top."""
-        lines = ['engine = "fleet"', *more, "[[site.anchors]]", 'id = "0"']
+        lines = ['engine = "fleet"', *more, "[[site.anchors]]", 'id = "1"']
         for index, pose in enumerate(start_poses(self._tags, self._seed)):
             start = f"{{ x = {pose.x}, y = {pose.y}, heading_rad = {pose.heading_rad} }}"
             lines += [f"[tags.{json.dumps(tag_name(index))}]", f"start = {start}"]

@@ -37,6 +37,7 @@ def frames(draw: st.DrawFn) -> Frame:
         sequence=draw(u32),
         boot_id=draw(u32),
         boot_clock=draw(st.booleans()),
+        replay=draw(st.booleans()),
     )
     if not len(frame):
         frame.headings.append(HeadingSample(T, 0.0))

@@ -22,6 +22,7 @@ from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.pending_tags import Newcomers
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
+from dropanchor_service.store.unknown_anchors import hint_about
 
 Answer = dict[str, Any]
 
@@ -53,6 +54,11 @@ class Answers:
         self.tracks = tracks
         self.newcomers = Newcomers(0) if newcomers is None else newcomers
 
+    def hint_of(self, tag: Tag) -> str:
+        """What a person can do so that more of what the tag sends is used; empty when there is nothing."""
+        unknown = self.tags.unknown_anchors.of(tag.row, self.now_ns())
+        return hint_about(unknown[1]) if unknown is not None and self.site.lacks(unknown[0]) else ""
+
     def pose_of(self, tag: Tag) -> Answer | None:
         """`Pose`, None before the tag's first one."""
         row = self.latest.row(tag.row)
@@ -81,7 +87,7 @@ class Answers:
         return self._poses(pose[None], now_ns, then=True, names=[name])[0] | {"hypotheses": []}
 
     def _pose_in_memory(self, latest: Array, t_ns: int, now_ns: int) -> Array:
-        aged = with_age(latest[None], (now_ns - latest["t_ns"][None]) * 1e-9)[0]
+        aged = with_age(latest[None], self.tags.age_s(latest[None], now_ns))[0]
         return pose_at(self.latest.history(int(latest["row"])), latest if t_ns <= latest["t_ns"] else aged, t_ns)
 
     def _memory(self, latest: Array) -> Array:

@@ -13,6 +13,7 @@ from dropanchor_service.estimation.batch import Array, State, StateReason
 from dropanchor_service.store.records import copied
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
+from dropanchor_service.store.unknown_anchors import hint_about
 
 STATES = [TrackingState[state.name].value for state in State]
 REASONS = [ReasonName[reason.name].value for reason in StateReason]
@@ -35,16 +36,19 @@ _HINTS = {
     "tag starts, or add a second anchor.",
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
+_LACK_OF_RANGES = [StateReason.NO_RANGE, StateReason.RANGES_MISSING]
 
 
 @dataclass(frozen=True)
 class PoseColumns:
-    """One entry per pose. poses: POSE; the others derived; an unknown float is NaN. anchor_ids: by the index that the
-    poses have of them. lat, lon: None without a georeference."""
+    """One entry per pose. poses: POSE; the others derived; an unknown float is NaN. hint: by its index in `hint_texts`.
+    anchor_ids: by the index that the poses have of them. lat, lon: None without a georeference."""
 
     poses: Array
     tags: list[str]
     online: Array
+    hint_texts: Sequence[str]
+    hint: Array
     anchor_ids: list[str]
     age_s: Array
     semi_major_m: Array
@@ -63,7 +67,7 @@ class PoseColumns:
 
     @property
     def hints(self) -> list[str]:
-        return [HINTS[reason] for reason in self.poses["reason"].tolist()]
+        return [self.hint_texts[index] for index in self.hint.tolist()]
 
     @property
     def anchors(self) -> list[str | None]:
@@ -81,16 +85,19 @@ def columns_of(
 ) -> PoseColumns:
     """poses: POSE, of any rows that `tags` knows, or of the tags of these names; then: they hold for their own time,
     and do not get old."""
-    age_s = (now_ns - poses["t_ns"]) * 1e-9
+    age_s = (now_ns - poses["t_ns"]) * 1e-9 if then else tags.age_s(poses, now_ns)
     aged = poses if then else with_age(poses, age_s)
     of_tags = tags.names(aged["row"].tolist()) if names is None else list(names)
     ellipse = ellipse_95(aged["cov"])
+    hint_texts, hint = (HINTS, aged["reason"]) if then else _hints(aged, site, tags, now_ns)
     origin = site.site.georeference
     lat, lon = (None, None) if origin is None else lat_lon(origin, aged["x"], aged["y"])
     return PoseColumns(
         poses=aged,
         tags=of_tags,
         online=tags.are_online(aged["row"]) if names is None else np.array([tags.is_online(name) for name in names]),
+        hint_texts=hint_texts,
+        hint=hint,
         anchor_ids=[anchor.id for anchor in site.anchors_by_index()],
         age_s=age_s,
         semi_major_m=ellipse[0],
@@ -99,6 +106,22 @@ def columns_of(
         lat=lat,
         lon=lon,
     )
+
+
+def _hints(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> tuple[Sequence[str], Array]:
+    """Texts, and the index of the one that fits each POSE: a tag that lacks ranges and hears an unknown anchor is told
+    so."""
+    unknown = {row: name for row, number, name in tags.unknown_anchors.fresh(now_ns) if site.lacks(number)}
+    lacking = np.isin(poses["reason"], _LACK_OF_RANGES) if unknown else np.zeros(len(poses), bool)
+    if not lacking.any():
+        return HINTS, poses["reason"]
+    hint = poses["reason"].astype(np.int64)
+    places: dict[str, int] = {}
+    for place in np.flatnonzero(lacking).tolist():
+        name = unknown.get(int(poses["row"][place]))
+        if name is not None:
+            hint[place] = places.setdefault(name, len(HINTS) + len(places))
+    return [*HINTS, *map(hint_about, places)], hint
 
 
 def with_age(poses: Array, age_s: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from dropanchor_service.answers.columns import HINTS, REASONS, STATES, PoseColumns, ellipse_95
+from dropanchor_service.answers.columns import REASONS, STATES, PoseColumns, ellipse_95
 from dropanchor_service.answers.json_template import INTEGER, NUMBER, QUOTED, TEXT, Filled, filled, nothing_of
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
 from dropanchor_service.estimation.batch import Array, State
@@ -23,9 +23,8 @@ _ELLIPSE = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 def poses_json(columns: PoseColumns, hypotheses: Iterable[bytes]) -> Filled:
     """`Pose` of each. hypotheses: JSON of those of the ambiguous ones."""
     codes = _codes(columns)
-    used = np.flatnonzero(np.bincount(codes))
+    used, form_of = np.unique(codes, return_inverse=True)
     forms = [_form(columns, code) for code in used.tolist()]
-    form_of = np.searchsorted(used, codes)
     texts = _texts(columns, hypotheses)
     return filled(forms, form_of, _numbers(columns), _DECIMALS, columns.poses["t_ns"], texts)
 
@@ -60,18 +59,20 @@ def _codes(columns: PoseColumns) -> Array:
     anchor = np.where((poses["anchor"] >= 0) & (poses["anchor"] < len(columns.anchor_ids)), poses["anchor"], -1)
     flags = columns.online * 4 + known * 2 + (columns.semi_major_m < BEYOND)
     states = poses["state"].astype(np.int64) * len(REASONS) + poses["reason"]
-    codes: Array = ((anchor + 1) * len(STATES) * len(REASONS) + states) * 8 + flags
+    hinted = columns.hint.astype(np.int64) * (len(columns.anchor_ids) + 1) + anchor + 1
+    codes: Array = (hinted * len(STATES) * len(REASONS) + states) * 8 + flags
     return codes
 
 
 def _form(columns: PoseColumns, code: int) -> bytes:
     code, flags = divmod(code, 8)
     code, reason = divmod(code, len(REASONS))
-    anchor, state = divmod(code, len(STATES))
+    code, state = divmod(code, len(STATES))
+    hint, anchor = divmod(code, len(columns.anchor_ids) + 1)
     place = NUMBER if columns.lat is not None else None
     return orjson.dumps(
         {"tag": QUOTED, "t_ns": INTEGER, "age_s": NUMBER}
-        | {"state": STATES[state], "reason": REASONS[reason], "hint": HINTS[reason]}
+        | {"state": STATES[state], "reason": REASONS[reason], "hint": columns.hint_texts[hint]}
         | dict.fromkeys(("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps"), NUMBER)
         | {"covariance": _COVARIANCE if flags & 2 else nothing_of(9)}
         | {"ellipse_95": _ELLIPSE if flags & 1 else nothing_of(3)}

@@ -15,6 +15,7 @@ from dropanchor_service.api.http.errors import Kind, add_error_handlers, problem
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import Buckets
+from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import DashboardMount
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.poses import poses_router
@@ -24,6 +25,7 @@ from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Doorkeeper
 
 PREFIX = "/api/v1"
@@ -41,11 +43,14 @@ def create_app(
     recorder: Recorder | None = None,
     max_tags: int = 20_000,
     dashboard: Path | None = DASHBOARD,
+    endpoints: tuple[str, ...] = (),
+    credentials: SecurityFolder | None = None,
     keeper: Doorkeeper | None = None,
     buckets: Buckets | None = None,
 ) -> FastAPI:
     """ready: whether the service can do its work, and why not. impaired: what else does not work. stopping: when set,
     streams end. recorder: None where nothing can be recorded. dashboard: the folder of the page, None for no page.
+    endpoints: of the Zenoh router, as they are set. credentials: what tags need, None where they need none.
     keeper: who knows who asks; None: everybody may do everything. buckets: how often one client may ask."""
     app = FastAPI(
         title="Dropanchor",
@@ -66,6 +71,7 @@ def create_app(
         track_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),
+        connect_router(answers.site, endpoints, credentials),
         recordings_router(recorder),
         health_router(ready, impaired),
     ):

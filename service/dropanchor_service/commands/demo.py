@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--recording",
         metavar="NAME",
-        help="a real tag instead: plaza1 or plaza2 (needs the extra `recordings`), or the folder of a recording",
+        help="a real tag instead: plaza1 or plaza2 (needs gtsam: pip install gtsam), or the folder of a recording",
     )
     parser.add_argument(
         "--unknown-start", action="store_true", help="do not say where the tags start: the engine fleet finds them"

@@ -39,9 +39,9 @@ and the settings of the recording; --engine, --config and --out are what can be 
 """
 EPILOG = """\
 examples:
-  dropanchor replay recordings/yard --anchor 7 --start=10,0,1.57
-  dropanchor replay recordings/yard --anchor 7 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
-  dropanchor replay recordings/yard --anchor 7 --start=10,0 --smooth --out track.csv
+  dropanchor replay recordings/yard --anchor 1 --start=10,0,1.57
+  dropanchor replay recordings/yard --anchor 1 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
+  dropanchor replay recordings/yard --anchor 1 --start=10,0 --smooth --out track.csv
   dropanchor replay yard-20270115T080000-000000Z.mcap --out poses.csv
   dropanchor-tag simulate --out recordings/yard      makes a recording with truth to try it on
 """

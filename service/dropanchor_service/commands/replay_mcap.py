@@ -92,6 +92,7 @@ class Outcome:
     states: dict[str, Counter[str]] = field(default_factory=dict)
     compared: int = 0
     equal: int = 0
+    placed_once: int = 0
     worst_m: float = 0.0
     _places: dict[tuple[str, int], tuple[float, float]] = field(default_factory=dict)
     _estimates: list[tuple[str, int, float, float]] = field(default_factory=list)
@@ -116,9 +117,12 @@ class Outcome:
             shares = ", ".join(f"{state} {n / count:.1%}" for state, n in self.states[tag].most_common())
             yield f"{tag}: {count} poses, {shares}"
         if self.compared:
+            equal = f"{self.compared} compared, {self.equal} the same within a nanometre"
+            yield f"recorded poses: {equal}, worst difference {self.worst_m:.3g} m"
+        if self.placed_once:
             yield (
-                f"recorded poses: {self.compared} compared, {self.equal} the same within a nanometre, "
-                f"worst difference {self.worst_m:.3g} m"
+                f"recorded poses: {self.placed_once} not compared, for their position is known either in the recording "
+                "or in this replay only: a recording that was begun while tags were running has fresh estimators here"
             )
 
     def _compare(self) -> None:
@@ -128,11 +132,13 @@ class Outcome:
             if place is None:
                 left.append((tag, t_ns, x, y))
                 continue
+            if math.isnan(x) != math.isnan(place[0]):
+                self.placed_once += 1
+                continue
             self.compared += 1
-            both_unknown = math.isnan(x) and math.isnan(place[0])
-            off_m = 0.0 if both_unknown else math.hypot(place[0] - x, place[1] - y)
+            off_m = 0.0 if math.isnan(x) else math.hypot(place[0] - x, place[1] - y)
             self.equal += off_m <= SAME_M
-            self.worst_m = max(self.worst_m, math.inf if math.isnan(off_m) else off_m)
+            self.worst_m = max(self.worst_m, off_m)
         self._estimates = left[-MOST_WAITING:]
         self._places.clear()
 

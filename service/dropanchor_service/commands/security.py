@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_service.answers.connect_command import reached_at
 from dropanchor_service.commands.options import positive
 from dropanchor_service.security.folder import SecurityError, SecurityFolder, Table
 
@@ -82,7 +83,7 @@ def _init(arguments: argparse.Namespace) -> None:
     hosts = _hosts(arguments.host)
     table = Table(site=arguments.site, hosts=hosts, listen=(arguments.listen,))
     SecurityFolder.make(arguments.security, table, arguments.days)
-    print(_next_steps(arguments.security, hosts, arguments.site))
+    print(_next_steps(arguments.security, table))
 
 
 def _renew(arguments: argparse.Namespace) -> None:
@@ -112,14 +113,15 @@ def _is_address(host: str) -> bool:
     return True
 
 
-def _next_steps(folder: Path, hosts: tuple[str, ...], site: str) -> str:
+def _next_steps(folder: Path, table: Table) -> str:
+    site = table.site
     of_site = "" if site == "default" else f"\n     (with [site] id = {site!r} in its settings)"
     return f"""\
-The credentials of site {site!r} are in {folder}/. The certificates are good for: {", ".join(hosts)}.
+The credentials of site {site!r} are in {folder}/. The certificates are good for: {", ".join(table.hosts)}.
 Next:
   1. a tag:      dropanchor tag add NAME --security {folder}
                  and give the folder {folder}/tags/NAME to it, over a channel that you trust
   2. the router: dropanchor router --security {folder}        again after tags were added or revoked
-  3. the service: dropanchor serve --security {folder} --zenoh-connect tls/localhost:7447{of_site}
+  3. the service: dropanchor serve --security {folder} --zenoh-connect {reached_at(table.listen[0])}{of_site}
   4. the page and REST (https, with the certificate {folder}/ca.pem): dropanchor key add NAME --security {folder}
 """

@@ -29,7 +29,7 @@ examples:
 a settings file:
   unknown_tags = "refuse"
   [[site.anchors]]
-  id = "7"
+  id = "1"
   z = 2.5
   [tags.forklift-1]
   height_m = 1.2

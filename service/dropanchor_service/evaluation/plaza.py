@@ -6,6 +6,8 @@ MATLAB files: GT (t, x, y, heading), TD (t, sender, receiver, range), DR (t, way
 
 import importlib.util
 import math
+import shlex
+import sys
 from array import array
 from pathlib import Path
 
@@ -22,7 +24,7 @@ FILES = {"plaza1": ("Plaza1_.mat", 0.0), "plaza2": ("Plaza2_.mat", math.pi)}
 PLAZA_SCALE, PLAZA_STD = 1.069, 0.6
 """Of its radios: measured distance over true distance, and standard deviation, m, by a fit to the truth."""
 
-MISSING = "the Plaza sets come with gtsam, which is not installed: pip install dropanchor-service[recordings]"
+MISSING = f"the Plaza sets come with gtsam, which is not installed: {shlex.quote(sys.executable)} -m pip install gtsam"
 
 
 def read_plaza(name: str, folder: Path | None = None) -> Recording:

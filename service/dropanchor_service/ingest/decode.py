@@ -134,7 +134,7 @@ def _json_forms(
             continue
         frames[index] = frame
         form = forms[index]
-        form["accepted"], form["boot_clock"] = True, frame.boot_clock
+        form["accepted"], form["boot_clock"], form["replay"] = True, frame.boot_clock, frame.replay
         form["numbered"] = frame.sequence is not None and bool(frame.boot_id)
         form["sequence"], form["boot_id"] = frame.sequence or 0, frame.boot_id or 0
     return frames, rejected

@@ -10,12 +10,12 @@ from dropanchor_service.estimation.batch import BEARING, HEADING, RANGE, Array, 
 from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import Estimators
-from dropanchor_service.ingest.kernels.values import shift_times
+from dropanchor_service.ingest.kernels.values import newest_times, shift_times
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Losses
 from dropanchor_service.ingest.reorder_buffer import HeldMessages
 from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
-from dropanchor_service.store import SiteStore
+from dropanchor_service.store import SiteStore, TagTable
 from dropanchor_service.store.rings import rank_in_row
 
 HELD_BYTES = 2**26
@@ -27,10 +27,11 @@ class Preparation:
     window_ns: so long a message waits for those that its publisher numbered before it.
     """
 
-    def __init__(self, site: SiteStore, estimators: Estimators, losses: Losses, window_ns: int) -> None:
+    def __init__(self, site: SiteStore, tags: TagTable, estimators: Estimators, losses: Losses, window_ns: int) -> None:
         self.window_ns = window_ns
         self.publishers = Publishers()
         self._site = site
+        self._tags = tags
         self._estimators = estimators
         self._losses = losses
         self._held = HeldMessages(HELD_BYTES)
@@ -61,7 +62,9 @@ class Preparation:
             in_part = replace(sequenced, due=due)
             offsets, jumps = self.publishers.time_offsets(read.forms, in_part, arrived, _times(decoded))
             self._losses.clocks_jumped(jumps)
-            yield self._batch(_in_time(decoded, offsets, rejected), rejected, of_row)
+            in_time = _in_time(decoded, offsets, rejected)
+            self._note_replays(in_time, due, of_row, arrived)
+            yield self._batch(in_time, rejected, of_row, arrived)
 
     def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
         """What arrived until then has waited long enough. The window counts in arrivals: where messages have lain in a
@@ -78,8 +81,17 @@ class Preparation:
             self._losses.decoder_failed(error)
             return read_forms([_if_readable(*pair) for pair in zip(payloads, encodings, strict=True)], encodings)
 
-    def _batch(self, decoded: Decoded, rejected: list[Rejected], of_row: Array) -> SampleBatch:
+    def _note_replays(self, decoded: Decoded, due: Array, of_row: Array, arrived: Array) -> None:
+        """How far the newest sample of a replay lies before its arrival: answers count the age of its poses from
+        there. No sample's time depends on it."""
+        newest = np.full(len(of_row), -1, np.int64)
+        for messages, t_ns in _times(decoded) if decoded.forms["replay"][due].any() else ():
+            newest_times(t_ns, messages, newest)
+        self._tags.set_behind(of_row[due], np.where(newest[due] < 0, 0, arrived[due] - newest[due]))
+
+    def _batch(self, decoded: Decoded, rejected: list[Rejected], of_row: Array, arrived: Array) -> SampleBatch:
         self._bind_first_anchor(decoded)
+        self._note_unknown_anchors(decoded, of_row, arrived)
         ranges = self._anchored(decoded.ranges, rejected)
         bearings = self._anchored(decoded.bearings, rejected)
         for entry in rejected:
@@ -99,6 +111,14 @@ class Preparation:
         number = int(decoded.ranges["anchor"][0])
         if self._site.bind_first(decoded.anchor_names.get(number, str(number))):
             self._estimators.follow_site()
+
+    def _note_unknown_anchors(self, decoded: Decoded, of_row: Array, arrived: Array) -> None:
+        ranges = decoded.ranges[self._estimators.anchor_indices(decoded.ranges["anchor"]) < 0]
+        messages, first = np.unique(ranges["message"], return_index=True)
+        for message, number in zip(messages.tolist(), ranges["anchor"][first].tolist(), strict=True):
+            name = decoded.anchor_names.get(number, str(number))
+            tag = self._tags.at(int(of_row[message]))
+            self._tags.unknown_anchors.note(tag.row, tag.name, number, name, int(arrived[message]))
 
     def _anchored(self, samples: Array, rejected: list[Rejected]) -> Array:
         """The samples of anchors that the site has, with the engine's index of the anchor in `anchor`."""

@@ -39,7 +39,7 @@ class Ingest:
         reorder_ns: int = 250_000_000,
     ) -> None:
         self._losses = Losses(tags, metrics)
-        self.preparation = Preparation(site, estimators, self._losses, reorder_ns)
+        self.preparation = Preparation(site, tags, estimators, self._losses, reorder_ns)
         self._buffer = buffer
         self._admission = admission
         self._site = site

@@ -101,7 +101,7 @@ class FleetGauges(Collector):
 
     def collect(self) -> Iterable[Metric]:
         poses = self._latest.since()[1]
-        shown = with_age(poses, (self._now_ns() - poses["t_ns"]) * 1e-9)
+        shown = with_age(poses, self._tags.age_s(poses, self._now_ns()))
         by_state = np.bincount(shown["state"], minlength=len(STATES))
         tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
         for state, count in zip(STATES, by_state, strict=True):

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
@@ -24,6 +24,7 @@ def _is_endpoint(text: str) -> str:
 def _is_tag_id(name: str) -> str:
     try:
         chunk_from_id(name)
+        refuse_pattern(name)
     except InvalidKeyError as error:
         raise ValueError(str(error)) from error
     return name

@@ -95,7 +95,7 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
 
 def _sentence(error: Any, layers: list[tuple[str, dict[str, Any]]]) -> str:
     """Where it stands, which key, what is expected; the value is left out, it may be a secret."""
-    path = [str(part) for part in error["loc"]]
+    path = [str(part) for part in error["loc"] if part != "[key]"]  # pydantic's word for a key that is wrong itself
     place, _ = max(reversed([entry for entry in layers if entry[1]]), key=lambda entry: _depth(entry[1], path))
     key = ".".join(path) or "all together"
     if error["type"] == "extra_forbidden":

@@ -67,6 +67,10 @@ class SiteStore:
         entry = self._anchors.get(number)
         return None if entry is None or entry[1] not in self.site.anchors else entry[0]
 
+    def lacks(self, number: int) -> bool:
+        """Whether the site has no anchor with this number."""
+        return self.anchor_index(number) is None
+
     def anchors_by_index(self) -> list[Anchor]:
         """Every anchor the site has or had: an index keeps its meaning for the life of the store."""
         return [anchor for _, anchor in sorted(self._anchors.values(), key=lambda entry: entry[0])]

@@ -10,6 +10,7 @@ import numpy as np
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.store.records import enlarged
+from dropanchor_service.store.unknown_anchors import UnknownAnchors
 
 KINDS = ("imu", "range", "heading", "bearing")
 REASONS = tuple(Reason)
@@ -73,6 +74,8 @@ class TagTable:
         self._counts = np.zeros(16, _COUNTS)
         self._online: set[str] = set()
         self._is_online = np.zeros(16, bool)  # the same, by row
+        self._behind_ns = np.zeros(16, np.int64)  # how far the recording of a replayed tag lies in the past, by row
+        self.unknown_anchors = UnknownAnchors()
 
     def __len__(self) -> int:
         return len(self._by_row)
@@ -118,6 +121,15 @@ class TagTable:
         online: Array = self._is_online[rows]
         return online
 
+    def set_behind(self, rows: Array, behind_ns: Array) -> None:
+        """How far what these tags replay lies in the past, ns; 0 for tags that are live."""
+        self._behind_ns[rows] = behind_ns
+
+    def age_s(self, poses: Array, now_ns: int) -> Array:
+        """Age of POSE of any rows, s. The present of a replayed tag is where its recording has come to."""
+        age_s: Array = (now_ns - self._behind_ns[poses["row"]] - poses["t_ns"]) * 1e-9
+        return age_s
+
     @property
     def online_names(self) -> int:
         """How many names have a liveliness token, registered or not."""
@@ -155,6 +167,7 @@ class TagTable:
         if rows > len(self._counts):
             self._counts = enlarged(self._counts, 2 * len(self._counts))
             self._is_online = enlarged(self._is_online, len(self._counts))
+            self._behind_ns = enlarged(self._behind_ns, len(self._counts))
 
 
 def _count(column: Array, rows: Array) -> None:

@@ -13,7 +13,7 @@ from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
 class AnchorPlace(NamedTuple):
     """Where an anchor stands, m."""
 
-    id: str = "0"
+    id: str = "1"
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0

@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         t0_ns = time.time_ns() - round(_behind(arguments.speed) * (last_s - first_s) * _NS_PER_S)
         t0_ns -= round(first_s * _NS_PER_S)
     tag = arguments.tag or recording.name
-    with opened_client(arguments, tag, wait_when_congested=arguments.speed == 0) as client:
+    with opened_client(arguments, tag, replay=True, wait_when_congested=arguments.speed == 0) as client:
         while True:
             replay(client, recording, anchor=arguments.anchor, speed=arguments.speed, t0_ns=t0_ns)
             if not arguments.loop:

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--range-hz", type=_positive, metavar="HZ", help="ranges per second (default: as --noise says)")
     group.add_argument("--imu-hz", type=_positive, metavar="HZ", help="IMU samples per second (default: 100)")
-    group.add_argument("--anchor", default="0", metavar="ID", help="id of the anchor (default: %(default)s)")
+    group.add_argument("--anchor", default="1", metavar="ID", help="id of the anchor (default: %(default)s)")
     group.add_argument("--duration", type=_positive, metavar="S", help="end after so long")
     group.add_argument(
         "--out",

@@ -20,5 +20,5 @@ def chromium() -> Iterator[Browser]:
 @pytest.fixture
 def place() -> Iterator[Place]:
     house = live_house()
-    with running_server(house.app(DASHBOARD), house.stopping) as port:
+    with running_server(house.app(DASHBOARD, endpoints=("tcp/127.0.0.1:19747",)), house.stopping) as port:
         yield Place(house, f"http://127.0.0.1:{port}/")

@@ -1,5 +1,6 @@
 """The page in a real browser on the real interface, over a store that the tests fill."""
 
+import sysconfig
 import time
 from contextlib import ExitStack
 from threading import Event
@@ -41,7 +42,11 @@ def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> Non
 def test_without_a_tag_the_page_tells_how_to_start_one(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url) as page:
         page.page.locator("#empty").wait_for(state="visible")
-        assert page.page.locator("#command").inner_text() == "dropanchor-tag simulate"
+        page.page.wait_for_function("document.querySelector('#command').textContent.includes('--connect')")
+        command = page.page.locator("#command").inner_text()
+        assert command.startswith(f"{sysconfig.get_path('scripts')}/dropanchor-tag simulate")
+        assert "--connect tcp/127.0.0.1:19747" in command
+        assert not page.page.locator("#credentials").is_visible()
         place.move("cart", x=1.0, y=2.0)
         page.page.locator("#empty").wait_for(state="hidden")
 

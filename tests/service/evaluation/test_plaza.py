@@ -2,6 +2,7 @@
 
 import importlib.util
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,7 @@ def test_without_gtsam_the_message_says_what_to_install() -> None:
     with pytest.raises(RecordingError) as error:
         read_plaza("plaza2")
     assert str(error.value) == MISSING
-    assert "pip install dropanchor-service[recordings]" in MISSING
+    assert MISSING.endswith(f"{sys.executable} -m pip install gtsam")
 
 
 @pytest.mark.recordings

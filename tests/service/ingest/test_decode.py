@@ -40,6 +40,7 @@ frames = st.builds(
     sequence=numbers,
     boot_id=numbers,
     boot_clock=st.booleans(),
+    replay=st.booleans(),
 )
 
 
@@ -79,6 +80,7 @@ def assert_equal_to_the_contract(payloads: list[bytes]) -> None:
         assert form["accepted"]
         assert (form["sequence"], form["boot_id"]) == (expected.sequence, expected.boot_id)
         assert form["boot_clock"] == expected.boot_clock
+        assert form["replay"] == expected.replay
         assert samples_of(decoded, index) == as_text(
             expected.imu, expected.ranges, expected.headings, expected.bearings
         )

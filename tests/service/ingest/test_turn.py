@@ -1,6 +1,7 @@
 """From messages to poses: admission, anchors, duplicates, clocks; every loss is counted, and no fault spreads."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,13 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
+from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
 from dropanchor_service.ingest import samples as prepare
 from dropanchor_service.ingest.buffer import STRANGERS_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
+from dropanchor_service.store.unknown_anchors import FRESH_NS, MOST_LOGGED
 from support.ingest import Bench
 
 T = 1_760_000_000_000_000_000
@@ -405,3 +408,42 @@ def test_a_listed_tag_has_a_row_before_it_is_heard_and_an_announced_one_too(tmp_
     bench.ingest.announce("alive")
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]
+
+
+def test_anchors_that_the_site_lacks_are_logged_once_each_and_no_more_than_a_bounded_number(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    bench = Bench(site={"anchors": [{"id": "1"}]})
+    for anchor in range(2, 1000):
+        bench.send("a", ranges(1.0, anchor=anchor), ranges(1.0, anchor=anchor))
+    lines = [record.message for record in caplog.records if "unknown_anchors" in record.name]
+    assert len(lines) == MOST_LOGGED + 1
+    assert lines[0].startswith("tag a hears anchor 2, which this site does not have")
+    assert "PUT /api/v1/anchors/2" in lines[0]
+    assert "no more of them" in lines[-1]
+    assert len(list(bench.tags.unknown_anchors.fresh(bench.clock.now_ns()))) == 1
+    assert bench.tags.unknown_anchors.of(0, bench.clock.now_ns() + FRESH_NS) is None
+
+
+def test_a_replay_is_as_old_as_its_silence_and_a_live_tag_as_its_measurement() -> None:
+    bench = Bench()
+    answers = Answers(bench.site, bench.tags, bench.latest, bench.clock.now_ns)
+
+    def state_of(name: str, later_s: float = 0.0) -> tuple[str, float]:
+        tag = bench.tags.find(name)
+        assert tag is not None
+        answers.now_ns = lambda: bench.clock.now_ns() + int(later_s * S)
+        pose = answers.pose_of(tag)
+        assert pose is not None
+        return pose["state"], pose["age_s"]
+
+    bench.send("live", ranges(1.0))
+    bench.send("replayed", replace(ranges(1.0), replay=True))
+    assert state_of("live")[0] == "lost"
+    state, age_s = state_of("replayed")
+    assert state == "tracking"
+    assert age_s == pytest.approx(0.0, abs=0.5)
+    assert state_of("replayed", 5.0)[0] == "coasting"
+    assert state_of("replayed", 15.0)[0] == "lost"
+    bench.send("replayed", ranges(2.0))
+    assert state_of("replayed")[0] == "lost"

@@ -38,6 +38,19 @@ def test_init_says_what_comes_next_and_never_overwrites(tmp_path: Path, capsys: 
     assert {file.name: file.read_bytes() for file in folder.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    ("listen", "reached"),
+    [("tls/0.0.0.0:19747", "tls/localhost:19747"), ("tls/192.0.2.7:19748", "tls/192.0.2.7:19748")],
+)
+def test_the_next_steps_name_the_endpoint_that_was_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], listen: str, reached: str
+) -> None:
+    assert main(["security", "init", "--security", str(tmp_path / "s"), "--host", "192.0.2.7", "--listen", listen]) == 0
+    said = capsys.readouterr().out
+    assert f"--zenoh-connect {reached}" in said
+    assert "7447" not in said
+
+
 def test_private_keys_are_for_the_owner_alone(tmp_path: Path) -> None:
     site = secured_site(tmp_path / "security", "a")
     found = modes(site.folder.path)

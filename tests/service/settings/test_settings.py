@@ -97,6 +97,8 @@ def test_variables_of_others_with_our_prefix_are_left_alone() -> None:
         ("[tags.a.start]\nx = 1.0", ["tags.a.start.y", "required"]),
         (f"[tags.{'a' * 65}]", ["tags", "1 to 64 characters"]),
         ("[paper]\nparameters = { gat = 3.0 }", ["paper", "gat is not a parameter", "did you mean gate?"]),
+        ('[tags."*"]\nheight_m = 1.0', ["tags.*: '*' would be", "not a pattern", "give each tag its own"]),
+        ('[tags."forklift-*"]', ["tags.forklift-*", "not a pattern"]),
         ("max_tags = 1\n[tags.a]\n[tags.b]", ["max_tags is 1, but 2 tags are listed"]),
         ("port = ", ["is not TOML", "Invalid value"]),
     ],

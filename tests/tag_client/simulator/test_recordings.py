@@ -34,7 +34,7 @@ def test_a_recording_holds_the_simulation(tmp_path: Path) -> None:
     ranges = numbers(folder / "range.csv", "t_s", "range_m", "std_m")
     assert ranges[:, 0] == pytest.approx(run.ranges.t_s, abs=1e-6)
     assert ranges[:, 1:] == pytest.approx(np.column_stack([run.ranges.range_m, run.ranges.std_m]), rel=1e-8)
-    assert set(columns_of(folder / "range.csv")["anchor_id"]) == {"0"}
+    assert set(columns_of(folder / "range.csv")["anchor_id"]) == {"1"}
     imu = numbers(folder / "imu.csv", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz")
     assert imu == pytest.approx(np.hstack([run.imu.acc, run.imu.gyro, run.imu.mag]), rel=1e-8)
     truth = numbers(folder / "truth.csv", "x", "y", "z", "yaw_rad")
@@ -43,7 +43,7 @@ def test_a_recording_holds_the_simulation(tmp_path: Path) -> None:
     assert numbers(folder / "truth.csv", "qw", "qx", "qy", "qz") == pytest.approx(run.truth.attitude, abs=1e-8)
     heading = numbers(folder / "heading.csv", "t_s", "yaw_rad")
     assert heading[:, 1] == pytest.approx(run.scalars.heading_rad, abs=1e-8)
-    assert columns_of(folder / "anchors.csv") == {"id": ["0"], "x": ["0.0"], "y": ["0.0"], "z": ["0.0"]}
+    assert columns_of(folder / "anchors.csv") == {"id": ["1"], "x": ["0.0"], "y": ["0.0"], "z": ["0.0"]}
     assert json.loads((folder / "meta.json").read_text())["rates_hz"]["range_total"] == pytest.approx(10.0, abs=0.1)
 
 

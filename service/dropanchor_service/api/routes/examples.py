@@ -22,7 +22,7 @@ POSE: dict[str, Any] = {
     "sigma_pos_m": 0.115,
     "sigma_obs_m": 0.31,
     "range_m": 3.64,
-    "anchor": "17",
+    "anchor": "1",
     "hypotheses": [],
     "lat": 52.512345678,
     "lon": 13.412345678,
@@ -37,7 +37,7 @@ EXPLANATION: dict[str, Any] = {
         {
             "t_ns": 1_800_000_000_000_000_000,
             "kind": "range",
-            "anchor": "17",
+            "anchor": "1",
             "measured": 3.64,
             "predicted": 3.58,
             "innovation": 0.06,
@@ -59,7 +59,7 @@ POSE_FRAME: dict[str, Any] = {
     "state": ["tracking", "initialising"],
     "reason": ["resolved", "no_heading"],
     "hint": ["", "No heading yet: the tag has to send IMU samples or a platform heading."],
-    "anchor": ["17", "17"],
+    "anchor": ["1", "1"],
     "age_s": [0.042, 0.05],
     "x": [3.2, None],
     "y": [-1.7, None],
@@ -100,6 +100,7 @@ TAG: dict[str, Any] = {
     "messages": 3000,
     "samples": {"imu": 60000, "range": 6000},
     "rejected": {"range_negative": 2},
+    "hint": "",
     "settings": TAG_SETTINGS,
 }
 TAG_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "tags": [TAG]}
@@ -114,7 +115,7 @@ NEWCOMER_LIST: dict[str, Any] = {
         }
     ],
 }
-ANCHOR: dict[str, Any] = {"id": "17", "x": 0.0, "y": 0.0, "z": 2.5}
+ANCHOR: dict[str, Any] = {"id": "1", "x": 0.0, "y": 0.0, "z": 2.5}
 SITE: dict[str, Any] = {
     "id": "default",
     "name": "Yard",
@@ -136,6 +137,11 @@ TRACK: dict[str, Any] = {
         }
     ],
     "next": None,
+}
+CONNECT: dict[str, Any] = {
+    "endpoints": ["tcp/192.168.1.10:7447"],
+    "credentials": False,
+    "simulate": "dropanchor-tag simulate --connect tcp/192.168.1.10:7447",
 }
 NO_RECORDING: dict[str, Any] = {"recording": False, "since_ns": None, "tags": None, "file": None}
 RECORDING: dict[str, Any] = {"recording": True, "since_ns": 1_800_000_000_000_000_000, "tags": None, "file": None}

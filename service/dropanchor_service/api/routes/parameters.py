@@ -56,7 +56,7 @@ async def _tag_id(
 
 async def _anchor_id(
     anchor: Annotated[
-        str, Path(description="The anchor's id, percent-escaped.", examples=["17"], json_schema_extra=ID_SCHEMA)
+        str, Path(description="The anchor's id, percent-escaped.", examples=["1"], json_schema_extra=ID_SCHEMA)
     ],
 ) -> str:
     return id_of(anchor)

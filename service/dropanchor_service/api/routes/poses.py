@@ -66,7 +66,7 @@ def poses_router(answers: Answers) -> APIRouter:
     async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()]) -> Response:
         explanation = explanation_of(answers, _known(answers, tag), query.last)
         if explanation is None:
-            raise _no_pose_yet(tag)
+            raise _no_pose_yet(answers, tag)
         return json_response(explanation)
 
     @router.get(
@@ -120,14 +120,15 @@ def _known(answers: Answers, name: str) -> Tag:
     return tag
 
 
-def _no_pose_yet(name: str) -> ProblemError:
-    return ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet.")
+def _no_pose_yet(answers: Answers, name: str) -> ProblemError:
+    hint = answers.hint_of(_known(answers, name))
+    return ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet. {hint}".rstrip())
 
 
 def _pose_of(answers: Answers, name: str) -> Answer:
     pose = answers.pose_of(_known(answers, name))
     if pose is None:
-        raise _no_pose_yet(name)
+        raise _no_pose_yet(answers, name)
     return pose
 
 
@@ -139,7 +140,7 @@ def _pose_at(answers: Answers, name: str, at_ns: int) -> Answer:
     except NoPoseThenError as error:
         raise ProblemError(Kind.NO_POSE_THEN, f"Tag {name!r}: {error}.") from error
     if pose is None:
-        raise _no_pose_yet(_known(answers, name).name)
+        raise _no_pose_yet(answers, name)
     return pose
 
 

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Body
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
+from dropanchor_schemas.keys import InvalidKeyError, refuse_pattern
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
@@ -85,6 +86,10 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     def put_tag_settings(
         tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])]
     ) -> Response:
+        try:
+            refuse_pattern(tag)
+        except InvalidKeyError as error:
+            raise ProblemError(Kind.INVALID_REQUEST, f"path.tag: {error}") from error
         if answers.tags.find(tag) is None and len(answers.tags) >= max_tags:
             raise ProblemError(Kind.TAGS_FULL, f"{max_tags} tags are registered, and no more are allowed.")
         with saving():
@@ -116,5 +121,6 @@ def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
             "messages": messages,
             "samples": {kind: count for kind, count in zip(KINDS, samples.tolist(), strict=True) if count},
             "rejected": {name: count for name, count in zip(_REASON_NAMES, rejected.tolist(), strict=True) if count},
+            "hint": answers.hint_of(tag),
             "settings": configured[tag.name].model_dump() if tag.name in configured else default,
         }

@@ -12,6 +12,7 @@ const ASK_MS_PER_TAG = 5;
  * @property {boolean} online
  * @property {Record<string, number>} samples by kind
  * @property {Record<string, number>} rejected by reason
+ * @property {string} hint what a person can do so that more is used; empty when nothing is needed
  * @property {{height_m: number}} settings
  */
 

@@ -78,7 +78,7 @@ export class Detail {
     const reason = current ? value.reason[row] : null;
     put(this.#part("meaning"), state.meaning);
     put(this.#part("reason"), reason ? words(reason) : "");
-    const hint = (current ? value.hint[row] : null) ?? "";
+    const hint = (current ? value.hint[row] || this.roster.of(name)?.hint : null) ?? "";
     put(this.#part("hint"), hint);
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));

@@ -1,6 +1,7 @@
 /** What the page says about itself: connecting, connection lost, no tags yet. */
 
 import { hasKey, keepKey } from "../data/access.js";
+import { api, getJson } from "../data/connection.js";
 import { age } from "../data/format.js";
 
 /** @param {string} id */
@@ -15,9 +16,6 @@ export class Notices {
     for (const button of document.querySelectorAll("button[data-copies]")) installCopy(button);
     connection.addEventListener("status", () => this.update());
     byId("locked").addEventListener("submit", (event) => this.#unlock(event));
-    if (!["localhost", "127.0.0.1", "[::1]"].includes(location.hostname)) {
-      byId("command").textContent += ` --connect tcp/${location.hostname}:7447`;
-    }
     this.update();
   }
 
@@ -31,7 +29,20 @@ export class Notices {
     write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
     byId("locked").hidden = status !== "locked";
     byId("refused").hidden = !hasKey();
-    byId("empty").hidden = status !== "live" || this.connection.stats.frames === 0 || this.fleet.size > 0;
+    const isEmpty = status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
+    if (isEmpty && byId("empty").hidden) this.#askForCommand();
+    byId("empty").hidden = !isEmpty;
+  }
+
+  /** The service knows where tags connect. */
+  async #askForCommand() {
+    try {
+      const { simulate, credentials } = await getJson(api("connect"));
+      write(byId("command"), simulate);
+      byId("credentials").hidden = !credentials;
+    } catch {
+      // The connection says so; the command is asked for again when it is back.
+    }
   }
 
   /** @param {Event} event */

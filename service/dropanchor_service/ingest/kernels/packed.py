@@ -8,12 +8,24 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from dropanchor_schemas.wire import BEARING, FLAG_BOOT_CLOCK, HEADER, HEADING, IMU, MAX_T_NS, RANGE, VERSION
+from dropanchor_schemas.wire import (
+    BEARING,
+    FLAG_BOOT_CLOCK,
+    FLAG_REPLAY,
+    HEADER,
+    HEADING,
+    IMU,
+    KNOWN_FLAGS,
+    MAX_T_NS,
+    RANGE,
+    VERSION,
+)
 
 FORM = np.dtype(
     [
         ("accepted", "?"),
         ("boot_clock", "?"),
+        ("replay", "?"),
         ("numbered", "?"),  # has a sequence and a boot id
         ("sequence", "u4"),
         ("boot_id", "u4"),
@@ -47,7 +59,7 @@ def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> i
         form = forms[where[i]]
         form.accepted = (
             first & 0xFF == VERSION
-            and flags & ~FLAG_BOOT_CLOCK == 0
+            and flags & ~KNOWN_FLAGS == 0
             and words[at + 6] >> 16 == 0
             and words[at + 7] == 0
             and sizes[i] == _HEADER_WORDS + needed
@@ -58,6 +70,7 @@ def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> i
             continue
         accepted += 1
         form.boot_clock = flags & FLAG_BOOT_CLOCK != 0
+        form.replay = flags & FLAG_REPLAY != 0
         form.sequence, form.boot_id = words[at + 2], words[at + 3]
         form.numbered = words[at + 3] != 0
         form.t0_ns = t0_ns

@@ -161,3 +161,12 @@ def test_a_change_that_cannot_be_saved_is_not_made(tmp_path: Path) -> None:
     assert kind_of(ask(app, "PUT", "/api/v1/tags/a/settings", json={})) == "not-saved"
     assert kind_of(ask(app, "DELETE", "/api/v1/anchors/17")) == "not-saved"
     assert (house.answers.site.site.anchors, len(house.answers.tags)) == ([Anchor(id="17")], 0)
+
+
+@pytest.mark.parametrize("escaped", ["*", "%2A", "forklift-*"])
+def test_a_pattern_in_the_place_of_a_tag_is_refused_with_a_sentence(escaped: str) -> None:
+    house = make_house()
+    response = ask(house.app(), "PUT", f"/api/v1/tags/{escaped}/settings", json={})
+    assert kind_of(response) == "invalid-request"
+    assert "settings for all tags do not exist" in response.json()["detail"]
+    assert len(house.answers.tags) == 0

@@ -1,0 +1,60 @@
+"""How a tag connects to this site."""
+
+import ipaddress
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from dropanchor_schemas.answers import Connect
+from dropanchor_service.answers.connect_command import reached_at, simulate_command, tag_command
+from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, shown
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.store.site import SiteStore
+
+SIMULATED_TAG = "sim-1"
+_FORWARDED = ("forwarded", "x-forwarded-for", "x-real-ip", "via")
+
+
+def connect_router(store: SiteStore, endpoints: tuple[str, ...], credentials: SecurityFolder | None) -> APIRouter:
+    router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+
+    @router.get(
+        "/connect",
+        operation_id="get_connect",
+        summary="Where tags connect, and a command that starts a simulated one",
+        response_model=Connect,
+        responses=shown(examples.CONNECT) | problems(Kind.INVALID_REQUEST),
+    )
+    async def get_connect(request: Request) -> Response:
+        site, is_local = store.site, _is_local(request)
+        reached = [reached_at(endpoint, _host(request)) for endpoint in endpoints]
+        folder = None
+        if credentials is not None:
+            folder = str(credentials.bundle(SIMULATED_TAG).resolve()) if is_local else SIMULATED_TAG
+        program, anchors = tag_command(show_path=is_local), [anchor.id for anchor in site.anchors]
+        command = simulate_command(program, reached, site.id, anchors, folder)
+        return json_response({"endpoints": reached, "credentials": credentials is not None, "simulate": command})
+
+    return router
+
+
+def _host(request: Request) -> str:
+    """The name by which whoever asks has reached this machine."""
+    name = request.url.hostname or "localhost"
+    return f"[{name}]" if ":" in name else name
+
+
+def _is_local(request: Request) -> bool:
+    """Whether somebody on this machine asks: paths are for them alone. A proxy on this machine asks for others."""
+    if request.client is None or any(name in request.headers for name in _FORWARDED):
+        return False
+    return _is_loopback(request.client.host) and _is_loopback(request.url.hostname or "")
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False

@@ -1,0 +1,142 @@
+"""What somebody new does in the first ten minutes, word for word as the README and the page say it."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from dropanchor_tag_client import TagClient
+from support.recordings import write_square
+from support.service import ROOT, Running, environment, running_service
+from support.zenoh_router import free_port, wait_until
+
+README = (ROOT / "README.md").read_text()
+TAG_README = (ROOT / "tag_client" / "README.md").read_text()
+
+
+def snippet(text: str, endpoint: str) -> str:
+    (program, *_) = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    connected = re.sub(r'TagClient\(("[^"]+").*?\)', rf'TagClient(\1, connect="{endpoint}")', program, count=1)
+    assert connected != program
+    return str(connected)
+
+
+def shell(line: str, **options: Any) -> None:
+    """As pasted into a terminal that knows nothing of the environment of the service."""
+    bare = {"PATH": "/usr/bin:/bin", "PYTHONPATH": environment()["PYTHONPATH"]}
+    subprocess.run(["sh", "-c", line], check=True, timeout=120, env=bare, capture_output=True, **options)
+
+
+def tags(service: Running) -> dict[str, dict[str, Any]]:
+    return {tag["tag"]: tag for tag in service.get("/api/v1/tags")["tags"]}
+
+
+def test_every_way_to_start_a_tag_speaks_of_the_same_anchor(tmp_path: Path) -> None:
+    with running_service() as service:
+        for text in (README, TAG_README):
+            subprocess.run(
+                [sys.executable, "-c", snippet(text, service.zenoh)], check=True, timeout=120, env=environment()
+            )
+        (line,) = re.findall(r"^(echo .*)\.venv/bin/dropanchor-tag publish (.*)$", README, re.MULTILINE)
+        shell(f"{line[0]}{sys.executable} -m dropanchor_tag_client publish {line[1]} --connect {service.zenoh}")
+        command = service.get("/api/v1/connect")["simulate"]
+        assert command.startswith("/")
+        assert service.zenoh in command
+        shell(f"{command} --duration 3", cwd=tmp_path)
+        wait_until(lambda: tags(service).get("sim-1", {}).get("samples", {}).get("range", 0) > 10)
+        found = tags(service)
+        assert {"forklift-7", "cart-1", "sim-1"} <= set(found)
+        assert [tag["rejected"] for tag in found.values()] == [{}] * len(found)
+        assert [anchor["id"] for anchor in service.get("/api/v1/site")["anchors"]] == ["1"]
+
+
+def test_the_command_of_the_page_fits_a_site_with_another_name_and_another_anchor(tmp_path: Path) -> None:
+    config = tmp_path / "yard.toml"
+    config.write_text('[site]\nid = "west yard"\n[[site.anchors]]\nid = "gate 3"\n')
+    with running_service("--config", str(config)) as service:
+        shell(f"{service.get('/api/v1/connect')['simulate']} --duration 2", cwd=tmp_path)
+        wait_until(lambda: tags(service).get("sim-1", {}).get("samples", {}).get("range", 0) > 5)
+
+
+def test_an_anchor_that_the_site_lacks_is_told_to_everybody_who_looks_and_once_in_the_log() -> None:
+    with running_service() as service, TagClient("cart", connect=service.zenoh) as cart:
+        cart.publish_range(1, 5.0)
+        cart.flush()
+        wait_until(lambda: service.get("/api/v1/site")["anchors"])
+
+        def hears(tag: TagClient) -> str:
+            if tag is cart:
+                tag.publish_heading(1.0)
+            tag.publish_range(7, 4.0)
+            tag.flush()
+            return str(tags(service).get(tag.tag, {}).get("hint", ""))
+
+        with TagClient("stray", connect=service.zenoh) as stray:
+            wait_until(lambda: "hears anchor 7, which this site does not have" in hears(stray).lower())
+            answer = service.ask("GET", "/api/v1/tags/stray/pose")
+            assert answer.status_code == 404
+            assert "Hears anchor 7" in answer.json()["detail"]
+        wait_until(lambda: "Hears anchor 7" in hears(cart))
+        wait_until(lambda: "Hears anchor 7" in hears(cart) and "Hears" in service.get("/api/v1/tags/cart/pose")["hint"])
+        pose = service.get("/api/v1/tags/cart/pose")
+        (listed,) = service.get("/api/v1/poses?tags=cart")["poses"]
+        assert listed["hint"] == pose["hint"]
+        service.put("/api/v1/anchors/7", {"id": "7", "x": 3.0})
+        wait_until(lambda: hears(cart) == "")
+        lines = [line for line in service.log if "hears anchor 7, which this site does not have" in line]
+        assert len(lines) == 1
+        assert "PUT /api/v1/anchors/7" in lines[0]
+
+
+def test_a_recording_replayed_ten_times_as_fast_is_tracked_and_old_once_it_has_ended(tmp_path: Path) -> None:
+    recording = write_square(tmp_path)
+    config = tmp_path / "service.toml"
+    start = "{ x = 10, y = 0, heading_rad = 1.5708 }"
+    config.write_text(f'[[site.anchors]]\nid = "A"\nx = 2\ny = -3\n[tags.cart]\nstart = {start}\n')
+    with running_service("--config", str(config)) as service:
+        words = ["replay", str(recording), "--tag", "cart", "--anchor", "A", "--speed", "10"]
+        replay = [sys.executable, "-m", "dropanchor_tag_client", *words, "--connect", service.zenoh]
+        process = subprocess.Popen(replay, stderr=subprocess.DEVNULL, env=environment())
+        seen: list[dict[str, Any]] = []
+        try:
+            while process.poll() is None:
+                answer = service.ask("GET", "/api/v1/tags/cart/pose")
+                seen += [answer.json()] if answer.status_code == 200 else []
+        finally:
+            process.kill()
+            process.wait()
+        placed = seen[next(i for i, pose in enumerate(seen) if pose["state"] == "tracking") :]
+        assert "lost" not in {pose["state"] for pose in placed}
+        assert sum(pose["state"] == "tracking" for pose in placed) > 0.8 * len(placed) > 9
+        assert max(abs(pose["age_s"]) for pose in placed) < 5.0
+        assert placed[-1]["t_ns"] - placed[0]["t_ns"] > 40e9  # its own time goes on undivided
+        wait_until(lambda: service.get("/api/v1/tags/cart/pose")["state"] in ("coasting", "lost"))
+
+
+def test_the_page_of_a_secured_site_names_the_credentials(tmp_path: Path) -> None:
+    folder = tmp_path / "credentials of the yard"
+    made = [sys.executable, "-m", "dropanchor_service"]
+    subprocess.run(
+        [*made, "security", "init", "--security", str(folder), "--host", "localhost"], check=True, env=environment()
+    )
+    subprocess.run([*made, "tag", "add", "sim-1", "--security", str(folder)], check=True, env=environment())
+    key = subprocess.run(
+        [*made, "key", "add", "page", "--scope", "read", "--security", str(folder)],
+        check=True,
+        env=environment(),
+        capture_output=True,
+        text=True,
+    ).stdout.strip()
+    with running_service(
+        "--security", str(folder), "--zenoh-listen", f"tls/0.0.0.0:{free_port()}", ca=folder / "ca.pem"
+    ) as service:
+        assert service.ask("GET", "/api/v1/connect").status_code == 401
+        bearer = {"authorization": f"Bearer {key}"}
+        answer = service.ask("GET", "/api/v1/connect", headers=bearer).json()
+        assert answer["credentials"]
+        shell(f"{answer['simulate']} --duration 2", cwd=tmp_path)
+        wait_until(
+            lambda: json.loads(service.ask("GET", "/api/v1/tags/sim-1", headers=bearer).text).get("messages", 0) > 5
+        )
