@@ -16,12 +16,12 @@ from dropanchor_schemas.answers import Problem
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
-from dropanchor_service.api.http.rates import Buckets
+from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.recording.recorder import Recorder
-from dropanchor_service.security.identity import Doorkeeper
-from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
+from dropanchor_service.security.identity import Authenticator
+from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
 
 T_NS = 1_800_000_000_000_000_000
 
@@ -57,8 +57,8 @@ class House:
         self,
         dashboard: Path | None = None,
         max_tags: int = 1000,
-        keeper: Doorkeeper | None = None,
-        buckets: Buckets | None = None,
+        authenticator: Authenticator | None = None,
+        rate_limiter: RateLimiter | None = None,
         endpoints: tuple[str, ...] = (),
     ) -> FastAPI:
         return create_app(
@@ -69,8 +69,8 @@ class House:
             recorder=self.recorder,
             max_tags=max_tags,
             dashboard=dashboard,
-            keeper=keeper,
-            buckets=buckets,
+            authenticator=authenticator,
+            rate_limiter=rate_limiter,
             endpoints=endpoints,
         )
 
@@ -80,7 +80,7 @@ def make_house(site: Site | None = None, folder: Path | None = None, retention: 
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
     tags = TagTable()
     tracks = Tracks(folder, retention, tags, store, lambda: house.now_ns) if folder and retention else None
-    house = House(Answers(store, tags, LatestPoses(), tracks=tracks, newcomers=Newcomers(10)))
+    house = House(Answers(store, tags, LatestPoses(), tracks=tracks, pending_tags=PendingTags(10)))
     house.answers.now_ns = lambda: house.now_ns
     return house
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from types import ModuleType
 
-from dropanchor_service.runtime.kernel_cache import keep_compiled
+from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 
 _COMMANDS = {
     "demo": "the service with simulated tags, to look at in a browser",
@@ -62,7 +62,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     for name, brief in _COMMANDS.items():
         one = commands.add_parser(name, help=brief, formatter_class=argparse.RawDescriptionHelpFormatter)
         if words[:1] == [name]:
-            keep_compiled()  # before a command imports what is compiled
+            use_kernel_cache()  # before a command imports what is compiled
             command = _imported(f"dropanchor_service.commands.{name}")
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)

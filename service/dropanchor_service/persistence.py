@@ -6,7 +6,7 @@ from typing import Self
 
 from dropanchor_service.estimation.batch import Array
 from dropanchor_service.history.tracks import Retention, Tracks
-from dropanchor_service.ingest.observers import NO_TAPS, Taps
+from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.recording.folder import Limits
@@ -15,7 +15,7 @@ from dropanchor_service.settings.model import HistorySettings, RecordingSettings
 from dropanchor_service.store import SiteStore, TagTable
 
 
-class Keepers:
+class Persistence:
     """They write while this is open. tracks, recorder: None where there is none."""
 
     def __init__(
@@ -52,7 +52,7 @@ class Keepers:
         self._opened.close()
 
     @property
-    def taps(self) -> Taps:
+    def observers(self) -> Observers:
         tracks, recorder = self.tracks, self.recorder
 
         def take(poses: Array) -> None:
@@ -61,7 +61,7 @@ class Keepers:
             if recorder is not None:
                 recorder.poses(poses)
 
-        return NO_TAPS if recorder is None else Taps(recorder.messages, take)
+        return NO_OBSERVERS if recorder is None else Observers(recorder.messages, take)
 
     def problems(self) -> Sequence[str]:
         """Why one of them does not write, or has lost what it had."""

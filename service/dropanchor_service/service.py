@@ -14,27 +14,27 @@ from pydantic import ValidationError
 
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
-from dropanchor_service.api.http.rates import Buckets
+from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
 from dropanchor_service.checkpoints.files import CheckpointFolder
-from dropanchor_service.checkpoints.snapshot import WholeState
-from dropanchor_service.checkpoints.thread import Checkpointer
+from dropanchor_service.checkpoints.snapshot import ServiceState
+from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_passes
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
-from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.persistence import Keepers
+from dropanchor_service.persistence import Persistence
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
-from dropanchor_service.security.credentials import certificate_of, credentials_of, doorkeeper_of
+from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
 from dropanchor_service.zenoh_io.intake import ZenohIntake
@@ -58,8 +58,8 @@ class Service:
         self._credentials = credentials_of(settings)
         refuse_exposure(settings, self._credentials)
         self._certificate = certificate_of(settings.http, self._credentials)
-        self._keeper = doorkeeper_of(settings.security)
-        warm_up_passes()
+        self._authenticator = authenticator_of(settings.security)
+        warm_up_ingest()
         warm_up_answers()
         self._stopping = Event()
         self._opened = ExitStack()
@@ -68,25 +68,27 @@ class Service:
         self.clock = UtcClock()
         self.tags = TagTable()
         self.latest = LatestPoses()
-        newcomers = Newcomers(settings.max_tags)
+        pending_tags = PendingTags(settings.max_tags)
         self.site = _site_store(settings)
-        self._keepers = Keepers(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
-        self.answers = Answers(self.site, self.tags, self.latest, self.clock.now_ns, self._keepers.tracks, newcomers)
+        self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
+        self.answers = Answers(
+            self.site, self.tags, self.latest, self.clock.now_ns, self._persistence.tracks, pending_tags
+        )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
-        estimators = Estimators(create_engine(settings), self.site, self.tags, self.metrics)
+        engine = GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics)
         self._ingest = Ingest(
             self._buffer,
-            Admission(settings, self.site, self.tags, newcomers),
-            estimators,
+            Admission(settings, self.site, self.tags, pending_tags),
+            engine,
             self.site,
             self.tags,
             self.latest,
             self.metrics,
             self.clock,
-            taps=self._keepers.taps,
+            observers=self._persistence.observers,
             reorder_ns=round(settings.ingest.reorder_ms * 1e6),
         )
-        self._checkpoints = self._checkpointer(estimators)
+        self._checkpoints = self._checkpointer(engine)
         self._thread = IngestThread(
             self._ingest,
             self._buffer,
@@ -96,7 +98,7 @@ class Service:
         )
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self.metrics.watch(
-            FleetGauges(self.tags, newcomers, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
+            FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )
 
     def __enter__(self) -> Self:
@@ -106,7 +108,7 @@ class Service:
             self._opened.enter_context(self._supervision)
             self._http = self._http_thread(bound)
             self._opened.callback(self._http.join, HTTP_STOP_S)
-            self._opened.enter_context(self._keepers)
+            self._opened.enter_context(self._persistence)
             if self._checkpoints is not None:
                 self._checkpoints.load()
                 self._checkpoints.start()
@@ -148,7 +150,7 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """What does not work although the service does its work."""
-        found = [*self._keepers.problems(), self._checkpoints.problem if self._checkpoints else None]
+        found = [*self._persistence.problems(), self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -167,16 +169,16 @@ class Service:
             threads["checkpoints"] = self._checkpoints.is_alive
         return sorted({*self._supervision.dead, *(name for name, lives in threads.items() if not lives)})
 
-    def _checkpointer(self, estimators: Estimators) -> Checkpointer | None:
+    def _checkpointer(self, engine: GuardedEngine) -> CheckpointThread | None:
         """None where nothing is kept."""
         folder = self._settings.data_dir
-        if folder is None or not estimators.keeps_state:
+        if folder is None or not engine.keeps_state:
             return None
-        state = WholeState(self.site, self.tags, self.latest, estimators, self._ingest.preparation.publishers)
+        state = ServiceState(self.site, self.tags, self.latest, engine, self._ingest.reader.publishers)
         kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
-        return Checkpointer(state, kept, self.metrics, self._settings.checkpoint_s)
+        return CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
-    def _write_last_checkpoint(self, checkpoints: Checkpointer) -> None:
+    def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
         if self._thread.is_alive or "ingest" in self._supervision.dead:
             _log.error("the ingest thread has not come to a proper end: there is no last checkpoint")
         else:
@@ -194,7 +196,7 @@ class Service:
                 self.metrics,
                 self.clock,
                 self._settings.max_tags,
-                self._ingest.preparation.publishers,
+                self._ingest.reader.publishers,
             ),
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),
@@ -205,14 +207,14 @@ class Service:
             self.answers,
             ready=lambda: (not (found := self.problems()), found),
             impaired=self.impairments,
-            recorder=self._keepers.recorder,
+            recorder=self._persistence.recorder,
             registry=self.metrics.registry,
             stopping=self._stopping,
             max_tags=self._settings.max_tags,
             endpoints=endpoints_of(self._settings.zenoh, self._credentials),
             credentials=self._credentials,
-            keeper=self._keeper,
-            buckets=Buckets(self._settings.http.requests_per_s, self._settings.http.burst),
+            authenticator=self._authenticator,
+            rate_limiter=RateLimiter(self._settings.http.requests_per_s, self._settings.http.burst),
         )
         self._address = bound.getsockname()
         return HttpThread(build_server(app, self._stopping, certificate=self._certificate), bound)

@@ -45,7 +45,7 @@ def service(*arguments: str, program: str | None = None, **more: str) -> Iterato
     ("thread", "module", "kind", "method"),
     [
         ("ingest", "ingest_thread", "IngestThread", "_turn"),
-        ("checkpoints", "checkpointer", "Checkpointer", "_write"),
+        ("checkpoints", "checkpointer", "CheckpointThread", "_write"),
         ("poses", "zenoh_poses", "ZenohPoses", "_run"),
         ("http", "api.server", "Server", "main_loop"),
     ],

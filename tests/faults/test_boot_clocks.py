@@ -70,8 +70,8 @@ class Run:
 
     def catch_up(self, cached: Iterable[Message], live: Iterable[Message], asked_ns: int) -> None:
         """Fetch what was missed from caches, which answer at `asked_ns`; what is live waits for that."""
-        publishers, tags = self.bench.ingest.preparation.publishers, self.bench.tags
-        passed = {samples_key("default", tag.name): publishers.passed(tag.row) for tag in tags.all()}
+        publishers, tags = self.bench.ingest.reader.publishers, self.bench.tags
+        passed = {samples_key("default", tag.name): publishers.sequence_states(tag.row) for tag in tags.all()}
         caught = CatchUp(self.bench.buffer, KEYS, lambda key: passed[key], lambda *_: None, 1000)
         for message in live:
             caught.hear(samples_key("default", message.tag), message.payload, ENCODING_PACKED, message.due_ns)

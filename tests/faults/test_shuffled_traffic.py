@@ -68,7 +68,7 @@ def deliver(engine: Engine, messages: Iterable[Message]) -> Bench:
         bench.ingest.turn()
     clock.t_ns += WINDOW_NS
     bench.ingest.turn()
-    assert not bench.ingest.holds
+    assert not bench.ingest.has_pending
     return bench
 
 

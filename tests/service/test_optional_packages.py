@@ -11,10 +11,10 @@ EXTRA = ("matplotlib", "scipy", "sympy")
 SERVICE_AND_ENGINE = """
 import dropanchor_service.service
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_passes
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest
 from dropanchor_service.settings.model import Settings
 create_engine(Settings(engine="fleet"))
-warm_up_passes()
+warm_up_ingest()
 warm_up_answers()
 """
 COMMAND = """

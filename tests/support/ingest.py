@@ -11,17 +11,17 @@ from prometheus_client.samples import Sample
 
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, encode_packed
-from dropanchor_service.checkpoints.snapshot import WholeState
-from dropanchor_service.engines.warm_up import warm_up_passes
+from dropanchor_service.checkpoints.snapshot import ServiceState
+from dropanchor_service.engines.warm_up import warm_up_ingest
 from dropanchor_service.estimation.batch import POSE, Array, Engine, PoseBatch, SampleBatch, State
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
-from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.sources import load_settings
-from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
 
 
 @dataclass
@@ -63,20 +63,20 @@ class Bench:
         clock: UtcClock | None = None,
         **options: Any,
     ) -> None:
-        warm_up_passes()
+        warm_up_ingest()
         settings = load_settings(options=options, environment={})
         self.engine = TransparentEngine()
         self.clock = clock or UtcClock()
         self.metrics = Metrics()
         self.tags = TagTable()
         self.latest = LatestPoses()
-        self.newcomers = Newcomers(settings.max_tags)
+        self.pending_tags = PendingTags(settings.max_tags)
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
-        self.estimators = Estimators(engine or self.engine, self.site, self.tags, self.metrics)
+        self.estimators = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
         self.ingest = Ingest(
             self.buffer,
-            Admission(settings, self.site, self.tags, self.newcomers),
+            Admission(settings, self.site, self.tags, self.pending_tags),
             self.estimators,
             self.site,
             self.tags,
@@ -85,8 +85,8 @@ class Bench:
             self.clock,
         )
 
-    def whole_state(self) -> WholeState:
-        return WholeState(self.site, self.tags, self.latest, self.estimators, self.ingest.preparation.publishers)
+    def whole_state(self) -> ServiceState:
+        return ServiceState(self.site, self.tags, self.latest, self.estimators, self.ingest.reader.publishers)
 
     def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
         data = encode_packed(payload) if isinstance(payload, Frame) else payload

@@ -96,7 +96,7 @@ def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
 
 
 def wait_until(condition: Callable[[], object], timeout_s: float = 40.0) -> None:
-    """Returns when the condition holds; fails the test when it does not come true in time."""
+    """Returns when the condition has_pending; fails the test when it does not come true in time."""
     deadline = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline, f"not within {timeout_s} s"

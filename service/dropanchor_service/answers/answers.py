@@ -19,7 +19,7 @@ from dropanchor_service.answers.track_pages import pose_in_tracks
 from dropanchor_service.estimation.batch import POSE, Array, State
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.latest_poses import LatestPoses
-from dropanchor_service.store.pending_tags import Newcomers
+from dropanchor_service.store.pending_tags import PendingTags
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
 from dropanchor_service.store.unknown_anchors import hint_about
@@ -44,15 +44,15 @@ class Answers:
         latest: LatestPoses,
         now_ns: Callable[[], int] = time.time_ns,
         tracks: Tracks | None = None,
-        newcomers: Newcomers | None = None,
+        pending_tags: PendingTags | None = None,
     ) -> None:
-        """tracks: where poses are kept for long, None for nowhere. newcomers: tags that have no row yet."""
+        """tracks: where poses are kept for long, None for nowhere. pending_tags: tags that have no row yet."""
         self.site = site
         self.tags = tags
         self.latest = latest
         self.now_ns = now_ns
         self.tracks = tracks
-        self.newcomers = Newcomers(0) if newcomers is None else newcomers
+        self.pending_tags = PendingTags(0) if pending_tags is None else pending_tags
 
     def hint_of(self, tag: Tag) -> str:
         """What a person can do so that more of what the tag sends is used; empty when there is nothing."""

@@ -14,7 +14,7 @@ from dropanchor_service.api.http.access import OPEN, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
-from dropanchor_service.api.http.rates import Buckets
+from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import DashboardMount
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
@@ -26,7 +26,7 @@ from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
-from dropanchor_service.security.identity import Doorkeeper
+from dropanchor_service.security.identity import Authenticator
 
 PREFIX = "/api/v1"
 MAX_BODY_BYTES = 1_048_576
@@ -45,13 +45,13 @@ def create_app(
     dashboard: Path | None = DASHBOARD,
     endpoints: tuple[str, ...] = (),
     credentials: SecurityFolder | None = None,
-    keeper: Doorkeeper | None = None,
-    buckets: Buckets | None = None,
+    authenticator: Authenticator | None = None,
+    rate_limiter: RateLimiter | None = None,
 ) -> FastAPI:
     """ready: whether the service can do its work, and why not. impaired: what else does not work. stopping: when set,
     streams end. recorder: None where nothing can be recorded. dashboard: the folder of the page, None for no page.
     endpoints: of the Zenoh router, as they are set. credentials: what tags need, None where they need none.
-    keeper: who knows who asks; None: everybody may do everything. buckets: how often one client may ask."""
+    authenticator: who knows who asks; None: everybody may do everything. rate_limiter: how often one client may ask."""
     app = FastAPI(
         title="Dropanchor",
         version="1",
@@ -61,7 +61,7 @@ def create_app(
         redirect_slashes=False,
     )
     app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
-    app.add_middleware(Access, keeper=keeper, buckets=buckets)
+    app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
     add_error_handlers(app)

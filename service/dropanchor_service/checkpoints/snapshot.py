@@ -5,23 +5,23 @@ import numpy as np
 from dropanchor_schemas.site import Anchor
 from dropanchor_service.checkpoints.files import Snapshot, layout_of
 from dropanchor_service.estimation.batch import Array
-from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.runtime.kernel_cache import sources_digest
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.records import put
 
 
-class WholeState:
+class ServiceState:
     """Owned by the ingest thread while it runs."""
 
     def __init__(
-        self, site: SiteStore, tags: TagTable, latest: LatestPoses, estimators: Estimators, publishers: Publishers
+        self, site: SiteStore, tags: TagTable, latest: LatestPoses, engine: GuardedEngine, publishers: Publishers
     ) -> None:
         self._site = site
         self._tags = tags
         self._latest = latest
-        self._estimators = estimators
+        self._engine = engine
         self._publishers = publishers
         self._buffers: dict[str, Array] = {}
         self.template = self.snapshot()
@@ -38,7 +38,7 @@ class WholeState:
         arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns}
         arrays["times"] = self._publishers.times
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
-        arrays |= {f"engine.{name}": array for name, array in self._estimators.state().items()}
+        arrays |= {f"engine.{name}": array for name, array in self._engine.state().items()}
         anchors = [anchor.model_dump() for anchor in self._site.anchors_by_index()]
         document = {"site": self._site.site.id, "anchors": anchors, "tags": [tag.name for tag in self._tags.all()]}
         return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, document)
@@ -62,7 +62,7 @@ class WholeState:
         self._publishers.columns = snapshot.arrays["publishers"]
         self._publishers.times = snapshot.arrays["times"]
         self._latest.restore(_part(snapshot, "latest"))
-        self._estimators.restore(_part(snapshot, "engine"))
+        self._engine.restore(_part(snapshot, "engine"))
 
 
 def _part(snapshot: Snapshot, part: str) -> dict[str, Array]:

@@ -5,7 +5,7 @@ import threading
 import time
 
 from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot
-from dropanchor_service.checkpoints.snapshot import WholeState
+from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 
@@ -16,10 +16,10 @@ _TURN_S = 1.0  # for the ingest thread to come round
 _log = logging.getLogger(__name__)
 
 
-class Checkpointer:
+class CheckpointThread:
     """A thread of its own between `start` and `stop`. `between_turns` is called by the ingest thread."""
 
-    def __init__(self, state: WholeState, folder: CheckpointFolder, metrics: Metrics, period_s: float) -> None:
+    def __init__(self, state: ServiceState, folder: CheckpointFolder, metrics: Metrics, period_s: float) -> None:
         self._log = RareLog(_log)
         self._state = state
         self._folder = folder

@@ -4,7 +4,7 @@ import argparse
 
 from dropanchor_service.commands.options import add_log_option
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_passes
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest
 from dropanchor_service.runtime import logs
 from dropanchor_service.settings.model import Settings
 
@@ -27,6 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
     create_engine(Settings(engine="fleet"))
-    warm_up_passes()
+    warm_up_ingest()
     warm_up_answers()
     return 0

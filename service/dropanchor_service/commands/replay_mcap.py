@@ -76,7 +76,7 @@ def _replay_session(
         tags = [service.tags.at(row).name for row in poses["row"].tolist()]
         outcome.add(turn, tags, poses)
         write(_rows(tags, poses))
-    for line in [*outcome.lines(), *_losses(service, readers)]:
+    for line in [*outcome.lines(), *_rejections(service, readers)]:
         print(line)
 
 
@@ -151,7 +151,7 @@ def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:
         yield [tag, t_ns, *(f"{value:.6f}" for value in values), State(state).name.lower()]
 
 
-def _losses(service: OfflineService, readers: Sequence[RecordingReader]) -> Iterator[str]:
+def _rejections(service: OfflineService, readers: Sequence[RecordingReader]) -> Iterator[str]:
     counts = {reason: int(service.metrics.rejected.labels(reason)._value.get()) for reason in Reason}
     refused = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
     if refused:

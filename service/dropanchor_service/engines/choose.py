@@ -2,7 +2,7 @@
 
 from dropanchor_service.engines.warm_up import warm_up
 from dropanchor_service.estimation.batch import Engine
-from dropanchor_service.runtime.kernel_cache import keep_compiled
+from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 from dropanchor_service.settings.model import Settings
 
 
@@ -14,7 +14,7 @@ def create_engine(settings: Settings) -> Engine:
 
             return PaperEngine(settings.paper.values())
         case "fleet":
-            keep_compiled()
+            use_kernel_cache()
             from dropanchor_service.estimation.fleet.engine import FleetEngine
 
             warm_up(FleetEngine())

@@ -117,7 +117,7 @@ def _moving_off(rows: int) -> SampleBatch:
 
 @_without_blas()
 @_said_while_compiling("the reader of messages")
-def warm_up_passes() -> None:
+def warm_up_ingest() -> None:
     """Compile what every message goes through: two of a publisher, with a gap between, and one alone, whose columns
     are another type to the compiler, for they have no strides."""
     frame = Frame(

@@ -10,14 +10,14 @@ from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.estimation.batch import POSE, Array
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
-from dropanchor_service.ingest.guarded_engine import Estimators
-from dropanchor_service.ingest.observers import Taps
+from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.ingest.turn import MESSAGES_PER_TURN, Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.recording.reading import Turn
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import LatestPoses, Newcomers, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.store.site import SiteDocument
 
 SETTLE_NS = 1_000_000_000  # what may still wait for messages before it comes out within that
@@ -51,14 +51,14 @@ class OfflineService:
         )
         self._ingest = Ingest(
             self._buffer,
-            Admission(settings, self.site, self.tags, Newcomers(0)),
-            Estimators(create_engine(settings), self.site, self.tags, self.metrics),
+            Admission(settings, self.site, self.tags, PendingTags(0)),
+            GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics),
             self.site,
             self.tags,
             LatestPoses(),
             self.metrics,
             self._clock,
-            taps=Taps(poses=self._poses.append),
+            observers=Observers(poses=self._poses.append),
             reorder_ns=round(settings.ingest.reorder_ms * 1e6),
         )
 

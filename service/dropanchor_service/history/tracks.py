@@ -15,7 +15,7 @@ from dropanchor_service.history.track_file import Stored, TrackReader, TrackWrit
 from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
-from dropanchor_service.store.thinning import Thinning
+from dropanchor_service.store.thinning import Decimation
 
 FILE_NAME = "history.sqlite"
 WRITE_S = 2.0
@@ -48,7 +48,7 @@ class Tracks:
         self._tags = tags
         self._site = site
         self._now_ns = now_ns
-        self._thinning = Thinning(retention.period_ns, retention.distance_m, retention.still_ns)
+        self._thinning = Decimation(retention.period_ns, retention.distance_m, retention.still_ns)
         self._file: TrackWriter | None = None
         self._reader = TrackReader(self._path)
         self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MOST_WAITING_BYTES)

@@ -4,11 +4,11 @@ import numpy as np
 
 from dropanchor_schemas.keys import InvalidKeyError, tag_from_key
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.ingest.buffer import Stranger
+from dropanchor_service.ingest.buffer import UnregisteredMessage
 from dropanchor_service.ingest.decode import read_forms
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import Newcomers, SiteStore, Tag, TagTable
-from dropanchor_service.store.pending_tags import Waiting, is_proof
+from dropanchor_service.store import PendingTags, SiteStore, Tag, TagTable
+from dropanchor_service.store.pending_tags import Waiting, is_confirmed
 
 _REFUSALS = {"refuse": Reason.TAG_UNKNOWN, "quarantine": Reason.TAG_QUARANTINED}
 
@@ -20,16 +20,16 @@ class Admission:
     were heard no more than once. Beyond that their first message waits until another one comes. Owned by one thread.
     """
 
-    def __init__(self, settings: Settings, site: SiteStore, tags: TagTable, newcomers: Newcomers) -> None:
+    def __init__(self, settings: Settings, site: SiteStore, tags: TagTable, pending_tags: PendingTags) -> None:
         self._refusal = _REFUSALS.get(settings.unknown_tags)
         self._max_tags = settings.max_tags
-        self._most_unproven = settings.unproven_tags
+        self._max_unconfirmed = settings.unproven_tags
         self._site = site
         self._tags = tags
-        self._newcomers = newcomers
-        self._unproven = np.zeros(0, np.int64)  # rows of strangers who had not proven themselves
+        self._pending_tags = pending_tags
+        self._unconfirmed = np.zeros(0, np.int64)  # rows of strangers who had not proven themselves
 
-    def hear(self, stranger: Stranger) -> Tag | Reason | None:
+    def hear(self, stranger: UnregisteredMessage) -> Tag | Reason | None:
         """Who sent this, with a row; or why it is not used; None: it waits."""
         key, message = stranger[0], stranger[1:]
         try:
@@ -38,11 +38,11 @@ class Admission:
             return Reason.KEY_INVALID
         found = self.by_name(name)
         if found is Reason.TAG_QUARANTINED:
-            self._newcomers.hear(name, message[2])
-        return self._prove(name, message) if found is Reason.TAG_UNPROVEN else found
+            self._pending_tags.hear(name, message[2])
+        return self._confirm(name, message) if found is Reason.TAG_UNPROVEN else found
 
     def by_name(self, name: str) -> Tag | Reason:
-        """The tag of this name, registered when it may be without a proof, or why it may not."""
+        """The tag of this name, registered when it may be without a confirmed, or why it may not."""
         tag = self._tags.find(name)
         if tag is not None:
             return tag
@@ -52,36 +52,36 @@ class Admission:
             return self._refusal
         if len(self._tags) >= self._max_tags:
             return Reason.TAGS_FULL
-        if len(self._unproven) >= self._most_unproven:
+        if len(self._unconfirmed) >= self._max_unconfirmed:
             return Reason.TAG_UNPROVEN
         tag = self._tags.register(name)
-        self._unproven = np.append(self._unproven, tag.row)
+        self._unconfirmed = np.append(self._unconfirmed, tag.row)
         return tag
 
     def waited(self, tag: Tag) -> list[Waiting]:
         """What came from this tag before it got its row, in order of arrival."""
-        return self._newcomers.take(tag.name)
+        return self._pending_tags.take(tag.name)
 
-    def waited_in_vain(self) -> int:
+    def take_expired(self) -> int:
         """Messages of tags that did not send another one, since the last call."""
-        return self._newcomers.take_gone()
+        return self._pending_tags.take_gone()
 
     def review(self) -> None:
         """Rows whose tags have proven themselves make room for other strangers."""
-        if len(self._unproven) >= self._most_unproven:
-            counts = self._tags.counts(self._unproven)
-            proof = is_proof(counts["messages"], counts["first_heard_ns"], counts["last_heard_ns"])
-            self._unproven = self._unproven[~(proof & counts["samples"].any(axis=1))]
+        if len(self._unconfirmed) >= self._max_unconfirmed:
+            counts = self._tags.counts(self._unconfirmed)
+            confirmed = is_confirmed(counts["messages"], counts["first_heard_ns"], counts["last_heard_ns"])
+            self._unconfirmed = self._unconfirmed[~(confirmed & counts["samples"].any(axis=1))]
 
     def register_listed(self) -> None:
         """A row for every tag that the operator has listed."""
         for name in self._site.tags:
             self._tags.register(name)
 
-    def _prove(self, name: str, message: Waiting) -> Tag | Reason | None:
+    def _confirm(self, name: str, message: Waiting) -> Tag | Reason | None:
         payload, encoding, arrival_ns = message
         for _, reason in read_forms([payload], [encoding]).rejected:
             return reason
-        if self._newcomers.hear(name, arrival_ns):
+        if self._pending_tags.hear(name, arrival_ns):
             return self._tags.register(name)
-        return None if self._newcomers.keep(name, message) else Reason.TAG_UNPROVEN
+        return None if self._pending_tags.keep(name, message) else Reason.TAG_UNPROVEN

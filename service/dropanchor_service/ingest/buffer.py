@@ -16,12 +16,12 @@ from dropanchor_service.store.rings import rank_in_row
 
 Message = tuple[int, bytes, str, int]
 """Row of the tag, payload, encoding, UTC of arrival in ns."""
-Stranger = tuple[str, bytes, str, int]
+UnregisteredMessage = tuple[str, bytes, str, int]
 """The same of a key that has no row yet."""
 
 MESSAGE_OVERHEAD = 200  # bytes that a waiting message takes beside its payload
-STRANGER_BYTES = 8 * 2**20  # of messages of tags without a row that may wait
-STRANGERS_PER_TURN = 250  # of them at a time: each costs many times as much as a message of a known tag
+UNREGISTERED_BYTES = 8 * 2**20  # of messages of tags without a row that may wait
+UNREGISTERED_PER_TURN = 250  # of them at a time: each costs many times as much as a message of a known tag
 MAX_WAIT_NS = 500_000_000
 CALM_NS = 2_000_000_000  # without shedding anything: then an overload is over
 _KEPT_SHARE = 0.75  # of what may wait after shedding for room, so that it is rare
@@ -30,11 +30,11 @@ _ROW, _PAYLOAD = itemgetter(0), itemgetter(1)
 
 
 class Shed(NamedTuple):
-    """What was lost. by_row: messages. samples: in those of them that were packed. strangers: their messages."""
+    """What was lost. by_row: messages. samples: in those of them that were packed. unregistered: their messages."""
 
     by_row: Counter[int]
     samples: int
-    strangers: int
+    unregistered: int
 
 
 class _Behind(NamedTuple):
@@ -64,11 +64,11 @@ class MessageBuffer:
         self._rows: dict[str, int] = {}
         self._messages: list[Message] = []
         self._bytes = 0
-        self._strangers: deque[Stranger] = deque()
-        self._stranger_bytes = 0
+        self._unregistered: deque[UnregisteredMessage] = deque()
+        self._unregistered_bytes = 0
         self._shed: Counter[int] = Counter()
         self._shed_samples = 0
-        self._strangers_shed = 0
+        self._unregistered_shed = 0
         self._cached = 0  # messages up to the last one that a cache gave
         self._behind: _Behind | None = None
         self._drained_bytes = 0  # since then
@@ -90,7 +90,7 @@ class MessageBuffer:
                 if self._bytes > self._capacity_bytes:
                     self._make_room(_KEPT_SHARE * self._capacity_bytes)
             else:
-                self._append_stranger((key, payload, encoding, arrival_ns))
+                self._append_unregistered((key, payload, encoding, arrival_ns))
         if not self._filled.is_set():
             self._filled.set()
 
@@ -99,42 +99,44 @@ class MessageBuffer:
         self._rows[key] = row
 
     def row_of(self, key: str) -> int | None:
-        """None of a stranger."""
+        """None of a unregistered."""
         return self._rows.get(key)
 
     def wait(self, timeout_s: float) -> bool:
         """Until there is a message; False when there is none in time."""
         return self._filled.wait(timeout_s)
 
-    def drain(self, most: int, now_ns: int = 0) -> tuple[list[Message], list[Stranger]]:
-        """At most so many messages of known keys, each tag's in their order, and of strangers. now_ns: UTC."""
+    def drain(self, most: int, now_ns: int = 0) -> tuple[list[Message], list[UnregisteredMessage]]:
+        """At most so many messages of known keys, each tag's in their order, and of unregistered. now_ns: UTC."""
         with self._lock:
             taken = self._next(most, now_ns)
             self._cached = max(0, self._cached - len(taken))
             self._drained_bytes += _size_of_all(taken) if self._behind else 0
-            strangers = [self._strangers.popleft() for _ in range(min(STRANGERS_PER_TURN, len(self._strangers)))]
-            self._stranger_bytes -= sum(map(_size, strangers))
-            if not self._messages and not self._strangers:
+            unregistered = [
+                self._unregistered.popleft() for _ in range(min(UNREGISTERED_PER_TURN, len(self._unregistered)))
+            ]
+            self._unregistered_bytes -= sum(map(_size, unregistered))
+            if not self._messages and not self._unregistered:
                 self._filled.clear()
-            return taken, strangers
+            return taken, unregistered
 
     def take_shed(self) -> Shed:
         """What was lost since the last call."""
         with self._lock:
-            shed = Shed(self._shed, self._shed_samples, self._strangers_shed)
-            self._shed, self._shed_samples, self._strangers_shed = Counter(), 0, 0
+            shed = Shed(self._shed, self._shed_samples, self._unregistered_shed)
+            self._shed, self._shed_samples, self._unregistered_shed = Counter(), 0, 0
             return shed
 
     @property
     def depth(self) -> int:
-        return len(self._messages) + len(self._strangers)
+        return len(self._messages) + len(self._unregistered)
 
-    def _append_stranger(self, message: Stranger) -> None:
-        self._strangers.append(message)
-        self._stranger_bytes += _size(message)
-        while self._stranger_bytes > STRANGER_BYTES:
-            self._stranger_bytes -= _size(self._strangers.popleft())
-            self._strangers_shed += 1
+    def _append_unregistered(self, message: UnregisteredMessage) -> None:
+        self._unregistered.append(message)
+        self._unregistered_bytes += _size(message)
+        while self._unregistered_bytes > UNREGISTERED_BYTES:
+            self._unregistered_bytes -= _size(self._unregistered.popleft())
+            self._unregistered_shed += 1
 
     def _next(self, most: int, now_ns: int) -> list[Message]:
         """Those that `drain` takes, and in an overload others are shed."""
@@ -213,7 +215,7 @@ class MessageBuffer:
         return np.fromiter(map(_ROW, self._messages), np.int64, count), sizes + MESSAGE_OVERHEAD
 
 
-def _size(message: Message | Stranger) -> int:
+def _size(message: Message | UnregisteredMessage) -> int:
     return len(message[1]) + MESSAGE_OVERHEAD
 
 

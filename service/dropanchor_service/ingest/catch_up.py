@@ -1,7 +1,7 @@
-"""What tags published while nobody listened, fetched from their publishers' caches and put before what is live.
+"""Put what tags published while nobody listened, fetched from their caches, before what is live.
 
-The first messages of a tag are held until its caches have been asked; then all go on in one order. Pure: it is told
-what is live, what was fetched, and when an answer is complete.
+The first messages of a tag are suspended until its caches have answered; then all go on in one order. No I/O: the
+caller says what is live, what was fetched, and when an answer is complete.
 """
 
 from collections import Counter
@@ -12,12 +12,12 @@ from typing import NamedTuple
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, Rejection, read_header
 from dropanchor_service.ingest.buffer import MESSAGE_OVERHEAD, MessageBuffer
-from dropanchor_service.ingest.publishers import Passed
+from dropanchor_service.ingest.publishers import SequenceState
 
-MOST_BYTES = 64 * 2**20  # of held messages; beyond it they go on as they are
+MOST_BYTES = 64 * 2**20  # of suspended messages; beyond it they go on as they are
 TRIES = 10  # of asking again
 
-PassedOf = Callable[[str], Mapping[int, Passed]]
+StatesOf = Callable[[str], Mapping[int, SequenceState]]
 """What was fused before the restart of the tag with this key, by boot id."""
 
 
@@ -29,7 +29,7 @@ class _Number(NamedTuple):
     t_ns: int
 
 
-class _Held(NamedTuple):
+class _Suspended(NamedTuple):
     key: str
     payload: bytes
     encoding: str
@@ -51,18 +51,18 @@ class CatchUp:
         self,
         buffer: MessageBuffer,
         expected: Iterable[str],
-        passed_of: PassedOf,
+        states_of: StatesOf,
         ask: Callable[[str, int, int], None],
         most_of_new: int,
     ) -> None:
         self._lock = Lock()
         self._buffer = buffer
         self._expected = set(expected)
-        self._passed_of = passed_of
+        self._states_of = states_of
         self._ask = ask
         self._most_of_new = most_of_new
-        self._first_round = True  # all caches are being asked, all messages are held
-        self._held: dict[str, list[_Held]] = {}
+        self._first_round = True  # all caches are being asked, all messages are suspended
+        self._suspended: dict[str, list[_Suspended]] = {}
         self._fetched: Counter[str] = Counter()  # since the key was asked last
         self._tries: Counter[str] = Counter()  # of asking again
         self._bytes = 0
@@ -70,11 +70,11 @@ class CatchUp:
     def hear(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """A live message."""
         if self._waits(key):
-            held = _Held(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
+            suspended = _Suspended(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
             with self._lock:
-                waits = self._waits(key) and not self._is_first(held)
+                waits = self._waits(key) and not self._is_first(suspended)
                 if waits:
-                    self._hold(held)
+                    self._suspend(suspended)
             if waits:
                 self._bound()
                 return
@@ -88,11 +88,11 @@ class CatchUp:
 
     def fetch(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """A message from a cache."""
-        held = _Held(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
+        suspended = _Suspended(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
         with self._lock:
-            if self._first_round or key in self._held:
+            if self._first_round or key in self._suspended:
                 self._fetched[key] += 1
-                self._hold(held)
+                self._suspend(suspended)
         self._bound()
 
     def answered(self, key: str, most: int) -> int:
@@ -108,20 +108,20 @@ class CatchUp:
         asked once more: a session that has just been opened tells of its caches last."""
         with self._lock:
             self._first_round = False
-            unheard = {key for key in self._held if key in self._expected and not self._fetched[key]}
-            again = unheard | {key for key in self._held if self._lacks(key, most)}
+            unheard = {key for key in self._suspended if key in self._expected and not self._fetched[key]}
+            again = unheard | {key for key in self._suspended if self._lacks(key, most)}
             for key in again:
                 self._ask_again(key)
-            complete = self._held.keys() - again
+            complete = self._suspended.keys() - again
         return self._release(*complete)
 
     def _waits(self, key: str) -> bool:
-        return self._first_round or key in self._expected or key in self._held
+        return self._first_round or key in self._expected or key in self._suspended
 
-    def _is_first(self, message: _Held) -> bool:
+    def _is_first(self, message: _Suspended) -> bool:
         """Whether a tag that is new begins with it, so that there is nothing to ask its caches for."""
         number, key = message.number, message.key
-        if self._first_round or key in self._held or number is None or number.sequence or self._passed_of(key):
+        if self._first_round or key in self._suspended or number is None or number.sequence or self._states_of(key):
             return False
         self._expected.discard(key)
         return True
@@ -143,12 +143,12 @@ class CatchUp:
     def _distances(self, key: str) -> list[tuple[bool, set[int]]]:
         """For each publisher, whether the last process knew it, and the numbers that were not fused, counted from the
         one that it expected, or from any."""
-        passed, found = self._passed_of(key), dict[int, set[int]]()
-        first: dict[int, Passed] = {}
-        for message in self._held.get(key, ()):
+        passed, found = self._states_of(key), dict[int, set[int]]()
+        first: dict[int, SequenceState] = {}
+        for message in self._suspended.get(key, ()):
             if message.number:
                 boot_id, sequence, _ = message.number
-                origin = passed.get(boot_id) or first.setdefault(boot_id, Passed(sequence, 0))
+                origin = passed.get(boot_id) or first.setdefault(boot_id, SequenceState(sequence, 0))
                 ahead = origin.ahead(sequence)
                 if ahead >= 0 or boot_id in first:
                     found.setdefault(boot_id, set()).add(ahead)
@@ -156,11 +156,11 @@ class CatchUp:
 
     def _missing(self, key: str) -> int:
         """How many messages one of its publishers has sent that were not fused, as far as their numbers tell."""
-        passed = self._passed_of(key)
-        numbers = [held.number for held in self._held.get(key, ()) if held.number]
+        passed = self._states_of(key)
+        numbers = [suspended.number for suspended in self._suspended.get(key, ()) if suspended.number]
         return max((self._missing_to(number, passed) for number in numbers), default=0)
 
-    def _missing_to(self, number: _Number, passed: Mapping[int, Passed]) -> int:
+    def _missing_to(self, number: _Number, passed: Mapping[int, SequenceState]) -> int:
         known = passed.get(number.boot_id)
         return max(0, known.ahead(number.sequence)) + 1 if known else min(number.sequence + 1, self._most_of_new)
 
@@ -169,18 +169,18 @@ class CatchUp:
         self._fetched[key] = 0
         self._tries[key] += 1
 
-    def _hold(self, message: _Held) -> None:
+    def _suspend(self, message: _Suspended) -> None:
         self._open(message.key)
-        self._held[message.key].append(message)
+        self._suspended[message.key].append(message)
         self._bytes += _size(message)
 
     def _bound(self) -> None:
         if self._bytes > MOST_BYTES:
-            self._release(*list(self._held))
+            self._release(*list(self._suspended))
 
     def _open(self, key: str) -> None:
-        if key not in self._held:
-            self._held[key] = []
+        if key not in self._suspended:
+            self._suspended[key] = []
             if not self._first_round:
                 self._ask(key, 0, 0)
 
@@ -188,41 +188,43 @@ class CatchUp:
         """In the order in which they would have arrived: one message of a tag is fused at a time, but of many tags at
         once. Nobody who hears something waits for the sorting; what is heard meanwhile follows."""
         with self._lock:
-            taken = {key: self._held[key] for key in keys if key in self._held}
+            taken = {key: self._suspended[key] for key in keys if key in self._suspended}
             cached = any(self._fetched[key] or self._tries[key] for key in taken)
-            self._held |= {key: [] for key in taken}
-        released = [message for key, held in taken.items() for message in _in_order(held, self._passed_of(key))]
+            self._suspended |= {key: [] for key in taken}
+        released = [
+            message for key, suspended in taken.items() for message in _in_order(suspended, self._states_of(key))
+        ]
         released.sort(key=lambda message: message.arrival_ns)
         for message in released:
             self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns, cached)
         gone = {(message.key, message.number) for message in released if message.number}
         with self._lock:
-            for key, held in taken.items():
+            for key, suspended in taken.items():
                 self._expected.discard(key)
                 self._fetched.pop(key, None)
                 self._tries.pop(key, None)
-                meanwhile = self._held[key]
-                self._bytes -= sum(map(_size, held)) + sum(map(_size, meanwhile))
+                meanwhile = self._suspended[key]
+                self._bytes -= sum(map(_size, suspended)) + sum(map(_size, meanwhile))
                 for message in meanwhile:
                     if (key, message.number) not in gone:
                         self._buffer.append(key, message.payload, message.encoding, message.arrival_ns)
-                del self._held[key]  # from now on what is heard does not wait for the lock
+                del self._suspended[key]  # from now on what is heard does not wait for the lock
         return len(released)
 
 
-def _size(message: _Held) -> int:
+def _size(message: _Suspended) -> int:
     return len(message.payload) + MESSAGE_OVERHEAD
 
 
-_Numbered = tuple[_Number, _Held]
+_Numbered = tuple[_Number, _Suspended]
 
 
-def _in_order(held: list[_Held], passed: Mapping[int, Passed]) -> list[_Held]:
+def _in_order(suspended: list[_Suspended], passed: Mapping[int, SequenceState]) -> list[_Suspended]:
     """Every message once, as they would have arrived: each publisher's in the order of their numbers, with the delay
     that its newest one has."""
     by_publisher: dict[int, dict[int, _Numbered]] = {}
-    others: list[_Held] = []
-    for message in held:
+    others: list[_Suspended] = []
+    for message in suspended:
         number = message.number
         if number is None:
             others.append(message)
@@ -235,7 +237,7 @@ def _in_order(held: list[_Held], passed: Mapping[int, Passed]) -> list[_Held]:
     return others
 
 
-def _as_if_live(messages: list[_Numbered]) -> Iterator[_Held]:
+def _as_if_live(messages: list[_Numbered]) -> Iterator[_Suspended]:
     """One publisher's, with the arrivals that they would have had; clocks that jump move none behind the next one."""
     first = messages[0][0].sequence
     ordered = sorted(messages, key=lambda entry: (entry[0].sequence - first + 2**31) % 2**32)
@@ -245,8 +247,8 @@ def _as_if_live(messages: list[_Numbered]) -> Iterator[_Held]:
     for number, _ in reversed(ordered):
         arrival_ns = min(arrival_ns, number.t_ns + delay_ns)
         arrivals.append(arrival_ns)
-    for (number, held), arrived_ns in zip(ordered, reversed(arrivals), strict=True):
-        yield _Held(held.key, held.payload, held.encoding, arrived_ns, number)
+    for (number, suspended), arrived_ns in zip(ordered, reversed(arrivals), strict=True):
+        yield _Suspended(suspended.key, suspended.payload, suspended.encoding, arrived_ns, number)
 
 
 def _number_of(payload: bytes, encoding: str) -> _Number | None:

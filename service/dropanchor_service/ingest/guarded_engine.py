@@ -38,7 +38,7 @@ class _Faults(NamedTuple):
     until_ns: int
 
 
-class Estimators:
+class GuardedEngine:
     """Owned by one thread."""
 
     def __init__(self, engine: Engine, site: SiteStore, tags: TagTable, metrics: Metrics) -> None:

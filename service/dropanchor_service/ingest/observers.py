@@ -11,7 +11,7 @@ def _nobody(*_: object) -> None:
 
 
 @dataclass(frozen=True)
-class Taps:
+class Observers:
     """Called by the ingest thread, which cannot wait for them.
 
     messages: with the admitted messages of a turn: row, payload, encoding, arrival. poses: with POSE as the engine
@@ -22,4 +22,4 @@ class Taps:
     poses: Callable[[Array], None] = _nobody
 
 
-NO_TAPS = Taps()
+NO_OBSERVERS = Observers()

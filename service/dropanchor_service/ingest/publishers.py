@@ -15,17 +15,17 @@ from dropanchor_service.store.records import enlarged
 
 @dataclass(frozen=True)
 class Sequenced:
-    """Indices of messages. due: to be fused now, in this order; held: to be put in again, before newer ones, until
+    """Indices of messages. due: to be fused now, in this order; pending: to be put in again, before newer ones, until
     they are due. missing: messages that are given up. slots: the publisher of each message, -1 without one."""
 
     due: Array
-    held: Array
+    pending: Array
     duplicates: Array
     missing: int
     slots: Array
 
 
-class Passed(NamedTuple):
+class SequenceState(NamedTuple):
     """next: the number that is expected; seen: bit n % WINDOW is set when the message n has come."""
 
     next: int
@@ -77,31 +77,31 @@ class Publishers:
         self._grow(rows)
         n = len(rows)
         slots, distances, verdicts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
-        held = sequences.pass_in_order(forms, rows, arrivals, self._columns, slots, distances, verdicts)
+        pending = sequences.pass_in_order(forms, rows, arrivals, self._columns, slots, distances, verdicts)
         due = np.flatnonzero(verdicts == sequences.PASS)
         missing = 0
-        if held:
-            behind = np.flatnonzero(verdicts == sequences.HELD)
+        if pending:
+            behind = np.flatnonzero(verdicts == sequences.PENDING)
             ordered = behind[np.lexsort((distances[behind], slots[behind]))]
             missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_ns, verdicts)
             due = np.concatenate([due, ordered[verdicts[ordered] == sequences.PASS]])
-        again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.HELD))
+        again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.PENDING))
         return Sequenced(due, waiting, again, missing, slots)
 
-    def passed(self, row: int) -> dict[int, Passed]:
+    def sequence_states(self, row: int) -> dict[int, SequenceState]:
         """By boot id, of this tag's publishers."""
         of_tag = self._columns[row * PER_TAG : (row + 1) * PER_TAG]
         return {
-            int(publisher["boot_id"]): Passed(
+            int(publisher["boot_id"]): SequenceState(
                 int(publisher["next"]), int.from_bytes(publisher["seen"].astype("<u8").tobytes(), "little")
             )
             for publisher in of_tag[of_tag["status"] == sequences.RUNNING]
         }
 
-    def excuse(self, rows: Array) -> None:
+    def allow_gap(self, rows: Array) -> None:
         """Messages of these rows were shed before they got here: nobody need wait for them."""
         known = rows[(rows + 1) * PER_TAG <= len(self._columns)]
-        self._columns["excused"].reshape(-1, PER_TAG)[known] = True
+        self._columns["gap_allowed"].reshape(-1, PER_TAG)[known] = True
 
     def time_offsets(
         self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]

@@ -9,7 +9,7 @@ from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import TagTable
 
 
-class Losses:
+class Rejections:
     """Owned by one thread."""
 
     def __init__(self, tags: TagTable, metrics: Metrics) -> None:
@@ -33,7 +33,7 @@ class Losses:
         self.reject(Reason.SHED, rows)
         self._metrics.shed_samples.inc(samples)
 
-    def lose_strangers(self, reason: Reason, messages: int) -> None:
+    def count_unregistered(self, reason: Reason, messages: int) -> None:
         """Messages of tags without a row."""
         self._metrics.rejected.labels(reason).inc(messages)
 
@@ -47,7 +47,7 @@ class Losses:
         if times:
             self._metrics.clock_jumps.inc(times)
 
-    def tap_failed(self, error: Exception) -> None:
+    def observer_failed(self, error: Exception) -> None:
         """An error of ours."""
         self._metrics.faults.labels("tap").inc()
         self._log.exception("tap", error)

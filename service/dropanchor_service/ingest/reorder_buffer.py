@@ -3,7 +3,7 @@
 from dropanchor_service.ingest.buffer import Message
 
 
-class HeldMessages:
+class ReorderBuffer:
     """Put aside behind a gap in their publisher's numbers. Bounded in time by who wakes them, in bytes by `is_full`."""
 
     def __init__(self, most_bytes: int) -> None:
@@ -19,11 +19,11 @@ class HeldMessages:
         """Nobody should wait any longer."""
         return self._bytes > self._most_bytes
 
-    def hold(self, messages: list[Message]) -> None:
+    def add(self, messages: list[Message]) -> None:
         self._messages += messages
         self._bytes += sum(len(message[1]) for message in messages)
 
-    def wake(self, others: list[Message], due_ns: int) -> list[Message]:
+    def take_due(self, others: list[Message], due_ns: int) -> list[Message]:
         """Take out, in order of arrival, all of the rows that `others` are of or that have one from until `due_ns`."""
         if not self._messages:
             return []

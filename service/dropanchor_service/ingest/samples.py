@@ -9,59 +9,61 @@ from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.batch import BEARING, HEADING, RANGE, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
-from dropanchor_service.ingest.guarded_engine import Estimators
+from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.kernels.values import newest_times, shift_times
 from dropanchor_service.ingest.publishers import Publishers
-from dropanchor_service.ingest.rejections import Losses
-from dropanchor_service.ingest.reorder_buffer import HeldMessages
+from dropanchor_service.ingest.rejections import Rejections
+from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
 from dropanchor_service.store import SiteStore, TagTable
 from dropanchor_service.store.rings import rank_in_row
 
-HELD_BYTES = 2**26
+REORDER_BYTES = 2**26
 
 
-class Preparation:
+class SampleReader:
     """Owned by one thread.
 
     window_ns: so long a message waits for those that its publisher numbered before it.
     """
 
-    def __init__(self, site: SiteStore, tags: TagTable, estimators: Estimators, losses: Losses, window_ns: int) -> None:
+    def __init__(
+        self, site: SiteStore, tags: TagTable, engine: GuardedEngine, rejections: Rejections, window_ns: int
+    ) -> None:
         self.window_ns = window_ns
         self.publishers = Publishers()
         self._site = site
         self._tags = tags
-        self._estimators = estimators
-        self._losses = losses
-        self._held = HeldMessages(HELD_BYTES)
+        self._engine = engine
+        self._rejections = rejections
+        self._reorder = ReorderBuffer(REORDER_BYTES)
 
     @property
-    def holds(self) -> int:
+    def has_pending(self) -> int:
         """Messages that wait for one before them."""
-        return len(self._held)
+        return len(self._reorder)
 
     def batches_of(self, fresh: list[Message], now_ns: int) -> Iterator[SampleBatch]:
         """Those of the fresh messages and of ones held before that are due, at most one of each tag in a batch: what
         becomes of a message does not depend on which others of its tag came in with it."""
         due_ns = self._due_ns(fresh, now_ns)
-        messages = [*self._held.wake(fresh, due_ns), *fresh] if self.holds else fresh
+        messages = [*self._reorder.take_due(fresh, due_ns), *fresh] if self.has_pending else fresh
         if not messages:
             return
         rows, payloads, encodings, arrivals = zip(*messages, strict=True)
         read = self._forms(payloads, encodings)
         of_row, arrived = np.array(rows, np.int32), np.array(arrivals, np.int64)
         for reason in {reason for _, reason in read.rejected}:
-            self._losses.reject(reason, of_row[[index for index, why in read.rejected if why == reason]])
+            self._rejections.reject(reason, of_row[[index for index, why in read.rejected if why == reason]])
         sequenced = self.publishers.sequence(read.forms, of_row, arrived, due_ns)
-        self._losses.give_up(sequenced.missing)
-        self._held.hold([messages[index] for index in sequenced.held.tolist()])
-        self._losses.reject(Reason.DUPLICATE, of_row[sequenced.duplicates])
+        self._rejections.give_up(sequenced.missing)
+        self._reorder.add([messages[index] for index in sequenced.pending.tolist()])
+        self._rejections.reject(Reason.DUPLICATE, of_row[sequenced.duplicates])
         for due in _one_of_each(sequenced.due, of_row):
             decoded, rejected = screen(read_samples(read, due))
             in_part = replace(sequenced, due=due)
             offsets, jumps = self.publishers.time_offsets(read.forms, in_part, arrived, _times(decoded))
-            self._losses.clocks_jumped(jumps)
+            self._rejections.clocks_jumped(jumps)
             in_time = _in_time(decoded, offsets, rejected)
             self._note_replays(in_time, due, of_row, arrived)
             yield self._batch(in_time, rejected, of_row, arrived)
@@ -69,7 +71,7 @@ class Preparation:
     def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
         """What arrived until then has waited long enough. The window counts in arrivals: where messages have lain in a
         backlog, one that came soon after those behind the gap may still lie there."""
-        if self._held.is_full:
+        if self._reorder.is_full:
             return now_ns
         return min(now_ns, max((message[3] for message in fresh), default=now_ns)) - self.window_ns
 
@@ -78,7 +80,7 @@ class Preparation:
         try:
             return read_forms(payloads, encodings)
         except Exception as error:
-            self._losses.decoder_failed(error)
+            self._rejections.decoder_failed(error)
             return read_forms([_if_readable(*pair) for pair in zip(payloads, encodings, strict=True)], encodings)
 
     def _note_replays(self, decoded: Decoded, due: Array, of_row: Array, arrived: Array) -> None:
@@ -95,7 +97,7 @@ class Preparation:
         ranges = self._anchored(decoded.ranges, rejected)
         bearings = self._anchored(decoded.bearings, rejected)
         for entry in rejected:
-            self._losses.reject(entry.reason, of_row[entry.messages])
+            self._rejections.reject(entry.reason, of_row[entry.messages])
         decoded.imu["row"] = of_row[decoded.imu["row"]]
         return SampleBatch(
             imu=decoded.imu,
@@ -110,10 +112,10 @@ class Preparation:
             return
         number = int(decoded.ranges["anchor"][0])
         if self._site.bind_first(decoded.anchor_names.get(number, str(number))):
-            self._estimators.follow_site()
+            self._engine.follow_site()
 
     def _note_unknown_anchors(self, decoded: Decoded, of_row: Array, arrived: Array) -> None:
-        ranges = decoded.ranges[self._estimators.anchor_indices(decoded.ranges["anchor"]) < 0]
+        ranges = decoded.ranges[self._engine.anchor_indices(decoded.ranges["anchor"]) < 0]
         messages, first = np.unique(ranges["message"], return_index=True)
         for message, number in zip(messages.tolist(), ranges["anchor"][first].tolist(), strict=True):
             name = decoded.anchor_names.get(number, str(number))
@@ -124,7 +126,7 @@ class Preparation:
         """The samples of anchors that the site has, with the engine's index of the anchor in `anchor`."""
         if not len(samples):
             return samples
-        indices = self._estimators.anchor_indices(samples["anchor"])
+        indices = self._engine.anchor_indices(samples["anchor"])
         unknown = indices < 0
         kept = keep(samples, samples["message"], unknown, Reason.ANCHOR_UNKNOWN, rejected)
         kept["anchor"] = indices[~unknown]

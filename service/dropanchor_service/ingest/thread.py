@@ -1,4 +1,4 @@
-"""The only thread that runs estimators. It survives errors, and says so when it does not."""
+"""The only thread that runs engine. It survives errors, and says so when it does not."""
 
 import logging
 import threading
@@ -11,7 +11,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 
 IDLE_S = 0.25
-HOLDING_S = 0.02  # of waiting while a held message may become due
+PENDING_S = 0.02  # of waiting while a held message may become due
 BACKLOG = 1000  # messages beyond which there is no waiting for more
 SILENT_S = 5.0  # without a turn the thread counts as stuck
 TURN_S = 0.1  # that a turn may take when more waits than it takes
@@ -63,7 +63,7 @@ class IngestThread:
     def _run(self) -> None:
         self._turn()  # tags that are known are admitted before anything comes in
         while not self._stop.is_set():
-            if self._buffer.wait(HOLDING_S if self._ingest.holds else IDLE_S) and self._buffer.depth < BACKLOG:
+            if self._buffer.wait(PENDING_S if self._ingest.has_pending else IDLE_S) and self._buffer.depth < BACKLOG:
                 # so that one call fuses many messages
                 self._stop.wait(self._turned_s + self._period_s - time.monotonic())
             self._turn()

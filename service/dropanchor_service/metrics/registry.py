@@ -10,7 +10,7 @@ from prometheus_client.registry import Collector
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.answers.columns import STATES, with_age
 from dropanchor_service.store.latest_poses import LatestPoses
-from dropanchor_service.store.pending_tags import Newcomers
+from dropanchor_service.store.pending_tags import PendingTags
 from dropanchor_service.store.tags import KINDS, TagTable
 
 _SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
@@ -88,13 +88,13 @@ class FleetGauges(Collector):
     def __init__(
         self,
         tags: TagTable,
-        newcomers: Newcomers,
+        pending_tags: PendingTags,
         latest: LatestPoses,
         now_ns: Callable[[], int],
         queue_depth: Callable[[], int],
     ) -> None:
         self._tags = tags
-        self._newcomers = newcomers
+        self._pending_tags = pending_tags
         self._latest = latest
         self._now_ns = now_ns
         self._queue_depth = queue_depth
@@ -108,6 +108,8 @@ class FleetGauges(Collector):
             tags.add_metric([state], count)
         yield tags
         yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that have a row.", len(self._tags))
-        yield GaugeMetricFamily("dropanchor_newcomers", "Tags that were heard and have no row.", len(self._newcomers))
+        yield GaugeMetricFamily(
+            "dropanchor_newcomers", "Tags that were heard and have no row.", len(self._pending_tags)
+        )
         yield GaugeMetricFamily("dropanchor_tags_online", "Tags whose token is present.", self._tags.online_names)
         yield GaugeMetricFamily("dropanchor_queue_messages", "Messages that wait to be fused.", self._queue_depth())

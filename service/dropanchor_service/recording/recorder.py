@@ -15,7 +15,7 @@ from dropanchor_service.recording.output import End, Item, Messages, Output, Pos
 from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
-from dropanchor_service.store.thinning import Thinning
+from dropanchor_service.store.thinning import Decimation
 
 FOLDER = "recordings"
 WRITE_S = 1.0  # what a kill can cost
@@ -59,7 +59,7 @@ class Recorder:
         self._running: Running | None = None
         self._site_version = 0
         self._session = ""
-        self._thinning = Thinning(pose_period_ns)
+        self._thinning = Decimation(pose_period_ns)
         self._output = Output(self._new_file, self._prune, limits, tags, site)
         self.writer: BackgroundWriter[Item] = BackgroundWriter(
             "recording", self._output.write, WRITE_S, MOST_WAITING_BYTES
@@ -102,7 +102,7 @@ class Recorder:
         if self._running is not None:
             return False
         self._site_version = 0
-        self._thinning = Thinning(self._pose_period_ns)
+        self._thinning = Decimation(self._pose_period_ns)
         since_ns = self._now_ns()
         self._session = str(since_ns)
         self._running = Running(since_ns, None if tags is None else tuple(tags))

@@ -22,7 +22,7 @@ def sources_digest() -> str:
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
 
 
-def keep_compiled() -> None:
+def use_kernel_cache() -> None:
     """Choose the cache's folder, unless the environment has. It takes effect if numba is not imported yet."""
     if VARIABLE in os.environ:
         return

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.files import PRIVATE, one_at_a_time
-from dropanchor_service.security.identity import Identity, Scope, UnknownError
+from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
 
 FILE = "api_keys.json"
 SOURCE = "key"
@@ -92,13 +92,13 @@ class ApiKeys:
         return secret.startswith(PREFIX)
 
     def identify(self, secret: str) -> Identity:
-        """Raises UnknownError."""
+        """Raises UnauthenticatedError."""
         self._follow_file()
         key = self._keys.get(secret.removeprefix(PREFIX).partition("_")[0])
         if key is None or not hmac.compare_digest(key.sha256, _hash(secret)):
-            raise UnknownError("the API key is not known, or was revoked")
+            raise UnauthenticatedError("the API key is not known, or was revoked")
         if key.is_expired:
-            raise UnknownError("the API key has expired")
+            raise UnauthenticatedError("the API key has expired")
         return Identity(SOURCE, key.name, key.scope)
 
     def is_still_good(self, identity: Identity) -> bool:

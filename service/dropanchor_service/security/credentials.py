@@ -8,7 +8,7 @@ from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
 from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
-from dropanchor_service.security.identity import Doorkeeper, Register
+from dropanchor_service.security.identity import Authenticator, IdentityProvider
 from dropanchor_service.settings.model import HttpSettings, SecuritySettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 
@@ -39,14 +39,14 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
     return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
 
 
-def doorkeeper_of(settings: SecuritySettings) -> Doorkeeper | None:
+def authenticator_of(settings: SecuritySettings) -> Authenticator | None:
     """None when nobody is asked. Raises SettingsError."""
-    registers: dict[str, Register] = {}
+    providers: dict[str, IdentityProvider] = {}
     try:
         if settings.folder is not None:
-            registers[api_keys.SOURCE] = ApiKeys(settings.folder)
+            providers[api_keys.SOURCE] = ApiKeys(settings.folder)
     except ApiKeyError as error:
         raise SettingsError(f"security.folder: {error}") from error
     if settings.oidc is not None:
-        registers[oidc.SOURCE] = oidc.OidcTokens(settings.oidc)
-    return Doorkeeper(registers) if registers else None
+        providers[oidc.SOURCE] = oidc.OidcTokens(settings.oidc)
+    return Authenticator(providers) if providers else None

@@ -36,11 +36,11 @@ class Identity:
     expires_s: float | None = None
 
 
-class UnknownError(Exception):
+class UnauthenticatedError(Exception):
     """Nobody is known by what was shown; the message may be told to whoever asks."""
 
 
-class Register(Protocol):
+class IdentityProvider(Protocol):
     """One place where somebody may be known."""
 
     takes_time: bool
@@ -50,24 +50,24 @@ class Register(Protocol):
         """Whether it looks like one of ours."""
 
     def identify(self, secret: str) -> Identity:
-        """Raises UnknownError."""
+        """Raises UnauthenticatedError."""
 
     def is_still_good(self, identity: Identity) -> bool:
         """Whether the identity it once gave still holds. At once."""
 
 
-class Doorkeeper:
-    """Knows which register to ask. registers: by the source that their identities name."""
+class Authenticator:
+    """Knows which register to ask. providers: by the source that their identities name."""
 
-    def __init__(self, registers: Mapping[str, Register]) -> None:
-        self._registers = dict(registers)
+    def __init__(self, providers: Mapping[str, IdentityProvider]) -> None:
+        self._providers = dict(providers)
 
-    def register_of(self, secret: str) -> Register:
-        """Raises UnknownError."""
-        for register in self._registers.values():
+    def provider_of(self, secret: str) -> IdentityProvider:
+        """Raises UnauthenticatedError."""
+        for register in self._providers.values():
             if register.knows(secret):
                 return register
-        raise UnknownError("what was sent is neither an API key nor a token that this service takes")
+        raise UnauthenticatedError("what was sent is neither an API key nor a token that this service takes")
 
     def is_still_good(self, identity: Identity) -> bool:
-        return self._registers[identity.source].is_still_good(identity)
+        return self._providers[identity.source].is_still_good(identity)

@@ -8,7 +8,7 @@ from typing import Any
 
 import jwt
 
-from dropanchor_service.security.identity import Identity, Scope, UnknownError
+from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
 from dropanchor_service.settings.model import OidcSettings, is_safe_url
 
 SOURCE = "token"
@@ -34,11 +34,11 @@ class OidcTokens:
         return secret.count(".") == 2
 
     def identify(self, secret: str) -> Identity:
-        """Raises UnknownError. Asks the provider for its keys when they are needed."""
+        """Raises UnauthenticatedError. Asks the provider for its keys when they are needed."""
         try:
             header = jwt.get_unverified_header(secret)
             if header.get("alg") not in ALGORITHMS:
-                raise UnknownError("the token is not signed by an algorithm that is taken here")
+                raise UnauthenticatedError("the token is not signed by an algorithm that is taken here")
             claims = jwt.decode(
                 secret,
                 self._keys.find(header.get("kid")),
@@ -49,7 +49,7 @@ class OidcTokens:
                 options={"require": ["exp", "iss", "aud"]},
             )
         except jwt.PyJWTError as error:
-            raise UnknownError(f"the token is not valid: {error}") from error
+            raise UnauthenticatedError(f"the token is not valid: {error}") from error
         name = str(claims.get("sub") or claims.get("client_id") or "a token without a subject")
         return Identity(SOURCE, name, self._scope(claims), float(claims["exp"]))
 
@@ -82,12 +82,12 @@ class SigningKeys:
         self._fetched_s = self._tried_s = -float("inf")
 
     def find(self, kid: str | None) -> jwt.PyJWK:
-        """Return the key of this id. Raises UnknownError."""
+        """Return the key of this id. Raises UnauthenticatedError."""
         if kid not in self._keys or self._clock() - self._fetched_s > REFRESH_S:
             self._refresh()
         if kid not in self._keys:
             why = "that its issuer does not publish" if self._keys else "of an issuer that does not answer"
-            raise UnknownError(f"the token is signed with a key {why}")
+            raise UnauthenticatedError(f"the token is signed with a key {why}")
         return self._keys[kid]
 
     def _refresh(self) -> None:

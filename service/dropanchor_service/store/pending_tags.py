@@ -8,19 +8,19 @@ from typing import Any
 Waiting = tuple[bytes, str, int]
 """Payload, encoding, UTC of arrival in ns."""
 
-PROOF_MESSAGES = 2  # that can be decoded
-PROOF_NS = 100_000_000  # from the first of them to the last: a message that was doubled on its way proves nothing
+CONFIRMED_MESSAGES = 2  # that can be decoded
+CONFIRMED_NS = 100_000_000  # from the first of them to the last: a message that was doubled on its way proves nothing
 MOST_BYTES = 16 * 2**20  # of all messages that wait
 _OVERHEAD = 200  # bytes of one beside its payload
 
 
-def is_proof(messages: Any, first_ns: Any, last_ns: Any) -> Any:
+def is_confirmed(messages: Any, first_ns: Any, last_ns: Any) -> Any:
     """Whether somebody is there who goes on sending; for one tag or for columns of many."""
-    return (messages >= PROOF_MESSAGES) & (last_ns - first_ns >= PROOF_NS)
+    return (messages >= CONFIRMED_MESSAGES) & (last_ns - first_ns >= CONFIRMED_NS)
 
 
 @dataclass(slots=True)
-class Newcomer:
+class PendingTag:
     """messages: how many have come, of which those in `waiting` are kept."""
 
     name: str
@@ -30,14 +30,14 @@ class Newcomer:
     waiting: list[Waiting] = field(default_factory=list)
 
 
-class Newcomers:
+class PendingTags:
     """At most so many, and MOST_BYTES of messages: who was heard least recently gives way. From any thread."""
 
     def __init__(self, most: int, most_bytes: int = MOST_BYTES) -> None:
         self._most = most
         self._most_bytes = most_bytes
         self._lock = Lock()
-        self._by_name: OrderedDict[str, Newcomer] = OrderedDict()  # who was heard least recently first
+        self._by_name: OrderedDict[str, PendingTag] = OrderedDict()  # who was heard least recently first
         self._bytes = 0
         self._gone = 0
 
@@ -45,15 +45,15 @@ class Newcomers:
         return len(self._by_name)
 
     def hear(self, name: str, arrival_ns: int) -> bool:
-        """A message has come. Returns whether those that came so far are a proof."""
+        """A message has come. Returns whether those that came so far are a confirmed."""
         with self._lock:
-            newcomer = self._by_name.pop(name, None) or Newcomer(name, arrival_ns, arrival_ns)
-            self._by_name[name] = newcomer
-            newcomer.messages += 1
-            newcomer.last_heard_ns = arrival_ns
+            pending = self._by_name.pop(name, None) or PendingTag(name, arrival_ns, arrival_ns)
+            self._by_name[name] = pending
+            pending.messages += 1
+            pending.last_heard_ns = arrival_ns
             if len(self._by_name) > self._most:
                 self._gone += len(self._forget(next(iter(self._by_name))))
-            return bool(is_proof(newcomer.messages, newcomer.first_heard_ns, newcomer.last_heard_ns))
+            return bool(is_confirmed(pending.messages, pending.first_heard_ns, pending.last_heard_ns))
 
     def keep(self, name: str, message: Waiting) -> bool:
         """Let the message of somebody who was just heard wait; False when there is no room for it."""
@@ -76,7 +76,7 @@ class Newcomers:
             gone, self._gone = self._gone, 0
             return gone
 
-    def all(self) -> list[Newcomer]:
+    def all(self) -> list[PendingTag]:
         """Who was heard last first."""
         with self._lock:
             return list(reversed(self._by_name.values()))

@@ -28,7 +28,7 @@ class SlotFirsts:
         return take(poses, slots != before)
 
 
-class Thinning:
+class Decimation:
     """Of the first poses of the slots those are kept that are `distance_m` away from the one kept before, or have
     another state, or come `still_ns` after it. Owned by one thread."""
 

@@ -20,7 +20,7 @@ import zenoh
 from dropanchor_schemas import keys
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp
-from dropanchor_service.ingest.publishers import Passed, Publishers
+from dropanchor_service.ingest.publishers import Publishers, SequenceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
@@ -66,7 +66,7 @@ class ZenohCaches:
         self.catch_up = CatchUp(
             buffer,
             expected,
-            self._passed,
+            self._sequence_states,
             self._want,
             self._most(self._newest_ns),
         )
@@ -83,9 +83,9 @@ class ZenohCaches:
         self._tasks.put(None)
         self._thread.join(1.0)
 
-    def _passed(self, key: str) -> Mapping[int, Passed]:
+    def _sequence_states(self, key: str) -> Mapping[int, SequenceState]:
         tag = self._tags.find(keys.tag_from_key(key))
-        return {} if tag is None else self._publishers.passed(tag.row)
+        return {} if tag is None else self._publishers.sequence_states(tag.row)
 
     def _want(self, key: str, missing: int, tries: int) -> None:
         if tries:

@@ -12,7 +12,7 @@ import pytest
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.checkpoints import thread as checkpointer
 from dropanchor_service.checkpoints.files import CheckpointFolder
-from dropanchor_service.checkpoints.thread import Checkpointer
+from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.estimation.batch import Array, State
 from dropanchor_service.ingest.thread import IngestThread
 from support.ingest import Bench, TransparentEngine
@@ -44,7 +44,7 @@ class Kept:
         self.bench.estimators.follow_site()
         state = self.bench.whole_state()
         kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
-        self.checkpoints = Checkpointer(state, kept, self.bench.metrics, period_s=0.01)
+        self.checkpoints = CheckpointThread(state, kept, self.bench.metrics, period_s=0.01)
         self.thread = IngestThread(
             self.bench.ingest, self.bench.buffer, self.bench.metrics, 0.001, self.checkpoints.between_turns
         )

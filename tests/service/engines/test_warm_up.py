@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_service.runtime.kernel_cache import VARIABLE, keep_compiled
+from dropanchor_service.runtime.kernel_cache import VARIABLE, use_kernel_cache
 from support.service import ROOT, environment
 
-PLACE = "import os; from dropanchor_service.runtime.kernel_cache import *; keep_compiled(); print(os.environ[VARIABLE])"
+PLACE = (
+    "import os; from dropanchor_service.runtime.kernel_cache import *; use_kernel_cache(); print(os.environ[VARIABLE])"
+)
 
 
 def place(**variables: str) -> str:
@@ -36,7 +38,7 @@ def test_a_cache_that_cannot_be_written_is_replaced_by_a_fresh_folder_of_our_own
 
 def test_what_the_environment_says_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "somewhere")
-    keep_compiled()
+    use_kernel_cache()
     assert os.environ[VARIABLE] == "somewhere"
 
 

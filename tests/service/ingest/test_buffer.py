@@ -9,8 +9,8 @@ import numpy as np
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, HeadingSample, RangeSample, encode_packed
 from dropanchor_service.ingest.buffer import (
     MESSAGE_OVERHEAD,
-    STRANGER_BYTES,
-    STRANGERS_PER_TURN,
+    UNREGISTERED_BYTES,
+    UNREGISTERED_PER_TURN,
     Message,
     MessageBuffer,
 )
@@ -187,16 +187,16 @@ def test_strangers_push_out_only_each_other() -> None:
     put(buffer, "known", 0)
     for number in range(100_000):
         put(buffer, f"stranger{number}", number)
-    shed = buffer.take_shed().strangers
+    shed = buffer.take_shed().unregistered
     messages, strangers = buffer.drain(10**9)
     assert [message[0] for message in messages] == [0]
-    assert len(strangers) == STRANGERS_PER_TURN
+    assert len(strangers) == UNREGISTERED_PER_TURN
     while more := buffer.drain(10**9)[1]:
-        assert len(more) <= STRANGERS_PER_TURN
+        assert len(more) <= UNREGISTERED_PER_TURN
         strangers += more
     assert not buffer.wait(0.0)
     assert len(strangers) == 100_000 - shed
-    assert len(strangers) * MESSAGE_OVERHEAD < STRANGER_BYTES
+    assert len(strangers) * MESSAGE_OVERHEAD < UNREGISTERED_BYTES
     assert strangers[-1][0] == "stranger99999"
 
 

@@ -21,7 +21,7 @@ from dropanchor_service.ingest import catch_up
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.ingest.decode import read_forms
-from dropanchor_service.ingest.publishers import Passed
+from dropanchor_service.ingest.publishers import SequenceState
 
 S = 1_000_000_000
 MOST = 100  # messages that a cache was asked for
@@ -53,7 +53,7 @@ class Interrupted(MessageBuffer):
 class House:
     """A catch-up that expects the tags a and b, and what goes on from it."""
 
-    def __init__(self, passed: Mapping[str, Mapping[int, Passed]] = MappingProxyType({})) -> None:
+    def __init__(self, passed: Mapping[str, Mapping[int, SequenceState]] = MappingProxyType({})) -> None:
         self.asked: list[str] = []
         self.missing: list[int] = []
         self._buffer = Interrupted()
@@ -113,7 +113,7 @@ def test_what_is_live_waits_for_what_was_fetched_and_each_comes_once() -> None:
 
 
 def test_a_listed_tag_that_begins_is_not_asked_for_what_it_cannot_have() -> None:
-    house = House({B: {1: Passed(next=4, seen=0b1111)}})
+    house = House({B: {1: SequenceState(next=4, seen=0b1111)}})
     house.catch_up.first_round_answered(MOST)
     for sequence in (0, 1):
         live(house, sequence)
@@ -125,7 +125,7 @@ def test_a_listed_tag_that_begins_is_not_asked_for_what_it_cannot_have() -> None
 
 
 def test_what_was_fused_before_the_restart_is_left_out() -> None:
-    house = House({A: {1: Passed(next=4, seen=0b1111)}})
+    house = House({A: {1: SequenceState(next=4, seen=0b1111)}})
     cached(house, 2, 3, 4)
     cached(house, 2, boot_id=9)
     cached(house, 2, key=B)
@@ -227,7 +227,7 @@ def test_a_tag_that_is_heard_in_the_first_round_without_an_answer_of_its_caches_
 
 
 def test_a_tag_whose_answer_was_cut_short_is_asked_for_all_that_is_missing() -> None:
-    house = House({A: {1: Passed(next=4, seen=0b1111)}})
+    house = House({A: {1: SequenceState(next=4, seen=0b1111)}})
     live(house, 10)
     live(house, 10, boot_id=2, key=NEW)
     live(house, 6, key=B)
@@ -247,7 +247,7 @@ def test_a_tag_whose_answer_was_cut_short_is_asked_for_all_that_is_missing() -> 
 
 
 def test_a_hole_or_silence_where_something_is_missing_is_asked_for_again_and_again_but_not_for_ever() -> None:
-    house = House({B: {1: Passed(next=4, seen=0b1111)}})
+    house = House({B: {1: SequenceState(next=4, seen=0b1111)}})
     live(house, 9)
     cached(house, 5, 6, 7)
     live(house, 6, key=B)

@@ -62,7 +62,7 @@ def test_one_that_is_due_takes_those_before_it_along_but_not_those_behind_the_ne
     numbers, arrivals = [8, 5, 3], np.array([S + 9, S, S + 9])
     released = publishers.sequence(forms_of(numbers), np.zeros(3, np.int32), arrivals, S)
     assert [numbers[index] for index in released.due.tolist()] == [3, 5]
-    assert [numbers[index] for index in released.held.tolist()] == [8]
+    assert [numbers[index] for index in released.pending.tolist()] == [8]
 
 
 def test_one_that_comes_after_it_was_given_up_passes_once_and_the_engine_judges_it() -> None:
@@ -91,7 +91,7 @@ def test_shuffled_and_doubled_numbers_come_out_once_and_in_order() -> None:
         numbers = [*waiting, *(number for _, number in late[begin : begin + 7])]
         result = put(publishers, numbers)
         fused += [numbers[index] for index in result.due.tolist()]
-        waiting = [numbers[index] for index in result.held.tolist()]
+        waiting = [numbers[index] for index in result.pending.tolist()]
         doubles += len(result.duplicates)
     assert fused == stream
     assert doubles == len(stream)
@@ -107,7 +107,7 @@ def test_a_publisher_that_counts_from_the_start_again_is_heard() -> None:
 def test_nobody_waits_for_what_was_shed_here() -> None:
     publishers = Publishers()
     assert passed(publishers, [0]) == [0]
-    publishers.excuse(np.array([ROW, 99]))
+    publishers.allow_gap(np.array([ROW, 99]))
     released = put(publishers, [5, 6])
     assert released.due.tolist() == [0, 1]
     assert released.missing == 0
@@ -135,11 +135,11 @@ def test_a_copy_of_the_columns_goes_on_where_the_first_stopped() -> None:
     first, second = Publishers(), Publishers()
     assert passed(first, list(range(50))) == list(range(50))
     second.columns = first.columns
-    known = first.passed(ROW)[BOOT]
+    known = first.sequence_states(ROW)[BOOT]
     assert [known.has(number) for number in (0, 49, 50, 2**32 - 1)] == [True, True, False, False]
     assert [known.ahead(number) for number in (2**32 - 1, 49, 50, 52)] == [-51, -1, 0, 2]
-    assert first.passed(ROW).keys() == {BOOT}
-    assert first.passed(ROW + 1) == {}
+    assert first.sequence_states(ROW).keys() == {BOOT}
+    assert first.sequence_states(ROW + 1) == {}
     again = put(second, [48, 49, 50, 52])
     assert again.duplicates.tolist() == [0, 1]
     assert again.due.tolist() == [2]

@@ -21,7 +21,7 @@ from dropanchor_schemas.wire import (
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
 from dropanchor_service.ingest import samples as prepare
-from dropanchor_service.ingest.buffer import STRANGERS_PER_TURN
+from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
 from dropanchor_service.store.unknown_anchors import FRESH_NS, MOST_LOGGED
@@ -305,12 +305,12 @@ def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses
     bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["quick"]
-    assert len(bench.newcomers) == 1
+    assert len(bench.pending_tags) == 1
     bench.put("slow", ranges(3.0, sequence=1, boot_id=5), at_ns=T + S)
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["quick", "slow"]
     assert fused(bench) == [1.0, 2.0, 3.0]
-    assert len(bench.newcomers) == 0
+    assert len(bench.pending_tags) == 0
     assert bench.rejected() == {}
 
 
@@ -323,7 +323,7 @@ def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
     bench.ingest.turn()
     assert len(bench.tags) == 0
     assert bench.rejected() == {"version_unknown": 3}
-    assert [newcomer.name for newcomer in bench.newcomers.all()] == ["doubled"]
+    assert [pending.name for pending in bench.pending_tags.all()] == ["doubled"]
 
 
 def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
@@ -347,7 +347,7 @@ def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_co
     take_turns(bench)
     bench.ingest.turn()
     assert len(bench.tags) == 10
-    assert len(bench.newcomers) == 100
+    assert len(bench.pending_tags) == 100
     assert bench.rejected() == {"tag_unproven": 5_000 - 10 - 100}
 
 
@@ -357,12 +357,12 @@ def test_a_tag_in_quarantine_is_listed_and_comes_in_once_somebody_has_put_its_se
     for value in (2.0, 3.0):
         bench.send("stranger", ranges(value))
     assert fused(bench) == [1.0]
-    assert [(newcomer.name, newcomer.messages) for newcomer in bench.newcomers.all()] == [("stranger", 2)]
+    assert [(pending.name, pending.messages) for pending in bench.pending_tags.all()] == [("stranger", 2)]
     assert bench.rejected() == {"tag_quarantined": 2}
     bench.site.set_tag("stranger", TagSettings())
     bench.send("stranger", ranges(4.0))
     assert fused(bench) == [1.0, 4.0]
-    assert len(bench.newcomers) == 0
+    assert len(bench.pending_tags) == 0
 
 
 def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
@@ -375,7 +375,7 @@ def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
 
 
 def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
-    names = [f"listed-{number}" for number in range(STRANGERS_PER_TURN + 500)]
+    names = [f"listed-{number}" for number in range(UNREGISTERED_PER_TURN + 500)]
     bench = Bench(tags={name: {} for name in names})
     bench.ingest.turn()
     for name in names:
@@ -430,9 +430,12 @@ def test_a_replay_is_as_old_as_its_silence_and_a_live_tag_as_its_measurement() -
     answers = Answers(bench.site, bench.tags, bench.latest, bench.clock.now_ns)
 
     def state_of(name: str, later_s: float = 0.0) -> tuple[str, float]:
+        """State and age as they are so much later than the last message, however long compiling has taken."""
         tag = bench.tags.find(name)
         assert tag is not None
-        answers.now_ns = lambda: bench.clock.now_ns() + int(later_s * S)
+        assert tag.last_heard_ns is not None
+        now_ns = tag.last_heard_ns + int(later_s * S)
+        answers.now_ns = lambda: now_ns
         pose = answers.pose_of(tag)
         assert pose is not None
         return pose["state"], pose["age_s"]

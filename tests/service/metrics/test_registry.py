@@ -6,7 +6,7 @@ from prometheus_client import generate_latest
 from dropanchor_schemas.wire import Frame, RangeSample, Reason
 from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.store import LatestPoses, Newcomers, TagTable
+from dropanchor_service.store import LatestPoses, PendingTags, TagTable
 from support.ingest import Bench
 
 S = 1_000_000_000
@@ -41,9 +41,9 @@ def test_tags_are_counted_by_the_state_that_is_shown_not_by_the_one_that_was_sto
     for name in "abcd":
         tags.register(name)
     tags.set_online("a", True)
-    newcomers = Newcomers(10)
-    newcomers.hear("e", 100 * S)
-    metrics.watch(FleetGauges(tags, newcomers, latest, lambda: 100 * S, lambda: 5))
+    pending_tags = PendingTags(10)
+    pending_tags.hear("e", 100 * S)
+    metrics.watch(FleetGauges(tags, pending_tags, latest, lambda: 100 * S, lambda: 5))
     found = lines(metrics)
     states = {state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("tracking", "coasting", "lost")}
     assert states == {"tracking": 1, "coasting": 1, "lost": 1}

@@ -7,7 +7,7 @@ import pytest
 
 from dropanchor_service.cli import main
 from dropanchor_service.security.api_keys import FILE, ApiKeyError, ApiKeys
-from dropanchor_service.security.identity import Scope, UnknownError
+from dropanchor_service.security.identity import Scope, UnauthenticatedError
 from support.secured import secured_site
 
 
@@ -33,14 +33,14 @@ def test_a_running_service_follows_within_a_second(tmp_path: Path) -> None:
     ApiKeys(tmp_path).revoke("late")
     now_s = 2.2
     assert not running.is_still_good(identity)
-    with pytest.raises(UnknownError, match="was revoked"):
+    with pytest.raises(UnauthenticatedError, match="was revoked"):
         running.identify(secret)
 
 
 def test_an_expired_key_is_told_so(tmp_path: Path) -> None:
     keys = ApiKeys(tmp_path)
     secret = keys.add("short", Scope.READ, days=-1)
-    with pytest.raises(UnknownError, match="has expired"):
+    with pytest.raises(UnauthenticatedError, match="has expired"):
         keys.identify(secret)
 
 

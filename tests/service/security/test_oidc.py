@@ -13,7 +13,7 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from pydantic import ValidationError
 
-from dropanchor_service.security.identity import Scope, UnknownError
+from dropanchor_service.security.identity import Scope, UnauthenticatedError
 from dropanchor_service.security.oidc import RETRY_S, OidcTokens, SigningKeys
 from dropanchor_service.settings.model import OidcSettings
 
@@ -114,7 +114,7 @@ def test_scopes_are_mapped_as_the_settings_say(
     ],
 )
 def test_claims_that_are_not_for_us_are_refused(provider: Provider, claims: dict[str, Any], words: str) -> None:
-    with pytest.raises(UnknownError, match=words):
+    with pytest.raises(UnauthenticatedError, match=words):
         OidcTokens(provider.settings()).identify(provider.token(**claims))
 
 
@@ -131,7 +131,7 @@ def test_signatures_of_others_are_refused(provider: Provider) -> None:
         "a.b.c",
         "..",
     ):
-        with pytest.raises(UnknownError):
+        with pytest.raises(UnauthenticatedError):
             tokens.identify(forged)
     assert public is not None
 
@@ -142,7 +142,7 @@ def test_a_new_key_of_the_provider_is_found_and_made_up_ones_cost_it_one_questio
     assert keys.find("one")
     provider.new_key("two")
     for _ in range(50):
-        with pytest.raises(UnknownError, match="does not publish"):
+        with pytest.raises(UnauthenticatedError, match="does not publish"):
             keys.find("two")
     assert provider.asked == ["/keys"]
     now_s = RETRY_S + 0.1
@@ -153,7 +153,7 @@ def test_a_new_key_of_the_provider_is_found_and_made_up_ones_cost_it_one_questio
 def test_a_provider_that_is_away_is_told_and_its_known_keys_still_count(provider: Provider) -> None:
     now_s = 0.0
     nobody = SigningKeys("http://127.0.0.1:9", None, lambda: now_s)
-    with pytest.raises(UnknownError, match="does not answer"):
+    with pytest.raises(UnauthenticatedError, match="does not answer"):
         nobody.find("one")
     keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
     assert keys.find("one")
@@ -187,7 +187,7 @@ def test_no_token_waits_for_a_provider_that_hangs_while_its_keys_are_known(provi
 
 def test_keys_come_from_the_address_that_was_set_and_from_no_other(provider: Provider) -> None:
     provider.moved_to = f"{provider.url}/other"
-    with pytest.raises(UnknownError, match="does not answer"):
+    with pytest.raises(UnauthenticatedError, match="does not answer"):
         SigningKeys(provider.url, f"{provider.url}/keys").find("one")
     assert provider.asked == ["/keys"]
 
@@ -197,7 +197,7 @@ def test_a_provider_whose_keys_others_could_replace_is_not_asked_for_them(
     provider: Provider, jwks_uri: str | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     provider.answer = lambda _path: {"jwks_uri": jwks_uri}  # type: ignore[method-assign, assignment]
-    with pytest.raises(UnknownError, match="does not answer"):
+    with pytest.raises(UnauthenticatedError, match="does not answer"):
         SigningKeys(provider.url, None).find("one")
     assert "an address that begins with https://" in caplog.text
 

@@ -11,8 +11,8 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dropanchor_service.api.http.errors import Kind, problem_response
-from dropanchor_service.api.http.rates import Buckets
-from dropanchor_service.security.identity import Doorkeeper, Identity, UnknownError
+from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 from dropanchor_service.security.identity import Scope as Rank
 
 OPEN = ("/api/v1/health/live", "/api/v1/health/ready", "/api/v1/openapi.json")
@@ -26,10 +26,10 @@ _HOW = (
 class Access:
     """ASGI. Without a doorkeeper everybody may do everything; the loopback is then not held back either."""
 
-    def __init__(self, app: ASGIApp, keeper: Doorkeeper | None, buckets: Buckets | None) -> None:
+    def __init__(self, app: ASGIApp, authenticator: Authenticator | None, rate_limiter: RateLimiter | None) -> None:
         self._app = app
-        self._keeper = keeper
-        self._buckets = buckets
+        self._authenticator = authenticator
+        self._rate_limiter = rate_limiter
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http" or not _is_guarded(scope["path"]):
@@ -46,25 +46,25 @@ class Access:
             await self._app(scope, receive, self._while_good(identity, send))
 
     async def _identified(self, request: Request) -> tuple[Identity | None, Response | None]:
-        if self._keeper is None:
+        if self._authenticator is None:
             return None, None
         scheme, _, secret = Headers(scope=request.scope).get("authorization", "").partition(" ")
         if scheme.lower() != "bearer" or not secret.strip():
             return None, _unauthenticated(request, f"This service wants to know who asks. {_HOW}")
         try:
-            register, secret = self._keeper.register_of(secret.strip()), secret.strip()
+            register, secret = self._authenticator.provider_of(secret.strip()), secret.strip()
             if register.takes_time:
                 return await asyncio.to_thread(register.identify, secret), None
             return register.identify(secret), None
-        except UnknownError as error:
+        except UnauthenticatedError as error:
             return None, _unauthenticated(request, f"Refused: {error}. {_HOW}")
 
     def _held_back(self, request: Request, identity: Identity | None) -> Response | None:
         address = "" if request.client is None else request.client.host
         client = _network(address) if identity is None else f"{identity.source} {identity.name}"
-        if self._buckets is None or (self._keeper is None and client == "loopback"):
+        if self._rate_limiter is None or (self._authenticator is None and client == "loopback"):
             return None
-        wait_s = self._buckets.wait_s(client)
+        wait_s = self._rate_limiter.wait_s(client)
         if wait_s == 0:
             return None
         seconds = math.ceil(wait_s)
@@ -73,15 +73,15 @@ class Access:
 
     def _while_good(self, identity: Identity, send: Send) -> Send:
         """A stream ends when its key is revoked or its token expires."""
-        assert self._keeper is not None
-        keeper, pieces, ended = self._keeper, 0, False
+        assert self._authenticator is not None
+        authenticator, pieces, ended = self._authenticator, 0, False
 
         async def sending(message: Message) -> None:
             nonlocal pieces, ended
             if ended:
                 return  # the server tells the route that its client is gone
             pieces += message["type"] == "http.response.body"
-            if pieces > 1 and not keeper.is_still_good(identity):
+            if pieces > 1 and not authenticator.is_still_good(identity):
                 ended = True
                 message = {"type": "http.response.body", "body": b"", "more_body": False}
             await send(message)

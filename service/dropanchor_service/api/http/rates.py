@@ -7,7 +7,7 @@ from collections.abc import Callable
 MOST = 10_000  # clients that are remembered; the one that was silent for the longest is forgotten first
 
 
-class Buckets:
+class RateLimiter:
     """Each holds `burst` tokens and gains `per_s` a second."""
 
     def __init__(self, per_s: float, burst: int, clock: Callable[[], float] = time.monotonic) -> None:

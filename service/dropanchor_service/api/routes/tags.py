@@ -49,7 +49,7 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
                 "last_heard_ns": newcomer.last_heard_ns,
                 "messages": newcomer.messages,
             }
-            for newcomer in answers.newcomers.all()
+            for newcomer in answers.pending_tags.all()
         ]
         return json_response({"t_ns": answers.now_ns(), "newcomers": newcomers})
 

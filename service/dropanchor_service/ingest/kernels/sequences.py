@@ -18,7 +18,7 @@ HEARD: Final = 1  # nothing has passed yet
 RUNNING: Final = 2
 
 PASS: Final = 0
-HELD: Final = 1
+PENDING: Final = 1
 DUPLICATE: Final = 2
 REFUSED: Final = 3  # has no form
 
@@ -27,7 +27,7 @@ PUBLISHER: Final = np.dtype(
         ("boot_id", "u4"),
         ("next", "u4"),  # the number that is expected; HEARD: the first that was heard
         ("status", "u1"),
-        ("excused", "?"),  # what is missing next was shed here: nobody need wait for it
+        ("gap_allowed", "?"),  # what is missing next was shed here: nobody need wait for it
         ("used_ns", "i8"),  # last arrival
         ("least_ns", "i8"),  # least arrival minus time of this epoch, and of the one before; NONE_NS: not yet
         ("previous_least_ns", "i8"),
@@ -91,12 +91,12 @@ def _advance(publisher: Any, sequence: int) -> int:
 def _verdict(publisher: Any, sequence: int) -> int:
     if publisher.status != RUNNING:
         if sequence != 0:
-            return HELD  # it has begun before: what else comes of it may be older
+            return PENDING  # it has begun before: what else comes of it may be older
         _begin(publisher, sequence)
         return PASS
     ahead = _ahead(sequence, publisher.next)
     if ahead > 0:
-        return HELD
+        return PENDING
     if ahead == 0:
         _advance(publisher, sequence)
         return PASS
@@ -122,7 +122,7 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
             found = slot
     publisher = publishers[found]
     publisher.boot_id, publisher.next, publisher.status = boot_id, sequence, HEARD
-    publisher.excused, publisher.used_ns, publisher.epoch_end_ns = False, arrival_ns, 0
+    publisher.gap_allowed, publisher.used_ns, publisher.epoch_end_ns = False, arrival_ns, 0
     publisher.least_ns = publisher.previous_least_ns = NONE_NS
     publisher.newest_ns = publisher.heard_ns = publisher.shift_ns = 0
     return found
@@ -132,7 +132,7 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
 def pass_in_order(
     forms: Any, rows: Any, arrivals: Any, publishers: Any, slots: Any, distances: Any, verdicts: Any
 ) -> int:
-    """Judge each message as it comes: PASS, HELD, DUPLICATE or REFUSED. Returns how many are held.
+    """Judge each message as it comes: PASS, PENDING, DUPLICATE or REFUSED. Returns how many are held.
 
     forms: FORM. publishers: PUBLISHER, PER_TAG for each row. slots: where the publisher of each message is, -1 without
     one. distances: how far each lies ahead of the number that is expected.
@@ -149,7 +149,7 @@ def pass_in_order(
         publisher = publishers[slots[i]]
         distances[i] = _ahead(form.sequence, publisher.next)
         verdicts[i] = _verdict(publisher, form.sequence)
-        held += verdicts[i] == HELD
+        held += verdicts[i] == PENDING
     return held
 
 
@@ -176,16 +176,16 @@ def release(ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any
         publisher = publishers[slot]
         while end < len(ordered) and slots[ordered[end]] == slot:
             end += 1
-            if publisher.excused or arrivals[ordered[end - 1]] <= due_ns:
+            if publisher.gap_allowed or arrivals[ordered[end - 1]] <= due_ns:
                 forced = end
         for k in range(begin, end):
             i = ordered[k]
             verdicts[i] = _verdict(publisher, forms[i].sequence)
-            if verdicts[i] == HELD and k < forced:
+            if verdicts[i] == PENDING and k < forced:
                 absent = _force(publisher, forms[i].sequence)
-                missing += 0 if publisher.excused else absent
+                missing += 0 if publisher.gap_allowed else absent
                 verdicts[i] = PASS
         if forced > begin:
-            publisher.excused = False
+            publisher.gap_allowed = False
         begin = end
     return missing

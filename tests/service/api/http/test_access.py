@@ -10,10 +10,10 @@ from fastapi import FastAPI
 
 from api_house import ask, kind_of, make_house
 from dropanchor_service.api.http.access import OPEN
-from dropanchor_service.api.http.rates import MOST, Buckets
+from dropanchor_service.api.http.rates import MOST, RateLimiter
 from dropanchor_service.api.routes import examples
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
-from dropanchor_service.security.identity import Doorkeeper, Scope
+from dropanchor_service.security.identity import Authenticator, Scope
 from support.http_server import running_server
 
 READ, WRITE, ADMIN = Scope.READ, Scope.WRITE, Scope.ADMIN
@@ -22,13 +22,13 @@ READ, WRITE, ADMIN = Scope.READ, Scope.WRITE, Scope.ADMIN
 class Guarded:
     """An interface with one key of each scope."""
 
-    def __init__(self, folder: Path, buckets: Buckets | None = None) -> None:
+    def __init__(self, folder: Path, rate_limiter: RateLimiter | None = None) -> None:
         self.clock_s = 0.0
         self.keys = ApiKeys(folder, lambda: self.clock_s)
         self.secrets = {scope: self.keys.add(scope.word, scope) for scope in Scope}
         self.house = make_house()
         self.house.move("a")
-        self.app: FastAPI = self.house.app(keeper=Doorkeeper({SOURCE: self.keys}), buckets=buckets)
+        self.app: FastAPI = self.house.app(authenticator=Authenticator({SOURCE: self.keys}), rate_limiter=rate_limiter)
 
     def ask(self, method: str, path: str, secret: str | Scope | None = None, **options: Any) -> httpx.Response:
         shown = self.secrets[secret] if isinstance(secret, Scope) else secret
@@ -132,7 +132,7 @@ def test_a_revoked_key_ends_its_streams_too(tmp_path: Path) -> None:
 
 def test_too_many_requests_are_held_back_each_client_alone(tmp_path: Path) -> None:
     now_s = 0.0
-    guarded = Guarded(tmp_path, Buckets(per_s=2.0, burst=3, clock=lambda: now_s))
+    guarded = Guarded(tmp_path, RateLimiter(per_s=2.0, burst=3, clock=lambda: now_s))
     statuses = [guarded.ask("GET", "/api/v1/poses", READ).status_code for _ in range(4)]
     assert statuses == [200, 200, 200, 429]
     held_back = guarded.ask("GET", "/api/v1/poses", READ)
@@ -144,14 +144,14 @@ def test_too_many_requests_are_held_back_each_client_alone(tmp_path: Path) -> No
 
 
 def test_whoever_guesses_keys_is_held_back_by_address(tmp_path: Path) -> None:
-    guarded = Guarded(tmp_path, Buckets(per_s=1.0, burst=3, clock=lambda: 0.0))
+    guarded = Guarded(tmp_path, RateLimiter(per_s=1.0, burst=3, clock=lambda: 0.0))
     guesses = [guarded.ask("GET", "/api/v1/poses", f"guess-{n}", address="192.0.2.1").status_code for n in range(5)]
     assert guesses == [401, 401, 401, 429, 429]
     assert guarded.ask("GET", "/api/v1/poses", READ, address="192.0.2.1").status_code == 200
 
 
 def test_without_credentials_the_loopback_is_not_held_back_and_others_are() -> None:
-    app = make_house().app(buckets=Buckets(per_s=1.0, burst=2, clock=lambda: 0.0))
+    app = make_house().app(rate_limiter=RateLimiter(per_s=1.0, burst=2, clock=lambda: 0.0))
 
     def statuses(*addresses: str) -> set[int]:
         return {ask(app, "GET", "/api/v1/poses", address).status_code for address in addresses}
@@ -162,12 +162,12 @@ def test_without_credentials_the_loopback_is_not_held_back_and_others_are() -> N
 
 
 def test_the_clients_that_are_remembered_are_bounded() -> None:
-    buckets = Buckets(per_s=1.0, burst=1, clock=lambda: 0.0)
-    assert buckets.wait_s("first") == 0.0
-    assert buckets.wait_s("first") == 1.0
+    rate_limiter = RateLimiter(per_s=1.0, burst=1, clock=lambda: 0.0)
+    assert rate_limiter.wait_s("first") == 0.0
+    assert rate_limiter.wait_s("first") == 1.0
     for number in range(MOST):
-        buckets.wait_s(str(number))
-    assert buckets.wait_s("first") == 0.0
+        rate_limiter.wait_s(str(number))
+    assert rate_limiter.wait_s("first") == 0.0
 
 
 def test_every_answer_has_headers_that_browsers_obey_and_no_other_origin_may_read_it(guarded: Guarded) -> None:
