@@ -84,7 +84,7 @@ def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) 
         raise ValueError(f"nothing is left: the tag is first seen at {seen:.1f} s, and the motion ends before")
     ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
     scalars = models.scalar.measure(motion, models.mount_rad, error, stream(seed, Stream.SCALAR))
-    before = _with_row_before(motion)
+    before = with_row_before(motion)
     imu = unit.measure(before, stream(seed, Stream.IMU), np.concatenate([error[:1], error]))
     return Simulation(
         scenario=scenario,
@@ -112,7 +112,7 @@ def truth_of(motion: Trajectory, unit: ImuUnit, height: float) -> Truth:
     )
 
 
-def _with_row_before(motion: Trajectory) -> Trajectory:
+def with_row_before(motion: Trajectory) -> Trajectory:
     """The motion with its first row repeated one step earlier: it begins without acceleration."""
     columns = [np.concatenate([getattr(motion, f.name)[:1], getattr(motion, f.name)]) for f in fields(motion)]
     columns[0][0] -= motion.dt
