@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions
+from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions, turned
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges, sample_times
 from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, Scalars
@@ -47,11 +47,13 @@ class Simulation:
     def level_imu(self) -> Imu:
         """The scalar sensors as the samples of an IMU that is always level and has no magnetometer (NaN).
 
-        Leftward acceleration is the true v·w: the scalar sensors have none.
+        Its axes are those of the heading. The acceleration to the left of the course is the true v·w: the scalar
+        sensors have none.
         """
         n = len(self.scalars.t_s)
         zero = np.zeros(n)
-        acc = np.column_stack([self.scalars.acceleration_mps2, self.truth.v * self.truth.w, zero + GRAVITY])
+        mount = self.truth.course - self.truth.heading
+        acc = turned(self.scalars.acceleration_mps2, self.truth.v * self.truth.w, zero + GRAVITY, mount)
         return Imu(
             self.scalars.t_s, acc, np.column_stack([zero, zero, self.scalars.gyro_radps]), np.full((n, 3), np.nan)
         )

@@ -25,7 +25,8 @@ def upward(acc: Array, hz: float) -> Array:
     gravity = np.column_stack([np.convolve(np.pad(axis, len(kernel), "edge"), kernel, "same") for axis in acc.T])
     gravity = gravity[len(kernel) : -len(kernel)]
     size = np.sqrt((gravity**2).sum(axis=1))
-    return (acc * gravity).sum(axis=1) / size - size
+    along: Array = (acc * gravity).sum(axis=1) / size - size
+    return along
 
 
 def spectrum(signal: Array, hz: float) -> tuple[float, list[float]]:
