@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dropanchor_service.engines.warm_up import warm_up
 from dropanchor_service.estimation.batch import POSE, Array, Engine, SampleBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.evaluation.product.rows import Row
@@ -13,7 +14,6 @@ from dropanchor_service.evaluation.product.runs import TagRun, sources, tag_run
 from dropanchor_service.evaluation.product.scores import RowScore, TagScore, score, summary
 from dropanchor_service.evaluation.replay import NS_PER_S, Track
 from dropanchor_service.evaluation.simulated import batches, merged
-from dropanchor_service.kernels import warm_up
 
 BATCH_S = 0.05
 ROWS_PER_TASK = 6
