@@ -13,7 +13,9 @@ from dropanchor_service.evaluation import recordings
 from dropanchor_service.evaluation.paper.whole import FULL, QUICK, TITLE, Experiment, experiments, preface
 from dropanchor_service.evaluation.parallel import Workers
 from dropanchor_service.evaluation.plaza import FILES, read_plaza
+from dropanchor_service.evaluation.product.rows import NoRowError
 from dropanchor_service.evaluation.report import Section, markdown_table, write_report
+from dropanchor_service.evaluation.results import NoPlaceError
 from dropanchor_tag_client.recording import RecordingError
 
 DESCRIPTION = """\
@@ -66,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     """0 when it ran to the end, 2 when recordings cannot be used or nothing can be written, 130 on Ctrl-C."""
     try:
         return {"paper": _paper, "recordings": _recordings, "product": product.run}[arguments.what](arguments)
-    except (RecordingError, OSError, ValueError) as error:
+    except (RecordingError, NoRowError, NoPlaceError, OSError) as error:
         print(f"dropanchor evaluate: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

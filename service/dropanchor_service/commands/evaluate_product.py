@@ -6,7 +6,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from dropanchor_service.evaluation.parallel import Workers
-from dropanchor_service.evaluation.product.report import markdown, write_between_markers, write_json
+from dropanchor_service.evaluation.product.report import markdown, write_into, write_json
 from dropanchor_service.evaluation.product.rows import (
     DEVELOPMENT_SEEDS,
     FIRST_REPORTED_SEED,
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--list", action="store_true", help="print the names of the rows and stop")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write product.json and product.md there")
-    parser.add_argument("--into", type=Path, metavar="FILE", help="put the table between its markers in a document")
+    parser.add_argument("--into", type=Path, metavar="PAGE", help="put the table between its markers in a page")
 
 
 def seed_range(text: str) -> range:
@@ -50,7 +50,7 @@ def seed_range(text: str) -> range:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Return 0. Raises ValueError, RecordingError and OSError."""
+    """Return 0. Raises NoRowError, NoPlaceError, RecordingError and OSError."""
     every = [*simulated_rows(), *recorded_rows(arguments.data)]
     rows = selected(every, arguments.rows or (QUICK if arguments.quick and not arguments.list else ()))
     if arguments.list:
@@ -75,6 +75,6 @@ def _write(arguments: argparse.Namespace, results: list[Result], seeds: range) -
     print(text)
     if arguments.out:
         write_json(arguments.out / "product.json", results, seeds)
-        write_between_markers(arguments.out / "product.md", text)
+        (arguments.out / "product.md").write_text(text + "\n", encoding="utf-8")
     if arguments.into:
-        write_between_markers(arguments.into, text)
+        write_into(arguments.into, results, seeds)

@@ -1,19 +1,19 @@
-"""The results as a table, as JSON, and between markers in a document."""
+"""The results as a table, as JSON, and between markers in a page."""
 
 import json
 import math
-import os
-import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from dropanchor_service.evaluation.product.rows import purpose
 from dropanchor_service.evaluation.product.work import BATCH_S, Result
+from dropanchor_service.evaluation.results import Measured, commit, write
 
-MARKER = "dropanchor evaluate product"
+NAME = "product"
+ROOT = Path(__file__).parents[4]
+SOURCES = ("service/dropanchor_service/estimation", "tag_client/dropanchor_tag_client/simulator")
 COLUMNS = (
     *("motion / sensors / told / start", "RMSE", "2nd half", "up to rotation", "lost", "tracking after", "never"),
     *("tracking", "95 % ellipse holds", "worst", "µs"),
@@ -35,10 +35,10 @@ def markdown(results: Sequence[Result], seeds: range) -> str:
 
 
 def origin(seeds: range) -> str:
-    when = datetime.now(UTC).strftime("%Y-%m-%d")
+    """Return what was run."""
     return (
-        f"Engine fleet, commit {_commit()}, {when}; seeds {seeds[0]} to {seeds[-1]} ({purpose(seeds)}); samples in "
-        f"batches of {1e3 * BATCH_S:.0f} ms, all tags of a row in one engine. Recordings are development sets."
+        f"Engine fleet; seeds {seeds[0]} to {seeds[-1]} ({purpose(seeds)}); samples in batches of "
+        f"{1e3 * BATCH_S:.0f} ms, all tags of a row in one engine. Recordings are development sets."
     )
 
 
@@ -47,19 +47,13 @@ def write_json(path: Path, results: Sequence[Result], seeds: range) -> None:
     rows = {
         result.row.name: {**asdict(result.score), "by_tag": [asdict(tag) for tag in result.tags]} for result in results
     }
-    text = {"origin": origin(seeds), "seeds": [seeds[0], seeds[-1]], "rows": rows}
+    text = {"commit": commit(ROOT), "origin": origin(seeds), "seeds": [seeds[0], seeds[-1]], "rows": rows}
     path.write_text(json.dumps(_finite(text), indent=1, allow_nan=False) + "\n")
 
 
-def write_between_markers(path: Path, text: str) -> None:
-    """Put the text between its markers in the document, which must have them or be new. Raises ValueError, OSError."""
-    begin, end = f"<!-- {MARKER} -->", f"<!-- /{MARKER} -->"
-    document = path.read_text(encoding="utf-8") if path.exists() else f"{begin}\n{end}\n"
-    before, found, rest = document.partition(begin)
-    _, closed, after = rest.partition(end)
-    if not found or not closed:
-        raise ValueError(f"{path} has no place for the table; put in two lines: {begin} and {end}")
-    path.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
+def write_into(page: Path, results: Sequence[Result], seeds: range) -> None:
+    """Put the table between its markers in a page of the project. Raises NoPlaceError, OSError."""
+    write(ROOT, page, NAME, markdown(results, seeds), Measured(SOURCES, f"{seeds[0]}-{seeds[-1]}"))
 
 
 def _line(result: Result) -> str:
@@ -80,14 +74,6 @@ def _line(result: Result) -> str:
 
 def _m(value: float) -> str:
     return "–" if math.isinf(value) else f"{value:.2f}"
-
-
-def _commit() -> str:
-    command = ["git", "-C", os.path.dirname(__file__), "describe", "--always", "--dirty", "--abbrev=9", "--exclude=*"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
 
 
 def _finite(value: Any) -> Any:

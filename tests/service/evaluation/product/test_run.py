@@ -11,7 +11,6 @@ import pytest
 from dropanchor_service.cli import main
 from dropanchor_service.commands.evaluate_product import seed_range
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.evaluation.product.report import write_between_markers
 from dropanchor_service.evaluation.product.rows import Row, recorded_rows
 from dropanchor_service.evaluation.product.runs import sources, tag_run
 from dropanchor_service.evaluation.product.work import Task, run_tags, work
@@ -73,9 +72,7 @@ def test_a_recording_is_told_no_more_than_its_row_says(tmp_path: Path) -> None:
 
 def test_the_command_writes_the_table_and_every_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     document = tmp_path / "README.md"
-    document.write_text(
-        "before\n<!-- dropanchor evaluate product -->\nof last year\n<!-- /dropanchor evaluate product -->\nafter\n"
-    )
+    document.write_text("before\n<!-- results product -->\nof last year\n<!-- end product -->\nafter\n")
     options = ["--seeds", "5000-5001", "--jobs", "1", "--data", str(tmp_path / "none")]
     rows = ["--rows", "C5/scalar/everything/known", "rolling/6-axis/nothing/unknown"]
     assert main(["evaluate", "product", *rows, *options, "--out", str(tmp_path), "--into", str(document)]) == 0
@@ -107,9 +104,12 @@ def test_a_wrong_pattern_or_wrong_seeds_say_what_to_do(tmp_path: Path, capsys: p
     assert seed_range("5003") == range(5003, 5004)
 
 
-def test_a_document_without_the_markers_is_left_alone(tmp_path: Path) -> None:
-    document = tmp_path / "other.md"
-    document.write_text("text\n")
-    with pytest.raises(ValueError, match="put in two lines"):
-        write_between_markers(document, "table")
-    assert document.read_text() == "text\n"
+def test_a_page_without_a_place_for_the_table_is_named_and_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "other.md"
+    page.write_text("text\n")
+    options = ["--rows", "C5/scalar/everything/known", "--seeds", "5000", "--jobs", "1", "--data", str(tmp_path)]
+    assert main(["evaluate", "product", *options, "--into", str(page)]) == 2
+    assert "other.md has no place for product" in capsys.readouterr().err
+    assert page.read_text() == "text\n"
