@@ -1,4 +1,4 @@
-"""`dropanchor evaluate`: the experiments of the paper, and real recordings, as a report."""
+"""`dropanchor evaluate`: the experiments of the paper, real recordings, and the product as users get it."""
 
 import argparse
 import os
@@ -8,17 +8,22 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from dropanchor_service.commands import evaluate_product as product
 from dropanchor_service.evaluation import recordings
 from dropanchor_service.evaluation.paper.whole import FULL, QUICK, TITLE, Experiment, experiments, preface
 from dropanchor_service.evaluation.parallel import Workers
 from dropanchor_service.evaluation.plaza import FILES, read_plaza
+from dropanchor_service.evaluation.product.rows import NoRowError
 from dropanchor_service.evaluation.report import Section, markdown_table, write_report
+from dropanchor_service.evaluation.results import NoPlaceError
 from dropanchor_tag_client.recording import RecordingError
 
 DESCRIPTION = """\
 paper       every experiment of the paper that needs none of its hardware, as a report with the paper's own numbers
             beside ours: report.html, report.md, results.json and pictures; some minutes on two cores
 recordings  the paper's filter and our engine on real recordings with ground truth
+product     the whole engine on what tags send: scalar, 9-axis, 6-axis; everything, the mounting angle or nothing told;
+            known and unknown start; vehicles, smooth rolling, forklift, walks, recordings
 """
 EPILOG = """\
 examples:
@@ -26,6 +31,8 @@ examples:
   dropanchor evaluate paper --out report --quick    a handful of seeds: does it run?
   dropanchor evaluate recordings --plaza            real ranges and RTK truth from PyPI's gtsam
   dropanchor evaluate recordings --data FOLDER      recordings of your own, one folder each, with truth.csv
+  dropanchor evaluate product --quick               a handful of development seeds
+  dropanchor evaluate product --rows 'S5/*' 'walk-*/9-axis/*' --seeds 5000-5019
 """
 DATA = Path("../shared/data")
 
@@ -40,6 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     real.add_argument("--plaza", action="store_true", help="the Plaza sets of the package gtsam")
     real.add_argument("--out", type=Path, metavar="DIR", help="write a report there, too")
     _add_common(real)
+    product.add_arguments(what.add_parser("product", help="the whole engine on what tags send"))
+    _add_common(what.choices["product"])
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
@@ -50,14 +59,16 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"folder with recordings ($DROPANCHOR_DATA, else {DATA})",
     )
-    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="(one per core)")
+    parser.add_argument(
+        "--processes", "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="(one per core)"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """0 when it ran to the end, 2 when recordings cannot be used or nothing can be written, 130 on Ctrl-C."""
     try:
-        return _paper(arguments) if arguments.what == "paper" else _recordings(arguments)
-    except (RecordingError, OSError) as error:
+        return {"paper": _paper, "recordings": _recordings, "product": product.run}[arguments.what](arguments)
+    except (RecordingError, NoRowError, NoPlaceError, OSError) as error:
         print(f"dropanchor evaluate: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -52,7 +52,7 @@ def compared(recording: Recording, anchors: int | None = None) -> Results:
 
 def _numbers(engine: Engine, recording: Recording, anchor_id: str, truth: Truth) -> Numbers:
     samples = samples_of(recording, [anchor_id])
-    settings = _settings(recording, float(samples.batch.ranges["t_ns"][0]) * 1e-9)
+    settings = settings_of(recording, float(samples.batch.ranges["t_ns"][0]) * 1e-9)
     track = track_of([poses for _, poses in replay(engine, anchors_of(recording), settings, samples)])
     anchor = recording.anchor(anchor_id)
     try:
@@ -62,8 +62,8 @@ def _numbers(engine: Engine, recording: Recording, anchor_id: str, truth: Truth)
     return Numbers(found.ate, found.rmse, found.coverage)
 
 
-def _settings(recording: Recording, t: float) -> Array:
-    """The true start at the time of the first range, with its heading, and the mean height."""
+def settings_of(recording: Recording, t: float) -> Array:
+    """Return the true start at the time t of the first range, with its heading, the mean height and what is told."""
     truth = {name: np.asarray(column) for name, column in recording.truth.items()}
     height = float(np.nanmean(truth["z"])) if np.isfinite(truth["z"]).any() else 0.0
     settings = default_settings()

@@ -98,13 +98,13 @@ def _sentence(root: Path, measured: Measured) -> str:
     when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     seeds = f", seeds {measured.seeds}" if measured.seeds else ""
     cores = f"{os.cpu_count()} cores of {_processor()}"
-    return f"Measured {when} at commit {_commit(root)}{seeds}, Python {platform.python_version()}, {cores}."
+    return f"Measured {when} at commit {commit(root)}{seeds}, Python {platform.python_version()}, {cores}."
 
 
-def _commit(root: Path) -> str:
+def commit(root: Path) -> str:
     """Return the short hash of the commit, with a plus where the tree differs from it; "unknown" outside of git."""
     try:
-        commit = subprocess.run(
+        described = subprocess.run(
             ["git", "describe", "--always", "--dirty=+", "--exclude=*"],
             cwd=root,
             capture_output=True,
@@ -113,7 +113,7 @@ def _commit(root: Path) -> str:
         )
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
-    return commit.stdout.strip()
+    return described.stdout.strip()
 
 
 def _processor() -> str:

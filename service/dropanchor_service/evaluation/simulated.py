@@ -25,9 +25,12 @@ from dropanchor_tag_client.simulator.imu import Imu
 from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, ScalarModel
 from dropanchor_tag_client.simulator.simulation import Simulation
 
-Feed = Literal["heading", "level", "raw"]
+Feed = Literal["heading", "level", "raw", "raw 6-axis", "raw 6-axis and heading"]
 """What an engine gets beside the ranges: the scalar heading; the scalar heading and a level IMU without a magnetometer;
-or raw 9-axis samples and nothing else, so that its own attitude filter is in the loop."""
+raw samples of 9 or 6 axes and nothing else, so that its own attitude filter is in the loop; or 6 axes and the scalar
+heading."""
+
+WITHOUT_HEADING: frozenset[Feed] = frozenset({"raw", "raw 6-axis"})
 
 START_STD = 0.1  # m
 NOISE = ScalarModel()
@@ -70,7 +73,7 @@ def run_engine(engine: Engine, simulations: Sequence[Simulation], known: Known) 
     for row, simulation in enumerate(simulations):
         engine.configure(row, _settings(simulation, known))
     started = time.process_time()
-    steps = [engine.process(batch).poses for batch in _seconds(_together(simulations, known))]
+    steps = [engine.process(batch).poses for batch in batches(_together(simulations, known))]
     seconds = time.process_time() - started
     poses = np.concatenate([np.empty(0, POSE), *steps])
     by_row = [poses[poses["row"] == row] for row in range(len(simulations))]
@@ -83,7 +86,7 @@ def _settings(simulation: Simulation, known: Known) -> Array:
     settings["height"] = truth.z[0]
     settings["mount_angle"] = truth.course[0] - truth.heading[0]
     settings["reverse_allowed"] = known.reverse
-    settings["heading_source"] = HeadingSource.IMU if known.feed == "raw" else HeadingSource.PLATFORM
+    settings["heading_source"] = HeadingSource.IMU if known.feed in WITHOUT_HEADING else HeadingSource.PLATFORM
     if known.calibrated:
         settings["range_bias_std"] = settings["mount_angle_std"] = settings["slip_std"] = 0.0
         if known.exact_heading:
@@ -92,26 +95,40 @@ def _settings(simulation: Simulation, known: Known) -> Array:
     if known.start:
         settings["start_known"], settings["start_std"] = True, START_STD
         settings["start_x"], settings["start_y"] = truth.x[0], truth.y[0]
-        settings["start_heading"] = truth.heading[0] if known.feed == "raw" else np.nan
+        settings["start_heading"] = truth.heading[0] if known.feed in WITHOUT_HEADING else np.nan
     return settings
 
 
 def _together(simulations: Sequence[Simulation], known: Known) -> SampleBatch:
     """All samples of all runs, in order of time."""
-    rows = list(enumerate(simulations))
+    return merged([samples_of(one, known.feed, known.heading_std, row) for row, one in enumerate(simulations)])
+
+
+def samples_of(simulation: Simulation, feed: Feed, heading_std: float = np.nan, row: int = 0) -> SampleBatch:
+    """Return what the tag sends, as samples of this row. heading_std: what the headings say of themselves, rad."""
     return SampleBatch(
-        imu=_in_order([_imu(row, one, known.feed) for row, one in rows], IMU),
-        ranges=_in_order([_ranges(row, one) for row, one in rows], RANGE),
-        headings=_in_order([_headings(row, one, known) for row, one in rows], HEADING),
+        imu=_imu(row, simulation, feed),
+        ranges=_ranges(row, simulation),
+        headings=_headings(row, simulation, feed, heading_std),
+    )
+
+
+def merged(parts: Sequence[SampleBatch]) -> SampleBatch:
+    """Return all samples in order of time."""
+    return SampleBatch(
+        imu=_in_order([part.imu for part in parts], IMU),
+        ranges=_in_order([part.ranges for part in parts], RANGE),
+        headings=_in_order([part.headings for part in parts], HEADING),
     )
 
 
 def _imu(row: int, simulation: Simulation, feed: Feed) -> Array:
     if feed == "heading":
         return np.empty(0, IMU)
-    measured: Imu = simulation.imu if feed == "raw" else _noisy(simulation.level_imu(), simulation)
+    measured: Imu = _noisy(simulation.level_imu(), simulation) if feed == "level" else simulation.imu
     samples = _empty(row, measured.t_s, IMU)
-    samples["acc"], samples["gyro"], samples["mag"] = measured.acc, measured.gyro, measured.mag
+    samples["acc"], samples["gyro"] = measured.acc, measured.gyro
+    samples["mag"] = measured.mag if feed == "raw" else np.nan
     return samples
 
 
@@ -132,11 +149,11 @@ def _ranges(row: int, simulation: Simulation) -> Array:
     return samples
 
 
-def _headings(row: int, simulation: Simulation, known: Known) -> Array:
-    if known.feed == "raw":
+def _headings(row: int, simulation: Simulation, feed: Feed, heading_std: float) -> Array:
+    if feed in WITHOUT_HEADING:
         return np.empty(0, HEADING)
     samples = _empty(row, simulation.scalars.t_s, HEADING)
-    samples["heading"], samples["std"] = simulation.scalars.heading_rad, known.heading_std
+    samples["heading"], samples["std"] = simulation.scalars.heading_rad, heading_std
     return samples
 
 
@@ -151,10 +168,11 @@ def _in_order(parts: list[Array], dtype: Any) -> Array:
     return samples[np.argsort(samples["t_ns"], kind="stable")]
 
 
-def _seconds(batch: SampleBatch) -> Iterator[SampleBatch]:
+def batches(batch: SampleBatch, step_s: float = STEP_S) -> Iterator[SampleBatch]:
+    """Cut samples in order of time into stretches of `step_s`."""
     kinds = (batch.imu, batch.ranges, batch.headings)
     last = max(samples["t_ns"][-1] for samples in kinds if len(samples))
-    edges = np.arange(0, last + NS_PER_S * STEP_S + 1, NS_PER_S * STEP_S)
+    edges = np.arange(0, last + NS_PER_S * step_s + 1, NS_PER_S * step_s)
     cuts = [np.searchsorted(samples["t_ns"], edges) for samples in kinds]
     for i in range(len(edges) - 1):
         imu, ranges, headings = (samples[cut[i] : cut[i + 1]] for samples, cut in zip(kinds, cuts, strict=True))

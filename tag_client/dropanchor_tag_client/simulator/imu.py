@@ -71,7 +71,7 @@ class ImuModel:
     declination_rad: float = 0.0
 
 
-class _Waves(NamedTuple):
+class Waves(NamedTuple):
     """A smooth random function: a sum of sines. amplitude, rate and phase (k,)."""
 
     amplitude: Array
@@ -94,11 +94,11 @@ class ImuUnit:
     acc_scale: Array
     acc_bias: Array
     gyro_bias: Array
-    wander: tuple[_Waves, _Waves, _Waves]
+    wander: tuple[Waves, Waves, Waves]
     soft_iron: Array
     hard_iron: Array
     lean: Array
-    rocking: tuple[_Waves, _Waves]
+    rocking: tuple[Waves, Waves]
     seed: int
 
     def attitude(self, motion: Trajectory) -> Attitude:
@@ -111,25 +111,32 @@ class ImuUnit:
         azimuth_error: (n,) or a number, rad: how far the field makes the heading seem too large.
         """
         attitude = self.attitude(motion)
-        moving = np.minimum(np.abs(motion.v), 1.0)
         exact = Imu(
             motion.t,
             specific_force(motion, self.mount, attitude),
             body_rates(attitude, motion.dt),
-            into_body(attitude, self._field(motion.t, azimuth_error)),
+            into_body(attitude, self.field(motion.t, azimuth_error)),
         )
+        return self.with_errors(exact, np.minimum(np.abs(motion.v), 1.0), rng)
+
+    def with_errors(self, exact: Imu, moving: Array, rng: np.random.Generator) -> Imu:
+        """Return the samples of this unit where perfect sensors would give `exact`, without the first row.
+
+        moving: (n,), 0 at rest to 1, the share of the vibration.
+        """
         model = self.model
         acc = exact.acc * self.acc_scale + self.acc_bias + _white(rng, model.acc_std, model.vibration_acc * moving)
-        gyro = exact.gyro + self._gyro_error(motion.t) + _white(rng, model.gyro_std, model.vibration_gyro * moving)
+        gyro = exact.gyro + self._gyro_error(exact.t_s) + _white(rng, model.gyro_std, model.vibration_gyro * moving)
         mag = exact.mag @ self.soft_iron.T + self.hard_iron + _white(rng, model.mag_std, 0.0 * moving)
-        return Imu(motion.t[1:], acc[1:], gyro[1:], mag[1:])
+        return Imu(exact.t_s[1:], acc[1:], gyro[1:], mag[1:])
 
     def _gyro_error(self, t: Array) -> Array:
         error = self.gyro_bias + np.column_stack([waves.at(t) for waves in self.wander])
         error[:, 2] += self.model.gyro_drift * slow_drift(t)
         return error
 
-    def _field(self, t: Array, azimuth_error: Array | float) -> Array:
+    def field(self, t: Array, azimuth_error: Array | float) -> Array:
+        """Return the Earth's field and its disturbances in the site frame, (n, 3) µT."""
         azimuth = self.model.declination_rad + azimuth_error + np.zeros_like(t)
         horizontal = self.model.field_ut * math.cos(self.model.dip_rad)
         down = self.model.field_ut * math.sin(self.model.dip_rad)
@@ -172,16 +179,22 @@ def draw_unit(model: ImuModel, mount: float, rng: np.random.Generator) -> ImuUni
 
 def specific_force(motion: Trajectory, mount: float, attitude: Attitude) -> Array:
     """Rᵀ (a + (0, 0, g)), (n, 3) m/s², with a the mean acceleration since the row before."""
-    forward = backward_rate(motion.v, motion.dt)
-    leftward = motion.v * backward_rate(motion.course, motion.dt)
-    level = np.column_stack(
-        [
-            math.cos(mount) * forward - math.sin(mount) * leftward,
-            math.sin(mount) * forward + math.cos(mount) * leftward,
-            np.full(len(motion), GRAVITY),
-        ]
-    )
-    return untilted(attitude, level)
+    forward, leftward = path_acceleration(motion)
+    return untilted(attitude, turned(forward, leftward, np.full(len(motion), GRAVITY), mount))
+
+
+def path_acceleration(motion: Trajectory) -> tuple[Array, Array]:
+    """Return the acceleration along and to the left of the course, (n,) m/s², means since the row before."""
+    return backward_rate(motion.v, motion.dt), motion.v * backward_rate(motion.course, motion.dt)
+
+
+def turned(forward: Array, leftward: Array, up: Array, mount: Array | float) -> Array:
+    """Return a vector along, left of and above the course in the level frame of the body's yaw, (n, 3).
+
+    mount: course minus body yaw, rad.
+    """
+    cos, sin = np.cos(mount), np.sin(mount)
+    return np.column_stack([cos * forward - sin * leftward, sin * forward + cos * leftward, up])
 
 
 def body_rates(attitude: Attitude, dt: float) -> Array:
@@ -229,16 +242,16 @@ def _white(rng: np.random.Generator, std: float, added_std: Array) -> Array:
     return np.hypot(std, added_std)[:, None] * rng.standard_normal((len(added_std), 3))
 
 
-def _wander(model: ImuModel, rng: np.random.Generator) -> _Waves:
-    return _waves(rng, model.gyro_wander_std, (30.0, 300.0))
+def _wander(model: ImuModel, rng: np.random.Generator) -> Waves:
+    return draw_waves(rng, model.gyro_wander_std, (30.0, 300.0))
 
 
-def _rocking(model: ImuModel, rng: np.random.Generator) -> _Waves:
-    return _waves(rng, model.rocking_std, model.rocking_m)
+def _rocking(model: ImuModel, rng: np.random.Generator) -> Waves:
+    return draw_waves(rng, model.rocking_std, model.rocking_m)
 
 
-def _waves(rng: np.random.Generator, std: float, lengths: tuple[float, float]) -> _Waves:
+def draw_waves(rng: np.random.Generator, std: float, lengths: tuple[float, float]) -> Waves:
     """Waves of random length (log-uniform) and phase whose sum has this standard deviation."""
     length = np.exp(rng.uniform(math.log(lengths[0]), math.log(lengths[1]), ROCKING_WAVES))
     amplitude = np.full(ROCKING_WAVES, std * math.sqrt(2.0 / ROCKING_WAVES))
-    return _Waves(amplitude, math.tau / length, rng.uniform(0.0, math.tau, ROCKING_WAVES))
+    return Waves(amplitude, math.tau / length, rng.uniform(0.0, math.tau, ROCKING_WAVES))

@@ -17,6 +17,8 @@ class Stream(IntEnum):
     IMU_UNIT = 3
     IMU = 4
     HEADING_ERROR = 5
+    GAIT = 6
+    BLOCKED = 7
 
 
 def stream(seed: int, use: Stream, index: int = 0) -> np.random.Generator:

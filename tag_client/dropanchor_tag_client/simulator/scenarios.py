@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from dropanchor_tag_client.simulator.families import Legs, Line, Wandering
+from dropanchor_tag_client.simulator.ground import Forklift, Rolling
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.shapes import fig4_line, paper_stages, ten_stages, triangle, tum_letters
 from dropanchor_tag_client.simulator.trajectory import Trajectory
@@ -11,7 +12,7 @@ from dropanchor_tag_client.simulator.trajectory import Trajectory
 NEAREST_M = 0.7
 FARTHEST_M = 120.0
 
-FAMILIES: Mapping[str, Legs | Line | Wandering] = MappingProxyType(
+FAMILIES: Mapping[str, Legs | Line | Wandering | Rolling | Forklift] = MappingProxyType(
     {
         "S5": Legs(),
         "M5": Legs(arc_probability=0.5),
@@ -20,6 +21,8 @@ FAMILIES: Mapping[str, Legs | Line | Wandering] = MappingProxyType(
         "L1": Line(),
         "SG": Legs(stop_s=(3.0, 6.0)),
         "RV": Legs(backwards=(1, 3)),
+        "rolling": Rolling(),
+        "forklift": Forklift(),
     }
 )
 

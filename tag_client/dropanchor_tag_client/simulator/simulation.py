@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions
+from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions, turned
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges, sample_times
 from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, Scalars
@@ -47,11 +47,13 @@ class Simulation:
     def level_imu(self) -> Imu:
         """The scalar sensors as the samples of an IMU that is always level and has no magnetometer (NaN).
 
-        Leftward acceleration is the true v·w: the scalar sensors have none.
+        Its axes are those of the heading. The acceleration to the left of the course is the true v·w: the scalar
+        sensors have none.
         """
         n = len(self.scalars.t_s)
         zero = np.zeros(n)
-        acc = np.column_stack([self.scalars.acceleration_mps2, self.truth.v * self.truth.w, zero + GRAVITY])
+        mount = self.truth.course - self.truth.heading
+        acc = turned(self.scalars.acceleration_mps2, self.truth.v * self.truth.w, zero + GRAVITY, mount)
         return Imu(
             self.scalars.t_s, acc, np.column_stack([zero, zero, self.scalars.gyro_radps]), np.full((n, 3), np.nan)
         )
@@ -84,7 +86,7 @@ def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) 
         raise ValueError(f"nothing is left: the tag is first seen at {seen:.1f} s, and the motion ends before")
     ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
     scalars = models.scalar.measure(motion, models.mount_rad, error, stream(seed, Stream.SCALAR))
-    before = _with_row_before(motion)
+    before = with_row_before(motion)
     imu = unit.measure(before, stream(seed, Stream.IMU), np.concatenate([error[:1], error]))
     return Simulation(
         scenario=scenario,
@@ -112,7 +114,7 @@ def truth_of(motion: Trajectory, unit: ImuUnit, height: float) -> Truth:
     )
 
 
-def _with_row_before(motion: Trajectory) -> Trajectory:
+def with_row_before(motion: Trajectory) -> Trajectory:
     """The motion with its first row repeated one step earlier: it begins without acceleration."""
     columns = [np.concatenate([getattr(motion, f.name)[:1], getattr(motion, f.name)]) for f in fields(motion)]
     columns[0][0] -= motion.dt

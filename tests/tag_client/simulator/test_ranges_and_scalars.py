@@ -203,3 +203,12 @@ def test_rates_may_be_given() -> None:
     run = simulate("S5", 0, preset("real", range_hz=5.0, imu_hz=50.0))
     assert np.diff(run.ranges.t_s) == pytest.approx(0.2)
     assert np.diff(run.imu.t_s) == pytest.approx(0.02)
+
+
+def test_the_level_imu_of_a_turned_body_has_the_axes_of_its_heading() -> None:
+    straight = simulate("M5", 5000, noiseless())
+    turned = simulate("M5", 5000, replace(noiseless(), mount_rad=0.6))
+    along, left = straight.level_imu().acc[:, 0], straight.level_imu().acc[:, 1]
+    expected = np.column_stack([np.cos(0.6) * along - np.sin(0.6) * left, np.sin(0.6) * along + np.cos(0.6) * left])
+    np.testing.assert_allclose(turned.level_imu().acc[:, :2], expected, atol=1e-9)
+    assert np.abs(expected[:, 1] - left).max() > 0.5

@@ -1,0 +1,102 @@
+"""The rows of the evaluation: what moves, what it sends, what is told, and whether the start is known."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from dropanchor_service.evaluation.recordings import recordings_in
+
+DEVELOPMENT_SEEDS = range(5000, 6000)
+"""An engine may be developed and tuned on these seeds, and on no others."""
+FIRST_REPORTED_SEED = 20_000
+"""Figures that are reported come from seeds from here on; nothing is ever tuned on them."""
+
+VEHICLES = ("P", "S5", "M5", "OU", "C5")
+MOTIONS = (*VEHICLES, "rolling", "forklift")
+CARRIED = ("walk-hand", "walk-pocket", "walk-turned")
+SENSORS = ("scalar", "9-axis", "6-axis")
+BARE = "9-axis-bare"
+TOLD = ("everything", "mount", "nothing")
+STARTS = ("known", "unknown")
+FAST = "-100Hz"
+QUICK = ("*/everything/known", "*/nothing/unknown", "walk-*/nothing/known", "phones-*")
+
+
+@dataclass(frozen=True)
+class Row:
+    """motion: a scenario, a walk, or a name of recordings; a suffix -100Hz means 0.2 m ranges at 100 Hz.
+
+    sensors: scalar (a platform's heading, level axes), 9-axis (calibrated magnetometer), 9-axis-bare (10 µT of hard
+    iron), 6-axis, recorded. told: everything, mount (the mounting angle alone) or nothing; operator: what the operator
+    of a recording could know. folders: of the recordings, empty for simulations.
+    """
+
+    motion: str
+    sensors: str
+    told: str
+    start: str
+    folders: tuple[Path, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return "/".join((self.motion, self.sensors, self.told, self.start))
+
+    @property
+    def scenario(self) -> str:
+        return self.motion.removesuffix(FAST)
+
+    @property
+    def runs_of(self) -> tuple[str, bool, tuple[Path, ...]]:
+        """Rows of which this is equal can share their runs."""
+        return self.motion, self.sensors == BARE, self.folders
+
+
+def simulated_rows() -> list[Row]:
+    """All rows of simulations. No one mounting angle describes a device that turns or lies in a pocket."""
+    full = [(motion, sensors, told) for motion in (*MOTIONS, "walk-hand") for sensors in SENSORS for told in TOLD]
+    loose = [(motion, sensors, "nothing") for motion in CARRIED[1:] for sensors in SENSORS]
+    fast = [(motion + FAST, "scalar", "everything") for motion in ("P", "S5", "M5")]
+    bare = [(motion, BARE, "nothing") for motion in (*VEHICLES[1:], "walk-hand")]
+    return [Row(*what, start) for what in (*fast, *full, *loose, *bare) for start in STARTS]
+
+
+def recorded_rows(data: Path) -> list[Row]:
+    """The rows of the recordings in a folder and of the walks in its folder `phones`; none where it is missing."""
+    rows = [
+        Row(folder.name, "recorded", told, start, (folder,))
+        for folder in recordings_in(data)
+        for told, start in (("operator", "known"), ("nothing", "known"), ("nothing", "unknown"))
+    ]
+    walks = recordings_in(data / "phones")
+    for kind in sorted({folder.name.rpartition("_")[2] for folder in walks}):
+        folders = tuple(folder for folder in walks if folder.name.endswith(f"_{kind}"))
+        rows += [Row(f"phones-{kind}", "recorded", "nothing", start, folders) for start in STARTS]
+    return rows
+
+
+class NoRowError(ValueError):
+    """A pattern that no row matches."""
+
+
+def selected(rows: Sequence[Row], patterns: Sequence[str]) -> list[Row]:
+    """Return the rows that match one of the shell patterns, in their order; all without patterns. Raises NoRowError."""
+    for pattern in patterns:
+        if not any(fnmatchcase(row.name, pattern) for row in rows):
+            raise NoRowError(f"no row matches {pattern!r}; --list prints all rows")
+    return [row for row in rows if not patterns or any(fnmatchcase(row.name, pattern) for pattern in patterns)]
+
+
+def purpose(seeds: range) -> str:
+    """Return what these seeds are for. Raises ValueError when they are neither for development nor for reports."""
+    if not len(seeds):
+        raise ValueError("there are no seeds")
+    if seeds[0] in DEVELOPMENT_SEEDS and seeds[-1] in DEVELOPMENT_SEEDS:
+        return "development"
+    if seeds[0] >= FIRST_REPORTED_SEED:
+        return "reported"
+    first, last = DEVELOPMENT_SEEDS[0], DEVELOPMENT_SEEDS[-1]
+    raise ValueError(
+        f"seeds {seeds[0]} to {seeds[-1]}: take {first} to {last} for development, {FIRST_REPORTED_SEED} and above "
+        "for figures that are reported"
+    )
