@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Self
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics

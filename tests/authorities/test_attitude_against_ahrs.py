@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from ahrs.filters import AQUA
 
-from dropanchor_service.estimation import attitude
-from dropanchor_service.estimation.attitude import AttitudeFilter, AttitudeParameters, Quaternion
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.paper.attitude import AttitudeFilter, AttitudeParameters, Quaternion
+from dropanchor_service.estimation.paper.engine import attitude
 
 DT = 0.01
 GAIN = 0.02

@@ -10,7 +10,7 @@ from benchmarks.motion import MESSAGE_S, SAMPLES_PER_MESSAGE, STEP_NS, Track, me
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.batch import ANCHOR, RANGE, SampleBatch
+from dropanchor_service.estimation.columns import ANCHOR, RANGE, SampleBatch
 from dropanchor_service.ingest.decode import decode
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.settings.sources import load_settings

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from benchmarks import report
-from dropanchor_service.estimation.batch import (
+from dropanchor_service.estimation.columns import (
     ANCHOR,
     IMU,
     RANGE,
@@ -24,9 +24,10 @@ from dropanchor_service.estimation.batch import (
     State,
     default_settings,
 )
-from dropanchor_service.estimation.ekf import PoseFilter
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.paper import TUNED, PaperEngine
+from dropanchor_service.estimation.paper.ekf import PoseFilter
+from dropanchor_service.estimation.paper.engine import PaperEngine
+from dropanchor_service.estimation.paper.parameters import TUNED
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 

@@ -15,7 +15,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.answers.columns import PoseColumns, columns_of, ellipse_95
 from dropanchor_service.engines.warm_up import warm_up_answers
-from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, Array, State, StateReason
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
 pytestmark = pytest.mark.benchmark

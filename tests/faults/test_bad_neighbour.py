@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dropanchor_schemas.wire import Frame, ImuSample, RangeSample, encode_packed
-from dropanchor_service.estimation.batch import Engine, PoseBatch, SampleBatch
+from dropanchor_service.estimation.columns import Engine, PoseBatch, SampleBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from support.ingest import Bench
 from support.traffic import T0_NS, Message, traffic

@@ -13,7 +13,7 @@ import pytest
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED, FLAG_BOOT_CLOCK, Frame, decode_packed, encode_packed
 from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
-from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.runtime.clock import UtcClock

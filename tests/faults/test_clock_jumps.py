@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_tag_client.simulator.live import start_poses, tag_name

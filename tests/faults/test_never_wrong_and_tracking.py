@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.evaluation.simulated import Known, run_engine
 from dropanchor_tag_client.simulator.perturbations import perturbed

@@ -15,7 +15,7 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_service.estimation.batch import POSE, Array, Engine, PoseBatch, SampleBatch
+from dropanchor_service.estimation.columns import POSE, Array, Engine, PoseBatch, SampleBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.runtime.clock import UtcClock
 from support.ingest import Bench

@@ -9,13 +9,12 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
-from dropanchor_service.estimation.batch import Array, Engine, MeasurementKind, PoseBatch
+from dropanchor_service.estimation.columns import Array, Engine, MeasurementKind, PoseBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.fleet.smoothed import smoothed_poses
-from dropanchor_service.estimation.fleet.trace import TracingEngine
-from dropanchor_service.estimation.paper import TUNED, PaperEngine
+from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
+from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
+from dropanchor_service.estimation.paper.engine import PaperEngine
+from dropanchor_service.estimation.paper.parameters import TUNED
 from replay.samples import BATCH_S, FOLDER, NS_PER_S, anchors_of, read_batches, settings_of
 from replay.scenarios import SCENARIOS, Scenario
 
@@ -103,7 +102,7 @@ def _online(engine: Engine, name: str, scenario: Scenario) -> Table:
 
 def _of_pose(pose: Array) -> list[float]:
     values = [pose[field] for field in ("state", "reason", "anchor", *POSE_FIELDS)]
-    return [pose["t_ns"] / NS_PER_S, *map(float, values), *(float(pose["cov"][i, j]) for i, j in UPPER)]
+    return [float(pose["t_ns"]) / NS_PER_S, *map(float, values), *(float(pose["cov"][i, j]) for i, j in UPPER)]
 
 
 def _of_range(batch: PoseBatch) -> list[float]:
@@ -111,7 +110,7 @@ def _of_range(batch: PoseBatch) -> list[float]:
     records, pose = batch.innovations, batch.poses[-1]
     own = records[(records["kind"] == MeasurementKind.RANGE) & (records["t_ns"] == pose["t_ns"])]
     values = (
-        [float(own[-1][field]) for field in ("innovation", "S", "p_outlier", "fused")] if len(own) else [np.nan] * 4
+        [float(own[-1][field]) for field in ("innovation", "S", "p_outlier", "fused")] if len(own) else [math.nan] * 4
     )
     return [*values, float(len(batch.hypotheses))]
 

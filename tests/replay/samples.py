@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import (
+from dropanchor_service.estimation.columns import (
     ANCHOR,
     BEARING,
     HEADING,

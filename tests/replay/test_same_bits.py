@@ -6,7 +6,7 @@ import pytest
 from numpy.lib.recfunctions import repack_fields
 
 from dropanchor_service.checkpoints.files import CheckpointFolder
-from dropanchor_service.estimation.batch import PoseBatch, SampleBatch, State
+from dropanchor_service.estimation.columns import PoseBatch, SampleBatch, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_tag_client.simulator.live import start_poses, tag_name
 from support.ingest import Bench

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from dropanchor_service.estimation.fleet.frontend import FRONTEND, close_node, feed, start_frontend
-from dropanchor_service.estimation.fleet.node import NODE
+from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, close_node, feed, start_frontend
+from dropanchor_service.estimation.fleet.frontend.node import NODE
 from support.imu import Motion
 
 Array = NDArray[Any]

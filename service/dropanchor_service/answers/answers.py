@@ -16,7 +16,7 @@ from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
 from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
 from dropanchor_service.answers.track_pages import pose_in_tracks
-from dropanchor_service.estimation.batch import POSE, Array, State
+from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.pending_tags import PendingTags

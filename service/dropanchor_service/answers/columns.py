@@ -9,7 +9,7 @@ from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, ellipses, grow_old
-from dropanchor_service.estimation.batch import Array, State, StateReason
+from dropanchor_service.estimation.columns import Array, State, StateReason
 from dropanchor_service.store.records import copied
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable

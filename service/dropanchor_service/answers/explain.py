@@ -4,7 +4,7 @@ import numpy as np
 
 from dropanchor_schemas.explain import MeasurementKind as KindName
 from dropanchor_service.answers.answers import Answer, Answers
-from dropanchor_service.estimation.batch import Array, MeasurementKind
+from dropanchor_service.estimation.columns import Array, MeasurementKind
 from dropanchor_service.store.tags import Tag
 
 RATE_NS = 2_000_000_000  # over which the rate of the ranges is taken

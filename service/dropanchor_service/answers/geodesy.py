@@ -4,7 +4,7 @@ import numpy as np
 from pymap3d.enu import enu2geodetic
 
 from dropanchor_schemas.site import Georeference
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 
 def lat_lon(origin: Georeference, x: Array, y: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import orjson
 
 from dropanchor_service.answers.kernels import json_numbers as holes
 from dropanchor_service.answers.kernels.json_numbers import fill
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 NUMBER = orjson.Fragment(bytes([holes.NUMBER]))
 INTEGER = orjson.Fragment(bytes([holes.INTEGER]))

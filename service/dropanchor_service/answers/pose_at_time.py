@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array, State
-from dropanchor_service.estimation.motion import bridged, interpolated, propagated
+from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.estimation.interpolation import bridged, interpolated, propagated
 
 CLOSE_NS = 1_000_000_000  # poses farther apart are not interpolated between
 AHEAD_NS = 2_000_000_000

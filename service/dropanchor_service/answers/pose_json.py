@@ -10,7 +10,7 @@ import orjson
 from dropanchor_service.answers.columns import REASONS, STATES, PoseColumns, ellipse_95
 from dropanchor_service.answers.json_template import INTEGER, NUMBER, QUOTED, TEXT, Filled, filled, nothing_of
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 
 CHUNK = 2500  # poses
 DECIMALS, FINE_DECIMALS = 6, 9  # µm, µrad, µs; of variances and degrees

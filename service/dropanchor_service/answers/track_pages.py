@@ -9,7 +9,7 @@ import numpy as np
 from dropanchor_service.answers.columns import REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.track_file import Stored
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.site import SiteStore

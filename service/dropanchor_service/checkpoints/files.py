@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.runtime.atomic_file import write_atomically
 
 KEPT = 2

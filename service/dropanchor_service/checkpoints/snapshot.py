@@ -4,7 +4,7 @@ import numpy as np
 
 from dropanchor_schemas.site import Anchor
 from dropanchor_service.checkpoints.files import Snapshot, layout_of
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.runtime.kernel_cache import sources_digest

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.commands.replay_mcap import files_of, replay_files
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.batch import Engine, State
+from dropanchor_service.estimation.columns import Engine, State
 from dropanchor_service.evaluation.accuracy import Accuracy, accuracy, share_of_time
 from dropanchor_service.evaluation.replay import (
     Samples,

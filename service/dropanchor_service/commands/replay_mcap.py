@@ -16,7 +16,7 @@ from typing import Any
 from tqdm import tqdm
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.evaluation.offline import OfflineService, settings_of
 from dropanchor_service.recording.mcap_file import SESSION
 from dropanchor_service.recording.reading import RecordingReader, Turn

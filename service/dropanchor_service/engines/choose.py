@@ -1,7 +1,7 @@
 """Build the engine that the settings choose."""
 
 from dropanchor_service.engines.warm_up import warm_up
-from dropanchor_service.estimation.batch import Engine
+from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 from dropanchor_service.settings.model import Settings
 
@@ -10,7 +10,7 @@ def create_engine(settings: Settings) -> Engine:
     """Each engine is imported when it is chosen: filterpy alone costs seconds, compiling the kernels a minute, once."""
     match settings.engine:
         case "paper":
-            from dropanchor_service.estimation.paper import PaperEngine
+            from dropanchor_service.estimation.paper.engine import PaperEngine
 
             return PaperEngine(settings.paper.values())
         case "fleet":

@@ -22,7 +22,7 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.estimation.batch import (
+from dropanchor_service.estimation.columns import (
     ANCHOR,
     HEADING,
     HYPOTHESIS,

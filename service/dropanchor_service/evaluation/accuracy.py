@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 
 CHI2_95_2DOF = 5.991464547107979  # 95 % quantile of χ² with two degrees of freedom
 MAX_TRUTH_GAP_S = 1.0

@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.guarded_engine import GuardedEngine

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numba import njit
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 X, Y, THETA, V, GYRO_BIAS, ACC_BIAS, LEAK = range(7)
 AT_REST_MPS = 1e-6

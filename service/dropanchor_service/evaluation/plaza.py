@@ -15,7 +15,7 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_tag_client.recording import Anchor, Recording, RecordingError
 
 FILES = {"plaza1": ("Plaza1_.mat", 0.0), "plaza2": ("Plaza2_.mat", math.pi)}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array, Engine, default_settings
+from dropanchor_service.estimation.columns import Array, Engine, default_settings
 from dropanchor_service.evaluation.accuracy import Truth, accuracy
 from dropanchor_service.evaluation.paper.engines import engines
 from dropanchor_service.evaluation.parallel import Workers

@@ -2,7 +2,7 @@
 
 import math
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.evaluation.plaza import PLAZA_SCALE, PLAZA_STD
 
 TOP_SPEED_MPS = {"iasl": 1.5, "tiers": 0.7, "starloc": 2.5, "mower": 1.0, "plaza": 6.0, "hanyang": 3.0, "inrol": 1.0}

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropanchor_schemas.wire import anchor_number
-from dropanchor_service.estimation.batch import ANCHOR, HEADING, IMU, POSE, RANGE, Array, Engine, SampleBatch
-from dropanchor_service.estimation.fleet.smoothed import smoothed_poses
-from dropanchor_service.estimation.fleet.trace import TracingEngine
+from dropanchor_service.estimation.columns import ANCHOR, HEADING, IMU, POSE, RANGE, Array, Engine, SampleBatch
+from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
+from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
 from dropanchor_service.evaluation.accuracy import Truth
 from dropanchor_service.ingest.decode import SCALAR, Decoded
 from dropanchor_service.ingest.kernels.packed import FORM

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import (
+from dropanchor_service.estimation.columns import (
     ANCHOR,
     HEADING,
     IMU,

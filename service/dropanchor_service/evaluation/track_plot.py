@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.evaluation.accuracy import Truth, truth_at
 
 COLOURS = {

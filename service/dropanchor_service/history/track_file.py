@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array
 
 VERSION = 1
 SLOT_NS = 10_000_000_000

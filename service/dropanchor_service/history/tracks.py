@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.history.damaged_file import is_damage, move_aside, set_aside
 from dropanchor_service.history.track_file import Stored, TrackReader, TrackWriter
 from dropanchor_service.runtime.background_writer import BackgroundWriter

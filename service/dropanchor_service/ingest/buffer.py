@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_schemas.wire import ENCODING_PACKED, HEADER
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.fair_share import fair_cap, newer_of_same
 from dropanchor_service.store.rings import rank_in_row
 

@@ -23,7 +23,7 @@ from dropanchor_schemas.wire import (
     Rejection,
     read_header,
 )
-from dropanchor_service.estimation.batch import IMU, Array
+from dropanchor_service.estimation.columns import IMU, Array
 from dropanchor_service.ingest.kernels import packed
 from dropanchor_service.ingest.kernels.packed import FORM
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 
 def fair_cap(sizes: Array, target: float) -> int:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_service.estimation.batch import (
+from dropanchor_service.estimation.columns import (
     POSE,
     TAG_SETTINGS,
     Array,

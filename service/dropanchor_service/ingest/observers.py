@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 
 def _nobody(*_: object) -> None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.kernels import sequences
 from dropanchor_service.ingest.kernels.clocks import TAG_TIME, time_offsets
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW

@@ -3,7 +3,7 @@
 import logging
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import TagTable

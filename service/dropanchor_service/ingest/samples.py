@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.batch import BEARING, HEADING, RANGE, Array, SampleBatch
+from dropanchor_service.estimation.columns import BEARING, HEADING, RANGE, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import GuardedEngine

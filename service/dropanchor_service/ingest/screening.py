@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dropanchor_schemas.wire import MAX_T_NS, Reason
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.kernels import values
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.batch import Array, PoseBatch, SampleBatch
+from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import Message, MessageBuffer, UnregisteredMessage
 from dropanchor_service.ingest.guarded_engine import GuardedEngine

@@ -10,7 +10,7 @@ from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.columns import REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.track_pages import ESTIMATED
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.recording import schemas
 from dropanchor_service.store.site import SiteDocument
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.mcap_file import McapFile, TooManyChannelsError
 from dropanchor_service.recording.messages import pose_messages, site_messages, topic_of

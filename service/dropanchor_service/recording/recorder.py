@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_schemas.keys import chunk_from_id
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.recording import folder as files
 from dropanchor_service.recording.folder import Limits, RecordedFile
 from dropanchor_service.recording.mcap_file import SESSION, McapFile

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dropanchor_schemas.site import Anchor, TagSettings
-from dropanchor_service.estimation.batch import ANCHOR, Array, HeadingSource, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, default_settings
 
 
 def anchor_columns(anchors: Sequence[Anchor]) -> Array:

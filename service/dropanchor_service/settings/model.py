@@ -10,8 +10,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
 from dropanchor_schemas.site import Site, TagSettings
-from dropanchor_service.estimation.attitude import AttitudeParameters
-from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
+from dropanchor_service.estimation.paper.attitude import AttitudeParameters
+from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 
 
 def _is_endpoint(text: str) -> str:

@@ -5,7 +5,7 @@ from threading import Lock
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
+from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from dropanchor_service.store.pose_history import PoseHistory
 from dropanchor_service.store.records import copied, enlarged, put, take
 from dropanchor_service.store.rings import RowRings, rank_in_row

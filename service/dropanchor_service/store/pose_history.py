@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.store.rings import RowRings
 from dropanchor_service.store.thinning import SlotFirsts
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 
 def take(records: Array, index: Any) -> Array:

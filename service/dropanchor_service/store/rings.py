@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import enlarged, put, take
 
 FEWEST = 2  # records of a row, however many rows there are

@@ -8,7 +8,7 @@ from threading import Lock
 import numpy as np
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.store.unknown_anchors import UnknownAnchors
 

@@ -11,7 +11,7 @@ from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.answers.columns import HINTS, REASONS, ellipse_95
-from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, Array, State, StateReason
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
 T_NS = 1_800_000_000_000_000_000

@@ -5,7 +5,7 @@ import pytest
 
 from dropanchor_schemas.site import Georeference
 from dropanchor_service.answers.geodesy import lat_lon
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 
 
 def ecef(lat_deg: Array, lon_deg: Array, height_m: Array) -> Array:

@@ -5,7 +5,7 @@ import pytest
 from dropanchor_schemas import Pose
 from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_service.answers.columns import HINTS, REASONS
-from dropanchor_service.estimation.batch import StateReason
+from dropanchor_service.estimation.columns import StateReason
 
 
 def test_the_contract_names_the_reasons_of_the_engines_and_no_other() -> None:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot, layout_of
-from dropanchor_service.estimation.batch import HYPOTHESIS
-from dropanchor_service.estimation.fleet.attitude import ATTITUDE
+from dropanchor_service.estimation.columns import HYPOTHESIS
+from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE
 
 WRITING = 8  # operations until the new name is there: open, writes of head, three arrays and digest, fsync, replace
 

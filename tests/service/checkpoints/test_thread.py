@@ -13,7 +13,7 @@ from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.checkpoints import thread as checkpointer
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.thread import CheckpointThread
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.ingest.thread import IngestThread
 from support.ingest import Bench, TransparentEngine
 from support.zenoh_router import wait_until

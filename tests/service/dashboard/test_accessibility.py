@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.estimation.batch import State
+from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_house
 from support.axe import axe_source, violations
 from support.browser import Scheme, Watched, watched_page

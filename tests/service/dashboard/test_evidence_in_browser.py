@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
+from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from service.dashboard.place import Place, live_house
 from support.browser import Scheme, Watched, watched_page
 from support.http_server import running_server

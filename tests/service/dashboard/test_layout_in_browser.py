@@ -8,7 +8,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.estimation.batch import State
+from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_house
 from support.browser import Scheme, Watched, watched_page
 from support.http_server import running_server

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State, StateReason
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from service.dashboard.place import Place, live_house
 from support.browser import Watched, watched_page
 from support.http_server import running_server

@@ -6,7 +6,7 @@ import pytest
 
 from dropanchor_schemas import Anchor, StartPose, TagSettings
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.batch import HeadingSource
+from dropanchor_service.estimation.columns import HeadingSource
 from dropanchor_service.settings.engine_columns import anchor_columns, tag_columns
 from dropanchor_service.settings.sources import load_settings
 

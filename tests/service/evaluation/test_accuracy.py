@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import POSE, Array, State
+from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.evaluation.accuracy import Truth, accuracy, truth_at
 
 T = np.linspace(0.0, 10.0, 101)

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import HEADING, RANGE, HeadingSource, SampleBatch, default_settings
-from dropanchor_service.estimation.paper import TUNED, PaperEngine, PaperParameters
+from dropanchor_service.estimation.columns import HEADING, RANGE, HeadingSource, SampleBatch, default_settings
+from dropanchor_service.estimation.paper.engine import PaperEngine
+from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.evaluation.paper.compiled import algorithm1
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import POSE, Array, State
+from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.evaluation.paper import unknown_start
 from dropanchor_service.evaluation.paper.scores import RunScore, bound_of, score, summary
 from dropanchor_service.evaluation.pcrb import Sensors

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.paper import TUNED, PaperEngine
+from dropanchor_service.estimation.paper.engine import PaperEngine
+from dropanchor_service.estimation.paper.parameters import TUNED
 from dropanchor_service.evaluation.paper.contestants import Paper
 from dropanchor_service.evaluation.simulated import Feed, Known, run_engine
 from dropanchor_tag_client.simulator.sensors import preset

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dropanchor_schemas.site import Site
-from dropanchor_service.estimation.batch import POSE
+from dropanchor_service.estimation.columns import POSE
 from dropanchor_service.history.tracks import FILE_NAME, MOST_DAMAGED, Tracks
 from dropanchor_service.persistence import retention_of
 from dropanchor_service.settings.model import HistorySettings

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.history.track_file import TrackFileError, TrackReader, TrackWriter
 
 SECOND = 1_000_000_000

@@ -19,7 +19,7 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.estimation.batch import SampleBatch, State, StateReason
+from dropanchor_service.estimation.columns import SampleBatch, State, StateReason
 from dropanchor_service.ingest import samples as prepare
 from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms

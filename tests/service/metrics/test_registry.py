@@ -4,7 +4,7 @@ import numpy as np
 from prometheus_client import generate_latest
 
 from dropanchor_schemas.wire import Frame, RangeSample, Reason
-from dropanchor_service.estimation.batch import HYPOTHESIS, POSE, State
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.store import LatestPoses, PendingTags, TagTable
 from support.ingest import Bench

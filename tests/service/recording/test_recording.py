@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 
 from dropanchor_schemas.site import Anchor, Georeference, Site, TagSettings
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
-from dropanchor_service.estimation.batch import POSE, State
+from dropanchor_service.estimation.columns import POSE, State
 from dropanchor_service.recording.folder import Limits, files_in, prune
 from dropanchor_service.recording.reading import RecordingReader, Turn
 from dropanchor_service.recording.recorder import Recorder

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
+from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.settings.sources import SettingsError, load_settings
 
 

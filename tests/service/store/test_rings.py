@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE
+from dropanchor_service.estimation.columns import POSE
 from dropanchor_service.store.pose_history import SPACING_NS, PoseHistory
 from dropanchor_service.store.rings import RowRings
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE, Array, State
+from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.store.thinning import Decimation
 
 SECOND = 1_000_000_000

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from numba import njit
 
-from dropanchor_service.estimation.batch import State, StateReason
+from dropanchor_service.estimation.columns import State, StateReason
 
 STALE_AFTER_S: Final = 1.0
 LOST_AFTER_S: Final = 10.0

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from .layout import ROW, SETTINGS
-from .tuning import Tuning
+from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
+from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RANGE_STD = 0.1  # m
 HEIGHT_STD = 0.15  # m

@@ -4,19 +4,18 @@ from collections import Counter
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import ANCHOR, Array, PoseBatch, SampleBatch
-
-from .configure import configured
-from .frontend import FRONTEND, start_frontend
-from .gather import gather
-from .kernel import advance
-from .layout import BELIEF, KEEP, ROW, make_pool, make_workspace, with_room
-from .node import NODE
-from .order import Order
-from .outputs import innovations_of, modes_of, poses_of
-from .platform import PLATFORM
-from .pool import release
-from .tuning import Tuning
+from dropanchor_service.estimation.columns import ANCHOR, Array, PoseBatch, SampleBatch
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, KEEP, ROW, make_pool, make_workspace, with_room
+from dropanchor_service.estimation.fleet.belief.pool import release
+from dropanchor_service.estimation.fleet.belief.step import advance
+from dropanchor_service.estimation.fleet.configure import configured
+from dropanchor_service.estimation.fleet.frontend.assembly import gather
+from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, start_frontend
+from dropanchor_service.estimation.fleet.frontend.node import NODE
+from dropanchor_service.estimation.fleet.frontend.ordering import Order
+from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
+from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of
+from dropanchor_service.estimation.fleet.tuning import Tuning
 
 HARD_IRON = 1.0  # prior of a magnetometer that nobody calibrated, in units of the field
 

@@ -4,12 +4,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
-
-from .compiled import njit
-from .layout import AMBIGUOUS
-from .modes import list_modes
-from .node import RANGE
+from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
+from dropanchor_service.estimation.fleet.belief.layout import AMBIGUOUS
+from dropanchor_service.estimation.fleet.belief.modes import list_modes
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import RANGE
 
 MODES: Final = 8
 REFUSED: Final = 0.5  # probability of an outlier above which a measurement hardly moved the belief

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from dropanchor_service.estimation.batch import Array
-from dropanchor_service.estimation.paper_parameters import PaperParameters
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.paper.parameters import PaperParameters
 
 NEAREST = 1e-3  # m, as in the engine
 

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE, Array, Engine, State
+from dropanchor_service.estimation.columns import POSE, Array, Engine, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.paper_parameters import PaperParameters
+from dropanchor_service.estimation.paper.parameters import PaperParameters
 from dropanchor_service.evaluation.paper import tuning
 from dropanchor_service.evaluation.paper.compiled import Estimate
 from dropanchor_service.evaluation.pcrb import Information

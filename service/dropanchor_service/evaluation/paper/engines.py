@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from dropanchor_service.estimation.batch import Engine
+from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.paper import TUNED, PaperEngine, PaperParameters
+from dropanchor_service.estimation.paper.engine import PaperEngine
+from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 
 WITHOUT_SPEED = 1.0  # blend: the whole weight on the speed of the EKF
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.evaluation.report import Section, Table
 from dropanchor_tag_client.simulator.scenarios import trajectory
 from dropanchor_tag_client.simulator.trajectory import Trajectory

@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from matplotlib.figure import Figure
 
-from dropanchor_service.estimation.batch import Array
-from dropanchor_service.estimation.paper_parameters import PaperParameters
-from dropanchor_service.estimation.range_filter import RangeFilter
-from dropanchor_service.estimation.speed import SpeedEstimator
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.paper.parameters import PaperParameters
+from dropanchor_service.estimation.paper.range_filter import RangeFilter
+from dropanchor_service.estimation.paper.speed import SpeedEstimator
 from dropanchor_service.evaluation.report import Section, Table
 from dropanchor_tag_client.simulator.scenarios import trajectory
 

@@ -6,7 +6,7 @@ import numpy as np
 import sympy as sp
 from matplotlib.figure import Figure
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.evaluation.report import Section, Table
 
 x, y, v, w = sp.symbols("x y v w", real=True)

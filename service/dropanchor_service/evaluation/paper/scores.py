@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees, truth_at
 from dropanchor_service.evaluation.pcrb import Information, Path, Sensors, position_bound
 from dropanchor_service.evaluation.replay import Track

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.paper_parameters import PaperParameters
+from dropanchor_service.estimation.paper.parameters import PaperParameters
 from dropanchor_service.evaluation.paper.tuning import RELEASED, STATED, Noise, tuned
 from dropanchor_service.evaluation.paper.tuning import run as run_algorithm1
 from dropanchor_service.evaluation.report import Section, Table

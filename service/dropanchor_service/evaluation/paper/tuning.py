@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array
-from dropanchor_service.estimation.paper_parameters import TUNED, PaperParameters
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.evaluation.paper.compiled import Estimate, algorithm1
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees, truth_at
 from dropanchor_service.evaluation.paper.contestants import engines
 from dropanchor_service.evaluation.paper.families import SEEDS_PER_TASK, Case, Task

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import ANCHOR, Array, HeadingSource, SampleBatch, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, SampleBatch, default_settings
 from dropanchor_service.evaluation.accuracy import Truth
 from dropanchor_service.evaluation.product.rows import BARE, CARRIED, FAST, Row
 from dropanchor_service.evaluation.recordings import settings_of

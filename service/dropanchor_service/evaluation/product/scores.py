@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import Array, State
+from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, Truth, nees, share_of_time, truth_at
 from dropanchor_service.evaluation.replay import Track
 

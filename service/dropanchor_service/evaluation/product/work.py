@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropanchor_service.engines.warm_up import warm_up
-from dropanchor_service.estimation.batch import POSE, Array, Engine, SampleBatch
+from dropanchor_service.estimation.columns import POSE, Array, Engine, SampleBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.evaluation.product.rows import Row
 from dropanchor_service.evaluation.product.runs import TagRun, sources, tag_run

@@ -6,7 +6,7 @@ import pytest
 from api_house import T_NS, House, ask, kind_of, make_house
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose
-from dropanchor_service.estimation.batch import HYPOTHESIS, INNOVATION, POSE, State
+from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, State
 
 SECOND = 1_000_000_000
 

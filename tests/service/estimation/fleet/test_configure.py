@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from dropanchor_schemas import StartPose, TagSettings
-from dropanchor_service.estimation.batch import Array
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.belief.heading_models import COMES_AGAIN, error_of
+from dropanchor_service.estimation.fleet.belief.layout import COMMON, STEADY, make_workspace
+from dropanchor_service.estimation.fleet.belief.start import choose_model, second_class
 from dropanchor_service.estimation.fleet.configure import (
     CRAB_KNOWN_STD,
     CRAB_UNKNOWN_STD,
@@ -13,10 +16,7 @@ from dropanchor_service.estimation.fleet.configure import (
     V_MAX,
     configured,
 )
-from dropanchor_service.estimation.fleet.heading import COMES_AGAIN, error_of
-from dropanchor_service.estimation.fleet.layout import COMMON, STEADY, make_workspace
-from dropanchor_service.estimation.fleet.node import DERIVED_HEADING, NODE
-from dropanchor_service.estimation.fleet.start import choose_model, second_class
+from dropanchor_service.estimation.fleet.frontend.node import DERIVED_HEADING, NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from dropanchor_service.settings.engine_columns import tag_columns
 

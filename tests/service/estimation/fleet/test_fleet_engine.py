@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.batch import (
+from dropanchor_service.estimation.columns import (
     ANCHOR,
     BEARING,
     HEADING,
@@ -17,8 +17,7 @@ from dropanchor_service.estimation.batch import (
     default_settings,
 )
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-
-from .tracks import CALIBRATED, DT, drive
+from service.estimation.fleet.tracks import CALIBRATED, DT, drive
 
 STEP = 10  # IMU samples per range
 

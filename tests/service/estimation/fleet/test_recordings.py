@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dropanchor_service.estimation.fleet.node import ABSOLUTE_HEADING, RELATIVE_HEADING
+from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, RELATIVE_HEADING
 from support.frontend import new_frontend, run
 from support.imu import Motion, Recording, recording, wrapped
 

@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import ANCHOR, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, default_settings
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, ROW, make_pool, make_workspace
+from dropanchor_service.estimation.fleet.belief.step import advance
 from dropanchor_service.estimation.fleet.configure import configured
-from dropanchor_service.estimation.fleet.kernel import advance
-from dropanchor_service.estimation.fleet.layout import BELIEF, ROW, make_pool, make_workspace
-from dropanchor_service.estimation.fleet.node import MEASURED_HEADING, NODE, RANGE
+from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, NODE, RANGE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 DT = 0.1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dropanchor_service.estimation.batch import POSE, State
+from dropanchor_service.estimation.columns import POSE, State
 from dropanchor_service.evaluation.accuracy import Truth
 from dropanchor_service.evaluation.product.scores import TagScore, rotated_onto, score, summary
 from dropanchor_service.evaluation.replay import Track

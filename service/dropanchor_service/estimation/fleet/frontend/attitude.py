@@ -1,0 +1,138 @@
+"""Attitude from gyroscope and accelerometer: a quaternion complementary filter, compiled, one row per tag.
+
+q = (w, x, y, z) turns body (x forward, y left, z up) into a level frame, z up, whose azimuth zero is arbitrary:
+yaw is the integrated gyroscope and nothing else, so that no magnetic disturbance can turn it. `magnetometer`
+finds where north lies in that frame.
+
+Predict (Trawny & Roumeliotis 2005, eq. 99, mean rate over the step):  q <- q * exp((w - b) dt / 2)
+Correct (explicit complementary filter, Mahony, Hamel & Pflimlin 2008, eq. 32, with accelerometer only):
+  e = a/|a| x R(q)^T z,   q <- q * exp(k e / 2),   b <- b - k_i e
+The gain is dt/tau; tau grows from zero with the time since start (a running mean), is short at confirmed rest, and
+the weight of a sample falls to nothing between 10 % and 20 % of deviation of |a| from the tag's own gravity (Valenti,
+Dryanovski & Xiao 2015, eq. 60). Own gravity: cheap accelerometers read 5 % high.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.compiled import njit
+
+ATTITUDE = np.dtype(
+    [
+        ("q", "f8", 4),
+        ("gyro", "f8", 3),  # last sample, rad/s, raw
+        ("bias", "f8", 3),  # rad/s
+        ("gravity", "f8"),  # |a| when nothing accelerates, m/s^2
+        ("age", "f8"),  # s of accelerometer seen
+    ]
+)
+
+TAU = 6.0  # s, of the tilt correction under motion
+TAU_REST = 0.5  # s, at confirmed rest
+TAU_BIAS = 40.0  # s, of the bias that tilt teaches
+TAU_GRAVITY = 30.0  # s
+FULL_WEIGHT, NO_WEIGHT = 0.1, 0.2  # relative deviation of |a|
+VERTICAL = 0.01  # smallest cos^2 of pitch at which yaw still has a rate
+SMALL_ANGLE = 0.04  # rad^2: below, two terms of the series are exact to 1e-9
+
+
+@njit(cache=True, nogil=True)
+def rotate_by(q: Any, x: float, y: float, z: float) -> None:
+    """q <- q * exp((x, y, z)/2): a small turn, rad, about body axes; keeps |q| = 1."""
+    s = 0.25 * (x * x + y * y + z * z)
+    if s < SMALL_ANGLE:
+        c = 1.0 - s * (0.5 - s / 24.0)
+        k = 0.5 * (1.0 - s * (1.0 / 6.0 - s / 120.0))
+    else:
+        half = math.sqrt(s)
+        c = math.cos(half)
+        k = 0.5 * math.sin(half) / half
+    x, y, z = k * x, k * y, k * z
+    q0, q1, q2, q3 = q[0], q[1], q[2], q[3]
+    w = c * q0 - x * q1 - y * q2 - z * q3
+    i = c * q1 + x * q0 + z * q2 - y * q3
+    j = c * q2 + y * q0 + x * q3 - z * q1
+    l = c * q3 + z * q0 + y * q1 - x * q2  # noqa: E741
+    n = 1.5 - 0.5 * (w * w + i * i + j * j + l * l)  # one Newton step to 1/|q|, which is 1 to 1e-7 here
+    q[0], q[1], q[2], q[3] = w * n, i * n, j * n, l * n
+
+
+@njit(cache=True, nogil=True)
+def up_in_body(q: Any) -> tuple[float, float, float]:
+    """R(q)^T z."""
+    return (
+        2.0 * (q[1] * q[3] - q[0] * q[2]),
+        2.0 * (q[2] * q[3] + q[0] * q[1]),
+        1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]),
+    )
+
+
+@njit(cache=True, nogil=True)
+def down_weight(deviation: float) -> float:
+    """Weight of an accelerometer sample in [0, 1] from the relative deviation of |a| from gravity."""
+    return min(1.0, max(0.0, (NO_WEIGHT - abs(deviation)) / (NO_WEIGHT - FULL_WEIGHT)))
+
+
+@njit(cache=True, nogil=True)
+def level(q: Any, ax: float, ay: float, az: float) -> None:
+    """q <- the attitude with yaw 0 in which (ax, ay, az) points up."""
+    n = math.sqrt(ax * ax + ay * ay + az * az)
+    roll = math.atan2(ay, az)
+    pitch = math.asin(max(-1.0, min(1.0, -ax / n)))
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    q[0], q[1], q[2], q[3] = cr * cp, sr * cp, cr * sp, -sr * sp
+
+
+@njit(cache=True, nogil=True)
+def turn(a: Any, dt: float, gyro: Any, rest: bool) -> None:
+    """Predict over dt with the mean of the last and this rate, rad/s; at confirmed rest only remember the rate."""
+    if not rest:
+        x = 0.5 * (a.gyro[0] + gyro[0]) - a.bias[0]
+        y = 0.5 * (a.gyro[1] + gyro[1]) - a.bias[1]
+        z = 0.5 * (a.gyro[2] + gyro[2]) - a.bias[2]
+        rotate_by(a.q, x * dt, y * dt, z * dt)
+    a.gyro[0], a.gyro[1], a.gyro[2] = gyro[0], gyro[1], gyro[2]
+
+
+@njit(cache=True, nogil=True)
+def correct_tilt(a: Any, dt: float, ax: float, ay: float, az: float, rest: bool) -> None:
+    """Correct with one accelerometer sample, m/s^2."""
+    n = math.sqrt(ax * ax + ay * ay + az * az)
+    if n < 1.0 or dt == 0.0:
+        return
+    if a.age == 0.0:
+        a.gravity = n
+    a.age += dt
+    tau_g = min(a.age, TAU_GRAVITY)
+    a.gravity += dt / (tau_g + dt) * (n - a.gravity)
+    weight = down_weight(n / a.gravity - 1.0)
+    if rest:
+        a.age = max(a.age, TAU)  # the tilt is known from now on, and what deviates from it is motion
+    ux, uy, uz = up_in_body(a.q)
+    k = weight * dt / (min(a.age, TAU_REST if rest else TAU) + dt)
+    s = 1.0 / n
+    ex, ey, ez = s * (ay * uz - az * uy), s * (az * ux - ax * uz), s * (ax * uy - ay * ux)
+    rotate_by(a.q, k * ex, k * ey, k * ez)
+    if a.age > TAU:
+        ki = weight * dt / (TAU * TAU_BIAS)
+        a.bias[0] -= ki * ex
+        a.bias[1] -= ki * ey
+        a.bias[2] -= ki * ez
+
+
+@njit(cache=True, nogil=True)
+def yaw_of(q: Any) -> float:
+    """Azimuth of the body x axis, rad, counter-clockwise."""
+    return math.atan2(2.0 * (q[1] * q[2] + q[0] * q[3]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
+
+
+@njit(cache=True, nogil=True)
+def spin(a: Any) -> float:
+    """d yaw / dt, rad/s, from the last body rates: (q sin roll + r cos roll) / cos pitch."""
+    q = a.q
+    ux, uy, uz = up_in_body(q)
+    rate = uy * (a.gyro[1] - a.bias[1]) + uz * (a.gyro[2] - a.bias[2])
+    return rate / max(1.0 - ux * ux, VERTICAL)  # type: ignore[no-any-return]

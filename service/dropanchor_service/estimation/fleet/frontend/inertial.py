@@ -1,0 +1,250 @@
+"""The IMU front-end of one tag: samples in, nodes out; one row of fixed size.
+
+Its results depend on the order of samples and node ends only, not on how they were cut into batches.
+
+What a node's heading is: with a calibrated magnetometer the azimuth of the body x axis from the long-term fusion of
+field and gyroscope (ABSOLUTE_HEADING). Its error hardly changes from node to node (it lasts minutes): `heading_var` is
+the variance of that common error, and averaging nodes does not lower it. Without, the integrated gyroscope since
+start, zero arbitrary (RELATIVE_HEADING), with the variance it has gathered since.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.attitude import (
+    ATTITUDE,
+    correct_tilt,
+    level,
+    spin,
+    turn,
+    up_in_body,
+    yaw_of,
+)
+from dropanchor_service.estimation.fleet.frontend.magnetometer import MAGNETOMETER, feel, lose_yaw, north_of
+from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, NO_HEADING, RELATIVE_HEADING
+from dropanchor_service.estimation.fleet.frontend.preintegration import (
+    GYRO_NOISE,
+    GYRO_SCALE,
+    HORIZON,
+    PREINTEGRATION,
+    accelerate,
+    end_node,
+    unwatched_turn,
+    wrap,
+)
+from dropanchor_service.estimation.fleet.frontend.standstill import (
+    CONFIRM,
+    STANDSTILL,
+    at_rest,
+    learn_bias,
+    observe,
+    start_standstill,
+)
+
+FRONTEND = np.dtype(
+    [
+        ("attitude", ATTITUDE),
+        ("standstill", STANDSTILL),
+        ("magnetometer", MAGNETOMETER),
+        ("preintegration", PREINTEGRATION),
+        ("hard_iron", "f8"),  # prior sd of the magnetometer's hard iron, in units of the field
+        ("declination", "f8"),  # rad, of magnetic north, positive east
+        ("t_imu", "i8"),  # ns, of the last IMU sample
+        ("t_node", "i8"),  # ns, end of the last node
+        ("bias_end", "f8"),  # rad/s, the gyroscope's bias about the vertical when the last node ended
+        ("running", "u1"),  # 0: no sample yet
+        ("absolute", "u1"),  # 1: the heading is referred to north
+        ("turned", "f8"),  # rad since start, net
+        ("drift_var", "f8"),  # rad^2, of yaw since start
+        ("drift_cov", "f8"),  # rad^2/s, of yaw with the gyroscope's bias
+        ("last", "f8", 6),  # acc and gyro of the last sample
+        ("same", "f8"),  # s for which it has been the same
+    ],
+    align=True,
+)
+
+GAP = 0.5  # s: a longer silence is not integrated over
+FROZEN = 0.25  # s of samples that are equal to the last bit: no sensor is so quiet, its driver repeats itself
+BIAS_LEFT = 1e-3  # rad/s, sd of the bias in motion after any rest
+BIAS_TAU = 100.0  # s
+ABSOLUTE_BELOW, RELATIVE_ABOVE = 0.2, 0.4  # rad^2, variance of north
+HEADING_FLOOR = 2e-4  # rad^2: tilt and mounting, 0.8 deg
+
+
+@njit(cache=True, nogil=True)
+def start_frontend(f: Any, hard_iron: float, declination: float) -> None:
+    """Nothing known.
+
+    hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
+    declination: rad, true minus magnetic north, positive east.
+    """
+    f.running = 0
+    f.t_node = 0
+    f.absolute = 0
+    f.hard_iron = hard_iron
+    f.declination = declination
+    f.turned = 0.0
+    f.drift_var = 0.0
+    f.drift_cov = 0.0
+    f.magnetometer.unit = 0.0
+
+
+@njit(cache=True, nogil=True)
+def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
+    """Level the attitude and begin the first node here."""
+    a, p, s = f.attitude, f.preintegration, f.standstill
+    a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
+    a.gyro[:] = gyro
+    a.bias[:] = 0.0
+    f.bias_end = 0.0
+    a.age = 0.0
+    a.gravity = 9.80665
+    start_standstill(s, acc, gyro)
+    p.V[:] = 0.0
+    p.a[:] = 0.0
+    p.V_end[:] = 0.0
+    p.rough = 0.0
+    p.yaw_rate = 0.0
+    p.yaw_end = 0.0
+    p.silent = 0.0
+    p.blind = 0.0
+    p.deaf = 0.0
+    f.magnetometer.elapsed = 0.0
+    f.magnetometer.count = 0.0
+    f.magnetometer.sum_m[:] = 0.0
+    f.magnetometer.sum_R[:] = 0.0
+    if math.isfinite(acc[0] + acc[1] + acc[2]):
+        level(a.q, acc[0], acc[1], acc[2])
+    f.t_imu = t_ns
+    if f.t_node == 0:
+        f.t_node = t_ns
+    f.running = 1
+
+
+@njit(cache=True, nogil=True)
+def lose_turn(f: Any, gap: float) -> None:
+    """Nobody watched for `gap` s: yaw is uncertain by what it may have turned."""
+    f.preintegration.silent += max(0.0, gap - f.preintegration.blind)
+    f.standstill.quiet = 0.0
+    if f.magnetometer.unit > 0.0:
+        lose_yaw(f.magnetometer, unwatched_turn(gap))
+    f.drift_var += unwatched_turn(gap)
+
+
+@njit(cache=True, nogil=True)
+def is_frozen(f: Any, dt: float, acc: Any, gyro: Any) -> bool:
+    """Whether the IMU repeats its last sample, which must not pass for a tag at rest."""
+    same = True
+    for i in range(3):
+        same = same and gyro[i] == f.last[3 + i] and (acc[i] == f.last[i] or math.isnan(acc[i]))
+        f.last[i], f.last[3 + i] = acc[i], gyro[i]
+    f.same = f.same + dt if same else 0.0
+    return f.same > FROZEN  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)
+def feed(f: Any, t_ns: int, acc: Any, gyro: Any, mag: Any) -> None:
+    """One IMU sample (m/s^2, rad/s, any unit; acc and mag may be NaN). One not after the last is left out."""
+    if not math.isfinite(gyro[0] + gyro[1] + gyro[2]):
+        return
+    if f.running == 0:
+        first_sample(f, t_ns, acc, gyro)
+        return
+    dt = (t_ns - f.t_imu) * 1e-9
+    if dt <= 0.0:
+        return
+    if is_frozen(f, dt, acc, gyro):
+        return
+    f.t_imu = t_ns
+    a, s, p = f.attitude, f.standstill, f.preintegration
+    if dt > GAP:
+        lose_turn(f, dt)
+        a.gyro[:] = gyro
+        dt = 0.0
+    p.blind = 0.0
+    heard = math.isfinite(acc[0] + acc[1] + acc[2])
+    if heard:
+        observe(s, dt, acc, gyro, a.bias)
+    else:
+        s.quiet = 0.0
+        p.deaf += dt
+    learn_bias(s, dt, gyro, a.bias)
+    rest = s.quiet > CONFIRM
+    turn(a, dt, gyro, rest)
+    if heard:
+        correct_tilt(a, dt, acc[0], acc[1], acc[2], rest)
+        accelerate(p, dt, a.q, acc, a.gravity, s.acc_var)
+    p.yaw_rate = 0.0 if rest else spin(a)
+    feel(f.magnetometer, dt, a.q, mag, rest, f.hard_iron)
+
+
+@njit(cache=True, nogil=True)
+def gather_drift(f: Any, dt: float, turned: float) -> None:
+    """Variance of the integrated yaw: white noise and a Gauss-Markov bias."""
+    f.turned += turned
+    if f.standstill.quiet > CONFIRM:
+        return
+    f.drift_var += GYRO_NOISE * dt + 2.0 * f.drift_cov * dt
+    f.drift_cov += -f.drift_cov * min(1.0, dt / BIAS_TAU) + (f.standstill.bias_var + BIAS_LEFT * BIAS_LEFT) * dt
+
+
+@njit(cache=True, nogil=True)
+def refer_heading(f: Any, psi: float, ahead: float, node: Any) -> None:
+    """Heading of the node from psi, the yaw at its end."""
+    blind = unwatched_turn(max(0.0, ahead - HORIZON))
+    north, variance = north_of(f.magnetometer)
+    f.absolute = variance < (RELATIVE_ABOVE if f.absolute else ABSOLUTE_BELOW)
+    if f.absolute:
+        node.heading = wrap(psi - north + 0.5 * math.pi - f.declination)
+        node.heading_var = variance + HEADING_FLOOR + blind
+        node.heading_kind = ABSOLUTE_HEADING
+    else:
+        node.heading = wrap(psi)
+        node.heading_var = f.drift_var + (GYRO_SCALE * f.turned) ** 2 + HEADING_FLOOR + blind
+        node.heading_kind = RELATIVE_HEADING
+
+
+@njit(cache=True, nogil=True)
+def know_nothing(dt: float, node: Any) -> None:
+    """A node before the first IMU sample."""
+    node.dt_s = dt
+    node.dyaw, node.dyaw_var = 0.0, unwatched_turn(dt)
+    node.gyro_var, node.gyro_step = 0.0, 0.0
+    node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
+    node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
+    node.rest = 0
+    node.unheard_s = dt
+
+
+@njit(cache=True, nogil=True)
+def tell_bias(f: Any, node: Any) -> None:
+    """What is known of the gyroscope's bias about the vertical, and what was learned of it in this node."""
+    x, y, z = up_in_body(f.attitude.q)
+    bias = x * f.attitude.bias[0] + y * f.attitude.bias[1] + z * f.attitude.bias[2]
+    node.gyro_var = f.standstill.bias_var
+    node.gyro_step = bias - f.bias_end if at_rest(f.standstill) else 0.0
+    f.bias_end = bias
+
+
+@njit(cache=True, nogil=True)
+def close_node(f: Any, t_ns: int, node: Any) -> None:
+    """End a node at t_ns, not before the last IMU sample or node, and begin the next.
+
+    Fills dt_s, dyaw, dv, heading and rest of `node` with their variances.
+    """
+    dt = (t_ns - f.t_node) * 1e-9 if f.t_node > 0 else 0.0
+    if f.running == 0:
+        f.t_node = t_ns
+        know_nothing(dt, node)
+        return
+    ahead = (t_ns - f.t_imu) * 1e-9
+    f.t_node = t_ns
+    psi = end_node(f.preintegration, yaw_of(f.attitude.q), ahead, dt, node)
+    gather_drift(f, dt, node.dyaw)
+    node.dt_s = dt
+    tell_bias(f, node)
+    refer_heading(f, psi, ahead, node)
+    node.rest = at_rest(f.standstill) and ahead < GAP

@@ -1,0 +1,32 @@
+"""A tag that is not where the point is that follows the course: on a mast, or held out in front.
+
+The pivot (a rear axle, the feet of whoever carries it) moves along the course; the tag, a lever (x, y) of the body
+frame away, swings about it when it turns. With w the rate and R(a) a turn by a, over a node:
+
+    swing = (R(dyaw) - I) lever,   dv of the pivot = dv of the tag - (R(dyaw) w x lever at the end - w x lever before).
+
+Rates are means over a node. The state is the place of the tag and the speed of the pivot.
+"""
+
+import math
+from typing import Any
+
+from dropanchor_service.estimation.fleet.compiled import njit
+
+
+@njit(nogil=True)
+def swing(row: Any, node: Any) -> None:
+    """Fill the node's swing, and make its dv that of the pivot."""
+    x, y = row.lever_x, row.lever_y
+    node.swing_forward, node.swing_left = 0.0, 0.0
+    if x == 0.0 and y == 0.0:
+        return
+    c, s = math.cos(node.dyaw), math.sin(node.dyaw)
+    node.swing_forward = (c - 1.0) * x - s * y
+    node.swing_left = s * x + (c - 1.0) * y
+    before = row.lever_rate
+    if node.dt_s > 0.0:
+        row.lever_rate = node.dyaw / node.dt_s
+    after = row.lever_rate
+    node.dv_forward -= -after * (c * y + s * x) + before * y
+    node.dv_left -= after * (c * x - s * y) - before * x

@@ -1,0 +1,108 @@
+"""Nodes' headings from a platform that has one already (a robot, a phone), with an IMU beside it or alone.
+
+Alone, the yaw increment of a node is the increment of the heading itself, extrapolated to the node's end with its last
+rate. Beside an IMU, every reading is carried to the node's end by the gyroscope and the readings are averaged.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.attitude import yaw_of
+from dropanchor_service.estimation.fleet.frontend.node import DERIVED_HEADING, MEASURED_HEADING, NO_HEADING
+from dropanchor_service.estimation.fleet.frontend.preintegration import wrap
+
+PLATFORM = np.dtype(
+    [
+        ("heard", "u1"),  # readings so far: 0, 1, or 2 for more
+        ("t_heading", "i8"),  # ns, of the last reading
+        ("heading", "f8"),
+        ("rate", "f8"),  # rad/s, between the last two readings
+        ("std", "f8"),  # rad, of the last reading, NaN: not told
+        ("t_node", "i8"),  # ns, end of the last node
+        ("node_heading", "f8"),
+        ("lead", "f8"),  # rad, mean of reading minus the gyroscope's yaw, of this node's readings
+        ("readings", "i4"),
+        ("moved", "u1"),  # 1: the tag has moved since the start
+        ("first_ranges", "i4"),
+        ("first_range", "f8"),  # m, mean of the first ranges
+    ]
+)
+
+NOISE = 1.6e-5  # rad^2/s, of a platform's increments
+READING_STD = 0.1  # rad, of a reading whose std is not told
+EXTRAPOLATE = 0.25  # s
+STILL_RATE = 0.03  # rad/s
+STILL_RANGES = 5
+
+
+@njit(nogil=True)
+def hear(p: Any, front: Any, t_ns: int, heading: float, std: float) -> None:
+    """One reading of the platform's heading."""
+    if p.heard > 0 and t_ns > p.t_heading:
+        p.rate = wrap(heading - p.heading) / max((t_ns - p.t_heading) * 1e-9, 1e-3)
+        p.heard = 2
+    if p.heard == 0:
+        p.heard = 1
+        p.t_node = t_ns
+        p.node_heading = heading
+    p.t_heading, p.heading, p.std = t_ns, heading, std
+    if front.running == 1:
+        lead = wrap(heading - yaw_of(front.attitude.q))
+        p.readings += 1
+        p.lead += wrap(lead - p.lead) / p.readings
+
+
+@njit(nogil=True)
+def derive_node(p: Any, t_ns: int, node: Any) -> None:
+    """The node from the platform alone: no acceleration, yaw by its own increments."""
+    node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
+    node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, 0
+    node.gyro_var, node.gyro_step = 0.0, 0.0
+    node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
+    node.unheard_s = 0.0
+    if p.heard == 0:
+        return
+    ahead = (t_ns - p.t_heading) * 1e-9
+    heading = wrap(p.heading + p.rate * max(min(ahead, EXTRAPOLATE), -EXTRAPOLATE))
+    node.dt_s = max((t_ns - p.t_node) * 1e-9, 0.0)
+    node.dyaw = wrap(heading - p.node_heading)
+    node.dyaw_var = NOISE * node.dt_s + 1e-7 + (0.5 * max(ahead - 2.0 * EXTRAPOLATE, 0.0)) ** 2
+    node.unheard_s = node.dt_s if ahead > 2.0 * EXTRAPOLATE else 0.0
+    std = p.std if math.isfinite(p.std) else 0.02
+    node.heading, node.heading_var, node.heading_kind = heading, std * std, DERIVED_HEADING
+    p.t_node, p.node_heading = t_ns, heading
+
+
+@njit(nogil=True)
+def watch_start(p: Any, node: Any, z: float, std: float) -> None:
+    """Whether a tag that was put down at a known start has moved yet: by its range, or by turning."""
+    if p.moved == 1:
+        return
+    if math.isfinite(z):
+        if p.first_ranges < STILL_RANGES:
+            p.first_ranges += 1
+            p.first_range += (z - p.first_range) / p.first_ranges
+        elif abs(z - p.first_range) > 4.0 * std:
+            p.moved = 1
+    if node.dt_s > 0.0 and abs(node.dyaw) > STILL_RATE * node.dt_s + 1e-4:
+        p.moved = 1
+    if p.moved == 0 and node.dt_s > 0.0:
+        node.rest = 2
+
+
+@njit(nogil=True)
+def refer_to_platform(p: Any, front: Any, node: Any) -> None:
+    """Replace the heading of an IMU node by the mean of the platform's readings in it; none if there was none."""
+    if p.readings == 0:
+        node.heading_kind = NO_HEADING
+        return
+    std = p.std if math.isfinite(p.std) and p.std > 0.0 else READING_STD
+    node.heading = wrap(front.preintegration.yaw_end + p.lead)
+    node.heading_var = std * std / p.readings
+    node.heading_kind = MEASURED_HEADING
+    node.unheard_s = 0.0
+    p.readings = 0
+    p.lead = 0.0

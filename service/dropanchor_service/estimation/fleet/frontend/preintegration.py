@@ -1,0 +1,95 @@
+"""The IMU between two ranges: what the pose belief predicts with.
+
+Yaw psi and the velocity integral V = int (R a)_xy dt live in the level frame of `attitude`; gravity has no horizontal
+part there. A node is a difference of psi and V between its two ends, so nodes telescope: however the ranges fall,
+nothing is counted twice. A range falls between IMU samples: both ends are extrapolated with the last rates, for HORIZON
+at most. dv is in the body-yaw frame at the start of the node.
+Accelerations are scaled to the tag's own gravity (cheap accelerometers read 5 % high).
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.compiled import njit
+
+PREINTEGRATION = np.dtype(
+    [
+        ("V", "f8", 2),  # m/s, level frame
+        ("a", "f8", 2),  # m/s^2, last horizontal acceleration, level frame
+        ("rough", "f8"),  # (m/s^2)^2, variance of the acceleration within tenths of a second, slowly averaged
+        ("yaw_rate", "f8"),  # rad/s, last
+        ("yaw_end", "f8"),  # rad, where the last node ended
+        ("V_end", "f8", 2),
+        ("silent", "f8"),  # s without usable IMU since the last node
+        ("blind", "f8"),  # s since the last IMU sample that earlier nodes have already counted as silent
+        ("deaf", "f8"),  # s without usable accelerometer since the last node
+    ]
+)
+
+G0 = 9.80665  # m/s^2
+HORIZON = 0.1  # s
+GYRO_NOISE = 4e-6  # rad^2/s: 0.02 rad/s white at 100 Hz
+GYRO_SCALE = 7e-3  # of the turn
+TURN_UNKNOWN = 1.0  # rad/s, sd of the rate of a tag whose IMU is silent
+ACC_FLOOR = 2e-4  # (m/s)^2/s
+ACC_ROUGH = 0.03  # s: what of the roughness leaks into the integral, measured on recordings
+ROUGH_TAU = 3.0  # s
+ACC_UNKNOWN = 1.0  # m/s^2, sd of the acceleration of a tag whose IMU is silent
+
+
+@njit(cache=True, nogil=True)
+def wrap(angle: float) -> float:
+    """Angle in [-pi, pi), rad."""
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+
+
+@njit(cache=True, nogil=True)
+def unwatched_turn(s: float) -> float:
+    """Variance, rad^2, of the turn in s seconds that no gyroscope watched; the rate lasts about a second."""
+    return TURN_UNKNOWN * TURN_UNKNOWN * s * max(s, 1.0)
+
+
+@njit(cache=True, nogil=True)
+def unwatched_speed(s: float) -> float:
+    """Variance, (m/s)^2, of the change of speed in s seconds that no accelerometer watched."""
+    return ACC_UNKNOWN * ACC_UNKNOWN * s * max(s, 1.0)
+
+
+@njit(cache=True, nogil=True)
+def accelerate(p: Any, dt: float, q: Any, acc: Any, gravity: float, variance: float) -> None:
+    """Add dt of acceleration (trapezoid); q is the attitude at the end of dt, variance that of standstill."""
+    p.rough += dt / (ROUGH_TAU + dt) * (variance - p.rough)
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    k = G0 / gravity
+    ax, ay, az = k * acc[0], k * acc[1], k * acc[2]
+    u = (1.0 - 2.0 * (y * y + z * z)) * ax + 2.0 * (x * y - w * z) * ay + 2.0 * (x * z + w * y) * az
+    v = 2.0 * (x * y + w * z) * ax + (1.0 - 2.0 * (x * x + z * z)) * ay + 2.0 * (y * z - w * x) * az
+    p.V[0] += 0.5 * dt * (p.a[0] + u)
+    p.V[1] += 0.5 * dt * (p.a[1] + v)
+    p.a[0], p.a[1] = u, v
+
+
+@njit(cache=True, nogil=True)
+def end_node(p: Any, yaw: float, ahead: float, dt: float, node: Any) -> float:
+    """Fill dyaw and dv of a node that lasts dt and ends `ahead` s after the last IMU sample; return psi at its end."""
+    reach = min(ahead, HORIZON)
+    end = yaw + p.yaw_rate * reach
+    vx, vy = p.V[0] + p.a[0] * reach, p.V[1] + p.a[1] * reach
+    node.dyaw = wrap(end - p.yaw_end)
+    dx, dy = vx - p.V_end[0], vy - p.V_end[1]
+    c, s = math.cos(p.yaw_end), math.sin(p.yaw_end)
+    node.dv_forward = c * dx + s * dy
+    node.dv_left = c * dy - s * dx
+    beyond = max(0.0, ahead - HORIZON)
+    unheard = p.silent + max(0.0, beyond - p.blind)
+    p.blind = max(p.blind, beyond)
+    node.unheard_s = unheard
+    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unwatched_turn(unheard)
+    node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + unwatched_speed(unheard)
+    p.yaw_end = wrap(end)
+    p.V_end[0], p.V_end[1] = vx, vy
+    p.silent = 0.0
+    p.deaf = 0.0
+    return end  # type: ignore[no-any-return]

@@ -1,0 +1,1 @@
+"""Smoothed tracks: what later samples say about earlier poses."""

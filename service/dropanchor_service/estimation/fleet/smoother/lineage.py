@@ -1,0 +1,89 @@
+"""Backwards from the heaviest hypothesis of the last node: the track that the surviving mode came along.
+
+Of the hypotheses that were kept of the node before, the one that moves to where the later one is; where none does, the
+later one is moved back by dead reckoning. It is where the iterated smoother begins.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.belief.layout import CRAB, MOUNT, PHI, YAW, N, R, V
+from dropanchor_service.estimation.fleet.belief.predict import move
+from dropanchor_service.estimation.fleet.belief.update import wrap
+from dropanchor_service.estimation.fleet.compiled import njit
+
+REACH = 25.0  # squared distance up to which a hypothesis is the one before
+POSITION_VARIANCE = 0.25  # m^2, at most: one that is nowhere in particular is not the one before
+OTHER_KIND = 9.0  # added where the hypothesis has another model of the heading reference
+SLACK = 0.01  # m^2, (m/s)^2
+YAW_SLACK = 1e-4  # rad^2
+
+
+@njit(nogil=True)
+def distance(s: Any, P: Any, target: Any) -> float:
+    """Squared distance in position, speed and yaw, in standard deviations."""
+    dx = s[R] * math.cos(s[PHI]) - target[R] * math.cos(target[PHI])
+    dy = s[R] * math.sin(s[PHI]) - target[R] * math.sin(target[PHI])
+    spread = min(P[R, R] + s[R] ** 2 * P[PHI, PHI], POSITION_VARIANCE)
+    dv, dyaw = s[V] - target[V], wrap(s[YAW] - target[YAW])
+    return float(
+        (dx * dx + dy * dy) / (spread + SLACK) + dv * dv / (P[V, V] + SLACK) + dyaw * dyaw / (P[YAW, YAW] + YAW_SLACK)
+    )
+
+
+@njit(nogil=True)
+def before(s: Any, node: Any, out: Any) -> None:
+    """Undo `move` by dead reckoning; the lower states stay."""
+    out[:] = s
+    m = s[MOUNT] + s[CRAB]
+    f = node.dv_forward * math.cos(m) + node.dv_left * math.sin(m) if math.isfinite(node.dv_var) else 0.0
+    out[V] = s[V] - f
+    out[YAW] = s[YAW] - node.dyaw
+    d = (out[V] + f / 2) * node.dt_s
+    course = out[YAW] + node.dyaw / 2 + m
+    c, sn = math.cos(out[YAW]), math.sin(out[YAW])
+    x = s[R] * math.cos(s[PHI]) - d * math.cos(course) - node.swing_forward * c + node.swing_left * sn
+    y = s[R] * math.sin(s[PHI]) - d * math.sin(course) - node.swing_forward * sn - node.swing_left * c
+    out[R] = max(math.hypot(x, y), 1e-3)
+    out[PHI] = math.atan2(y, x)
+
+
+@njit(nogil=True)
+def _unwind(reference: Any, nodes: Any, decay: Any) -> None:
+    """Bearing and yaw of every node on the branch on which the one before leads to it."""
+    F, s = np.zeros((4, N)), np.zeros(N)
+    for k in range(1, len(nodes)):
+        s[:] = reference[k - 1]
+        move(s, nodes[k], decay, F)
+        for i in (PHI, YAW):
+            reference[k, i] = s[i] + wrap(reference[k, i] - s[i])
+
+
+@njit(nogil=True, cache=True)
+def trace_back(nodes: Any, traces: Any, reference: Any, blocked: Any) -> int:
+    """Fill reference (n, N) and blocked (n,); returns which hypothesis of the first node it came from, -1 for none."""
+    F, s, decay = np.zeros((4, N)), np.zeros(N), np.ones(N)
+    n = len(nodes)
+    reference[n - 1] = traces[n - 1].mean[0]
+    blocked[n - 1] = traces[n - 1].blocked[0]
+    kind, chosen = traces[n - 1].kind[0], 0
+    for k in range(n - 1, 0, -1):
+        chosen, least = -1, REACH
+        for j in range(traces[k - 1].count):
+            s[:] = traces[k - 1].mean[j]
+            move(s, nodes[k], decay, F)
+            d2 = distance(s, traces[k - 1].cov[j], reference[k])
+            if traces[k - 1].kind[j] != kind:
+                d2 += OTHER_KIND
+            if d2 < least:
+                chosen, least = j, d2
+        if chosen >= 0:
+            reference[k - 1] = traces[k - 1].mean[chosen]
+            blocked[k - 1] = traces[k - 1].blocked[chosen]
+        else:
+            before(reference[k], nodes[k], reference[k - 1])
+            blocked[k - 1] = blocked[k]
+    _unwind(reference, nodes, decay)
+    return chosen

@@ -1,0 +1,41 @@
+"""Products of small matrices and vectors.
+
+numba's np.dot calls BLAS, which it gets by importing scipy.linalg: 0.2 s of processor time at every start, for 0.2 µs
+less of a product of 10 by 10.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.compiled import njit
+
+
+@njit(nogil=True)
+def times(A: Any, B: Any) -> Any:
+    """A B, of (l, m) and (m, n)."""
+    product = np.zeros((A.shape[0], B.shape[1]))
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            for j in range(B.shape[1]):
+                product[i, j] += A[i, k] * B[k, j]
+    return product
+
+
+@njit(nogil=True)
+def applied(A: Any, x: Any) -> Any:
+    """A x, of (m, n) and (n,)."""
+    product = np.zeros(A.shape[0])
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            product[i] += A[i, j] * x[j]
+    return product
+
+
+@njit(nogil=True)
+def inner(x: Any, y: Any) -> float:
+    """x^T y, of (n,) and (n,)."""
+    product = 0.0
+    for i in range(len(x)):
+        product += x[i] * y[i]
+    return product

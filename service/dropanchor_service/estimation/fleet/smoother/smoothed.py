@@ -1,0 +1,121 @@
+"""A track that has seen what came after: offline, from all of a recording, or with a fixed lag."""
+
+import math
+
+import numpy as np
+
+from dropanchor_service.estimation.columns import Array, State, StateReason
+from dropanchor_service.estimation.fleet.belief.heading_models import error_of
+from dropanchor_service.estimation.fleet.belief.heading_reference import recount_yaw
+from dropanchor_service.estimation.fleet.belief.layout import COMMON, DRIFTING, OWN_ERROR, PHI, REF, STEADY, YAW, V
+from dropanchor_service.estimation.fleet.belief.summary import add_reference
+from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, RANGE
+from dropanchor_service.estimation.fleet.outputs import poses_of
+from dropanchor_service.estimation.fleet.smoother.lag import describe_all, smooth_lagged
+from dropanchor_service.estimation.fleet.smoother.lineage import trace_back
+from dropanchor_service.estimation.fleet.smoother.smoother import Track, make_track, smooth
+from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
+from dropanchor_service.estimation.fleet.tuning import Tuning
+
+ITERATIONS = 20
+UNKNOWN_ANGLE = 1.0  # rad, spread of the prior around where a track with unknown start began
+UNKNOWN_SPEED = 2.0  # m/s
+ARBITRARY_YAW = 1.8  # rad, as in `publish`: sd of a uniform angle
+RESOLVED = (State.TRACKING, State.COASTING, State.DEGRADED)
+
+
+def smoothed_poses(engine: TracingEngine, row: int, lag: float | None) -> Array:
+    """POSE, one per range as the engine gave them, with x, y, heading, speed and covariance smoothed.
+
+    lag: s of data after each pose that may be used; None: all. A pose is as sure of its mode as the belief that has
+    seen that data: where that one is resolved, an ambiguous pose is `tracking`. What cannot be smoothed stays as the
+    filter had it.
+    """
+    nodes, beliefs, traces = engine.traced(row)
+    chosen = nodes["kind"] == RANGE
+    poses: Array = poses_of(nodes, beliefs)
+    if not len(poses) or traces["count"][-1] == 0:
+        return poses
+    now = engine.row(row)
+    if lag is None:
+        points, covs = _all(nodes, traces, now, engine.anchors, engine.tuning)
+        seen = np.full(len(nodes), len(nodes) - 1)
+    else:
+        points, covs = _lagged(nodes, traces, now, engine.anchors, engine.tuning, lag)
+        seen = np.searchsorted(nodes["t_ns"], nodes["t_ns"] + round(lag * 1e9) + 1000, side="right") - 1
+    _put(poses, points[chosen], covs[chosen], beliefs[seen[chosen]], now[0], engine.anchors)
+    return poses
+
+
+def _lagged(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning, lag: float) -> tuple[Array, Array]:
+    """points (n, 4): x, y from the anchor, course, speed; covs (n, 3, 3). NaN where there is nothing."""
+    points, covs = np.empty((len(nodes), 4)), np.empty((len(nodes), 3, 3))
+    most = np.searchsorted(nodes["t_ns"], nodes["t_ns"] + round((lag + 1.0) * 1e9)) - np.arange(len(nodes))
+    smooth_lagged(make_track(int(most.max()) + 1), nodes, traces, lag, now.copy(), anchors, t, points, covs)
+    return points, covs
+
+
+def _all(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning) -> tuple[Array, Array]:
+    """As `_lagged`, from the whole of the data since the engine last began."""
+    points, covs = np.full((len(nodes), 4), np.nan), np.full((len(nodes), 3, 3), np.nan)
+    first = int(np.flatnonzero(traces["count"] == 0).max(initial=-1)) + 1
+    nodes, traces = nodes[first:], traces[first:]
+    track = make_track(len(nodes))
+    origin = trace_back(nodes, traces, track.reference, track.blocked)
+    kind = int(traces["kind"][-1, 0])
+    _set_prior(track, traces, max(origin, 0), now[0], _reference_variance(nodes, traces, now[0], kind, t))
+    likelihood = smooth(track, nodes, now, anchors, kind, t, False, ITERATIONS)
+    if math.isfinite(likelihood):
+        describe_all(track.smooth, track.smooth_cov, points[first:], covs[first:])
+    return points, covs
+
+
+def _reference_variance(nodes: Array, traces: Array, now: Array, kind: int, t: Tuning) -> float:
+    """Variance of the error of the heading reference that the model at the end has, in rad^2."""
+    if kind == DRIFTING:
+        return 0.0
+    absolute = nodes["heading_var"][nodes["heading_kind"] == ABSOLUTE_HEADING]
+    model = int(now["model"])
+    claimed = float(absolute[0]) if model == COMMON and len(absolute) else 0.0
+    slow = error_of(now, claimed)[1] if model != STEADY else float(traces["cov"][0, 0, REF, REF]) ** 0.5
+    return slow**2 + (t.second_std**2 if kind == OWN_ERROR and model != STEADY else 0.0)
+
+
+def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_variance: float) -> None:
+    """The hypothesis that began the lineage; with an unknown start bearing, speed and yaw are those found, loosely.
+
+    With a given start and a magnetometer that yaw counts from later on, it counts from there all the time.
+    """
+    mean, cov, found = traces["mean"][0, origin].copy(), traces["cov"][0, origin].copy(), track.reference[0]
+    if now["start_known"] == 1 and now["model"] == COMMON and traces["model"][0] != COMMON:
+        recount_yaw(cov, UNKNOWN_ANGLE**2)
+        cov[REF, :] = cov[:, REF] = 0.0
+    cov[REF, REF] = max(cov[REF, REF], reference_variance)
+    if now["start_known"] == 0:
+        mean[[PHI, V, YAW]] = found[[PHI, V, YAW]]
+        cov[PHI, PHI] += UNKNOWN_ANGLE**2
+        cov[V, V] += UNKNOWN_SPEED**2
+        if traces["referred"][0] != now["referred"]:
+            cov[YAW, YAW] += UNKNOWN_ANGLE**2
+    for angle in (PHI, YAW):
+        mean[angle] = found[angle] + math.remainder(mean[angle] - found[angle], 2.0 * math.pi)
+    track.mean[0], track.cov[0] = mean, cov
+
+
+def _put(poses: Array, points: Array, covs: Array, seen: Array, now: Array, anchors: Array) -> None:
+    """Smoothed numbers into the poses; `seen`: the belief that has seen the data of each."""
+    good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2))
+    if now["start_known"] == 0:
+        std = float(now["reference_std"]) if now["referred"] == 1 else ARBITRARY_YAW
+        for k in np.flatnonzero(good):
+            add_reference(covs[k], points[k, 0], points[k, 1], std**2)
+    anchor = anchors[now["anchor"]]
+    poses["x"][good], poses["y"][good] = points[good, 0] + anchor["x"], points[good, 1] + anchor["y"]
+    poses["heading"][good], poses["speed"][good] = points[good, 2], points[good, 3]
+    poses["cov"][good] = covs[good]
+    poses["sigma_pos"][good] = np.sqrt(covs[good, 0, 0] + covs[good, 1, 1])
+    poses["p_mode"][good] = seen["p_mode"][good]
+    resolved = good & np.isin(seen["state"], RESOLVED) & (poses["state"] == State.AMBIGUOUS)
+    poses["state"][resolved], poses["reason"][resolved] = State.TRACKING, StateReason.RESOLVED
+    unsure = good & (seen["state"] == State.AMBIGUOUS)
+    poses["state"][unsure], poses["reason"][unsure] = State.AMBIGUOUS, StateReason.SEVERAL_MODES

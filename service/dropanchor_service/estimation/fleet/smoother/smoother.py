@@ -1,0 +1,298 @@
+"""Iterated Kalman smoother over nodes: the state and models of the belief, one hypothesis, all of the nodes at once.
+
+About a reference track x~ every node is linear,  x_k = f(x~_{k-1}) + A_k (x_{k-1} - x~_{k-1}) + q_k,  and so is every
+measurement,  z = h(x~_k) + H (x_k - x~_k) + r.  A forward Kalman filter and the backward recursion of Bryson and
+Frazier (Bierman 1973, "Fixed interval smoothing with discrete measurements", eq. 20-24; as Rauch-Tung-Striebel, with no
+inverse, so states without noise do no harm) give the smoothed track; it becomes the next reference. This is
+Gauss-Newton on the posterior of the whole track (Bell 1994, "The iterated Kalman smoother as a Gauss-Newton method").
+
+    forward   P- = A P A^T + Q,  S = H P- H^T + R,  x += P- H e / S,  P = P- - P- H H^T P- / S
+    backward  l~ = l - H (H^T P- l + e) / S,  L~ = (I - K H^T)^T L (I - K H^T) + H H^T / S,  l = A^T l~,  L = A^T L~ A
+    smoothed  x - P l,  P - P L P
+
+A range is clear, too long by about the outlier's mean, or nonsense: the probabilities come from the forward innovation
+at first, then from the smoothed residual (expectation-maximisation), and weight the range's information.
+"""
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dropanchor_service.estimation.fleet.belief.heading_models import error_of_class
+from dropanchor_service.estimation.fleet.belief.layout import GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
+from dropanchor_service.estimation.fleet.belief.predict import diffuse, fill_class, fill_decay, move, transport
+from dropanchor_service.estimation.fleet.belief.start import counts_from
+from dropanchor_service.estimation.fleet.belief.update import (
+    correct,
+    gaussian,
+    predict_range,
+    project,
+    rest_variance,
+    wrap,
+)
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, RANGE
+from dropanchor_service.estimation.fleet.smoother.products import applied, inner, times
+from dropanchor_service.estimation.fleet.tuning import Tuning
+
+MEASUREMENTS: Final = 5  # of one node: heading, speed and gyro at rest, bound of the speed, range or bearing
+BOUND_STD: Final = 0.05  # m/s, softness of the bounds on the speed
+BEARING_STD: Final = 0.1  # rad, of a bearing whose std is not told
+BLOCK_STD: Final = 1.1  # m, of a range offset that appears or goes: the outlier's mean and spread
+CONVERGED: Final = 1e-3  # m
+
+Floats = npt.NDArray[np.float64]
+
+
+class Track(NamedTuple):
+    """One hypothesis over up to n nodes. mean[0], cov[0]: the prior at node 0, whose measurements are not used."""
+
+    reference: Floats  # (n, N)
+    mean: Floats  # (n, N) filtered
+    cov: Floats  # (n, N, N)
+    F: Floats  # (n, 4, N)
+    decay: Floats  # (n, N)
+    used: npt.NDArray[np.int32]  # (n,) measurements of the node
+    H: Floats  # (n, MEASUREMENTS, N)
+    PH: Floats  # (n, MEASUREMENTS, N)
+    S: Floats  # (n, MEASUREMENTS)
+    e: Floats  # (n, MEASUREMENTS)
+    share: Floats  # (n, 2) probability that the range is clear, and that it is too long
+    blocked: npt.NDArray[np.int32]  # (n,) the line of sight is blocked
+    smooth: Floats  # (n, N)
+    smooth_cov: Floats  # (n, N, N)
+
+
+def make_track(n: int) -> Track:
+    """Room for n nodes."""
+    return Track(
+        np.zeros((n, N)),
+        np.zeros((n, N)),
+        np.zeros((n, N, N)),
+        np.zeros((n, 4, N)),
+        np.ones((n, N)),
+        np.zeros(n, np.int32),
+        np.zeros((n, MEASUREMENTS, N)),
+        np.zeros((n, MEASUREMENTS, N)),
+        np.ones((n, MEASUREMENTS)),
+        np.zeros((n, MEASUREMENTS)),
+        np.tile([1.0, 0.0], (n, 1)),
+        np.zeros(n, np.int32),
+        np.zeros((n, N)),
+        np.zeros((n, N, N)),
+    )
+
+
+@njit(nogil=True)
+def noise_of(node: Any, row: Any, kind: int, t: Tuning, decay: Any, growth: Any) -> None:
+    """Decay of the states over the node and the variances it adds, as in the filter."""
+    fill_decay(decay, growth, node, row, t)
+    fill_class(decay, growth, node, row, kind, t)
+
+
+@njit(nogil=True)
+def _predict(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, scratch: Any) -> None:
+    growth, s, A = scratch
+    F, decay, m, P = track.F[k], track.decay[k], track.mean[k], track.cov[k]
+    noise_of(node, row, kind, t, decay, growth)
+    s[:] = track.reference[k - 1]
+    d = track.mean[k - 1] - s
+    move(s, node, decay, F)
+    m[:] = s
+    for j in range(N):
+        for i in range(4):
+            m[i] += F[i, j] * d[j]
+    for j in range(4, N):
+        m[j] += decay[j] * d[j]
+    P[:] = track.cov[k - 1]
+    transport(P, F, decay, A)
+    diffuse(s, P, F, growth, node, t, track.blocked[k])
+    if track.blocked[k] != track.blocked[k - 1]:
+        P[OFFSET, OFFSET] += BLOCK_STD**2
+
+
+@njit(nogil=True)
+def _measure(track: Track, k: int, H: Any, e: float, variance: float) -> None:
+    """Fuse z = h + noise; e = z - h(reference), H = dh/dx there."""
+    m, P, n = track.mean[k], track.cov[k], track.used[k]
+    PH = track.PH[k, n]
+    S = project(P, H, PH) + variance
+    for i in range(N):
+        e -= H[i] * (m[i] - track.reference[k, i])
+    track.H[k, n], track.S[k, n], track.e[k, n] = H, S, e
+    track.used[k] += 1
+    correct(m, P, PH, S, e, 1.0)
+
+
+@njit(nogil=True)
+def _component(track: Track, k: int, index: int, z: float, variance: float, H: Any) -> None:
+    H[:] = 0.0
+    H[index] = 1.0
+    _measure(track, k, H, z - track.reference[k, index], variance)
+
+
+@njit(nogil=True)
+def _inertial(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, H: Any) -> None:
+    """Heading, standstill, and the bounds on the speed."""
+    s = track.reference[k]
+    if counts_from(row, node) and (row.model != STEADY or kind == 0):
+        white, _, _ = error_of_class(row, kind, node.heading_var, t)
+        H[:] = 0.0
+        H[YAW] = H[REF] = 1.0
+        _measure(track, k, H, wrap(node.heading - row.north - s[YAW] - s[REF]), white)
+    if node.rest == 1:
+        _component(track, k, V, 0.0, t.rest_std**2, H)
+    if node.rest == 1 and node.gyro_var > 0.0:
+        prior = track.cov[k, GYRO, GYRO]
+        if prior > 1.001 * node.gyro_var:
+            _component(track, k, GYRO, 0.0, rest_variance(prior, node), H)
+    elif node.rest > 0 and node.dt_s > 0.0:
+        variance = node.dyaw_var / node.dt_s**2 + t.rest_rate_std**2
+        _component(track, k, GYRO, node.dyaw / node.dt_s, variance, H)
+    low = -row.v_max if row.reverse == 1 else -t.reverse_slack
+    if s[V] < low:
+        _component(track, k, V, low, BOUND_STD**2, H)
+    elif s[V] > row.v_max:
+        _component(track, k, V, row.v_max, BOUND_STD**2, H)
+
+
+@njit(nogil=True)
+def range_residual(s: Any, node: Any, row: Any, anchors: Any, H: Any) -> tuple[float, float]:
+    """(z - h(s), variance of a clear range); H receives dh/ds."""
+    anchor, primary = anchors[node.anchor], anchors[row.anchor]
+    dz = row.height - anchor.z
+    z = node.z / row.range_scale
+    std = node.z_std if math.isfinite(node.z_std) and node.z_std > 0.0 else row.range_std
+    variance = std * std + (dz * row.height_std / max(z, 0.1)) ** 2
+    if node.anchor != row.anchor:
+        variance += row.offset_std**2
+    return z - predict_range(s, anchor.x - primary.x, anchor.y - primary.y, dz, node.lag_s, H), variance
+
+
+@njit(nogil=True)
+def assign(share: Any, e2: float, e: float, clear: float, long: float, t: Tuning) -> float:
+    """Shares of a clear and of a too long range, with these variances; returns the log likelihood. e2: e^2 expected."""
+    spread = e2 - e * e
+    inside = (1.0 - t.outlier) * gaussian(math.sqrt(max(e2, 0.0)), clear)
+    outside = t.outlier * gaussian(math.sqrt((e - t.outlier_mean) ** 2 + spread), long)
+    total = inside + outside + t.outlier * t.outlier_floor
+    share[0], share[1] = inside / total, outside / total
+    return math.log(total)
+
+
+@njit(nogil=True)
+def _range(track: Track, k: int, node: Any, row: Any, anchors: Any, t: Tuning, follow: bool, H: Any) -> float:
+    e, variance = range_residual(track.reference[k], node, row, anchors, H)
+    innovation = e
+    for i in range(N):
+        innovation -= H[i] * (track.mean[k, i] - track.reference[k, i])
+    S = project(track.cov[k], H, track.PH[k, track.used[k]]) + variance
+    share = np.zeros(2)
+    likelihood = assign(share, innovation**2, innovation, S, S + t.outlier_std**2, t)
+    if follow:
+        track.share[k] = share
+    clear = track.share[k, 0] / variance
+    long = track.share[k, 1] / (variance + t.outlier_std**2)
+    if clear + long > 1e-6:
+        _measure(track, k, H, e - t.outlier_mean * long / (clear + long), 1.0 / (clear + long))
+    return likelihood
+
+
+@njit(nogil=True)
+def _bearing(track: Track, k: int, node: Any, row: Any, anchors: Any, H: Any) -> None:
+    anchor, primary, s = anchors[node.anchor], anchors[row.anchor], track.reference[k]
+    c, sn = math.cos(s[PHI]), math.sin(s[PHI])
+    dx, dy = s[R] * c - (anchor.x - primary.x), s[R] * sn - (anchor.y - primary.y)
+    d2 = max(dx * dx + dy * dy, 1e-6)
+    H[:] = 0.0
+    H[R] = (dx * sn - dy * c) / d2
+    H[PHI] = s[R] * (dx * c + dy * sn) / d2
+    std = node.z_std if math.isfinite(node.z_std) and node.z_std > 0.0 else BEARING_STD
+    _measure(track, k, H, wrap(node.z - math.atan2(dy, dx)), std * std)
+
+
+@njit(nogil=True)
+def forward(track: Track, nodes: Any, row: Any, anchors: Any, kind: int, t: Tuning, follow: bool) -> float:
+    """Filter about the reference; `follow`: the reference is the filter itself. Returns the log likelihood."""
+    scratch = (np.zeros(N), np.zeros(N), np.zeros((4, N)))
+    H = np.zeros(N)
+    likelihood = 0.0
+    for k in range(1, len(nodes)):
+        node = nodes[k]
+        if follow:
+            track.reference[k - 1] = track.mean[k - 1]
+        _predict(track, k, node, row, kind, t, scratch)
+        if follow:
+            track.reference[k] = track.mean[k]
+        track.used[k] = 0
+        _inertial(track, k, node, row, kind, t, H)
+        if node.kind == RANGE:
+            likelihood += _range(track, k, node, row, anchors, t, follow, H)
+        elif node.kind == BEARING:
+            _bearing(track, k, node, row, anchors, H)
+    return likelihood
+
+
+@njit(nogil=True)
+def _adjoin(H: Any, PH: Any, S: float, e: float, costate: Any, L: Any) -> None:
+    """Costate l and its covariance L back over one scalar measurement."""
+    g = applied(L, PH) / S
+    c = (inner(PH, g) + 1.0) / S
+    pull = (inner(PH, costate) + e) / S
+    for i in range(N):
+        costate[i] -= H[i] * pull
+        for j in range(N):
+            L[i, j] += H[i] * H[j] * c - H[i] * g[j] - g[i] * H[j]
+
+
+@njit(nogil=True)
+def backward(track: Track, n: int) -> None:
+    """Fill smooth and smooth_cov of the first n nodes from what `forward` left."""
+    costate, L, A = np.zeros(N), np.zeros((N, N)), np.zeros((N, N))
+    for k in range(n - 1, -1, -1):
+        P = track.cov[k]
+        track.smooth[k] = track.mean[k] - applied(P, costate)
+        track.smooth_cov[k] = P - times(P, times(L, P))
+        for m in range(track.used[k] - 1, -1, -1):
+            _adjoin(track.H[k, m], track.PH[k, m], track.S[k, m], track.e[k, m], costate, L)
+        A[:] = 0.0
+        A[:4] = track.F[k]
+        for i in range(4, N):
+            A[i, i] = track.decay[k, i]
+        costate[:] = applied(A.T, costate)
+        L[:] = times(A.T, times(L, A))
+
+
+@njit(nogil=True)
+def _adopt(track: Track, nodes: Any, row: Any, anchors: Any, t: Tuning) -> float:
+    """The smoothed track becomes the reference, ranges are judged anew; returns the largest step, m."""
+    H, PH = np.zeros(N), np.zeros(N)
+    largest = 0.0
+    for k in range(len(nodes)):
+        s, old, node = track.smooth[k], track.reference[k], nodes[k]
+        step = math.hypot(s[R] - old[R], old[R] * (s[PHI] - old[PHI]))
+        largest = max(largest, step)
+        old[:] = s
+        old[R] = max(old[R], 1e-3)
+        if k > 0 and node.kind == RANGE:
+            e, variance = range_residual(old, node, row, anchors, H)
+            e2 = e * e + project(track.smooth_cov[k], H, PH)
+            assign(track.share[k], e2, e, variance, variance + t.outlier_std**2, t)
+    return largest
+
+
+@njit(nogil=True, cache=True)
+def smooth(
+    track: Track, nodes: Any, rows: Any, anchors: Any, kind: int, t: Tuning, follow: bool, iterations: int
+) -> float:
+    """Iterate from the reference, or from a filter's track (`follow`); returns the log likelihood of the ranges."""
+    row = rows[0]
+    likelihood = -math.inf
+    for i in range(iterations):
+        likelihood = forward(track, nodes, row, anchors, kind, t, follow and i == 0)
+        backward(track, len(nodes))
+        if _adopt(track, nodes, row, anchors, t) < CONVERGED:
+            break
+    return likelihood

@@ -1,0 +1,146 @@
+"""The engine `paper`: Algorithm 1 of "Accurate position tracking with a single UWB anchor", one instance per tag.
+
+It is written to be read beside the paper and to be compared with, not to be fast. Its filter has one mode and does
+not know of the mirror image of its track, so `p_mode` and `sigma_obs` of its poses are NaN.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import replace
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.estimation.columns import (
+    ANCHOR,
+    INNOVATION,
+    POSE,
+    Array,
+    MeasurementKind,
+    PoseBatch,
+    SampleBatch,
+)
+from dropanchor_service.estimation.paper.algorithm1 import Algorithm1, PoseRow
+from dropanchor_service.estimation.paper.parameters import PaperParameters
+from dropanchor_service.estimation.paper.tag import Tag
+
+IMU, HEADING, RANGE = range(3)  # the order in which samples of the same instant are taken
+ABSURD = 1e6  # in any unit of a sample
+Event = tuple[int, int, int, tuple[Any, ...]]
+"""Row, t_ns, kind, the rest of the sample."""
+
+
+class PaperEngine:
+    """Implements `Engine`."""
+
+    name = "paper"
+
+    def __init__(self, parameters: PaperParameters) -> None:
+        self._parameters = parameters
+        self._anchors: list[tuple[float, float, float]] = []
+        self._tags: dict[int, Tag] = {}
+        self._filters: dict[int, Algorithm1] = {}
+        self._times: dict[int, int] = {}  # of the newest sample of each row, ns
+
+    def set_anchors(self, anchors: Array) -> None:
+        """ANCHOR, indexed by the `anchor` columns of samples."""
+        self._anchors = anchors.astype(ANCHOR).tolist()
+
+    def configure(self, row: int, settings: Array) -> None:
+        """Make `row` with these TAG_SETTINGS (0-d), or start it afresh with new ones."""
+        self._tags[row] = Tag.of(settings)
+        self._filters[row] = Algorithm1(self._parameters, self._tags[row])
+        self._times.pop(row, None)
+
+    def process(self, samples: SampleBatch) -> PoseBatch:
+        """Take the samples of each row in order of time; what is older than its row is late and not used.
+
+        Bearings are not part of the paper and are passed over.
+        """
+        rejected: Counter[str] = Counter()
+        poses = []
+        innovations: list[tuple[Any, ...]] = []
+        with np.errstate(all="ignore"):  # numbers out of bounds are a fault of their row, not a warning
+            for event in _in_order(samples):
+                reason = self._refusal(event)
+                if reason is not None:
+                    rejected[reason] += 1
+                    continue
+                pose = self._take(event)
+                if pose is not None:
+                    poses.append((event[0], *pose))
+                    innovations.extend(self._innovation(event))
+        return PoseBatch(np.array(poses, POSE), innovations=np.array(innovations, INNOVATION), rejected=dict(rejected))
+
+    def _innovation(self, event: Event) -> Iterator[tuple[Any, ...]]:
+        """INNOVATION of a range that met a belief, in metres as measured."""
+        row, t_ns, _, (anchor, measured, _) = event
+        told = self._filters[row].innovation
+        if told is not None:
+            scale = self._tags[row].range_scale
+            y = told.y * scale
+            S = told.S * scale**2
+            yield row, t_ns, MeasurementKind.RANGE, anchor, measured, measured - y, y, S, math.nan, told.fused
+
+    def _refusal(self, event: Event) -> str | None:
+        """Why a sample is not used. Values are screened before; this keeps the state safe all the same."""
+        row, t_ns, kind, values = event
+        if t_ns < self._times.get(row, t_ns):
+            return "late"
+        if kind == RANGE and not 0 <= values[0] < len(self._anchors):
+            return "anchor_unknown"
+        return _fault_of(kind, values)
+
+    def _take(self, event: Event) -> PoseRow | None:
+        """One sample into its row. Numbers that blow up cost the row its state, and no other row anything."""
+        row, t_ns, kind, _ = event
+        self._times[row] = t_ns
+        try:
+            pose = self._fuse(event)
+            healthy = self._filters[row].finite
+        except (ArithmeticError, ValueError):
+            healthy = False
+        if healthy:
+            return pose
+        self._filters[row] = Algorithm1(self._parameters, replace(self._tags[row], start_known=False), faulted=True)
+        return self._filters[row].pose_before_start(t_ns) if kind == RANGE else None
+
+    def _fuse(self, event: Event) -> PoseRow | None:
+        row, t_ns, kind, values = event
+        tag_filter = self._filters[row]
+        if kind == IMU:
+            tag_filter.take_imu(t_ns, *values)
+            return None
+        if kind == HEADING:
+            tag_filter.take_heading(t_ns, *values)
+            return None
+        index, measured, std = values
+        x, y, z = self._anchors[index]
+        return tag_filter.take_range(t_ns, index, (x, y, z - self._tags[row].height), measured, std)
+
+
+def _in_order(samples: SampleBatch) -> Iterator[Event]:
+    """All samples by row, then time, then kind; what is equal in all three stays in order of arrival."""
+    events: list[Event] = []
+    for kind, columns, names in (
+        (IMU, samples.imu, ("acc", "gyro", "mag")),
+        (HEADING, samples.headings, ("heading", "std")),
+        (RANGE, samples.ranges, ("anchor", "range", "std")),
+    ):
+        values = zip(*(columns[name].tolist() for name in names), strict=True)
+        rows, times = columns["row"].tolist(), columns["t_ns"].tolist()
+        events.extend((row, t_ns, kind, v) for row, t_ns, v in zip(rows, times, values, strict=True))
+    events.sort(key=itemgetter(0, 1, 2))
+    yield from events
+
+
+def _fault_of(kind: int, values: tuple[Any, ...]) -> str | None:
+    """What is wrong with the numbers that a sample must have; a magnetic field and a std may be missing."""
+    needed = (*values[0], *values[1]) if kind == IMU else values[:1] if kind == HEADING else values[1:2]
+    if not all(map(math.isfinite, needed)):
+        return "not_finite"
+    if max(map(abs, needed)) > ABSURD:
+        return ("imu_absurd", "heading_absurd", "range_absurd")[kind]
+    return None

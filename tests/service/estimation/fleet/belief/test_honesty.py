@@ -1,0 +1,100 @@
+"""What the belief promises when things go wrong: not to be sure of a place in which the tag is not.
+
+Seeds 2000 to 2011; the belief was tuned on others.
+"""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import State
+from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees
+from service.estimation.fleet.tracks import Drive, drive, track
+
+BURSTS_S = ((3.0, 5.0, 1.5), (12.0, 13.5, 0.8), (20.0, 23.0, 1.2))  # from, to, metres too long
+BIAS = 0.1  # rad
+
+
+def distance(beliefs: Any, truth: Drive) -> Any:
+    return np.hypot(beliefs["x"] - truth.x, beliefs["y"] - truth.y)
+
+
+def inside(beliefs: Any, truth: Drive) -> Any:
+    """Whether the truth lies in the 95 % ellipse."""
+    e = np.stack([beliefs["x"] - truth.x, beliefs["y"] - truth.y], axis=1)
+    return nees(e, beliefs["cov"][:, :2, :2]) < CHI2_95_2DOF
+
+
+def elsewhere(beliefs: Any, truth: Drive) -> Any:
+    """Tracking, and further from the truth than 2 m and a tenth of the range."""
+    far = distance(beliefs, truth) > np.maximum(2.0, 0.1 * np.hypot(truth.x, truth.y))
+    return (beliefs["state"] == State.TRACKING) & far
+
+
+def blocked(seed: int) -> Drive:
+    """A drive with bursts of ranges that are too long."""
+    truth = drive(seed)
+    t = truth.nodes["t_ns"] * 1e-9
+    for first, last, excess in BURSTS_S:
+        truth.nodes["z"][(t >= first) & (t < last)] += excess
+    return truth
+
+
+def misled(seed: int) -> Drive:
+    """A drive with a heading reference that is wrong by a constant."""
+    truth = drive(seed)
+    truth.nodes["heading"] += BIAS
+    return truth
+
+
+def drifting(seed: int) -> Drive:
+    """A drive with a gyroscope whose bias swings by 0.03 rad/s within a minute."""
+    truth = drive(seed)
+    truth.nodes["dyaw"] += 0.03 * np.sin(2 * np.pi * truth.nodes["t_ns"] * 1e-9 / 60.0) * truth.nodes["dt_s"]
+    return truth
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_line_of_sight_that_is_blocked_for_seconds_is_seen_through(known: bool) -> None:
+    runs = [(track(d, known), d) for d in map(blocked, range(2000, 2012))]
+    assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.01
+    assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
+    assert np.mean([distance(b, d)[-50:].max() < 2.0 for b, d in runs]) > 0.9
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_heading_reference_with_a_constant_error_never_makes_the_ellipse_exclude_the_truth(known: bool) -> None:
+    runs = [(track(d, known), d) for d in map(misled, range(2000, 2012))]
+    tracking = [inside(b, d)[b["state"] == State.TRACKING].mean() for b, d in runs]
+    assert np.mean(tracking) > 0.93
+    assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
+
+
+def test_the_ranges_tell_a_gyroscope_that_drifts_from_a_heading_that_does() -> None:
+    runs = [(track(d, known=True), d) for d in map(drifting, range(2000, 2012))]
+    assert np.median([np.sqrt(np.mean(distance(b, d) ** 2)) for b, d in runs]) < 0.5
+    assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
+    assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.02
+
+
+def test_while_it_does_not_know_the_ellipse_holds_all_the_places_where_the_tag_may_be() -> None:
+    runs = [(track(d, known=False), d) for d in map(drive, range(2000, 2012))]
+    ambiguous = [inside(b, d)[20:][b["state"][20:] == State.AMBIGUOUS] for b, d in runs]
+    assert np.concatenate(ambiguous).mean() > 0.9
+
+
+def test_a_tag_that_is_first_heard_in_motion_is_not_declared_in_the_wrong_place() -> None:
+    for truth in map(drive, range(2000, 2012)):
+        late = Drive(*(column[100:] for column in truth))
+        beliefs = track(late, known=False)
+        assert elsewhere(beliefs, late).mean() < 0.02
+
+
+def test_after_a_wrong_turn_of_belief_an_exact_heading_is_tried_again() -> None:
+    """Ranges too long from the very start make a wrong reference look likely; later ranges say that it is right."""
+    runs = []
+    for truth in map(drive, range(2000, 2008)):
+        truth.nodes["z"][:25] += 0.6
+        runs.append((track(truth, known=True), truth))
+    assert np.median([distance(b, d)[-80:].mean() for b, d in runs]) < 0.6

@@ -1,0 +1,147 @@
+"""The compiled attitude filter against known rotations, the readable filter and the library ahrs."""
+
+import math
+from typing import Any
+
+import ahrs
+import numpy as np
+import pytest
+from numba import njit
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from dropanchor_service.estimation.fleet.frontend.attitude import (
+    ATTITUDE,
+    correct_tilt,
+    down_weight,
+    rotate_by,
+    turn,
+    yaw_of,
+)
+from dropanchor_service.estimation.paper.attitude import AttitudeFilter, AttitudeParameters
+from support.imu import G0, Motion, synthesise, turning, wrapped
+
+Array = NDArray[Any]
+
+
+@njit
+def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Array) -> None:
+    for k in range(len(t)):
+        dt = t[k] - t[k - 1] if k else 0.0
+        turn(a, dt, gyro[k], t[k] < rest_until)
+        correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until)
+        q[k] = a.q
+
+
+def attitude_of(m: Motion, start: Array, rest_until: float = -1.0) -> tuple[Array, Array]:
+    """The quaternions (n, 4) and the row after the motion; start (w, x, y, z)."""
+    row = np.zeros(1, ATTITUDE)
+    row[0]["q"] = start
+    row[0]["gyro"] = m.gyro[0]
+    row[0]["gravity"] = G0
+    q = np.empty((len(m.t), 4))
+    follow(row[0], m.t, m.acc, m.gyro, rest_until, q)
+    return q, row[0]
+
+
+def wxyz(r: Rotation) -> Array:
+    return np.roll(r.as_quat(), 1, axis=-1)
+
+
+def rotations(q: Array) -> Rotation:
+    return Rotation.from_quat(np.roll(q, -1, axis=-1))
+
+
+def angle_between(q: Array, truth: Rotation) -> Array:
+    """rad, (n,)."""
+    return (rotations(q).inv() * truth).magnitude()  # type: ignore[no-any-return]
+
+
+def test_a_small_turn_is_the_exponential_map_on_both_sides_of_the_series_limit() -> None:
+    for angle in (1e-9, 0.01, 0.39, 0.41, 1.0, 3.0):
+        q = np.array([0.5, -0.5, 0.5, 0.5])
+        vector = angle * np.array([0.6, -0.64, 0.48])
+        expected = wxyz(rotations(q) * Rotation.from_rotvec(vector))
+        rotate_by(q, *vector)
+        assert abs(abs(q @ expected) - 1) < 1e-12
+
+
+def test_perfect_samples_keep_the_attitude_over_many_turns_past_pi() -> None:
+    m = synthesise(np.arange(0, 60, 0.01), turning)
+    q, _ = attitude_of(m, wxyz(m.attitude[0]))
+    assert angle_between(q, m.attitude).max() < math.radians(0.1)
+
+
+def test_yaw_is_the_azimuth_of_the_body_x_axis_for_any_pitch_and_roll() -> None:
+    angles = np.random.default_rng(1).uniform([-3.1, -1.4, -3.1], [3.1, 1.4, 3.1], (200, 3))
+    for q, yaw in zip(wxyz(Rotation.from_euler("ZYX", angles)), angles[:, 0], strict=True):
+        assert yaw_of(q) == pytest.approx(yaw, abs=1e-9)
+
+
+def test_a_wrong_tilt_at_start_is_gone_within_a_second_because_the_gain_ramps() -> None:
+    m = synthesise(np.arange(0, 2, 0.01), lambda t: np.zeros((len(t), 3)))
+    q, _ = attitude_of(m, wxyz(Rotation.from_euler("ZYX", [0, 0.3, -0.4])))
+    up = rotations(q[100]).apply([0.0, 0.0, 1.0])
+    assert np.hypot(up[0], up[1]) < math.radians(1)
+
+
+def test_the_weight_of_the_accelerometer_fades_between_ten_and_twenty_percent() -> None:
+    assert [down_weight(d) for d in (0, 0.1, -0.15, 0.2, -3)] == pytest.approx([1, 1, 0.5, 0, 0])
+
+
+def test_a_hard_push_does_not_tilt_the_attitude() -> None:
+    def push(t: Array) -> Array:
+        return np.stack([np.where((t > 20) & (t < 22), 8.0, 0.0), 0 * t, 0 * t], axis=1)
+
+    m = synthesise(np.arange(0, 22, 0.01), lambda t: np.zeros((len(t), 3)), push)
+    q, _ = attitude_of(m, np.array([1.0, 0, 0, 0]))
+    assert angle_between(q, m.attitude).max() < math.radians(0.1)
+
+
+@pytest.mark.parametrize(("rest_until", "least", "most"), [(0.9, 1.0, 3.0), (-1.0, 5.0, 30.0)])  # deg
+def test_a_second_of_rest_makes_the_first_push_one_of_motion(rest_until: float, least: float, most: float) -> None:
+    def push(t: Array) -> Array:
+        return np.stack([np.where(t > 1, 4.0, 0.0), 0 * t, 0 * t], axis=1)
+
+    m = synthesise(np.arange(0, 1.5, 0.01), lambda t: np.zeros((len(t), 3)), push)
+    q, _ = attitude_of(m, np.array([1.0, 0, 0, 0]), rest_until)
+    assert math.radians(least) < angle_between(q, m.attitude).max() < math.radians(most)
+
+
+def test_an_accelerometer_that_reads_six_percent_high_is_its_own_gravity() -> None:
+    m = synthesise(np.arange(0, 60, 0.01), turning)
+    m.acc *= 1.06
+    q, row = attitude_of(m, wxyz(m.attitude[0]))
+    assert angle_between(q, m.attitude).max() < math.radians(0.1)
+    assert row["gravity"] == pytest.approx(1.06 * G0, rel=1e-3)
+
+
+def test_tilt_teaches_the_gyroscope_bias_across_the_vertical() -> None:
+    m = synthesise(np.arange(0, 300, 0.02), lambda t: np.zeros((len(t), 3)))
+    m.gyro += [0.01, -0.006, 0.0]
+    _, row = attitude_of(m, np.array([1.0, 0, 0, 0]))
+    assert row["bias"] == pytest.approx([0.01, -0.006, 0.0], abs=5e-4)
+
+
+def test_the_readable_filter_agrees_on_the_same_six_axis_samples() -> None:
+    rng = np.random.default_rng(2)
+    m = synthesise(np.arange(0, 40, 0.01), turning)
+    m.gyro += rng.normal(0, 0.01, m.gyro.shape)
+    m.acc += rng.normal(0, 0.1, m.acc.shape)
+    readable = AttitudeFilter(AttitudeParameters(yaw_time=math.inf), yaw_start=0.0)
+    theirs = []
+    for acc, gyro in zip(m.acc.tolist(), m.gyro.tolist(), strict=True):
+        readable.step(0.01, tuple(acc), tuple(gyro), (math.nan, math.nan, math.nan))
+        theirs.append(readable.q)
+    q, _ = attitude_of(m, np.array(theirs[0]))
+    assert angle_between(q, rotations(np.array(theirs))).max() < math.radians(1.5)
+
+
+def test_ahrs_aqua_agrees_on_tilt_and_yaw_increments() -> None:
+    m = synthesise(np.arange(0, 40, 0.01), turning)
+    start = wxyz(m.attitude[0])
+    filtered = ahrs.filters.AQUA(gyr=m.gyro, acc=m.acc, frequency=100.0, q0=start * [1, -1, -1, -1])
+    theirs = rotations(filtered.Q * [1, -1, -1, -1])  # ahrs turns world into body
+    q, _ = attitude_of(m, start)
+    assert angle_between(q, theirs).max() < math.radians(1.5)
+    assert abs(wrapped(m.yaw - np.array([yaw_of(v) for v in q]))).max() < math.radians(0.1)

@@ -1,0 +1,118 @@
+"""Nodes against a fine, independent integration, and what makes their variances grow."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING, RELATIVE_HEADING
+from support.frontend import new_frontend, run
+from support.imu import Motion, synthesise, turning, wrapped
+
+Array = NDArray[Any]
+
+
+def weaving(t: Array) -> Array:
+    """ENU acceleration, m/s²."""
+    return np.stack([0.8 * np.cos(1.1 * t), 0.6 * np.sin(1.7 * t), 0.3 * np.sin(2.3 * t)], axis=1)
+
+
+def six_axis(seconds: float, dt: float = 0.01) -> Motion:
+    m = synthesise(np.arange(0, seconds, dt), lambda t: turning(t, 0.6, 0.05), weaving)
+    m.mag[:] = np.nan
+    return m
+
+
+def velocity_change(t0: Array, t1: Array) -> Array:
+    """(n, 2) m/s, ENU: the exact integral of `weaving`."""
+
+    def v(t: Array) -> Array:
+        return np.stack([0.8 / 1.1 * np.sin(1.1 * t), -0.6 / 1.7 * np.cos(1.7 * t)], axis=1)
+
+    return v(t1) - v(t0)
+
+
+def test_yaw_increments_are_those_of_the_truth_between_samples_too() -> None:
+    m = six_axis(40)
+    ends = np.cumsum(np.random.default_rng(1).uniform(0.02, 0.1, 500))
+    nodes = run(new_frontend(), m, ends)
+    yaw = np.interp(ends, m.t, np.unwrap(m.yaw))
+    assert abs(nodes["dyaw"][1:] - np.diff(yaw)).max() < 2e-3
+    assert abs(np.cumsum(nodes["dyaw"])[1:] - (yaw[1:] - m.yaw[0])).max() < math.radians(0.3)
+
+
+def test_velocity_increments_are_gravity_free_and_in_the_body_yaw_frame_at_the_start() -> None:
+    m = six_axis(40)
+    ends = np.arange(0.1, 39.9, 0.1)
+    nodes = run(new_frontend(), m, ends)
+    start = np.interp(ends - 0.1, m.t, np.unwrap(m.yaw))
+    dv = velocity_change(ends - 0.1, ends)
+    forward = np.cos(start) * dv[:, 0] + np.sin(start) * dv[:, 1]
+    left = np.cos(start) * dv[:, 1] - np.sin(start) * dv[:, 0]
+    settled = ends > 20  # the tilt correction takes accelerations for gravity at first
+    assert abs(nodes["dv_forward"] - forward)[settled].max() < 0.03
+    assert abs(nodes["dv_left"] - left)[settled].max() < 0.03
+    assert np.corrcoef(nodes["dv_forward"][settled], forward[settled])[0, 1] > 0.98
+
+
+def test_cutting_a_node_in_two_changes_nothing_in_the_sum() -> None:
+    m = six_axis(20)
+    coarse = np.arange(0.1, 19.9, 0.1)
+    fine = np.sort(np.concatenate([coarse, coarse[:-1] + 0.037]))
+    a, b = run(new_frontend(), m, coarse), run(new_frontend(), m, fine)
+    assert np.sum(b["dyaw"]) == pytest.approx(np.sum(a["dyaw"]), abs=1e-9)
+    assert np.sum(b["dyaw_var"]) < 1.01 * np.sum(a["dyaw_var"])
+    assert b["heading"][-1] == a["heading"][-1]
+
+
+def test_six_percent_of_accelerometer_scale_leaves_the_velocity_as_it_is() -> None:
+    m, high = six_axis(30), six_axis(30)
+    high.acc *= 1.06
+    ends = np.arange(0.1, 29.9, 0.1)
+    a, b = run(new_frontend(), m, ends), run(new_frontend(), high, ends)
+    assert abs(a["dv_forward"] - b["dv_forward"])[50:].max() < 2e-3
+
+
+def test_a_rough_ride_has_a_larger_velocity_variance_than_a_smooth_one() -> None:
+    smooth, rough = six_axis(20), six_axis(20)
+    rough.acc += np.random.default_rng(2).normal(0, 0.6, rough.acc.shape)
+    ends = np.arange(0.1, 19.9, 0.1)
+    a, b = run(new_frontend(), smooth, ends), run(new_frontend(), rough, ends)
+    assert b["dv_var"][-1] > 3 * a["dv_var"][-1]
+
+
+def test_without_an_accelerometer_the_velocity_variance_is_infinite_and_yaw_goes_on() -> None:
+    m = synthesise(np.arange(0, 20, 0.01), lambda t: turning(t, 0.6, 0.0))
+    m.acc[:] = np.nan
+    m.mag[:] = np.nan
+    nodes = run(new_frontend(), m, ends := np.arange(0.1, 19.9, 0.1))
+    assert np.isinf(nodes["dv_var"]).all()
+    assert abs(wrapped(nodes["heading"] - 0.6 * ends)).max() < 1e-3
+    assert not nodes["rest"].any()
+
+
+@pytest.mark.parametrize("silence", [0.3, 3.0])
+def test_a_silent_imu_makes_the_turn_uncertain_by_what_it_may_have_been(silence: float) -> None:
+    m = six_axis(20)
+    heard = (m.t < 10) | (m.t > 10 + silence)
+    ends = np.arange(0.1, 19.9, 0.1)
+    nodes = run(new_frontend(), m.at(heard), ends)
+    truth = np.interp(ends, m.t, np.unwrap(m.yaw))
+    e = wrapped(nodes["heading"] - truth + m.yaw[0])
+    assert (nodes["heading_kind"] == RELATIVE_HEADING).all()
+    assert abs(e / np.sqrt(nodes["heading_var"])).max() < 3
+    inside = (ends > 10.15) & (ends < 10 + silence)
+    assert nodes["dyaw_var"][inside].max() > 100 * nodes["dyaw_var"][ends < 9].max()
+
+
+def test_before_the_first_sample_a_node_says_that_it_knows_nothing() -> None:
+    m = six_axis(2)
+    m.t += 1.0
+    nodes = run(new_frontend(), m, np.array([0.3, 0.7]))
+    assert nodes["dt_s"] == pytest.approx([0.0, 0.4])
+    assert (nodes["heading_kind"] == NO_HEADING).all()
+    assert np.isinf(nodes["dv_var"]).all()
+    assert np.isinf(nodes["heading_var"]).all()
+    assert nodes["dyaw_var"][1] > 0.05
