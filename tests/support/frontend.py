@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, close_node, feed, start_frontend
+from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, add_sample, close_node, start_frontend
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from support.imu import Motion
 
@@ -25,11 +25,11 @@ def drive(f: Any, t: Array, acc: Array, gyro: Array, mag: Array, ends: Array, no
     k = 0
     for e in range(len(ends)):
         while k < len(t) and t[k] <= ends[e]:
-            feed(f, t[k], acc[k], gyro[k], mag[k])
+            add_sample(f, t[k], acc[k], gyro[k], mag[k])
             k += 1
         close_node(f, ends[e], nodes[e])
     while k < len(t):
-        feed(f, t[k], acc[k], gyro[k], mag[k])
+        add_sample(f, t[k], acc[k], gyro[k], mag[k])
         k += 1
 
 

@@ -1,10 +1,11 @@
-"""A tag's settings to its row, with the defaults of what is not told."""
+"""From the settings of a tag to its row, with the defaults of what the operator left out."""
 
 import math
 from typing import Any
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
@@ -12,44 +13,50 @@ RANGE_STD = 0.1  # m
 HEIGHT_STD = 0.15  # m
 START_STD = 0.1  # m
 START_HEADING_STD = 0.05  # rad
+START_SPEED_STD = 0.3  # m/s
 REFERENCE_STD = 0.1  # rad, constant error of a heading reference
-V_MAX = 10.0  # m/s
+SPEED_MAX = 10.0  # m/s
 MOUNT_KNOWN_STD, MOUNT_UNKNOWN_STD = 0.02, 0.5  # rad
-CRAB_KNOWN_STD, CRAB_UNKNOWN_STD = 0.05, 0.1  # rad, slip of what drives, and sway of what is carried
-CRAB_KNOWN_TAU, CRAB_UNKNOWN_TAU = 1.0, 3.0  # s
-GYRO_STD = 0.001  # rad/s, what is left of the gyroscope's bias after the front-end, at least
+SLIP_KNOWN_STD, SLIP_UNKNOWN_STD = 0.05, 0.1  # rad, slip of what drives, sway of what is carried
+SLIP_KNOWN_TAU, SLIP_UNKNOWN_TAU = 1.0, 3.0  # s
+GYRO_BIAS_STD = 0.001  # rad/s, least bias of the gyroscope that the front-end leaves
 
 
-def configured(settings: Any, tuning: Tuning) -> Any:
-    """ROW (0-d) of a tag that has heard nothing; settings: TAG_SETTINGS (0-d)."""
+def configure_row(columns: Array, tuning: Tuning) -> Array:
+    """Return ROW (0-d) of a tag without samples, from TAG_SETTINGS (0-d) and our defaults."""
     row = np.zeros((), ROW)
-    for name, _ in SETTINGS:
-        if name in settings.dtype.names:
-            row[name] = settings[name]
-    told = math.isfinite(settings["mount_angle"])
-    row["mount"] = settings["mount_angle"] if told else 0.0
-    mount_std = settings["mount_angle_std"]
-    row["mount_std"] = mount_std if math.isfinite(mount_std) else (MOUNT_KNOWN_STD if told else MOUNT_UNKNOWN_STD)
-    slip = settings["slip_std"]
-    row["slip_known"] = math.isfinite(slip)
-    row["crab_std"] = slip if row["slip_known"] else (CRAB_KNOWN_STD if told else CRAB_UNKNOWN_STD)
-    row["crab_tau"] = CRAB_KNOWN_TAU if told else CRAB_UNKNOWN_TAU
-    row["range_std"] = _or_default(settings["range_std"], RANGE_STD)
-    row["offset"] = settings["range_bias"]
-    bias_std = settings["range_bias_std"]
-    row["offset_std"] = bias_std if math.isfinite(bias_std) else tuning.offset_std
-    row["height_std"] = HEIGHT_STD
-    row["start_std"] = _or_default(settings["start_std"], START_STD)
-    row["start_heading_std"] = START_HEADING_STD
-    row["start_speed_std"] = 0.3
-    row["reference_std"] = REFERENCE_STD
-    row["gyro_std"] = GYRO_STD
-    row["v_max"] = _or_default(settings["speed_max"], V_MAX)
-    row["reverse"] = settings["reverse_allowed"]
-    row["head"] = -1
+    settings, start = row["settings"], row["start"]
+    for name in SETTINGS.names or ():
+        if name in (columns.dtype.names or ()):
+            settings[name] = columns[name]
+    angle_given = math.isfinite(columns["mount_angle"])
+    settings["mount_angle"] = columns["mount_angle"] if angle_given else 0.0
+    settings["mount_angle_std"] = _given(
+        columns["mount_angle_std"], MOUNT_KNOWN_STD if angle_given else MOUNT_UNKNOWN_STD
+    )
+    settings["slip_given"] = math.isfinite(columns["slip_std"])
+    settings["slip_std"] = _given(columns["slip_std"], SLIP_KNOWN_STD if angle_given else SLIP_UNKNOWN_STD)
+    settings["slip_tau"] = SLIP_KNOWN_TAU if angle_given else SLIP_UNKNOWN_TAU
+    settings["range_std"] = _positive(columns["range_std"], RANGE_STD)
+    settings["range_bias_std"] = _given(columns["range_bias_std"], tuning.range_bias_std)
+    settings["height_std"] = HEIGHT_STD
+    settings["reference_std"] = REFERENCE_STD
+    settings["gyro_bias_std"] = GYRO_BIAS_STD
+    settings["speed_max"] = _positive(columns["speed_max"], SPEED_MAX)
+    for name in ("known", "x", "y", "heading"):
+        start[name] = columns[f"start_{name}"]
+    start["std"] = _positive(columns["start_std"], START_STD)
+    start["heading_std"] = START_HEADING_STD
+    start["speed_std"] = START_SPEED_STD
+    row["first_slot"] = -1
     row["anchor"] = -1
     return row
 
 
-def _or_default(value: Any, default: float) -> float:
+def _given(value: Any, default: float) -> float:
+    """Return the value unless it is NaN. A standard deviation of 0 says that something is known exactly."""
+    return float(value) if math.isfinite(value) else default
+
+
+def _positive(value: Any, default: float) -> float:
     return float(value) if math.isfinite(value) and value > 0.0 else default

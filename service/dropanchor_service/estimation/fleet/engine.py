@@ -5,14 +5,14 @@ from collections import Counter
 import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, Array, PoseBatch, SampleBatch
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, KEEP, ROW, make_pool, make_workspace, with_room
-from dropanchor_service.estimation.fleet.belief.pool import release
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, ROW, make_workspace
+from dropanchor_service.estimation.fleet.belief.pool import make_pool, release, with_room
 from dropanchor_service.estimation.fleet.belief.step import advance
-from dropanchor_service.estimation.fleet.configure import configured
-from dropanchor_service.estimation.fleet.frontend.assembly import gather
+from dropanchor_service.estimation.fleet.configure import configure_row
+from dropanchor_service.estimation.fleet.frontend.assembly import assemble_nodes
 from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.frontend.node import NODE
-from dropanchor_service.estimation.fleet.frontend.ordering import Order
+from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -29,15 +29,15 @@ class FleetEngine:
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         self._tuning = tuning or Tuning()
-        self._numbers = self._tuning.numbers()
+        self._tuning_record = self._tuning.record()
         self._anchors = np.zeros(0, ANCHOR)
         self._configured = 0
         self._rows = np.zeros(0, ROW)
         self._fronts = np.zeros(0, FRONTEND)
         self._platforms = np.zeros(0, PLATFORM)
-        self._pool = make_pool(KEEP * 2)
+        self._pool = make_pool(MAX_HYPOTHESES * 2)
         self._workspace = make_workspace()
-        self._order = Order()
+        self._queue = SampleQueue()
 
     def set_anchors(self, anchors: Array) -> None:
         """ANCHOR, indexed by the `anchor` columns of samples."""
@@ -45,30 +45,32 @@ class FleetEngine:
 
     def configure(self, row: int, settings: Array) -> None:
         """Make `row` with these TAG_SETTINGS (0-d), or start it afresh with new ones."""
-        self._reach(row + 1)
+        self._reserve_rows(row + 1)
         release(self._rows[row], self._pool)
-        self._rows[row] = configured(settings, self._tuning)
+        self._rows[row] = configure_row(settings, self._tuning)
         start_frontend(self._fronts[row], HARD_IRON, float(settings["declination"]))
         self._platforms[row] = np.zeros((), PLATFORM)
-        self._order.forget(row)
+        self._queue.forget(row)
 
     def process(self, samples: SampleBatch) -> PoseBatch:
         """Fuse the samples that are due; measurements ahead of their row's IMU wait for it, 250 ms at most."""
         rejected: Counter[str] = Counter()
-        due = self._order.due(samples, len(self._anchors), rejected)
+        due = self._queue.due(samples, len(self._anchors), rejected)
         if not len(due.order):
             return PoseBatch(rejected=dict(rejected))
         nodes = np.zeros(len(due.order), NODE)
-        nodes = nodes[: gather(samples.imu, due.events, due.order, self._fronts, self._platforms, self._rows, nodes)]
-        beliefs = self._believe(nodes)
+        nodes = nodes[
+            : assemble_nodes(samples.imu, due.events, due.order, self._fronts, self._platforms, self._rows, nodes)
+        ]
+        beliefs = self._run_belief(nodes)
         return PoseBatch(
             poses_of(nodes, beliefs),
             modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspace),
-            innovations_of(nodes, beliefs, self._rows),
+            innovations_of(nodes, beliefs),
             dict(rejected),
         )
 
-    def _reach(self, rows: int) -> None:
+    def _reserve_rows(self, rows: int) -> None:
         """Room for this many rows, twice as much as before where it lacks."""
         self._configured = max(self._configured, rows)
         if rows <= len(self._rows):
@@ -79,24 +81,24 @@ class FleetEngine:
             room[: len(before)] = before
             setattr(self, f"_{name}", room)
 
-    def _believe(self, nodes: Array) -> Array:
+    def _run_belief(self, nodes: Array) -> Array:
         """BELIEF, one per node."""
         beliefs = np.zeros(len(nodes), BELIEF)
         left = len(nodes)
         while left > 0:
-            self._pool = with_room(self._pool, KEEP)
+            self._pool = with_room(self._pool, MAX_HYPOTHESES)
             rest, found = nodes[-left:], beliefs[-left:]
-            left = advance(self._rows, self._pool, rest, self._anchors, self._numbers, self._workspace, found)
+            left = advance(self._rows, self._pool, rest, self._anchors, self._tuning_record, self._workspace, found)
         return beliefs
 
     def state(self) -> dict[str, Array]:
         """The rows, the pool, and the samples that wait; no copies."""
         kept = {name: getattr(self, f"_{name}")[: self._configured] for name in _BY_ROW}
-        return kept | {"pool": self._pool} | self._order.state()
+        return kept | {"pool": self._pool} | self._queue.state()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Take over a state. The settings are part of the rows; the anchors are not."""
         for name in (*_BY_ROW, "pool"):
             setattr(self, f"_{name}", state[name])
         self._configured = len(self._rows)
-        self._order.restore(state)
+        self._queue.restore(state)

@@ -1,17 +1,18 @@
 """What leaves the engine: poses, innovations and modes, written out of nodes and beliefs in compiled code."""
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, MeasurementKind
-from dropanchor_service.estimation.fleet.belief.layout import AMBIGUOUS
+from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, Pool, Rows
 from dropanchor_service.estimation.fleet.belief.modes import list_modes
+from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import RANGE
+from dropanchor_service.estimation.fleet.frontend.node import RANGE, Nodes
 
 MODES: Final = 8
-REFUSED: Final = 0.5  # probability of an outlier above which a measurement hardly moved the belief
+REJECTED_ABOVE: Final = 0.5  # probability of an outlier above which a measurement hardly moved the belief
 OF_RANGE, OF_BEARING = int(MeasurementKind.RANGE), int(MeasurementKind.BEARING)
 
 
@@ -21,13 +22,10 @@ def poses_of(nodes: Array, beliefs: Array) -> Array:
     return poses[: _write_poses(nodes, beliefs, poses)]
 
 
-def innovations_of(nodes: Array, beliefs: Array, rows: Array) -> Array:
-    """INNOVATION of the nodes whose measurement met a running belief, in the units of the measurement.
-
-    The belief compares ranges z / scale; here z = predicted + innovation holds for what was measured.
-    """
+def innovations_of(nodes: Nodes, beliefs: Beliefs) -> Array:
+    """Return INNOVATION of the nodes whose measurement met a belief: z = predicted + innovation, as measured."""
     records = np.zeros(len(nodes), INNOVATION)
-    return records[: _write_innovations(nodes, beliefs, rows, records)]
+    return records[: _write_innovations(nodes, beliefs, records)]
 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
@@ -37,7 +35,7 @@ def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Ar
 
 
 @njit(cache=True, nogil=True)
-def _write_poses(nodes: Any, beliefs: Any, poses: Any) -> int:
+def _write_poses(nodes: Nodes, beliefs: Beliefs, poses: Array) -> int:
     n = 0
     for k in range(len(nodes)):
         node, belief = nodes[k], beliefs[k]
@@ -62,7 +60,7 @@ def _write_poses(nodes: Any, beliefs: Any, poses: Any) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _write_innovations(nodes: Any, beliefs: Any, rows: Any, records: Any) -> int:
+def _write_innovations(nodes: Nodes, beliefs: Beliefs, records: Array) -> int:
     n = 0
     for k in range(len(nodes)):
         node, belief = nodes[k], beliefs[k]
@@ -70,26 +68,25 @@ def _write_innovations(nodes: Any, beliefs: Any, rows: Any, records: Any) -> int
             continue
         record = records[n]
         n += 1
-        unit = rows[node.row].range_scale if node.kind == RANGE else 1.0
         record.row, record.t_ns, record.anchor = node.row, node.t_ns, node.anchor
         record.kind = OF_RANGE if node.kind == RANGE else OF_BEARING
         record.measured = node.z
-        record.innovation = belief.innovation * unit
+        record.innovation = belief.innovation
         record.predicted = node.z - record.innovation
-        record.S = belief.innovation_variance * unit**2
+        record.S = belief.innovation_variance
         record.p_outlier = belief.p_outlier
-        record.fused = belief.p_outlier < REFUSED
+        record.fused = belief.p_outlier < REJECTED_ABOVE
     return n
 
 
 @njit(nogil=True)
-def _left_ambiguous(nodes: Any, beliefs: Any, k: int) -> bool:
+def _left_ambiguous(nodes: Nodes, beliefs: Beliefs, k: int) -> bool:
     last = k + 1 == len(nodes) or nodes[k + 1].row != nodes[k].row
     return bool(last and beliefs[k].state == AMBIGUOUS)
 
 
 @njit(cache=True, nogil=True)
-def _count_ambiguous(nodes: Any, beliefs: Any) -> int:
+def _count_ambiguous(nodes: Nodes, beliefs: Beliefs) -> int:
     count = 0
     for k in range(len(nodes)):
         count += _left_ambiguous(nodes, beliefs, k)
@@ -97,7 +94,9 @@ def _count_ambiguous(nodes: Any, beliefs: Any) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _write_modes(nodes: Any, beliefs: Any, rows: Any, pool: Any, anchors: Any, workspace: Any, modes: Any) -> int:
+def _write_modes(
+    nodes: Nodes, beliefs: Beliefs, rows: Rows, pool: Pool, anchors: Anchors, workspace: Rows, modes: Array
+) -> int:
     n = 0
     for k in range(len(nodes)):
         if _left_ambiguous(nodes, beliefs, k):

@@ -1,8 +1,11 @@
 """The numbers of the pose belief, in one value that is handed to the kernels."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
+
+TuningRecord: TypeAlias = npt.NDArray[np.void]  # (1,), what `Tuning.record` returns
 
 
 class Tuning(NamedTuple):
@@ -10,69 +13,69 @@ class Tuning(NamedTuple):
 
     q_position: float = 1e-4  # m^2/s
     q_speed: float = 1e-4  # m^2/s^3, with an accelerometer
-    q_speed_blind: float = 0.03  # m^2/s^3, without one
-    q_speed_blind_moving: float = 0.04  # per (m/s)^2 of speed, up to 1 m/s
+    q_speed_no_acc: float = 0.03  # m^2/s^3, without one
+    q_speed_no_acc_moving: float = 0.04  # per (m/s)^2 of speed, up to 1 m/s
     q_mount: float = 1e-6  # rad^2/s
     platform_mount_std: float = 0.02  # rad
-    platform_crab_std: float = 0.15  # rad, of a heading with no IMU beside it: lag of the readings, slip
-    platform_crab_tau: float = 1.0  # s
+    platform_slip_std: float = 0.15  # rad, of a heading with no IMU beside it: lag of the readings, slip
+    platform_slip_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
     aligned_log_prior: float = 3.0
-    gyro_std: float = 0.02  # rad/s, residual bias
+    gyro_bias_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0
     q_gyro: float = 1e-7  # (rad/s)^2/s, of a tag whose platform measures its heading beside it
     q_gyro_drift: float = 1e-4  # the same, of one that drifts
-    refuted: float = 1e-3  # weight below which a class of hypotheses no longer counts for the ellipse
-    drift_again: float = 0.0  # log prior of that, where heading and gyroscope drift apart
+    class_rejected_weight: float = 1e-3  # weight below which a class of hypotheses no longer counts for the ellipse
+    drift_again_log_prior: float = 0.0  # log prior of that, where heading and gyroscope drift apart
     q_gyro_own: float = 1e-6  # the same, of all others
-    acc_std: float = 0.11  # m/s^2
-    acc_rough: float = 0.7  # s: what the roughness of the motion adds to its variance, per dv_var / dt
-    acc_tau: float = 5.0  # s
-    offset_std: float = 0.15  # m, of a tag and anchor pair that nobody calibrated: antenna delays
-    q_offset: float = 1e-5  # m^2/s
-    q_blocked: float = 0.02  # m^2/s, offset while the line of sight is blocked
-    temper: float = 0.7
-    outlier: float = 0.02
+    acc_bias_std: float = 0.11  # m/s^2
+    acc_bias_roughness: float = 0.7  # s: what the roughness of the motion adds to its variance, per dv_var / dt
+    acc_bias_tau: float = 5.0  # s
+    range_bias_std: float = 0.15  # m, of a tag and anchor pair that nobody calibrated: antenna delays
+    q_range_bias: float = 1e-5  # m^2/s
+    q_nlos: float = 0.02  # m^2/s, offset while the line of sight is blocked
+    likelihood_power: float = 0.7
+    outlier_probability: float = 0.02
     outlier_mean: float = 0.8  # m
     outlier_std: float = 0.8  # m
     outlier_floor: float = 1e-4
     bilinear: float = 0.25  # of the product of the variances of speed and slip: added to that of a range
-    blocked_log_prior: float = -2.5
-    blocked_depth: float = 6.0  # log weight below the best at which a hypothesis gets no alternative
-    blocked_min: float = 0.15  # m, less than that is a clear line of sight
-    blocked_tau: float = 2.0  # s
-    blocked_run: int = 4
-    second_class: float = -1.0  # log prior of an error of the heading reference of its own
-    second_again: float = -2.0  # on top of it, when it had been given up and is tried again
-    second_std: float = 0.15  # rad
-    second_tau: float = 60.0  # s
+    nlos_log_prior: float = -2.5
+    nlos_depth: float = 6.0  # log weight below the best at which a hypothesis gets no alternative
+    nlos_min_bias: float = 0.15  # m, less than that is a clear line of sight
+    nlos_tau: float = 2.0  # s
+    nlos_run: int = 4
+    own_error_log_prior: float = -1.0  # log prior of an error of the heading reference of its own
+    own_error_again_log_prior: float = -2.0  # on top of it, when it had been given up and is tried again
+    own_error_std: float = 0.15  # rad
+    own_error_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
-    split_coarse: float = 0.2  # rad, of a tag that begins again after a gap, until it is declared
-    keep_coarse: int = 48  # hypotheses of such a tag
+    coarse_split_angle: float = 0.2  # rad, of a tag that begins again after a gap, until it is declared
+    coarse_hypotheses: int = 48  # hypotheses of such a tag
     coarse_bearings: int = 24
     coarse_speeds: int = 3
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
-    merge_at_rest: float = 1.0  # the same of a tag at rest: they differ in nothing that moves it
+    merge_distance_at_rest: float = 1.0  # the same of a tag at rest: they differ in nothing that moves it
     merge_light: float = 0.5  # by which that squared grows per unit of log weight that the lighter one lacks
-    keep_tracking: int = 32
-    prune: float = 10.0  # log weight below the best
+    tracking_hypotheses: int = 32
+    prune_depth: float = 10.0  # log weight below the best
     rest_std: float = 0.02  # m/s
-    rest_rate_std: float = 0.003  # rad/s
+    rest_gyro_std: float = 0.003  # rad/s
     misfit_s: float = 3.0
     reverse_slack: float = 0.05  # m/s
-    ring_bearings: int = 36
-    ring_speeds: int = 5
-    ring_speed_max: float = 5.0
-    loyalty: float = 2.0  # log weight by which a mode must win to be published instead of the last one
-    resolved: float = 0.99
+    start_bearings: int = 36
+    start_speeds: int = 5
+    start_speed_max: float = 5.0
+    mode_hysteresis: float = 2.0  # log weight by which a mode must win to be published instead of the last one
+    resolved_weight: float = 0.99
     resolved_s: float = 2.0
     model_forget: float = 60.0  # s
     obs_window: float = 10.0  # s
     obs_q: float = 0.003
-    obs_q_blind: float = 0.05
+    obs_q_no_acc: float = 0.05
 
-    def numbers(self) -> Any:
+    def record(self) -> TuningRecord:
         """As a structured array (1,): compiled code is handed one pointer instead of all the numbers."""
         kinds = [(name, np.int64 if kind is int else np.float64) for name, kind in type(self).__annotations__.items()]
         return np.array([tuple(self)], kinds)

@@ -5,16 +5,17 @@ import pytest
 
 from dropanchor_schemas import StartPose, TagSettings
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.heading_models import COMES_AGAIN, error_of
-from dropanchor_service.estimation.fleet.belief.layout import COMMON, STEADY, make_workspace
-from dropanchor_service.estimation.fleet.belief.start import choose_model, second_class
+from dropanchor_service.estimation.fleet.belief.heading_classes import add_own_error_class
+from dropanchor_service.estimation.fleet.belief.heading_models import SOFT_IRON_FACTOR, reference_error
+from dropanchor_service.estimation.fleet.belief.layout import MAGNETOMETER_MODEL, PLATFORM_MODEL, make_workspace
+from dropanchor_service.estimation.fleet.belief.start import choose_model
 from dropanchor_service.estimation.fleet.configure import (
-    CRAB_KNOWN_STD,
-    CRAB_UNKNOWN_STD,
     MOUNT_KNOWN_STD,
     MOUNT_UNKNOWN_STD,
-    V_MAX,
-    configured,
+    SLIP_KNOWN_STD,
+    SLIP_UNKNOWN_STD,
+    SPEED_MAX,
+    configure_row,
 )
 from dropanchor_service.estimation.fleet.frontend.node import DERIVED_HEADING, NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -22,38 +23,38 @@ from dropanchor_service.settings.engine_columns import tag_columns
 
 
 def row_of(settings: TagSettings) -> Array:
-    row: Array = configured(tag_columns(settings, 0.0), Tuning())
+    row: Array = configure_row(tag_columns(settings, 0.0), Tuning())
     return row
 
 
 def test_a_bias_that_is_not_calibrated_has_the_default_spread() -> None:
-    assert row_of(TagSettings())["offset_std"] == Tuning().offset_std
+    assert row_of(TagSettings())["settings"]["range_bias_std"] == Tuning().range_bias_std
 
 
 @pytest.mark.parametrize("std", [0.0, 0.04])
 def test_a_bias_is_known_as_well_as_the_operator_says(std: float) -> None:
     row = row_of(TagSettings(range_bias_m=0.2, range_bias_std_m=std))
-    assert [row[name].item() for name in ("offset", "offset_std")] == [0.2, std]
+    assert [row["settings"][name].item() for name in ("range_bias", "range_bias_std")] == [0.2, std]
 
 
 def test_a_known_mounting_angle_leaves_slip_and_an_unknown_one_sway() -> None:
-    assert row_of(TagSettings(mount_angle_rad=0.3))["crab_std"] == CRAB_KNOWN_STD
-    assert row_of(TagSettings())["crab_std"] == CRAB_UNKNOWN_STD
+    assert row_of(TagSettings(mount_angle_rad=0.3))["settings"]["slip_std"] == SLIP_KNOWN_STD
+    assert row_of(TagSettings())["settings"]["slip_std"] == SLIP_UNKNOWN_STD
 
 
-@pytest.mark.parametrize(("told", "kept"), [(None, Tuning().platform_crab_std), (0.0, 0.0), (0.4, 0.4)])
+@pytest.mark.parametrize(("told", "kept"), [(None, Tuning().platform_slip_std), (0.0, 0.0), (0.4, 0.4)])
 def test_a_platforms_slip_is_the_default_only_where_it_is_not_told(told: float | None, kept: float) -> None:
     rows = row_of(TagSettings(slip_std_rad=told)).reshape(1)
     node = np.zeros(1, NODE)
     node["heading_kind"] = DERIVED_HEADING
     choose_model(rows[0], node[0], Tuning())
-    assert rows[0]["model"] == STEADY
-    assert rows[0]["crab_std"] == kept
+    assert rows[0]["heading"]["model"] == PLATFORM_MODEL
+    assert rows[0]["settings"]["slip_std"] == kept
 
 
 def test_a_tag_is_no_faster_than_the_operator_says() -> None:
-    assert row_of(TagSettings())["v_max"] == V_MAX
-    assert row_of(TagSettings(speed_max_mps=1.5))["v_max"] == 1.5
+    assert row_of(TagSettings())["settings"]["speed_max"] == SPEED_MAX
+    assert row_of(TagSettings(speed_max_mps=1.5))["settings"]["speed_max"] == 1.5
 
 
 @pytest.mark.parametrize(
@@ -62,28 +63,28 @@ def test_a_tag_is_no_faster_than_the_operator_says() -> None:
 def test_a_mounting_angle_is_known_as_well_as_the_operator_says(
     angle: float | None, std: float | None, kept: float
 ) -> None:
-    assert row_of(TagSettings(mount_angle_rad=angle, mount_angle_std_rad=std))["mount_std"] == kept
+    assert row_of(TagSettings(mount_angle_rad=angle, mount_angle_std_rad=std))["settings"]["mount_angle_std"] == kept
 
 
 def test_a_heading_told_not_to_drift_has_one_class_and_no_error_beyond_what_was_told() -> None:
     for told, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
         rows = row_of(TagSettings(heading_std_rad=told)).reshape(1)
-        rows["model"] = STEADY
-        assert second_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == classes
-        assert error_of(rows[0], 1.0)[1] == slow
+        rows["heading"]["model"] = PLATFORM_MODEL
+        assert add_own_error_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == classes
+        assert reference_error(rows[0], 1.0)[1] == slow
 
 
 def test_a_magnetic_heading_is_not_what_was_told_of_the_platforms() -> None:
     rows = row_of(TagSettings(heading_std_rad=0.0)).reshape(1)
-    rows["model"] = COMMON
-    assert error_of(rows[0], 0.04)[1] == 0.2
-    assert second_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == 1
+    rows["heading"]["model"] = MAGNETOMETER_MODEL
+    assert reference_error(rows[0], 0.04)[1] == 0.2
+    assert add_own_error_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == 1
 
 
-@pytest.mark.parametrize(("heading", "times"), [(0.5, COMES_AGAIN), (None, 1.0)])
+@pytest.mark.parametrize(("heading", "times"), [(0.5, SOFT_IRON_FACTOR), (None, 1.0)])
 def test_a_magnetometer_counts_for_less_where_the_heading_at_the_start_was_told(
     heading: float | None, times: float
 ) -> None:
     row = row_of(TagSettings(start=StartPose(x=1.0, y=0.0, heading_rad=heading))).reshape(1)
-    row["model"] = COMMON
-    assert error_of(row[0], 0.04)[1] == pytest.approx(0.2 * times)
+    row["heading"]["model"] = MAGNETOMETER_MODEL
+    assert reference_error(row[0], 0.04)[1] == pytest.approx(0.2 * times)

@@ -5,14 +5,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, default_settings
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, ROW, make_pool, make_workspace
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, ROW, make_workspace
+from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.step import advance
-from dropanchor_service.estimation.fleet.configure import configured
+from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, NODE, RANGE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 DT = 0.1
-CALIBRATED = Tuning(offset_std=0.0)
+CALIBRATED = Tuning(range_bias_std=0.0)
 
 
 class Drive(NamedTuple):
@@ -64,7 +65,7 @@ def rows_of(count: int, known: bool) -> Any:
     if known:
         settings["start_known"], settings["start_x"], settings["start_y"] = True, 10.0, 0.0
     rows = np.zeros(count, ROW)
-    rows[:] = configured(settings, CALIBRATED)
+    rows[:] = configure_row(settings, CALIBRATED)
     return rows
 
 
@@ -74,7 +75,7 @@ ANCHORS = np.zeros(1, ANCHOR)
 def run(rows: Any, pool: Any, nodes: Any) -> Any:
     """BELIEF, one per node."""
     beliefs = np.zeros(len(nodes), BELIEF)
-    assert advance(rows, pool, nodes, ANCHORS, CALIBRATED.numbers(), make_workspace(), beliefs) == 0
+    assert advance(rows, pool, nodes, ANCHORS, CALIBRATED.record(), make_workspace(), beliefs) == 0
     return beliefs
 
 

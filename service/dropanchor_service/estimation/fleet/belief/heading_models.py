@@ -1,34 +1,49 @@
-"""What the heading reference is worth: a small bank of models of its error, judged by their predictions.
+"""How wrong the heading reference is: a small bank of models of its error, chosen by their predictions.
 
-Each model m is a Kalman filter over (yaw, gyro bias, slow error) with the node's yaw increment and heading; the models
-differ in how much of the claimed variance is white and how much is a Gauss-Markov error (sd, time constant). A heading
-whose error is white, and one that wanders for seconds, differ by much in what an average of them is worth.
+Each model m is a Kalman filter over (yaw, gyroscope bias, slow error) with the node's yaw increment and heading. The
+models differ in how much of the claimed variance is white and how much is a Gauss-Markov error. White errors average
+out; an error that wanders for seconds does not.
+
+    predict   yaw += dyaw - b dt,   slow *= exp(-dt/tau)          update   heading = yaw + slow + white
 """
 
 import math
-from typing import Any
 
-from dropanchor_service.estimation.fleet.belief.layout import COMMON, DRIFTING, MODELS, OWN_ERROR, STEADY
-from dropanchor_service.estimation.fleet.belief.update import wrap
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.layout import (
+    BANK,
+    DRIFT_MODEL,
+    DRIFTING,
+    MAGNETOMETER_MODEL,
+    OWN_ERROR,
+    PLATFORM_MODEL,
+    Floats,
+    Row,
+)
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-COMES_AGAIN = 3.0
+SOFT_IRON_FACTOR = 3.0  # times the claimed error of a magnetometer
+SWITCH_LOG_RATIO = 3.0  # log likelihood by which another model must win
+LATER_LOG_PRIOR = -2.0  # of all models but the first
+MAX_SQUARED_ERROR = 25.0  # in variances: one reading must not decide between models
+GIVEN_TAU = 60.0  # s, of an error that the operator gave
 
 
 @njit(nogil=True)
-def model_of(m: int, variance: float) -> tuple[float, float, float]:
-    """(white variance, sd of the slow error, its time constant) of model m for a claimed variance.
+def model_parameters(m: int, variance: float) -> tuple[float, float, float]:
+    """Return (white variance rad^2, sd of the slow error rad, its time constant s) of model m for a claimed variance.
 
-    Model COMMON: nearly all of the variance is one slow error. Model STEADY: a platform's own, good to 0.03 rad.
+    Of the bank, model 0 is white, 1 and 3 are almost all slow, and DRIFT_MODEL is half of each.
     """
-    if m == COMMON:
+    if m == MAGNETOMETER_MODEL:
         return 0.01 * variance + 1e-5, math.sqrt(variance), 30.0
-    if m == STEADY:
+    if m == PLATFORM_MODEL:
         return 4e-4, 0.03, 60.0
     if m == 1:
         return 0.01 * variance, 0.1, 3.0
-    if m == 2:
+    if m == DRIFT_MODEL:
         return variance, 0.15, 20.0
     if m == 3:
         return 0.01 * variance, 0.15, 15.0
@@ -36,65 +51,65 @@ def model_of(m: int, variance: float) -> tuple[float, float, float]:
 
 
 @njit(nogil=True)
-def error_of(row: Any, variance: float) -> tuple[float, float, float]:
-    """`model_of` the row's model; of a platform's heading, what was told of it goes before.
+def reference_error(row: Row, variance: float) -> tuple[float, float, float]:
+    """Return `model_parameters` of the row's model, or what the operator gave for a platform's heading.
 
-    Where the start's heading is given, the magnetometer has three times the error it claims: that of soft iron and
-    place comes again with every lap, so it does not average out; gyroscope and ranges bound yaw better for minutes.
+    With a given start heading a magnetometer gets three times the error it claims. Soft iron and the place disturb it
+    in the same way on every lap, so that does not average out; gyroscope and ranges know the yaw better for minutes.
     """
-    if not told_of(row):
-        white, slow, tau = model_of(row.model, variance)
-        if row.model == COMMON and row.start_known == 1 and math.isfinite(row.start_heading):
-            slow *= COMES_AGAIN
+    if not is_heading_std_given(row):
+        white, slow, tau = model_parameters(row.heading.model, variance)
+        if row.heading.model == MAGNETOMETER_MODEL and row.start.known == 1 and math.isfinite(row.start.heading):
+            slow *= SOFT_IRON_FACTOR
         return white, slow, tau
-    white, _, _ = model_of(STEADY if row.model == STEADY else 0, variance)
-    return white, row.heading_std, 60.0
+    white, _, _ = model_parameters(PLATFORM_MODEL if row.heading.model == PLATFORM_MODEL else 0, variance)
+    return white, row.settings.heading_std, GIVEN_TAU
 
 
 @njit(nogil=True)
-def error_of_class(row: Any, kind: int, variance: float, t: Tuning) -> tuple[float, float, float]:
-    """`error_of` for one class of hypotheses."""
-    if kind == DRIFTING:
-        return model_of(0, variance)
-    white, slow, tau = error_of(row, variance)
-    if kind == OWN_ERROR and row.model != STEADY:
-        return white, math.sqrt(slow * slow + t.second_std**2), max(t.second_tau, tau)
+def class_reference_error(row: Row, heading_class: int, variance: float, t: Tuning) -> tuple[float, float, float]:
+    """Return `reference_error` of one class of hypotheses."""
+    if heading_class == DRIFTING:
+        return model_parameters(0, variance)
+    white, slow, tau = reference_error(row, variance)
+    if heading_class == OWN_ERROR and row.heading.model != PLATFORM_MODEL:
+        return white, math.sqrt(slow * slow + t.own_error_std**2), max(t.own_error_tau, tau)
     return white, slow, tau
 
 
 @njit(nogil=True)
-def told_of(row: Any) -> bool:
-    """Whether the operator told the error of the heading in use."""
-    return row.model != COMMON and math.isfinite(row.heading_std)
+def is_heading_std_given(row: Row) -> bool:
+    """Return whether the operator gave the error of the heading in use."""
+    return row.heading.model != MAGNETOMETER_MODEL and math.isfinite(row.settings.heading_std)
 
 
 @njit(nogil=True)
-def reset_models(row: Any, heading: float, variance: float, t: Tuning) -> None:
-    """Start every model at this heading."""
-    for m in range(MODELS):
-        white, slow, _ = model_of(m, variance)
-        row.hm_mean[m, 0], row.hm_mean[m, 1], row.hm_mean[m, 2] = heading, 0.0, 0.0
+def reset_models(row: Row, heading: float, variance: float, t: Tuning) -> None:
+    """Start every model of the bank at this heading, rad."""
+    for m in range(BANK):
+        white, slow, _ = model_parameters(m, variance)
+        row.heading.bank_mean[m, 0], row.heading.bank_mean[m, 1], row.heading.bank_mean[m, 2] = heading, 0.0, 0.0
         for i in range(3):
             for j in range(3):
-                row.hm_cov[m, i, j] = 0.0
-        row.hm_cov[m, 0, 0] = white + slow * slow
-        row.hm_cov[m, 1, 1] = t.gyro_std**2
-        row.hm_cov[m, 2, 2] = slow * slow
-        row.hm_cov[m, 0, 2] = row.hm_cov[m, 2, 0] = -slow * slow
-        row.hm_loglik[m] = 0.0 if m == 0 else -2.0
-    row.hm_started = 1
-    row.model = 0
+                row.heading.bank_cov[m, i, j] = 0.0
+        row.heading.bank_cov[m, 0, 0] = white + slow * slow
+        row.heading.bank_cov[m, 1, 1] = t.gyro_bias_std**2
+        row.heading.bank_cov[m, 2, 2] = slow * slow
+        row.heading.bank_cov[m, 0, 2] = row.heading.bank_cov[m, 2, 0] = -slow * slow
+        row.heading.bank_log_likelihood[m] = 0.0 if m == 0 else LATER_LOG_PRIOR
+    row.heading.bank_started = 1
+    row.heading.model = 0
 
 
 @njit(nogil=True)
-def predict_models(row: Any, node: Any, variance: float, t: Tuning) -> None:
-    """yaw += dyaw - b dt; the slow error decays. At rest the increment measures the gyro bias."""
+def predict_models(row: Row, node: Node, variance: float, t: Tuning) -> None:
+    """Predict every model over the node. At rest the increment measures the gyroscope's bias."""
     dt = node.dt_s
-    for m in range(MODELS):
-        _, slow, tau = model_of(m, variance)
-        s, P = row.hm_mean[m], row.hm_cov[m]
-        if node.rest == 1 and dt > 0.0:
-            _scalar(s, P, 1, node.dyaw / dt - s[1], node.dyaw_var / dt**2 + t.rest_rate_std**2)
+    for m in range(BANK):
+        _, slow, tau = model_parameters(m, variance)
+        s, P = row.heading.bank_mean[m], row.heading.bank_cov[m]
+        if node.rest == RESTING and dt > 0.0:
+            _update_component(s, P, 1, node.dyaw / dt - s[1], node.dyaw_var / dt**2 + t.rest_gyro_std**2)
         decay = math.exp(-dt / tau)
         s[0] += node.dyaw - s[1] * dt
         s[2] *= decay
@@ -108,14 +123,14 @@ def predict_models(row: Any, node: Any, variance: float, t: Tuning) -> None:
 
 
 @njit(nogil=True)
-def _scalar(s: Any, P: Any, k: int, e: float, variance: float) -> None:
+def _update_component(s: Floats, P: Floats, k: int, e: float, variance: float) -> None:
     S = P[k, k] + variance
     k0, k1, k2 = P[0, k] / S, P[1, k] / S, P[2, k] / S
-    _gain(s, P, k0, k1, k2, e, S)
+    _apply_gain(s, P, k0, k1, k2, e, S)
 
 
 @njit(nogil=True)
-def _gain(s: Any, P: Any, k0: float, k1: float, k2: float, e: float, S: float) -> None:
+def _apply_gain(s: Floats, P: Floats, k0: float, k1: float, k2: float, e: float, S: float) -> None:
     s[0] += k0 * e
     s[1] += k1 * e
     s[2] += k2 * e
@@ -129,20 +144,22 @@ def _gain(s: Any, P: Any, k0: float, k1: float, k2: float, e: float, S: float) -
 
 
 @njit(nogil=True)
-def judge_models(row: Any, node: Any, t: Tuning) -> int:
-    """Update every model with the heading; returns the model to use (3 nats of hysteresis)."""
+def update_models(row: Row, node: Node, t: Tuning) -> int:
+    """Update every model with the node's heading. Return the model to use, with hysteresis."""
     forget = math.exp(-node.dt_s / t.model_forget)
+    log_likelihood = row.heading.bank_log_likelihood
     best = 0
-    for m in range(MODELS):
-        white, _, _ = model_of(m, node.heading_var)
-        s, P = row.hm_mean[m], row.hm_cov[m]
+    for m in range(BANK):
+        white, _, _ = model_parameters(m, node.heading_var)
+        s, P = row.heading.bank_mean[m], row.heading.bank_cov[m]
         e = wrap(node.heading - s[0] - s[2])
         p0, p1, p2 = P[0, 0] + P[0, 2], P[1, 0] + P[1, 2], P[2, 0] + P[2, 2]
         S = p0 + p2 + white
-        row.hm_loglik[m] = row.hm_loglik[m] * forget - 0.5 * min(e * e / S, 25.0) - 0.5 * math.log(S)
-        _gain(s, P, p0 / S, p1 / S, p2 / S, e, S)
-        if row.hm_loglik[m] > row.hm_loglik[best]:
+        gained = -0.5 * min(e * e / S, MAX_SQUARED_ERROR) - 0.5 * math.log(S)
+        log_likelihood[m] = log_likelihood[m] * forget + gained
+        _apply_gain(s, P, p0 / S, p1 / S, p2 / S, e, S)
+        if log_likelihood[m] > log_likelihood[best]:
             best = m
-    if row.hm_loglik[best] > row.hm_loglik[row.model] + 3.0:
+    if log_likelihood[best] > log_likelihood[row.heading.model] + SWITCH_LOG_RATIO:
         return best
-    return int(row.model)
+    return int(row.heading.model)

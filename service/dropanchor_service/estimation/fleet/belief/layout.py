@@ -1,6 +1,10 @@
-"""Where things lie: the state vector, one row per tag, and the pool of hypothesis slots rows point into."""
+"""The state vector, the row of one tag, and the records that the belief works on.
 
-from typing import Final
+Compiled code gets records of these dtypes. mypy cannot see their fields, so the aliases `Row`, `Hypothesis`, … say
+which record a function takes; the dtype of the same name lists its fields with units and shapes.
+"""
+
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -10,130 +14,164 @@ R: Final = 0  # m, horizontal distance
 PHI: Final = 1  # rad, bearing of the tag seen from the anchor
 YAW: Final = 2  # rad, body yaw in the site frame
 V: Final = 3  # m/s along the course
-MOUNT: Final = 4  # rad, course minus body yaw, constant part
-CRAB: Final = 5  # rad, course minus body yaw, Gauss-Markov part
-GYRO: Final = 6  # rad/s, residual gyro bias
-ACC: Final = 7  # m/s^2, forward acceleration bias
-REF: Final = 8  # rad, error of the heading reference
-OFFSET: Final = 9  # m, range offset of the primary anchor
+MOUNT: Final = 4  # rad, course minus body yaw, constant part: the mounting angle
+SLIP: Final = 5  # rad, course minus body yaw, Gauss-Markov part
+GYRO_BIAS: Final = 6  # rad/s, residual bias of the yaw increments
+ACC_BIAS: Final = 7  # m/s^2, bias of the forward acceleration
+REFERENCE: Final = 8  # rad, error of the heading reference
+RANGE_BIAS: Final = 9  # m, bias of ranges to the primary anchor, as measured
 N: Final = 10
-PACKED: Final = N * (N + 1) // 2
+PACKED: Final = N * (N + 1) // 2  # entries of the upper triangle of a covariance
 
-WORK: Final = 320  # hypotheses of one row while it is being worked on
-KEEP: Final = 192  # hypotheses of one row between batches, at most
-RING_RANGES: Final = 15
-WATCHED: Final = 4  # anchors of a row whose last ranges are kept; those of equal remainder share a slot
-MODELS: Final = 4  # models of the heading error that are judged by their predictions
-COMMON: Final = 4  # and two that are given by where the heading comes from
-STEADY: Final = 5
-WANDERING: Final = 2  # of the judged ones: heading and gyroscope drift apart, slowly
+WORKING_HYPOTHESES: Final = 320  # at most, of one row while it is being worked on
+MAX_HYPOTHESES: Final = 192  # at most, of one row between batches
+START_RANGES: Final = 15  # of which the median gives the distance of an unknown start
+STUCK_SLOTS: Final = 4  # anchors of a row whose last ranges are kept; those of equal remainder share a slot
 
-EXACT: Final = 0  # classes of hypotheses: the heading's error is as the model says
+# Models of the error of the heading reference (`heading_models`). The first BANK are judged by their predictions.
+BANK: Final = 4
+DRIFT_MODEL: Final = 2  # of the bank: heading and gyroscope drift apart, slowly
+MAGNETOMETER_MODEL: Final = 4  # given by the kind of heading: almost all of the variance is one slow error
+PLATFORM_MODEL: Final = 5  # given by the kind of heading: a platform's own, which is stable or drifts
+
+# Classes of hypotheses: what is wrong with the heading.
+EXACT: Final = 0  # no more than the heading model says
 OWN_ERROR: Final = 1  # the heading reference has a slow error of its own, or drifts
-DRIFTING: Final = 2  # it is the gyroscope that drifts, the heading does not
+DRIFTING: Final = 2  # the gyroscope drifts and the heading does not
+CLASSES: Final = 3
 
-INITIALISING: Final = 0
-AMBIGUOUS: Final = 1
-TRACKING: Final = 2
-COASTING: Final = 3
-DEGRADED: Final = 4
-LOST: Final = 5
-
-SETTINGS: Final = [
-    ("mount", np.float64),
-    ("mount_std", np.float64),
-    ("lever_x", np.float64),  # m, from the point that follows the course to the tag, body frame
-    ("lever_y", np.float64),
-    ("crab_std", np.float64),
-    ("crab_tau", np.float64),  # s
-    ("slip_known", np.uint8),  # 1: crab_std was told
-    ("height", np.float64),  # m, tag antenna above the site's zero
-    ("height_std", np.float64),
-    ("range_std", np.float64),
-    ("range_scale", np.float64),
-    ("offset", np.float64),
-    ("offset_std", np.float64),
-    ("reference_std", np.float64),  # rad, constant error of the heading reference
-    ("gyro_std", np.float64),  # rad/s, residual bias of the yaw increments
-    ("v_max", np.float64),
-    ("reverse", np.uint8),
-    ("heading_source", np.uint8),
-    ("heading_std", np.float64),  # rad, of a platform's heading that does not drift; NaN: not known
-    ("start_known", np.uint8),
-    ("start_x", np.float64),
-    ("start_y", np.float64),
-    ("start_std", np.float64),
-    ("start_heading", np.float64),  # rad, body yaw, NaN: unknown
-    ("start_heading_std", np.float64),
-    ("start_speed_std", np.float64),
-]
-
-ROW: Final = np.dtype(
+SETTINGS: Final = np.dtype(
     [
-        *SETTINGS,
-        ("head", np.int32),  # first slot of this row, -1: none
-        ("count", np.int32),
-        ("t_ns", np.int64),
-        ("anchor", np.int32),  # primary anchor, -1: none heard yet
-        ("state", np.uint8),
-        ("reason", np.uint8),
-        ("fault", np.uint8),
-        ("declared", np.uint8),
-        ("model", np.uint8),  # of the heading error
-        ("north", np.float64),  # rad, constant error of the heading reference, learned from a given start heading
-        ("ring_count", np.int32),
-        ("ring", np.float64, (RING_RANGES,)),
-        ("ring_yaw", np.float64),
-        ("ring_rest", np.uint8),
-        ("ring_s", np.float64),
-        ("since_manage_s", np.float64),
-        ("since_clear_s", np.float64),  # since blocked hypotheses were last offered a clear line of sight
-        ("since_range_s", np.float64),
-        ("since_seed_s", np.float64),
-        ("since_nlos_s", np.float64),
-        ("last_x", np.float64),  # m, of the mode that was published last, from the anchor
-        ("last_y", np.float64),
-        ("good_s", np.float64),
-        ("bad_s", np.float64),
-        ("high_run", np.int32),
-        ("low_run", np.int32),
-        ("misfit", np.float64),  # forgetting mean of the best hypothesis' outlier probability
-        ("hm_mean", np.float64, (MODELS, 3)),
-        ("hm_cov", np.float64, (MODELS, 3, 3)),
-        ("hm_loglik", np.float64, (MODELS,)),
-        ("hm_started", np.uint8),
-        ("referred", np.uint8),  # 1: the yaw of the hypotheses is in the site frame
-        ("information", np.float64, (3, 3)),
-        ("unwatched_s", np.float64),  # s of motion that no sensor watched, and where the tag was before
-        ("gap_x", np.float64),  # m, from the anchor
-        ("gap_y", np.float64),
-        ("gap_var", np.float64),  # m^2
-        ("gap_speed", np.float64),
-        ("gap_course", np.float64),
-        ("gap_yaw", np.float64),  # rad, then, and what was watched of its turns since
-        ("gap_yaw_var", np.float64),  # rad^2
-        ("gap_unheard", np.float64),  # s of turns that were not
-        ("watched_s", np.float64),  # since the last such gap
-        ("pieces", np.uint8),  # of samples that were heard between gaps since the track was lost
-        ("coarse", np.uint8),  # 1: it began again after such a gap, with few and wide hypotheses until one is declared
-        ("again", np.uint8),  # 1: the start is where the tag was before such a gap
-        ("lever_rate", np.float64),  # rad/s, mean of the last node
-        ("last_anchor", np.int32, (WATCHED,)),  # of each slot: the last range, how often and since when it is the same
-        ("last_z", np.float64, (WATCHED,)),
-        ("same_count", np.int32, (WATCHED,)),
-        ("same_ns", np.int64, (WATCHED,)),
+        ("mount_angle", np.float64),  # rad
+        ("mount_angle_std", np.float64),
+        ("lever_x", np.float64),  # m, from the point that follows the course to the tag, body frame
+        ("lever_y", np.float64),
+        ("slip_std", np.float64),  # rad
+        ("slip_tau", np.float64),  # s
+        ("slip_given", np.uint8),  # 1: the operator gave slip_std
+        ("height", np.float64),  # m, tag antenna above the site's zero
+        ("height_std", np.float64),
+        ("range_std", np.float64),  # m, of a measured range
+        ("range_scale", np.float64),  # measured = scale * distance + bias
+        ("range_bias", np.float64),  # m
+        ("range_bias_std", np.float64),
+        ("reference_std", np.float64),  # rad, constant error of the heading reference
+        ("gyro_bias_std", np.float64),  # rad/s, residual bias of the yaw increments
+        ("speed_max", np.float64),  # m/s
+        ("reverse_allowed", np.uint8),
+        ("heading_source", np.uint8),
+        ("heading_std", np.float64),  # rad, of a platform's heading that does not drift; NaN: not known
     ]
 )
 
-SLOT: Final = np.dtype(
+START: Final = np.dtype(
+    [
+        ("known", np.uint8),
+        ("x", np.float64),  # m
+        ("y", np.float64),
+        ("std", np.float64),
+        ("heading", np.float64),  # rad, body yaw; NaN: unknown
+        ("heading_std", np.float64),
+        ("speed_std", np.float64),  # m/s
+        ("after_gap", np.uint8),  # 1: the start is where the tag was before a gap
+        ("coarse", np.uint8),  # 1: it begins again after a gap, with few and wide hypotheses until one is resolved
+        ("range_count", np.int32),
+        ("ranges", np.float64, (START_RANGES,)),  # m, the last ones as distances
+        ("collected_s", np.float64),  # s over which they were collected
+    ]
+)
+
+HEADING: Final = np.dtype(
+    [
+        ("model", np.uint8),  # of the error of the reference in use
+        ("north", np.float64),  # rad, constant error of the reference, learned from a given start heading
+        ("in_site_frame", np.uint8),  # 1: the yaw of the hypotheses counts from east; 0: from an arbitrary zero
+        ("bank_started", np.uint8),
+        ("bank_mean", np.float64, (BANK, 3)),  # yaw rad, gyroscope bias rad/s, slow error rad
+        ("bank_cov", np.float64, (BANK, 3, 3)),
+        ("bank_log_likelihood", np.float64, (BANK,)),
+    ]
+)
+
+NLOS: Final = np.dtype(
+    [
+        ("high_run", np.int32),  # innovations in a row that were far too large
+        ("low_run", np.int32),  # and far too small
+        ("misfit", np.float64),  # exponential mean of the outlier probability that the best hypothesis gave
+        ("misfit_s", np.float64),  # s for which most ranges have been outliers
+        ("since_los_offer_s", np.float64),  # s since NLOS hypotheses were last offered a clear line of sight
+    ]
+)
+
+GAP: Final = np.dtype(
+    [
+        ("unobserved_s", np.float64),  # s of motion that no sensor observed; 0: there is no gap
+        ("x", np.float64),  # m, from the anchor, of the tag before the gap
+        ("y", np.float64),
+        ("var", np.float64),  # m^2
+        ("speed", np.float64),  # m/s
+        ("course", np.float64),  # rad
+        ("yaw", np.float64),  # rad, with the turns that were observed since
+        ("yaw_var", np.float64),  # rad^2, before the gap
+        ("turn_s", np.float64),  # s of turns that were not observed
+        ("observed_s", np.float64),  # s since the samples came back
+        ("fragments", np.uint8),  # short stretches of samples between gaps since the track was lost
+    ]
+)
+
+PUBLICATION: Final = np.dtype(
+    [
+        ("state", np.uint8),
+        ("reason", np.uint8),
+        ("resolved", np.uint8),  # 1: one mode has explained all ranges for long enough
+        ("resolved_s", np.float64),  # s for which one mode has been dominant and small
+        ("unresolved_s", np.float64),  # s for which none has been dominant
+        ("x", np.float64),  # m, from the anchor, of the mode that was published last
+        ("y", np.float64),
+        ("information", np.float64, (3, 3)),  # of recent ranges on (x, y, speed)
+    ]
+)
+
+STUCK: Final = np.dtype(
+    [
+        ("anchor", np.int32, (STUCK_SLOTS,)),  # of each slot: the last range, how often it came and since when
+        ("z", np.float64, (STUCK_SLOTS,)),  # m
+        ("count", np.int32, (STUCK_SLOTS,)),
+        ("t_ns", np.int64, (STUCK_SLOTS,)),
+    ]
+)
+
+ROW: Final = np.dtype(
+    [
+        ("settings", SETTINGS),
+        ("start", START),
+        ("heading", HEADING),
+        ("nlos", NLOS),
+        ("gap", GAP),
+        ("publication", PUBLICATION),
+        ("stuck", STUCK),
+        ("first_slot", np.int32),  # of this row in the pool, -1: none
+        ("count", np.int32),  # hypotheses
+        ("t_ns", np.int64),
+        ("anchor", np.int32),  # the primary anchor, -1: no range yet
+        ("faults", np.uint8),  # how often the numbers were not finite
+        ("since_reduction_s", np.float64),  # s since the mixture was last merged and split
+        ("since_range_s", np.float64),
+        ("since_class_check_s", np.float64),
+        ("lever_rate", np.float64),  # rad/s, mean yaw rate of the last node
+    ],
+    align=True,
+)
+
+POOL_SLOT: Final = np.dtype(
     [
         ("next", np.int32),
-        ("kind", np.int32),  # EXACT, OWN_ERROR or DRIFTING
-        ("blocked", np.int32),  # 1: the range is now longer than the line of sight
+        ("heading_class", np.int32),  # EXACT, OWN_ERROR or DRIFTING
+        ("nlos", np.int32),  # 1: there is no line of sight now, so ranges are too long
         ("free", np.int32),  # in slot 0: how many slots are free
         ("log_weight", np.float64),
-        ("clear_offset", np.float64),  # offset before the line of sight was blocked
-        ("clear_variance", np.float64),
+        ("los_bias", np.float64),  # m, range bias before the line of sight was lost
+        ("los_bias_var", np.float64),  # m^2
         ("mean", np.float64, (N,)),
         ("cov", np.float64, (PACKED,)),
     ]
@@ -151,9 +189,8 @@ BELIEF: Final = np.dtype(
         ("p_mode", np.float64),
         ("sigma_pos", np.float64),
         ("sigma_obs", np.float64),
-        ("range_m", np.float64),
-        ("innovation", np.float64),  # of the likeliest hypothesis; innovation_variance 0: nothing was compared
-        ("innovation_variance", np.float64),
+        ("innovation", np.float64),  # of the likeliest hypothesis, in the units of the measurement
+        ("innovation_variance", np.float64),  # 0: no measurement met a belief
         ("p_outlier", np.float64),
         ("hypotheses", np.int32),
         ("state", np.uint8),
@@ -161,24 +198,24 @@ BELIEF: Final = np.dtype(
     ]
 )
 
-
-HYPOTHESIS: Final = np.dtype(
+WORKING_HYPOTHESIS: Final = np.dtype(
     [
         ("log_weight", np.float64),
-        ("kind", np.int32),
-        ("blocked", np.int32),
-        ("clear", np.float64, (2,)),  # offset and its variance before the line of sight was blocked
+        ("heading_class", np.int32),
+        ("nlos", np.int32),
+        ("los_bias", np.float64),
+        ("los_bias_var", np.float64),
         ("mean", np.float64, (N,)),
         ("cov", np.float64, (N, N)),
-        ("shift", np.float64, (N,)),  # scratch of merging and splitting
-        ("weight", np.float64),  # what follows is filled by `locate`
+        ("delta", np.float64, (N,)),  # scratch of merging and splitting
+        ("weight", np.float64),  # `summary.fill_positions` fills this and what follows
         ("direction", np.float64, (2,)),  # unit vector from the anchor
-        ("place", np.float64, (2,)),  # m, from the anchor
-        ("spread", np.float64),  # m^2, variance but for a rotation of everything about the anchor
-        ("order", np.int32),  # index of the k-th heaviest
-        ("gone", np.bool_),
-        ("member", np.bool_),  # of the mode under consideration
-        ("taken", np.bool_),  # by a mode considered before
+        ("position", np.float64, (2,)),  # m, from the anchor
+        ("position_var", np.float64),  # m^2, without a common rotation about the anchor
+        ("by_weight", np.int32),  # index of the k-th heaviest
+        ("merged", np.bool_),  # into a heavier one
+        ("in_mode", np.bool_),  # a member of the mode under consideration
+        ("assigned", np.bool_),  # to a mode considered before
     ],
     align=True,
 )
@@ -195,38 +232,30 @@ SCRATCH: Final = np.dtype(
         ("mean", np.float64, (5,)),
         ("cov", np.float64, (3, 3)),
         ("part", np.float64, (3, 3)),
-        ("share", np.float64, (3,)),
+        ("share", np.float64, (CLASSES,)),
         ("point", np.float64, (3,)),
     ]
 )
 
+# All that one thread works on, as one record: compiled code counts no references to the parts of a record.
+WORKSPACE: Final = np.dtype(
+    [("hypotheses", WORKING_HYPOTHESIS, (WORKING_HYPOTHESES,)), ("scratch", SCRATCH)], align=True
+)
 
-# What one thread works on. One record, because compiled code counts no references to parts of a record.
-WORKSPACE: Final = np.dtype([("hypotheses", HYPOTHESIS, (WORK,)), ("scratch", SCRATCH)], align=True)
+Floats: TypeAlias = npt.NDArray[np.float64]
+Row: TypeAlias = Any  # a record of ROW
+Hypothesis: TypeAlias = Any  # a record of WORKING_HYPOTHESIS
+Hypotheses: TypeAlias = Any  # (WORKING_HYPOTHESES,) of them, of which the first `count` are in use
+Belief: TypeAlias = Any  # a record of BELIEF
+Scratch: TypeAlias = Any  # a record of SCRATCH
+Workspace: TypeAlias = Any  # a record of WORKSPACE
+Anchor: TypeAlias = Any  # a record of ANCHOR
+Rows: TypeAlias = npt.NDArray[np.void]  # ROW (n,)
+Pool: TypeAlias = npt.NDArray[np.void]  # POOL_SLOT (n,)
+Beliefs: TypeAlias = npt.NDArray[np.void]  # BELIEF (n,)
+Anchors: TypeAlias = npt.NDArray[np.void]  # ANCHOR (n,)
 
 
 def make_workspace() -> npt.NDArray[np.void]:
-    """WORKSPACE (1,): for one thread, with room for the hypotheses of one row, unpacked."""
+    """Return WORKSPACE (1,): for one thread, with room for the unpacked hypotheses of one row."""
     return np.zeros(1, WORKSPACE)
-
-
-def make_pool(capacity: int) -> npt.NDArray[np.void]:
-    """Slots in one free list: slot 0 is its head and never used otherwise."""
-    pool = np.zeros(capacity, SLOT)
-    pool["next"] = np.arange(1, capacity + 1)
-    pool["next"][-1] = -1
-    pool["free"][0] = capacity - 1
-    return pool
-
-
-def with_room(pool: npt.NDArray[np.void], slots: int) -> npt.NDArray[np.void]:
-    """The pool, or a larger one with the same hypotheses, that has this many free slots."""
-    have, free = len(pool), int(pool["free"][0])
-    if free >= slots:
-        return pool
-    grown = make_pool(max(have + slots, 2 * have))
-    added = len(grown) - have
-    grown["next"][-1] = pool["next"][0]
-    grown[1:have] = pool[1:]
-    grown["next"][0], grown["free"][0] = have, free + added
-    return grown

@@ -1,23 +1,36 @@
-"""Keep the Gaussian sum small and honest: prune, merge, split."""
+"""Keep the Gaussian mixture small and consistent: normalise, prune, merge and split."""
 
 import math
-from typing import Any
 
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, WORK, YAW, N, R, V
-from dropanchor_service.estimation.fleet.belief.update import wrap
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.layout import (
+    MOUNT,
+    PHI,
+    WORKING_HYPOTHESES,
+    YAW,
+    Floats,
+    Hypotheses,
+    N,
+    R,
+    V,
+)
 from dropanchor_service.estimation.fleet.compiled import njit
+
+SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
+SPLIT_SHIFT = 1.0576  # standard deviations
+SPLIT_REMOVED = 0.549  # share of the variance
 
 
 @njit(nogil=True)
-def copy_hypothesis(work: Any, source: int, target: int) -> None:
-    """target becomes a copy of source."""
+def copy_hypothesis(work: Hypotheses, source: int, target: int) -> None:
+    """Copy hypothesis `source` to `target`."""
     if source != target:
         work[target] = work[source]
 
 
 @njit(nogil=True)
-def best_of(work: Any, count: int) -> int:
-    """Index of the heaviest hypothesis; the first one of equals."""
+def best_of(work: Hypotheses, count: int) -> int:
+    """Return the index of the heaviest hypothesis, the first of equals."""
     best = 0
     for h in range(1, count):
         if work[h].log_weight > work[best].log_weight:
@@ -26,8 +39,8 @@ def best_of(work: Any, count: int) -> int:
 
 
 @njit(nogil=True)
-def normalise(work: Any, count: int) -> None:
-    """Log weights to a sum of one."""
+def normalise(work: Hypotheses, count: int) -> None:
+    """Normalise the weights to a sum of one."""
     if count == 1:
         work[0].log_weight = 0.0
         return
@@ -41,8 +54,8 @@ def normalise(work: Any, count: int) -> None:
 
 
 @njit(nogil=True)
-def prune(work: Any, count: int, depth: float) -> int:
-    """Drop what is lighter than the best by `depth`; returns the new count."""
+def prune(work: Hypotheses, count: int, depth: float) -> int:
+    """Drop hypotheses whose log weight is more than `depth` below the best. Return the count."""
     floor = work[best_of(work, count)].log_weight - depth
     kept = 0
     for h in range(count):
@@ -53,23 +66,23 @@ def prune(work: Any, count: int, depth: float) -> int:
 
 
 @njit(nogil=True)
-def put_in_order(work: Any, count: int) -> None:
-    """Fill `order`: heaviest first, the first one of equals first."""
+def sort_by_weight(work: Hypotheses, count: int) -> None:
+    """Fill `by_weight` with indices, the heaviest first. The sort is stable."""
     for h in range(count):
         k = h
-        while k > 0 and work[work[k - 1].order].log_weight < work[h].log_weight:
-            work[k].order = work[k - 1].order
+        while k > 0 and work[work[k - 1].by_weight].log_weight < work[h].log_weight:
+            work[k].by_weight = work[k - 1].by_weight
             k -= 1
-        work[k].order = h
+        work[k].by_weight = h
 
 
 @njit(nogil=True)
-def limit(work: Any, count: int, most: int) -> int:
-    """Keep the `most` heaviest."""
+def keep_heaviest(work: Hypotheses, count: int, most: int) -> int:
+    """Keep the `most` heaviest hypotheses. Return the count."""
     if count <= most:
         return count
-    put_in_order(work, count)
-    floor = work[work[most - 1].order].log_weight
+    sort_by_weight(work, count)
+    floor = work[work[most - 1].by_weight].log_weight
     kept = 0
     for h in range(count):
         if work[h].log_weight >= floor and kept < most:
@@ -79,15 +92,15 @@ def limit(work: Any, count: int, most: int) -> int:
 
 
 @njit(nogil=True)
-def angle_variance(P: Any) -> float:
-    """Variance of the angle between the course (without crab) and the bearing: what makes the step nonlinear."""
+def angle_variance(P: Floats) -> float:
+    """Return the variance, rad^2, of course (without slip) minus bearing: the angle that makes a step non-linear."""
     return float(P[YAW, YAW] + P[MOUNT, MOUNT] + P[PHI, PHI] + 2.0 * (P[YAW, MOUNT] - P[YAW, PHI] - P[MOUNT, PHI]))
 
 
 @njit(nogil=True)
-def _close(work: Any, a: int, b: int, distance: float) -> bool:
-    """Every one of r, v, phi and the angle within `distance` standard deviations of the heavier one."""
-    if work[a].kind != work[b].kind or work[a].blocked != work[b].blocked:
+def _are_close(work: Hypotheses, a: int, b: int, distance: float) -> bool:
+    """Return whether r, v, phi and that angle are each within `distance` standard deviations of the heavier one, a."""
+    if work[a].heading_class != work[b].heading_class or work[a].nlos != work[b].nlos:
         return False
     P = work[a].cov
     d2 = distance * distance
@@ -101,11 +114,11 @@ def _close(work: Any, a: int, b: int, distance: float) -> bool:
 
 
 @njit(nogil=True)
-def _absorb(work: Any, a: int, b: int) -> None:
-    """Moment matching of b into a."""
+def _merge_into(work: Hypotheses, a: int, b: int) -> None:
+    """Merge b into a by moment matching."""
     wa, wb = math.exp(work[a].log_weight), math.exp(work[b].log_weight)
     share = wb / (wa + wb)
-    d = work[a].shift
+    d = work[a].delta
     for i in range(N):
         d[i] = work[b].mean[i] - work[a].mean[i]
     d[PHI] = wrap(d[PHI])
@@ -119,77 +132,77 @@ def _absorb(work: Any, a: int, b: int) -> None:
 
 
 @njit(nogil=True)
-def merge(work: Any, count: int, distance: float, light: float) -> int:
-    """Merge close pairs into the heavier one, heaviest first; returns the new count. Weights must be normalised.
+def merge(work: Hypotheses, count: int, distance: float, light: float) -> int:
+    """Merge close pairs into the heavier one, heaviest first. Return the count. Weights must be normalised.
 
-    The lighter one may be the further away: what its place is worth shrinks with its weight, as in Salmond (1990).
+    A lighter hypothesis may be further away, because merging it changes the moments less (Salmond 1990).
     """
-    put_in_order(work, count)
+    sort_by_weight(work, count)
     for h in range(count):
-        work[h].gone = False
+        work[h].merged = False
     for ia in range(count):
-        a = work[ia].order
-        if not work[a].gone:
-            _absorb_close(work, count, ia, distance, light)
+        a = work[ia].by_weight
+        if not work[a].merged:
+            _merge_close(work, count, ia, distance, light)
     kept = 0
     for h in range(count):
-        if not work[h].gone:
+        if not work[h].merged:
             copy_hypothesis(work, h, kept)
             kept += 1
     return kept
 
 
 @njit(nogil=True)
-def _absorb_close(work: Any, count: int, ia: int, distance: float, light: float) -> None:
-    """Merge what is close to the ia-th heaviest into it."""
-    a = work[ia].order
+def _merge_close(work: Hypotheses, count: int, ia: int, distance: float, light: float) -> None:
+    """Merge hypotheses close to the ia-th heaviest into it."""
+    a = work[ia].by_weight
     for ib in range(ia + 1, count):
-        b = work[ib].order
-        if not work[b].gone:
+        b = work[ib].by_weight
+        if not work[b].merged:
             lacks = max(work[a].log_weight - work[b].log_weight, 0.0)
-            if _close(work, a, b, distance * math.sqrt(1.0 + light * lacks)):
-                _absorb(work, a, b)
-                work[b].gone = True
+            if _are_close(work, a, b, distance * math.sqrt(1.0 + light * lacks)):
+                _merge_into(work, a, b)
+                work[b].merged = True
 
 
 @njit(nogil=True)
-def split(work: Any, count: int, angle: float, depth: float) -> int:
-    """Split what is wider than `angle` into three along that angle's column; returns the new count.
+def split(work: Hypotheses, count: int, angle: float, depth: float) -> int:
+    """Split hypotheses whose angle is wider than `angle`, rad, into three along it. Return the count.
 
-    Weights .2252/.5496/.2252, shifts +-1.0576 sigma, variance along the column times 0.451: first two moments kept.
+    The weights and shifts below, and a variance along the angle of 0.451 of what it was, keep the first two moments.
     """
     floor = work[best_of(work, count)].log_weight - depth
     for h in range(count):
         variance = angle_variance(work[h].cov)
-        if variance > angle * angle and work[h].log_weight > floor and count + 2 <= WORK:
+        if variance > angle * angle and work[h].log_weight > floor and count + 2 <= WORKING_HYPOTHESES:
             _split_one(work, h, count, variance)
             count += 2
     return count
 
 
 @njit(nogil=True)
-def _split_one(work: Any, h: int, count: int, variance: float) -> None:
+def _split_one(work: Hypotheses, h: int, count: int, variance: float) -> None:
     P = work[h].cov
-    column = work[h].shift
+    column = work[h].delta
     for i in range(N):
         column[i] = P[i, YAW] + P[i, MOUNT] - P[i, PHI]
     for i in range(N):
         for j in range(N):
-            P[i, j] -= 0.549 * column[i] * column[j] / variance
+            P[i, j] -= SPLIT_REMOVED * column[i] * column[j] / variance
     copy_hypothesis(work, h, count)
     copy_hypothesis(work, h, count + 1)
-    step = 1.0576 / math.sqrt(variance)
+    step = SPLIT_SHIFT / math.sqrt(variance)
     for i in range(N):
         work[count].mean[i] += step * column[i]
         work[count + 1].mean[i] -= step * column[i]
-    work[h].log_weight += math.log(0.5496)
-    work[count].log_weight += math.log(0.2252)
-    work[count + 1].log_weight += math.log(0.2252)
+    work[h].log_weight += math.log(SPLIT_CENTRE)
+    work[count].log_weight += math.log(SPLIT_SIDE)
+    work[count + 1].log_weight += math.log(SPLIT_SIDE)
 
 
 @njit(nogil=True)
-def finite(work: Any, count: int) -> bool:
-    """Every hypothesis is a number with a positive variance in every direction that can be checked cheaply."""
+def all_finite(work: Hypotheses, count: int) -> bool:
+    """Return whether all weights, means and variances are finite and in range, and there is a hypothesis at all."""
     for h in range(count):
         if not math.isfinite(work[h].log_weight):
             return False

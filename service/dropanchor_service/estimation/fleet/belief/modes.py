@@ -1,44 +1,48 @@
 """The modes behind a pose: clusters of hypotheses with their weights, heaviest first."""
 
-from typing import Any
-
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.belief.layout import Anchors, Hypotheses, Pool, Row, Workspace
 from dropanchor_service.estimation.fleet.belief.mixture import normalise
 from dropanchor_service.estimation.fleet.belief.pool import load
-from dropanchor_service.estimation.fleet.belief.summary import add_reference, cluster, locate, moments
+from dropanchor_service.estimation.fleet.belief.summary import add_reference_variance, cluster, fill_positions, moments
 from dropanchor_service.estimation.fleet.compiled import njit
+
+LIGHTEST = 0.01  # weight of a mode that is listed
 
 
 @njit(nogil=True)
-def _heaviest(work: Any, count: int) -> int:
+def _heaviest(work: Hypotheses, count: int) -> int:
     head = -1
     for h in range(count):
-        if not work[h].taken and (head < 0 or work[h].log_weight > work[head].log_weight):
+        if not work[h].assigned and (head < 0 or work[h].log_weight > work[head].log_weight):
             head = h
     return head
 
 
 @njit(nogil=True)
-def list_modes(row: Any, pool: Any, anchors: Any, space: Any, modes: Any) -> int:
-    """Fill modes (HYPOTHESIS of `batch`) with the clusters above 1 %; returns their number."""
+def list_modes(row: Row, pool: Pool, anchors: Anchors, space: Workspace, modes: Array) -> int:
+    """Fill modes (HYPOTHESIS of `columns`) with the modes above 1 % of the weight. Return their number."""
     count = row.count
     work, scratch = space.hypotheses, space.scratch
     mean, cov = scratch.mean, scratch.cov
     load(row, pool, work)
     for h in range(count):
-        work[h].taken = False
+        work[h].assigned = False
     if count > 0:
         normalise(work, count)
-        locate(work, count)
+        fill_positions(work, count)
     for n in range(len(modes)):
         head = _heaviest(work, count)
         weight = cluster(work, count, head) if head >= 0 else 0.0
-        if weight < 0.01:
+        if weight < LIGHTEST:
             return n
         moments(work, count, head, scratch)
-        if row.start_known == 0:
-            add_reference(cov, mean[0], mean[1], (row.reference_std if row.referred == 1 else 1.8) ** 2)
+        if row.start.known == 0:
+            add_reference_variance(
+                cov, mean[0], mean[1], (row.settings.reference_std if row.heading.in_site_frame == 1 else 1.8) ** 2
+            )
         for h in range(count):
-            work[h].taken |= work[h].member
+            work[h].assigned |= work[h].in_mode
         mode, anchor = modes[n], anchors[row.anchor]
         mode.weight = min(weight, 1.0)
         mode.x, mode.y, mode.heading, mode.speed = mean[0] + anchor.x, mean[1] + anchor.y, mean[2], mean[3]

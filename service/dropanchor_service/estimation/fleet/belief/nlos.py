@@ -1,109 +1,133 @@
-"""A line of sight that is blocked for seconds, and a track that has lost its ranges.
+"""A line of sight that is lost for seconds, and a track that has lost its ranges.
 
-A blocked line of sight lengthens every range by one nearly constant amount: a second hypothesis with a larger range
-offset keeps what such ranges still say. It is opened when several ranges in a row are too long, closed when they fall.
+Without line of sight every range is too long by one nearly constant amount. A second hypothesis with a larger range
+bias keeps what such ranges still say. It is added when several ranges in a row are too long, and closed when the bias
+is that of a line of sight again.
 """
 
 import math
-from typing import Any
+from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.layout import KEEP, OFFSET, PHI, N, R, V
+from dropanchor_service.estimation.fleet.belief.layout import (
+    MAX_HYPOTHESES,
+    PHI,
+    RANGE_BIAS,
+    Floats,
+    Hypotheses,
+    N,
+    R,
+    Row,
+    V,
+)
 from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
 from dropanchor_service.estimation.fleet.belief.update import update_component
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
+
+OFFER_EVERY: Final = 1.0  # s between offers of a line of sight
+MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which most ranges are outliers
+CLOSE_SIGMAS, CLOSE_SLACK = 1.5, 0.2  # standard deviations and m within which a bias is that of a line of sight
+WIDEN_POSITION, WIDEN_SPEED = 1.0, 0.5  # m^2 and (m/s)^2 by which a track with a misfit is widened
 
 
 @njit(nogil=True)
-def open_alternative(work: Any, count: int, row: Any, t: Tuning) -> int:
-    """Alternatives of every likely hypothesis when ranges jump: up, the line of sight is blocked (or blocked by
-    more); down, it is clear again (or blocked by less). Returns the count."""
-    up = row.high_run >= t.blocked_run
-    if not up and row.low_run < t.blocked_run:
+def propose_alternatives(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
+    """Add an alternative to every likely hypothesis when the ranges jump. Return the count.
+
+    Ranges that are too long: the line of sight is lost, or the path grew longer. Ranges that are too short: the line of
+    sight is back, or the path grew shorter.
+    """
+    too_long = row.nlos.high_run >= t.nlos_run
+    if not too_long and row.nlos.low_run < t.nlos_run:
         return count
-    row.high_run = row.low_run = 0
-    floor = work[best_of(work, count)].log_weight - t.blocked_depth
+    row.nlos.high_run = row.nlos.low_run = 0
+    floor = work[best_of(work, count)].log_weight - t.nlos_depth
     for h in range(count):
         if work[h].log_weight < floor:
             continue
-        if (up or work[h].blocked == 1) and count < KEEP:
-            _block(work, h, count, t)
+        if (too_long or work[h].nlos == 1) and count < MAX_HYPOTHESES:
+            _add_nlos(work, h, count, t)
             count += 1
-        if not up and work[h].blocked == 1 and count < KEEP:
-            _clear(work, h, count, t)
+        if not too_long and work[h].nlos == 1 and count < MAX_HYPOTHESES:
+            _add_los(work, h, count, t)
             count += 1
     return count
 
 
 @njit(nogil=True)
-def _block(work: Any, source: int, target: int, t: Tuning) -> None:
+def _add_nlos(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
+    """Copy `source` for a path that is longer than the line of sight by about the mean of an outlier."""
     copy_hypothesis(work, source, target)
     new = work[target]
-    new.log_weight += t.blocked_log_prior
-    if new.blocked == 0:
-        new.clear[0], new.clear[1] = new.mean[OFFSET], new.cov[OFFSET, OFFSET]
-        new.blocked = 1
-    _forget_offset(new.cov)
-    new.mean[OFFSET] = new.clear[0] + t.outlier_mean
-    new.cov[OFFSET, OFFSET] = new.clear[1] + t.outlier_std**2
+    new.log_weight += t.nlos_log_prior
+    if new.nlos == 0:
+        new.los_bias, new.los_bias_var = new.mean[RANGE_BIAS], new.cov[RANGE_BIAS, RANGE_BIAS]
+        new.nlos = 1
+    _decorrelate_bias(new.cov)
+    new.mean[RANGE_BIAS] = new.los_bias + t.outlier_mean
+    new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var + t.outlier_std**2
 
 
 @njit(nogil=True)
-def _clear(work: Any, source: int, target: int, t: Tuning) -> None:
+def _add_los(work: Hypotheses, source: int, target: int, t: Tuning) -> None:
+    """Copy `source` for a line of sight that is back, with the range bias from before it was lost."""
     copy_hypothesis(work, source, target)
     new = work[target]
-    new.log_weight += t.blocked_log_prior
-    new.blocked = 0
-    _forget_offset(new.cov)
-    new.mean[OFFSET] = new.clear[0]
-    new.cov[OFFSET, OFFSET] = new.clear[1]
+    new.log_weight += t.nlos_log_prior
+    new.nlos = 0
+    _decorrelate_bias(new.cov)
+    new.mean[RANGE_BIAS] = new.los_bias
+    new.cov[RANGE_BIAS, RANGE_BIAS] = new.los_bias_var
 
 
 @njit(nogil=True)
-def _forget_offset(P: Any) -> None:
+def _decorrelate_bias(P: Floats) -> None:
     for i in range(N):
-        P[OFFSET, i] = P[i, OFFSET] = 0.0
+        P[RANGE_BIAS, i] = P[i, RANGE_BIAS] = 0.0
 
 
 @njit(nogil=True)
-def expect_clear(work: Any, count: int, row: Any, dt: float, t: Tuning) -> int:
-    """Blocked lines of sight clear at a rate of 1/blocked_tau, whether a jump shows it or not; returns the count."""
-    row.since_clear_s += dt
-    offer = row.since_clear_s >= 1.0
+def expect_los(work: Hypotheses, count: int, row: Row, dt: float, t: Tuning) -> int:
+    """Let lost lines of sight come back at the rate 1/nlos_tau, whether a jump shows it or not. Return the count."""
+    row.nlos.since_los_offer_s += dt
+    offer = row.nlos.since_los_offer_s >= OFFER_EVERY
     if offer:
-        row.since_clear_s = 0.0
-    floor = work[best_of(work, count)].log_weight - t.blocked_depth
+        row.nlos.since_los_offer_s = 0.0
+    floor = work[best_of(work, count)].log_weight - t.nlos_depth
     for h in range(count):
-        if work[h].blocked == 1:
-            if offer and work[h].log_weight > floor and count < KEEP:
-                _clear(work, h, count, t)
+        if work[h].nlos == 1:
+            if offer and work[h].log_weight > floor and count < MAX_HYPOTHESES:
+                _add_los(work, h, count, t)
                 count += 1
-            work[h].log_weight -= dt / t.blocked_tau
+            work[h].log_weight -= dt / t.nlos_tau
     return count
 
 
 @njit(nogil=True)
-def recover(work: Any, count: int, row: Any, node: Any, t: Tuning) -> None:
-    """Ranges that have been refused for seconds are right and the track is wrong: widen it."""
-    row.since_nlos_s = row.since_nlos_s + node.dt_s if row.misfit > 0.5 else 0.0
-    if row.since_nlos_s < t.misfit_s:
+def widen_after_misfit(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> None:
+    """Widen a track whose ranges have been outliers for seconds: the ranges are right and the track is wrong."""
+    nlos = row.nlos
+    nlos.misfit_s = nlos.misfit_s + node.dt_s if nlos.misfit > MISFIT_LIMIT else 0.0
+    if nlos.misfit_s < t.misfit_s:
         return
-    row.since_nlos_s = 0.0
+    nlos.misfit_s = 0.0
     for h in range(count):
         P = work[h].cov
-        P[R, R] += 1.0
-        P[PHI, PHI] += 1.0 / max(work[h].mean[R], 1.0) ** 2
-        P[V, V] += 0.5
+        P[R, R] += WIDEN_POSITION
+        P[PHI, PHI] += WIDEN_POSITION / max(work[h].mean[R], 1.0) ** 2
+        P[V, V] += WIDEN_SPEED
 
 
 @njit(nogil=True)
-def unblock(work: Any, count: int, PH: Any, t: Tuning) -> None:
-    """A blocked hypothesis whose extra offset has gone is a clear one, with the offset of a clear line of sight."""
+def close_nlos(work: Hypotheses, count: int, PH: Floats, t: Tuning) -> None:
+    """Turn NLOS hypotheses whose extra bias has gone into ones with the bias of a line of sight."""
     for h in range(count):
-        if work[h].blocked == 1:
-            extra = work[h].mean[OFFSET] - work[h].clear[0]
-            sigma = math.sqrt(work[h].cov[OFFSET, OFFSET])
-            if extra + 2.0 * sigma < t.blocked_min + 0.2 and extra < min(t.blocked_min, 1.5 * sigma):
-                work[h].blocked = 0
-                variance = max(work[h].clear[1], 1e-6)
-                update_component(work[h].mean, work[h].cov, PH, OFFSET, work[h].clear[0], variance)
+        if work[h].nlos == 1:
+            extra = work[h].mean[RANGE_BIAS] - work[h].los_bias
+            sigma = math.sqrt(work[h].cov[RANGE_BIAS, RANGE_BIAS])
+            certain = extra + 2.0 * sigma < t.nlos_min_bias + CLOSE_SLACK
+            if certain and extra < min(t.nlos_min_bias, CLOSE_SIGMAS * sigma):
+                work[h].nlos = 0
+                variance = max(work[h].los_bias_var, 1e-6)
+                update_component(work[h].mean, work[h].cov, PH, RANGE_BIAS, work[h].los_bias, variance)

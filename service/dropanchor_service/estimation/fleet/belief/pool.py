@@ -1,22 +1,55 @@
-"""One pool of hypothesis slots for all rows: a row's slots are a linked list, copied out to be worked on and back."""
+"""One pool of hypothesis slots for all rows.
 
-from typing import Any
+The slots of a row are a linked list. `load` unpacks them into the workspace and `store` packs them back.
+"""
 
-from dropanchor_service.estimation.fleet.belief.layout import KEEP, N
+import numpy as np
+
+from dropanchor_service.estimation.fleet.belief.layout import (
+    MAX_HYPOTHESES,
+    POOL_SLOT,
+    Floats,
+    Hypotheses,
+    N,
+    Pool,
+    Row,
+)
 from dropanchor_service.estimation.fleet.compiled import njit
 
 
+def make_pool(capacity: int) -> Pool:
+    """Return `capacity` slots in one free list. Slot 0 is the head of that list and holds no hypothesis."""
+    pool = np.zeros(capacity, POOL_SLOT)
+    pool["next"] = np.arange(1, capacity + 1)
+    pool["next"][-1] = -1
+    pool["free"][0] = capacity - 1
+    return pool
+
+
+def with_room(pool: Pool, slots: int) -> Pool:
+    """Return the pool, or a larger one with the same hypotheses, that has at least `slots` free slots."""
+    size, free = len(pool), int(pool["free"][0])
+    if free >= slots:
+        return pool
+    grown = make_pool(max(size + slots, 2 * size))
+    added = len(grown) - size
+    grown["next"][-1] = pool["next"][0]
+    grown[1:size] = pool[1:]
+    grown["next"][0], grown["free"][0] = size, free + added
+    return grown
+
+
 @njit(nogil=True)
-def load(row: Any, pool: Any, work: Any) -> None:
-    """Unpack the row's hypotheses into work, in the order they were stored."""
-    slot = row.head
+def load(row: Row, pool: Pool, work: Hypotheses) -> None:
+    """Unpack the row's hypotheses into `work`, in the order they were stored."""
+    slot = row.first_slot
     for h in range(row.count):
         stored = pool[slot]
         work[h].log_weight = stored.log_weight
-        work[h].kind = stored.kind
-        work[h].blocked = stored.blocked
-        work[h].clear[0] = stored.clear_offset
-        work[h].clear[1] = stored.clear_variance
+        work[h].heading_class = stored.heading_class
+        work[h].nlos = stored.nlos
+        work[h].los_bias = stored.los_bias
+        work[h].los_bias_var = stored.los_bias_var
         k = 0
         for i in range(N):
             work[h].mean[i] = stored.mean[i]
@@ -27,17 +60,17 @@ def load(row: Any, pool: Any, work: Any) -> None:
 
 
 @njit(nogil=True)
-def store(row: Any, pool: Any, work: Any, count: int) -> None:
-    """Pack work back, taking or returning slots: KEEP at most."""
-    _resize(row, pool, min(count, KEEP))
-    slot = row.head
+def store(row: Row, pool: Pool, work: Hypotheses, count: int) -> None:
+    """Pack up to MAX_HYPOTHESES of `work` into the row's slots. Take or return slots as needed."""
+    _resize(row, pool, min(count, MAX_HYPOTHESES))
+    slot = row.first_slot
     for h in range(row.count):
         stored = pool[slot]
         stored.log_weight = work[h].log_weight
-        stored.kind = work[h].kind
-        stored.blocked = work[h].blocked
-        stored.clear_offset = work[h].clear[0]
-        stored.clear_variance = work[h].clear[1]
+        stored.heading_class = work[h].heading_class
+        stored.nlos = work[h].nlos
+        stored.los_bias = work[h].los_bias
+        stored.los_bias_var = work[h].los_bias_var
         k = 0
         for i in range(N):
             stored.mean[i] = work[h].mean[i]
@@ -48,24 +81,24 @@ def store(row: Any, pool: Any, work: Any, count: int) -> None:
 
 
 @njit(nogil=True)
-def mirror(P: Any) -> None:
-    """Exactly symmetric from the upper triangle: what is stored is then what was worked with, to the last bit."""
+def mirror(P: Floats) -> None:
+    """Copy the upper triangle of P to the lower one, so that a stored hypothesis equals the one worked on."""
     for i in range(N):
         for j in range(i):
             P[i, j] = P[j, i]
 
 
 @njit(nogil=True, cache=True)
-def release(row: Any, pool: Any) -> None:
-    """Give all slots of the row back."""
+def release(row: Row, pool: Pool) -> None:
+    """Return all slots of the row."""
     _resize(row, pool, 0)
 
 
 @njit(nogil=True)
-def _resize(row: Any, pool: Any, count: int) -> None:
+def _resize(row: Row, pool: Pool, count: int) -> None:
     while row.count > count:
-        slot = row.head
-        row.head = pool[slot].next
+        slot = row.first_slot
+        row.first_slot = pool[slot].next
         pool[slot].next = pool[0].next
         pool[0].next = slot
         pool[0].free += 1
@@ -74,6 +107,6 @@ def _resize(row: Any, pool: Any, count: int) -> None:
         slot = pool[0].next
         pool[0].next = pool[slot].next
         pool[0].free -= 1
-        pool[slot].next = row.head
-        row.head = slot
+        pool[slot].next = row.first_slot
+        row.first_slot = slot
         row.count += 1

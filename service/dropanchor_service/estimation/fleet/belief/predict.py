@@ -1,50 +1,52 @@
 """Predict one hypothesis over a node: constant-course step in polar coordinates.
 
-With w = dyaw - b_g dt, m = mount + crab, alpha = yaw + w/2 + m - phi, f = dv_forward cos m + dv_left sin m - b_a dt and
-d = v dt + f dt/2, and with the swing g of a lever (forward, left), turned by yaw - phi:
+With w = dyaw - b_g dt, m = mount + slip, alpha = yaw + w/2 + m - phi, f = dv_forward cos m + dv_left sin m - b_a dt and
+d = v dt + f dt/2, and with the displacement g by a lever (forward, left), turned by yaw - phi:
 
     z = (r + d cos alpha, d sin alpha) + R(yaw - phi) g,  r' = |z|,  phi' = phi + atan2(z_y, z_x),
-    yaw' = yaw + w,  v' = v + f,  crab, b_a and the reference error decay with their time constants.
+    yaw' = yaw + w,  v' = v + f,  slip, b_a and the reference error decay with their time constants.
 """
 
 import math
 from typing import Any
 
-from dropanchor_service.estimation.fleet.belief.heading_models import error_of_class
+from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
 from dropanchor_service.estimation.fleet.belief.layout import (
-    ACC,
-    COMMON,
-    CRAB,
+    ACC_BIAS,
     DRIFTING,
-    GYRO,
+    GYRO_BIAS,
+    MAGNETOMETER_MODEL,
     MOUNT,
-    OFFSET,
     PHI,
-    REF,
+    RANGE_BIAS,
+    REFERENCE,
+    SLIP,
     YAW,
+    Floats,
     N,
     R,
+    Row,
     V,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, NO_HEADING
+from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, NO_HEADING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 
 @njit(nogil=True, inline="never")
-def move(s: Any, node: Any, decay: Any, F: Any) -> None:
-    """Move the state s (N,) over the node; F (4, N) receives d(r, phi, yaw, v)'/ds before any decay.
+def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
+    """Predict the state s (N,) over the node, and fill F (4, N) with d(r, phi, yaw, v)'/ds before any decay.
 
-    F must be zero or from another call: what is always zero in it is not written.
+    F must be zero or from an earlier call: entries that are always zero are not written.
     """
     dt = node.dt_s
-    w = node.dyaw - s[GYRO] * dt
-    m = s[MOUNT] + s[CRAB]
+    w = node.dyaw - s[GYRO_BIAS] * dt
+    m = s[MOUNT] + s[SLIP]
     cm, sm = math.cos(m), math.sin(m)
     sensed = math.isfinite(node.dv_var)
     forward = node.dv_forward if sensed else 0.0
     left = node.dv_left if sensed else 0.0
-    bias = s[ACC] * dt if sensed else 0.0
+    bias = s[ACC_BIAS] * dt if sensed else 0.0
     f = forward * cm + left * sm - bias
     f_m = -forward * sm + left * cm
     f_b = -dt if sensed else 0.0
@@ -66,23 +68,23 @@ def move(s: Any, node: Any, decay: Any, F: Any) -> None:
     F[0, YAW], F[1, YAW] = r_alpha + r_beta, p_alpha + p_beta
     F[0, V], F[1, V] = r_d * dt, p_d * dt
     F[0, MOUNT], F[1, MOUNT] = r_alpha + r_d * f_m * dt / 2, p_alpha + p_d * f_m * dt / 2
-    F[0, CRAB], F[1, CRAB] = F[0, MOUNT], F[1, MOUNT]
-    F[0, GYRO], F[1, GYRO] = -r_alpha * dt / 2, -p_alpha * dt / 2
-    F[0, ACC], F[1, ACC] = r_d * f_b * dt / 2, p_d * f_b * dt / 2
-    F[2, YAW], F[2, GYRO] = 1.0, -dt
-    F[3, V], F[3, MOUNT], F[3, CRAB], F[3, ACC] = 1.0, f_m, f_m, f_b
-    s[PHI] += angle_of(zx, zy)
+    F[0, SLIP], F[1, SLIP] = F[0, MOUNT], F[1, MOUNT]
+    F[0, GYRO_BIAS], F[1, GYRO_BIAS] = -r_alpha * dt / 2, -p_alpha * dt / 2
+    F[0, ACC_BIAS], F[1, ACC_BIAS] = r_d * f_b * dt / 2, p_d * f_b * dt / 2
+    F[2, YAW], F[2, GYRO_BIAS] = 1.0, -dt
+    F[3, V], F[3, MOUNT], F[3, SLIP], F[3, ACC_BIAS] = 1.0, f_m, f_m, f_b
+    s[PHI] += fast_atan2(zx, zy)
     s[R] = r
     s[YAW] += w
     s[V] += f
     for i in range(4, N):
         s[i] *= decay[i]
-    s[GYRO] -= node.gyro_step
+    s[GYRO_BIAS] -= node.gyro_bias_step
 
 
 @njit(nogil=True)
-def angle_of(x: float, y: float) -> float:
-    """atan2(y, x); near zero by its series, whose rest is below the rounding there."""
+def fast_atan2(x: float, y: float) -> float:
+    """Return atan2(y, x); for small angles by its series, whose remainder is below the rounding there."""
     if not abs(y) < 0.03 * x:
         return math.atan2(y, x)
     t = y / x
@@ -91,14 +93,14 @@ def angle_of(x: float, y: float) -> float:
 
 
 @njit(nogil=True)
-def _of_row(F: Any, i: int) -> tuple[float, float, float, float, float, float, float]:
-    """What is not zero of a row of F; of mount and crab, which act alike, the first."""
-    return F[i, R], F[i, PHI], F[i, YAW], F[i, V], F[i, MOUNT], F[i, GYRO], F[i, ACC]
+def _row_of(F: Floats, i: int) -> tuple[float, float, float, float, float, float, float]:
+    """Return the entries of a row of F that can differ from zero. That of mount is also that of slip."""
+    return F[i, R], F[i, PHI], F[i, YAW], F[i, V], F[i, MOUNT], F[i, GYRO_BIAS], F[i, ACC_BIAS]
 
 
 @njit(nogil=True)
-def _of_column(P: Any, j: int) -> tuple[float, float, float, float, float, float, float]:
-    return P[R, j], P[PHI, j], P[YAW, j], P[V, j], P[MOUNT, j] + P[CRAB, j], P[GYRO, j], P[ACC, j]
+def _column_of(P: Floats, j: int) -> tuple[float, float, float, float, float, float, float]:
+    return P[R, j], P[PHI, j], P[YAW, j], P[V, j], P[MOUNT, j] + P[SLIP, j], P[GYRO_BIAS, j], P[ACC_BIAS, j]
 
 
 @njit(nogil=True)
@@ -107,12 +109,12 @@ def _dot(f: Any, p: Any) -> float:
 
 
 @njit(nogil=True, inline="never")
-def transport(P: Any, F: Any, decay: Any, A: Any) -> None:
-    """P = J P J^T with J = [F; diag(decay)] of `move`, without the zeros and ones of F. A (4, N) is scratch."""
-    f, g = _of_row(F, R), _of_row(F, PHI)
-    yaw_g, v_m, v_a = F[YAW, GYRO], F[V, MOUNT], F[V, ACC]
+def predict_covariance(P: Floats, F: Floats, decay: Floats, A: Floats) -> None:
+    """Predict the covariance: P = J P J^T, J = [F; diag(decay)], skipping zeros and ones of F. A (4, N) is scratch."""
+    f, g = _row_of(F, R), _row_of(F, PHI)
+    yaw_g, v_m, v_a = F[YAW, GYRO_BIAS], F[V, MOUNT], F[V, ACC_BIAS]
     for j in range(N):
-        p = _of_column(P, j)
+        p = _column_of(P, j)
         A[R, j], A[PHI, j] = _dot(f, p), _dot(g, p)
         A[YAW, j], A[V, j] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_a * p[6]
     for i in range(4, N):
@@ -121,7 +123,7 @@ def transport(P: Any, F: Any, decay: Any, A: Any) -> None:
     for i in range(4):
         for j in range(4, N):
             P[i, j] = P[j, i] = A[i, j] * decay[j]
-        p = _of_column(A.T, i)
+        p = _column_of(A.T, i)
         P[i, R], P[i, PHI] = _dot(f, p), _dot(g, p)
         P[i, YAW], P[i, V] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_a * p[6]
     for i in range(4):
@@ -130,59 +132,66 @@ def transport(P: Any, F: Any, decay: Any, A: Any) -> None:
 
 
 @njit(nogil=True)
-def fill_decay(decay: Any, growth: Any, node: Any, row: Any, t: Tuning) -> None:
-    """Per-state decay over the node and the variance it adds; r's and phi's by `diffuse`, the classes' own below."""
+def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -> None:
+    """Fill the decay of every state over the node and the variance it gains.
+
+    `add_process_noise` adds that of r and phi, `fill_class_noise` fills what differs between heading classes.
+    """
     dt = node.dt_s
     decay[:] = 1.0
     growth[:] = 0.0
-    decay[CRAB] = math.exp(-dt / row.crab_tau)
-    decay[ACC] = math.exp(-dt / t.acc_tau)
+    decay[SLIP] = math.exp(-dt / row.settings.slip_tau)
+    decay[ACC_BIAS] = math.exp(-dt / t.acc_bias_tau)
     growth[YAW] = node.dyaw_var
     rough = 0.0
     if math.isfinite(node.dv_var):
         growth[V] = node.dv_var + t.q_speed * dt
         rough = node.dv_var / dt if dt > 0.0 else 0.0
     else:
-        growth[V] = t.q_speed_blind * dt
-    growth[MOUNT] = t.q_mount * dt if row.mount_std > 0.0 else 0.0
-    growth[CRAB] = row.crab_std**2 * (1.0 - decay[CRAB] ** 2)
-    growth[ACC] = (t.acc_std**2 + t.acc_rough * rough) * (1.0 - decay[ACC] ** 2)
-    growth[OFFSET] = t.q_offset * dt if row.offset_std > 0.0 else 0.0
+        growth[V] = t.q_speed_no_acc * dt
+    growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
+    growth[SLIP] = row.settings.slip_std**2 * (1.0 - decay[SLIP] ** 2)
+    growth[ACC_BIAS] = (t.acc_bias_std**2 + t.acc_bias_roughness * rough) * (1.0 - decay[ACC_BIAS] ** 2)
+    growth[RANGE_BIAS] = t.q_range_bias * dt if row.settings.range_bias_std > 0.0 else 0.0
 
 
 @njit(nogil=True)
-def fill_class(decay: Any, growth: Any, node: Any, row: Any, kind: int, t: Tuning) -> None:
-    """The same of what a class of hypotheses has of its own: the drifts of the gyroscope and of the reference."""
+def fill_class_noise(decay: Floats, growth: Floats, node: Node, row: Row, heading_class: int, t: Tuning) -> None:
+    """Fill what differs between heading classes: the drifts of the gyroscope and of the reference."""
     beside = node.heading_kind == MEASURED_HEADING or node.heading_kind == NO_HEADING
-    growth[GYRO] = (t.q_gyro_own if not beside else t.q_gyro_drift if kind == DRIFTING else t.q_gyro) * node.dt_s
-    if row.model == COMMON and node.heading_kind != ABSOLUTE_HEADING:
-        decay[REF], growth[REF] = 1.0, 0.0
+    growth[GYRO_BIAS] = (
+        t.q_gyro_own if not beside else t.q_gyro_drift if heading_class == DRIFTING else t.q_gyro
+    ) * node.dt_s
+    if row.heading.model == MAGNETOMETER_MODEL and node.heading_kind != ABSOLUTE_HEADING:
+        decay[REFERENCE], growth[REFERENCE] = 1.0, 0.0
         return
-    _, std, tau = error_of_class(row, kind, node.heading_var if math.isfinite(node.heading_var) else 1.0, t)
-    decay[REF] = math.exp(-node.dt_s / tau)
-    growth[REF] = std**2 * (1.0 - decay[REF] ** 2)
+    _, std, tau = class_reference_error(
+        row, heading_class, node.heading_var if math.isfinite(node.heading_var) else 1.0, t
+    )
+    decay[REFERENCE] = math.exp(-node.dt_s / tau)
+    growth[REFERENCE] = std**2 * (1.0 - decay[REFERENCE] ** 2)
 
 
 @njit(nogil=True)
-def diffuse(s: Any, P: Any, F: Any, growth: Any, node: Any, t: Tuning, blocked: int) -> None:
-    """Add the process noise of one node, of `move`'s F, to P."""
+def add_process_noise(s: Floats, P: Floats, F: Floats, growth: Floats, node: Node, t: Tuning, nlos: int) -> None:
+    """Add the process noise of one node to P. F is that of `predict_state`."""
     dt = node.dt_s
     P[R, R] += t.q_position * dt
     P[PHI, PHI] += t.q_position * dt / max(s[R], 0.1) ** 2
     for i in range(2, N):
         P[i, i] += growth[i]
     if not math.isfinite(node.dv_var):
-        P[V, V] += t.q_speed_blind_moving * min(abs(s[V]), 1.0) ** 2 * dt
-    if blocked == 1:
-        P[OFFSET, OFFSET] += t.q_blocked * dt
-    # speed noise acts during the step, so half of it is already travelled at the end
+        P[V, V] += t.q_speed_no_acc_moving * min(abs(s[V]), 1.0) ** 2 * dt
+    if nlos == 1:
+        P[RANGE_BIAS, RANGE_BIAS] += t.q_nlos * dt
+    # Speed noise acts during the step, so half of it has already moved the tag at the end.
     if growth[V] > 0.0 and dt > 0.05:
-        _travel(P, F[0, V], F[1, V], growth[V])
+        _correlate_speed_noise(P, F[0, V], F[1, V], growth[V])
 
 
 @njit(nogil=True)
-def _travel(P: Any, r_v: float, phi_v: float, q: float) -> None:
-    """r_v, phi_v: what a speed has moved the tag by in the step; q: variance that the speed has gathered."""
+def _correlate_speed_noise(P: Floats, r_v: float, phi_v: float, q: float) -> None:
+    """Correlate position and speed. r_v, phi_v: dr/dv and dphi/dv of the step; q: variance that the speed gained."""
     P[R, V] += q / 2 * r_v
     P[V, R] = P[R, V]
     P[PHI, V] += q / 2 * phi_v

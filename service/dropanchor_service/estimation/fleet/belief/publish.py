@@ -1,104 +1,144 @@
 """What is published of a row: pose, covariance, weight of its mode, observability, state and reason."""
 
 import math
-from typing import Any
+from typing import Final
 
-from dropanchor_service.estimation.fleet.belief import layout
+from dropanchor_service.estimation.fleet.belief.layout import Anchors, Belief, Floats, Hypotheses, Row, Scratch
+from dropanchor_service.estimation.fleet.belief.observability import predict_information, sigma_obs
+from dropanchor_service.estimation.fleet.belief.states import (
+    AMBIGUOUS,
+    COASTING,
+    DEGRADED,
+    HEADING_UNSURE,
+    IMU_MISSING,
+    LOST,
+    RANGES_MISSING,
+    RANGES_REJECTED,
+    RESOLVED,
+    SEVERAL_MODES,
+    TRACKING,
+    UNCERTAIN,
+)
 from dropanchor_service.estimation.fleet.belief.summary import (
-    add_reference,
+    add_reference_variance,
     best_mode,
-    forget_information,
-    sigma_obs,
     spread_over_all,
     spread_over_classes,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import RANGE
+from dropanchor_service.estimation.fleet.frontend.node import RANGE, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-UNRANGED = 3.0  # s without a range after which a place has to be resolved anew
+UNIFORM_ANGLE_STD: Final = 1.8  # rad, of an angle of which nothing is known
+DOMINANT: Final = 0.9  # weight of a mode above which the others hardly matter
+UNRESOLVED_S: Final = 1.0  # s without a dominant mode after which the row is ambiguous again
+RERESOLVE_AFTER: Final = 3.0  # s without a range after which one mode has to explain the ranges anew
+COASTING_AFTER, RANGES_LOST_AFTER = 1.5, 30.0  # s without a range
+IMU_DEGRADED_AFTER, IMU_LOST_AFTER = 0.5, 10.0  # s that no sensor observed
+SMALL_M, SMALL_SHARE = 1.5, 0.05  # a mode is small below 1.5 m or 5 % of the distance
+LARGE_M, LARGE_SHARE = 3.0, 0.35  # an ellipse is too large for use above 3 m or 35 % of the distance
+MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which the ranges are said to be rejected
 
 
 @njit(nogil=True)
-def publish(work: Any, count: int, row: Any, node: Any, anchors: Any, t: Tuning, belief: Any, scratch: Any) -> None:
+def publish(
+    work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, belief: Belief, scratch: Scratch
+) -> None:
+    """Fill `belief` from the row's hypotheses, and update the row's publication."""
     p_mode, relative, head = best_mode(work, count, row, scratch, t)
     mean, cov = scratch.mean, scratch.cov
     anchor = anchors[row.anchor]
     belief.x, belief.y = mean[0] + anchor.x, mean[1] + anchor.y
     belief.course, belief.speed, belief.yaw = mean[2], mean[3], mean[4]
     belief.yaw_rate = node.dyaw / node.dt_s if node.dt_s > 0.0 else 0.0
-    r2 = mean[0] ** 2 + mean[1] ** 2
-    blind = not math.isfinite(node.dv_var)
-    forget_information(row.information, mean[2], node.dt_s, t.obs_q_blind if blind else t.obs_q, t)
-    if node.kind == RANGE and r2 > 1e-6:
-        c, s = mean[0] / math.sqrt(r2), mean[1] / math.sqrt(r2)
-        weight = 1.0 / row.range_std**2
-        row.information[0, 0] += c * c * weight
-        row.information[0, 1] += c * s * weight
-        row.information[1, 0] = row.information[0, 1]
-        row.information[1, 1] += s * s * weight
-    belief.sigma_obs = sigma_obs(row.information)
-    _refer(row, mean, cov)
-    _declare(row, node, p_mode, relative, math.sqrt(r2), t)
-    _judge(row, relative, _sigma(cov), math.sqrt(r2), work[head].blocked == 1)
-    if row.declared == 0 or p_mode < 0.9:
+    r = math.sqrt(mean[0] ** 2 + mean[1] ** 2)
+    _update_information(row, node, mean, t)
+    belief.sigma_obs = sigma_obs(row.publication.information)
+    _add_reference_error(row, mean, cov)
+    _update_resolved(row, node, p_mode, relative, r, t)
+    _set_state(row, relative, _sigma_pos(cov), r, work[head].nlos == 1)
+    if row.publication.resolved == 0 or p_mode < DOMINANT:
         spread_over_all(work, count, scratch)
-        _refer(row, mean, cov)
     else:
-        spread_over_classes(work, count, head, scratch, t.refuted)
-        _refer(row, mean, cov)
+        spread_over_classes(work, count, head, scratch, t.class_rejected_weight)
+    _add_reference_error(row, mean, cov)
     for i in range(3):
         for j in range(3):
             belief.cov[i, j] = cov[i, j]
     belief.p_mode = min(p_mode, 1.0)
-    belief.sigma_pos = _sigma(cov)
+    belief.sigma_pos = _sigma_pos(cov)
     belief.hypotheses = count
 
 
 @njit(nogil=True)
-def _refer(row: Any, mean: Any, cov: Any) -> None:
-    """A start that was found is known only as well as the heading reference."""
-    if row.start_known == 0:
-        reference = row.reference_std if row.referred == 1 else 1.8  # nothing known: sd of a uniform angle
-        add_reference(cov, mean[0], mean[1], reference**2)
+def _update_information(row: Row, node: Node, mean: Floats, t: Tuning) -> None:
+    """Predict the information of recent ranges, and add that of this node's range."""
+    information, settings = row.publication.information, row.settings
+    no_acc = not math.isfinite(node.dv_var)
+    predict_information(information, mean[2], node.dt_s, t.obs_q_no_acc if no_acc else t.obs_q, t)
+    r2 = mean[0] ** 2 + mean[1] ** 2
+    if node.kind == RANGE and r2 > 1e-6:
+        c, s = mean[0] / math.sqrt(r2), mean[1] / math.sqrt(r2)
+        weight = settings.range_scale**2 / settings.range_std**2
+        information[0, 0] += c * c * weight
+        information[0, 1] += c * s * weight
+        information[1, 0] = information[0, 1]
+        information[1, 1] += s * s * weight
 
 
 @njit(nogil=True)
-def _sigma(cov: Any) -> float:
+def _add_reference_error(row: Row, mean: Floats, cov: Floats) -> None:
+    """Widen an ellipse whose start was found: it is known only as well as the heading reference."""
+    if row.start.known == 0:
+        std = row.settings.reference_std if row.heading.in_site_frame == 1 else UNIFORM_ANGLE_STD
+        add_reference_variance(cov, mean[0], mean[1], std**2)
+
+
+@njit(nogil=True)
+def _sigma_pos(cov: Floats) -> float:
     return math.sqrt(max(cov[0, 0] + cov[1, 1], 0.0))
 
 
 @njit(nogil=True)
-def _declare(row: Any, node: Any, p_mode: float, relative: float, r: float, t: Tuning) -> None:
-    """Whether one place has explained everything for long enough."""
-    resolved = p_mode > t.resolved and relative < max(1.5, 0.05 * r)
-    row.good_s = row.good_s + node.dt_s if resolved else 0.0
-    row.bad_s = 0.0 if p_mode > 0.9 else row.bad_s + node.dt_s
-    if row.good_s >= t.resolved_s or (row.start_known == 1 and row.again == 0 and row.declared == 0 and resolved):
-        row.declared, row.coarse = 1, 0
-    if row.bad_s > 1.0:
-        row.declared = 0
-    if row.since_range_s > UNRANGED:  # what follows must fit for a while before it is believed
-        row.declared, row.again = 0, 1
+def _is_small(relative: float, r: float) -> bool:
+    """Return whether a mode is small without a common rotation about the anchor. relative: its sigma, m."""
+    return relative < max(SMALL_M, SMALL_SHARE * r)
 
 
 @njit(nogil=True)
-def _judge(row: Any, relative: float, sigma: float, r: float, blocked: bool) -> None:
-    """State and reason."""
-    if row.since_range_s > 30.0:
-        row.state, row.reason = layout.LOST, 5
-    elif row.unwatched_s > 10.0:
-        row.state, row.reason = layout.LOST, 6
-    elif row.unwatched_s > 0.5:
-        row.state, row.reason = layout.DEGRADED, 6
-    elif row.since_range_s > 1.5 and (row.declared == 1 or row.state == layout.COASTING):
-        row.state, row.reason = layout.COASTING, 5
-    elif row.declared == 0:
-        row.state, row.reason = layout.AMBIGUOUS, 3
-    elif sigma > max(3.0, 0.35 * r):
-        # what is left of sigma without the rotation about the anchor tells which of the two it is
-        row.state, row.reason = layout.AMBIGUOUS, 11 if relative < max(1.5, 0.05 * r) else 9
-    elif row.misfit > 0.5 or blocked:
-        row.state, row.reason = layout.DEGRADED, 7
+def _update_resolved(row: Row, node: Node, p_mode: float, relative: float, r: float, t: Tuning) -> None:
+    """Set whether one mode has explained all ranges for long enough."""
+    publication, start = row.publication, row.start
+    resolved = p_mode > t.resolved_weight and _is_small(relative, r)
+    publication.resolved_s = publication.resolved_s + node.dt_s if resolved else 0.0
+    publication.unresolved_s = 0.0 if p_mode > DOMINANT else publication.unresolved_s + node.dt_s
+    at_given_start = start.known == 1 and start.after_gap == 0 and publication.resolved == 0 and resolved
+    if publication.resolved_s >= t.resolved_s or at_given_start:
+        publication.resolved, start.coarse = 1, 0
+    if publication.unresolved_s > UNRESOLVED_S:
+        publication.resolved = 0
+    if row.since_range_s > RERESOLVE_AFTER:
+        publication.resolved, start.after_gap = 0, 1
+
+
+@njit(nogil=True)
+def _set_state(row: Row, relative: float, sigma: float, r: float, nlos: bool) -> None:
+    """Set state and reason of the publication. The first condition that holds decides."""
+    publication, unobserved_s = row.publication, row.gap.unobserved_s
+    if row.since_range_s > RANGES_LOST_AFTER:
+        publication.state, publication.reason = LOST, RANGES_MISSING
+    elif unobserved_s > IMU_LOST_AFTER:
+        publication.state, publication.reason = LOST, IMU_MISSING
+    elif unobserved_s > IMU_DEGRADED_AFTER:
+        publication.state, publication.reason = DEGRADED, IMU_MISSING
+    elif row.since_range_s > COASTING_AFTER and (publication.resolved == 1 or publication.state == COASTING):
+        publication.state, publication.reason = COASTING, RANGES_MISSING
+    elif publication.resolved == 0:
+        publication.state, publication.reason = AMBIGUOUS, SEVERAL_MODES
+    elif sigma > max(LARGE_M, LARGE_SHARE * r):
+        # A mode that is small without the rotation about the anchor lacks only the heading.
+        publication.state, publication.reason = AMBIGUOUS, HEADING_UNSURE if _is_small(relative, r) else UNCERTAIN
+    elif row.nlos.misfit > MISFIT_LIMIT or nlos:
+        publication.state, publication.reason = DEGRADED, RANGES_REJECTED
     else:
-        row.state, row.reason = layout.TRACKING, 4
+        publication.state, publication.reason = TRACKING, RESOLVED

@@ -1,35 +1,36 @@
-"""The first hypotheses: around a known start, or a ring of bearings and speeds at the first ranges."""
+"""The first hypotheses: around a given start, or a ring of bearings and speeds at the distance of the first ranges."""
 
 import math
-from typing import Any
+from typing import Final
 
 import numpy as np
 
-from dropanchor_service.estimation.fleet.belief.heading_models import error_of, reset_models, told_of
-from dropanchor_service.estimation.fleet.belief.heading_reference import give_reference_error, turn_about
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.heading_classes import add_own_error_class
+from dropanchor_service.estimation.fleet.belief.heading_models import reference_error, reset_models
+from dropanchor_service.estimation.fleet.belief.heading_reference import add_common_rotation, add_reference_error
 from dropanchor_service.estimation.fleet.belief.layout import (
-    ACC,
-    COMMON,
-    CRAB,
-    DRIFTING,
+    ACC_BIAS,
     EXACT,
-    GYRO,
-    KEEP,
+    GYRO_BIAS,
+    MAGNETOMETER_MODEL,
     MOUNT,
-    OFFSET,
-    OWN_ERROR,
     PHI,
-    REF,
-    RING_RANGES,
-    STEADY,
-    WANDERING,
+    PLATFORM_MODEL,
+    RANGE_BIAS,
+    SLIP,
+    START_RANGES,
     YAW,
-    N,
+    Anchor,
+    Anchors,
+    Floats,
+    Hypotheses,
     R,
+    Row,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
-from dropanchor_service.estimation.fleet.belief.update import update_component, wrap
+from dropanchor_service.estimation.fleet.belief.mixture import copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.states import NO_HEADING_YET, NO_RANGE
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
@@ -38,63 +39,76 @@ from dropanchor_service.estimation.fleet.frontend.node import (
     NO_HEADING,
     RANGE,
     RELATIVE_HEADING,
+    RESTING,
+    Node,
 )
-from dropanchor_service.estimation.fleet.frontend.preintegration import unwatched_turn
+from dropanchor_service.estimation.fleet.frontend.preintegration import unobserved_turn_var
 from dropanchor_service.estimation.fleet.tuning import Tuning
+
+MIN_RANGES: Final = 5  # ranges that an unknown start needs at least
+COLLECT_S: Final = 1.0  # s over which it collects them, unless START_RANGES come sooner
+RELATIVE_YAW_VAR: Final = 1e-4  # rad^2, of a yaw that counts from wherever the body pointed first
+REST_SPEED_VAR: Final = 0.01  # (m/s)^2
 
 
 @njit(nogil=True)
-def _common(work: Any, h: int, row: Any, node: Any, yaw: float, yaw_variance: float, t: Tuning) -> None:
-    s, P = work[h].mean, work[h].cov
+def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_var: float, t: Tuning) -> None:
+    """Fill all of a hypothesis that does not depend on where the tag is."""
+    s, P, settings = work[h].mean, work[h].cov, row.settings
     s[:] = 0.0
     P[:] = 0.0
     s[YAW] = yaw
-    s[MOUNT] = row.mount
-    s[OFFSET] = row.offset
-    P[YAW, YAW] = yaw_variance
-    P[MOUNT, MOUNT] = row.mount_std**2
-    P[CRAB, CRAB] = row.crab_std**2
-    P[GYRO, GYRO] = max(row.gyro_std**2, node.gyro_var)
-    P[ACC, ACC] = t.acc_std**2
-    P[OFFSET, OFFSET] = row.offset_std**2
+    s[MOUNT] = settings.mount_angle
+    s[RANGE_BIAS] = settings.range_bias
+    P[YAW, YAW] = yaw_var
+    P[MOUNT, MOUNT] = settings.mount_angle_std**2
+    P[SLIP, SLIP] = settings.slip_std**2
+    P[GYRO_BIAS, GYRO_BIAS] = max(settings.gyro_bias_std**2, node.gyro_bias_var)
+    P[ACC_BIAS, ACC_BIAS] = t.acc_bias_std**2
+    P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2
     work[h].log_weight = 0.0
-    work[h].kind = EXACT
-    work[h].blocked = 0
+    work[h].heading_class = EXACT
+    work[h].nlos = 0
 
 
 @njit(nogil=True)
-def is_referred(kind: int) -> bool:
-    """The heading is in the site frame."""
-    return kind != NO_HEADING and kind != RELATIVE_HEADING
+def is_in_site_frame(heading_kind: int) -> bool:
+    """Return whether a node's heading counts from east."""
+    return heading_kind != NO_HEADING and heading_kind != RELATIVE_HEADING
 
 
 @njit(nogil=True)
-def counts_from(row: Any, node: Any) -> bool:
-    """The yaw of the hypotheses counts from the node's heading."""
-    return is_referred(node.heading_kind) and (node.heading_kind != ABSOLUTE_HEADING or row.model == COMMON)
+def uses_heading(row: Row, node: Node) -> bool:
+    """Return whether the yaw of the hypotheses counts from this node's heading."""
+    magnetic = node.heading_kind == ABSOLUTE_HEADING
+    return is_in_site_frame(node.heading_kind) and (not magnetic or row.heading.model == MAGNETOMETER_MODEL)
 
 
 @njit(nogil=True)
-def choose_model(row: Any, node: Any, t: Tuning) -> None:
-    """The heading error's model where the kind of heading gives it; a platform's heading is that of its travel."""
+def choose_model(row: Row, node: Node, t: Tuning) -> None:
+    """Set the model of the heading error where the kind of heading gives it.
+
+    A platform's heading is that of its travel: the mounting angle is small, and what remains is slip.
+    """
+    settings = row.settings
     if node.heading_kind == ABSOLUTE_HEADING:
-        row.model = COMMON
-        if row.start_known == 1 and math.isfinite(row.start_heading):
-            row.north = wrap(node.heading - row.start_heading)
-    elif is_referred(node.heading_kind) and math.isfinite(row.heading_std):
-        row.reference_std = row.heading_std
+        row.heading.model = MAGNETOMETER_MODEL
+        if row.start.known == 1 and math.isfinite(row.start.heading):
+            row.heading.north = wrap(node.heading - row.start.heading)
+    elif is_in_site_frame(node.heading_kind) and math.isfinite(settings.heading_std):
+        settings.reference_std = settings.heading_std
     if node.heading_kind == DERIVED_HEADING:
-        row.model = STEADY
-        row.mount_std = min(row.mount_std, t.platform_mount_std)
-        row.crab_tau = t.platform_crab_tau
-        if row.slip_known == 0:
-            row.crab_std = t.platform_crab_std
+        row.heading.model = PLATFORM_MODEL
+        settings.mount_angle_std = min(settings.mount_angle_std, t.platform_mount_std)
+        settings.slip_tau = t.platform_slip_tau
+        if settings.slip_given == 0:
+            settings.slip_std = t.platform_slip_std
 
 
 @njit(nogil=True)
-def _aligned(work: Any, count: int, row: Any, t: Tuning) -> int:
-    """Copies of the hypotheses for a body axis along the course, where it mostly is; returns their number."""
-    if row.mount_std <= t.aligned_std:
+def _add_aligned(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
+    """Copy all hypotheses for a body axis along the course, where it mostly is. Return the number of copies."""
+    if row.settings.mount_angle_std <= t.aligned_std:
         return 0
     for h in range(count):
         copy_hypothesis(work, h, count + h)
@@ -104,178 +118,124 @@ def _aligned(work: Any, count: int, row: Any, t: Tuning) -> int:
 
 
 @njit(nogil=True)
-def _bearings(row: Any, t: Tuning) -> int:
-    return t.coarse_bearings if row.coarse == 1 else t.ring_bearings
+def _bearings(row: Row, t: Tuning) -> int:
+    """Return the number of directions of a ring."""
+    return t.coarse_bearings if row.start.coarse == 1 else t.start_bearings
 
 
 @njit(nogil=True)
-def start_known(work: Any, row: Any, anchor: Any, node: Any, t: Tuning) -> int:
-    """Hypotheses at the given start, one per class, or a ring of headings where none is known; returns the count."""
-    x, y = row.start_x - anchor.x, row.start_y - anchor.y
+def start_known(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tuning) -> int:
+    """Make hypotheses at the given start: one per heading class, or a ring of headings where none is known.
+
+    Return their count.
+    """
+    start, gap = row.start, row.gap
+    x, y = start.x - anchor.x, start.y - anchor.y
     r = max(math.hypot(x, y), 1e-3)
-    given = math.isfinite(row.start_heading)
-    known = given or is_referred(node.heading_kind)
+    given = math.isfinite(start.heading)
+    known = given or is_in_site_frame(node.heading_kind)
     ring = 1 if known else _bearings(row, t)
     cell = 2.0 * math.pi / ring
     choose_model(row, node, t)
     for h in range(ring):
-        yaw = row.start_heading if given else node.heading - row.north + cell * h
-        variance = row.start_heading_std**2 if given else node.heading_var
-        _common(work, h, row, node, yaw, variance if known else (cell / 2.0) ** 2, t)
+        yaw = start.heading if given else node.heading - row.heading.north + cell * h
+        variance = start.heading_std**2 if given else node.heading_var
+        _initialise(work, h, row, node, yaw, variance if known else (cell / 2.0) ** 2, t)
         s, P = work[h].mean, work[h].cov
         s[R], s[PHI] = r, math.atan2(y, x)
-        P[R, R] = row.start_std**2
-        P[PHI, PHI] = (row.start_std / r) ** 2
-        P[V, V] = row.start_speed_std**2
-        if row.coarse == 1 and not known:
-            turned = wrap(yaw - row.gap_yaw)
-            work[h].log_weight = -0.5 * turned * turned / (row.gap_yaw_var + unwatched_turn(row.gap_unheard))
-    row.referred = 1
-    if not is_referred(node.heading_kind):
-        return ring + _aligned(work, ring, row, t)
-    _, slow, _ = error_of(row, node.heading_var)
-    give_reference_error(work[0].cov, slow, not given)
-    return ring + second_class(work, 0, ring, row, t, not given)
+        P[R, R] = start.std**2
+        P[PHI, PHI] = (start.std / r) ** 2
+        P[V, V] = start.speed_std**2
+        if start.coarse == 1 and not known:
+            turned = wrap(yaw - gap.yaw)
+            work[h].log_weight = -0.5 * turned * turned / (gap.yaw_var + unobserved_turn_var(gap.turn_s))
+    row.heading.in_site_frame = 1
+    if not is_in_site_frame(node.heading_kind):
+        return ring + _add_aligned(work, ring, row, t)
+    _, slow, _ = reference_error(row, node.heading_var)
+    add_reference_error(work[0].cov, slow, not given)
+    return ring + add_own_error_class(work, 0, ring, row, t, not given)
 
 
 @njit(nogil=True)
-def second_class(work: Any, source: int, target: int, row: Any, t: Tuning, yaw_follows: bool) -> int:
-    """A copy of `source` whose heading reference has a slow error of its own, or drifts; returns how many."""
-    if told_of(row):
-        return 0
-    copy_hypothesis(work, source, target)
-    work[target].kind = OWN_ERROR
-    if row.model == STEADY:
-        work[target].log_weight += t.drift_log_prior
-        work[target].cov[GYRO, GYRO] = t.drift_std**2
-    else:
-        work[target].log_weight += t.second_class
-        give_reference_error(work[target].cov, t.second_std, yaw_follows)
-    return 1
+def _start_ring(work: Hypotheses, row: Row, horizontal: float, node: Node, t: Tuning) -> int:
+    """Make hypotheses for all bearings and speeds, each with a standard deviation of half a cell. Return their count.
 
-
-@njit(nogil=True)
-def blame_gyro(work: Any, count: int, model: int, slow: float, t: Tuning) -> int:
-    """Heading and gyroscope drift apart: copies for which it is the gyroscope, as likely as not; the ranges decide.
-
-    Where the heading's error is not white after all, those hypotheses take that error. Returns the count.
+    Speeds are forward unless the tag may reverse. The numbers of the tuning keep the count within MAX_HYPOTHESES.
     """
-    old = count
-    blamed = False
-    for h in range(old):
-        blamed |= work[h].kind == DRIFTING
-    for h in range(old):
-        if model == WANDERING and not blamed and work[h].kind == EXACT and count < KEEP:
-            copy_hypothesis(work, h, count)
-            work[count].kind = DRIFTING
-            work[count].log_weight += t.drift_again
-            count += 1
-        elif model != WANDERING and slow > 0.0 and work[h].kind == DRIFTING:
-            work[h].kind = EXACT
-            give_reference_error(work[h].cov, slow, False)
-    return count
-
-
-@njit(nogil=True)
-def first_class(work: Any, source: int, target: int, PH: Any, t: Tuning) -> int:
-    """A copy of `source`, of the second class, with an exact heading reference after all; returns 1.
-
-    Its weight is the Savage-Dickey ratio: posterior over prior density of the reference's error at zero.
-    """
-    copy_hypothesis(work, source, target)
-    new = work[target]
-    new.kind = EXACT
-    error, variance = new.mean[REF], max(new.cov[REF, REF], 1e-9)
-    new.log_weight += 0.5 * math.log(t.second_std**2 / variance) - 0.5 * error * error / variance - t.second_class
-    update_component(new.mean, new.cov, PH, REF, 0.0, 1e-8)
-    for i in range(N):
-        new.cov[REF, i] = new.cov[i, REF] = 0.0
-    new.mean[REF] = 0.0
-    return 1
-
-
-@njit(nogil=True)
-def reseed(work: Any, count: int, row: Any, node: Any, PH: Any, t: Tuning) -> int:
-    """Keep both classes alive while tracking: a reference with an error of its own, and one without."""
-    if row.declared == 0 or count >= KEEP:
-        return count
-    wrong = 0
-    for h in range(count):
-        wrong += work[h].kind == OWN_ERROR
-    best = best_of(work, count)
-    if wrong == 0:
-        added = second_class(work, best, count, row, t, False)
-        work[count].log_weight += t.second_again
-        return count + added
-    _, slow, _ = error_of(row, node.heading_var)
-    if wrong == count and slow == 0.0:
-        return count + first_class(work, best, count, PH, t)
-    return count
-
-
-@njit(nogil=True)
-def start_ring(work: Any, row: Any, horizontal: float, node: Any, at_rest: bool, t: Tuning) -> int:
-    """Bearings x speeds with a standard deviation of half a cell; speeds forward unless reverse is allowed."""
-    signs = 2 if row.reverse == 1 and not at_rest else 1
+    at_rest = node.rest == RESTING
+    signs = 2 if row.settings.reverse_allowed == 1 and not at_rest else 1
     bearings = _bearings(row, t)
-    speeds = 1 if at_rest else (t.coarse_speeds if row.coarse == 1 else t.ring_speeds) // signs  # within KEEP always
-    top = min(t.ring_speed_max, row.v_max)
+    speeds = 1 if at_rest else (t.coarse_speeds if row.start.coarse == 1 else t.start_speeds) // signs
     cell = 2.0 * math.pi / bearings
+    speed_cell = min(t.start_speed_max, row.settings.speed_max) / speeds
     choose_model(row, node, t)
-    row.referred = 1 if is_referred(node.heading_kind) else 0
-    variance = node.heading_var if row.referred == 1 else 1e-4
+    row.heading.in_site_frame = 1 if is_in_site_frame(node.heading_kind) else 0
+    variance = node.heading_var if row.heading.in_site_frame == 1 else RELATIVE_YAW_VAR
     h = 0
     for i in range(bearings):
         for k in range(speeds):
             for g in range(signs):
-                _common(work, h, row, node, node.heading, variance, t)
+                _initialise(work, h, row, node, node.heading, variance, t)
                 s, P = work[h].mean, work[h].cov
                 s[R], s[PHI] = horizontal, cell * i
-                P[R, R] = row.range_std**2 / 4.0 + row.offset_std**2
-                P[R, OFFSET] = P[OFFSET, R] = -(row.offset_std**2)
-                P[PHI, PHI] = (cell / 2.0) ** 2
-                # an error of the mounting angle turns everything about the anchor: the ring covers the angle between
-                P[PHI, PHI] += row.mount_std**2
-                P[PHI, MOUNT] = P[MOUNT, PHI] = row.mount_std**2
-                speed_cell = top / speeds
+                _spread_ring(P, row, cell)
                 s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
-                P[V, V] = 0.01 if at_rest else (speed_cell / 2.0) ** 2
-                if row.referred == 1:
-                    _, slow, _ = error_of(row, node.heading_var)
-                    turn_about(P, slow)
+                P[V, V] = REST_SPEED_VAR if at_rest else (speed_cell / 2.0) ** 2
+                if row.heading.in_site_frame == 1:
+                    _, slow, _ = reference_error(row, node.heading_var)
+                    add_common_rotation(P, slow)
                 h += 1
     return h
 
 
 @njit(nogil=True)
-def median(values: Any, count: int) -> float:
-    """Of the first `count`."""
-    return float(np.median(values[:count]))
+def _spread_ring(P: Floats, row: Row, cell: float) -> None:
+    """Fill the covariance of distance and bearing of one cell of the ring.
+
+    distance = (measured - bias) / scale, so it shares the error of the bias. An error of the mounting angle turns
+    everything about the anchor: the ring covers the angle between mounting and bearing.
+    """
+    settings = row.settings
+    bias_var = settings.range_bias_std**2
+    P[R, R] = (settings.range_std**2 / 4.0 + bias_var) / settings.range_scale**2
+    P[R, RANGE_BIAS] = P[RANGE_BIAS, R] = -bias_var / settings.range_scale
+    P[PHI, PHI] = (cell / 2.0) ** 2
+    P[PHI, PHI] += settings.mount_angle_std**2
+    P[PHI, MOUNT] = P[MOUNT, PHI] = settings.mount_angle_std**2
 
 
 @njit(nogil=True)
-def begin(work: Any, row: Any, node: Any, anchors: Any, t: Tuning) -> int:
-    """Collect what a start needs and make the first hypotheses; returns their count."""
-    row.ring_s += node.dt_s
+def start_distance(row: Row, z: float) -> float:
+    """Return the slant distance, m, that the operator's scale and bias give a range z: (z - bias) / scale."""
+    return float((z - row.settings.range_bias) / row.settings.range_scale)
+
+
+@njit(nogil=True)
+def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: Tuning) -> int:
+    """Collect what a start needs, and make the first hypotheses once it is there. Return their count."""
+    start = row.start
+    start.collected_s += node.dt_s
     if node.kind == RANGE and row.anchor < 0:
         row.anchor = node.anchor
     if node.heading_kind == NO_HEADING:
-        row.reason = 1
+        row.publication.reason = NO_HEADING_YET
         return 0
-    if node.heading_kind == MEASURED_HEADING and row.hm_started == 0:
+    if node.heading_kind == MEASURED_HEADING and row.heading.bank_started == 0:
         reset_models(row, node.heading, node.heading_var, t)
     if row.anchor < 0:
-        row.reason = 0
+        row.publication.reason = NO_RANGE
         return 0
     anchor = anchors[row.anchor]
-    if row.start_known == 1 or row.again == 1:
+    if start.known == 1 or start.after_gap == 1:
         return start_known(work, row, anchor, node, t)
     if node.kind == RANGE and node.anchor == row.anchor:
-        row.ring[row.ring_count % RING_RANGES] = node.z / row.range_scale - row.offset
-        row.ring_count += 1
-    if row.ring_count < 5 or (row.ring_count < RING_RANGES and row.ring_s < 1.0):
-        row.reason = 0
+        start.ranges[start.range_count % START_RANGES] = start_distance(row, node.z)
+        start.range_count += 1
+    enough = start.range_count >= START_RANGES or start.collected_s >= COLLECT_S
+    if start.range_count < MIN_RANGES or not enough:
+        row.publication.reason = NO_RANGE
         return 0
-    slant = median(row.ring, min(row.ring_count, RING_RANGES))
-    horizontal = math.sqrt(max(slant**2 - (row.height - anchor.z) ** 2, 0.01))
-    return start_ring(work, row, horizontal, node, node.rest == 1, t)
+    slant = float(np.median(start.ranges[: min(start.range_count, START_RANGES)]))
+    horizontal = math.sqrt(max(slant**2 - (row.settings.height - anchor.z) ** 2, 0.01))
+    return _start_ring(work, row, horizontal, node, t)

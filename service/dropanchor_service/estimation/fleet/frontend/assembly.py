@@ -4,34 +4,26 @@ from typing import Any, Final
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.inertial import close_node, feed
-from dropanchor_service.estimation.fleet.frontend.lever import swing
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, NO_MEASUREMENT, RANGE
-from dropanchor_service.estimation.fleet.frontend.platform import derive_node, hear, refer_to_platform, watch_start
-
-IMU_EVENT: Final = 0  # the order in which samples of the same instant are taken
-HEADING_EVENT: Final = 1
-RANGE_EVENT: Final = 2
-BEARING_EVENT: Final = 3
-
-EVENT: Final = np.dtype(
-    [
-        ("row", np.int32),
-        ("t_ns", np.int64),
-        ("kind", np.uint8),
-        ("anchor", np.int32),
-        ("value", np.float64),  # of the heading, range or bearing
-        ("std", np.float64),
-    ]
+from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, RANGE_EVENT, Event
+from dropanchor_service.estimation.fleet.frontend.inertial import Frontend, add_sample, close_node
+from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, NO_MEASUREMENT, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.platform import (
+    Platform,
+    add_reading,
+    detect_first_motion,
+    fill_platform_node,
+    use_platform_heading,
 )
 
-LONGEST: Final = 150_000_000  # ns, of a node: with ranges at 10 Hz, every node ends with one
+MAX_NODE_NS: Final = 150_000_000  # ns, of a node: with ranges at 10 Hz, every node ends with one
 AUTO, IMU_ONLY, PLATFORM_ONLY = 0, 1, 2
 
 
 @njit(nogil=True)
-def _close(front: Any, platform: Any, row: Any, t_ns: int, node: Any) -> None:
+def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node) -> None:
     """End a node of the row at t_ns: inertial if it has an IMU, else the platform's."""
     node.row = -1
     node.t_ns = t_ns
@@ -41,43 +33,45 @@ def _close(front: Any, platform: Any, row: Any, t_ns: int, node: Any) -> None:
         newest = max(t_ns, front.t_imu, front.t_node)
         close_node(front, newest, node)
         node.t_ns = newest
-        if row.heading_source == PLATFORM_ONLY:
-            refer_to_platform(platform, front, node)
+        if row.settings.heading_source == PLATFORM_ONLY:
+            use_platform_heading(platform, front, node)
     else:
         newest = max(t_ns, platform.t_node)
-        derive_node(platform, newest, node)
+        fill_platform_node(platform, newest, node)
         node.t_ns = newest
-    swing(row, node)
+    apply_lever(row, node)
 
 
 @njit(nogil=True)
-def _measure(node: Any, event: Any, row: Any, platform: Any) -> None:
+def _measure(node: Node, event: Event, row: Any, platform: Platform) -> None:
     """Put the event's measurement into its node."""
     node.kind = RANGE if event.kind == RANGE_EVENT else BEARING
     node.anchor = event.anchor
     node.z = event.value
     node.z_std = event.std
     node.lag_s = (node.t_ns - event.t_ns) * 1e-9
-    if row.start_known == 1 and not np.isfinite(node.dv_var):
-        watch_start(platform, node, event.value if node.kind == RANGE else np.nan, row.range_std)
+    if row.start.known == 1 and not np.isfinite(node.dv_var):
+        detect_first_motion(platform, node, event.value if node.kind == RANGE else np.nan, row.settings.range_std)
 
 
 @njit(nogil=True)
-def _last_end(front: Any, platform: Any) -> int:
+def _last_end(front: Frontend, platform: Platform) -> int:
     if front.running == 1:
         return int(front.t_node)
     return int(platform.t_node) if platform.heard > 0 else -1
 
 
 @njit(nogil=True)
-def _is_long(front: Any, platform: Any, t_ns: int) -> bool:
+def _is_long(front: Frontend, platform: Platform, t_ns: int) -> bool:
     """The row's node has lasted long enough."""
     end = _last_end(front, platform)
-    return end >= 0 and t_ns - end >= LONGEST
+    return end >= 0 and t_ns - end >= MAX_NODE_NS
 
 
 @njit(cache=True, nogil=True)
-def gather(imu: Any, events: Any, order: Any, fronts: Any, platforms: Any, rows: Any, nodes: Any) -> int:
+def assemble_nodes(
+    imu: Array, events: Array, order: Array, fronts: Array, platforms: Array, rows: Array, nodes: Nodes
+) -> int:
     """Fill nodes (at least as many as order) from the samples in this order, IMU and EVENT; returns their number."""
     n = 0
     for k in range(len(order)):
@@ -87,7 +81,7 @@ def gather(imu: Any, events: Any, order: Any, fronts: Any, platforms: Any, rows:
             sample = imu[index]
             r, t_ns = sample.row, sample.t_ns
             row, front, platform = rows[r], fronts[r], platforms[r]
-            feed(front, t_ns, sample.acc, sample.gyro, sample.mag)
+            add_sample(front, t_ns, sample.acc, sample.gyro, sample.mag)
             if not _is_long(front, platform, t_ns):
                 continue
             _close(front, platform, row, t_ns, node)
@@ -96,8 +90,8 @@ def gather(imu: Any, events: Any, order: Any, fronts: Any, platforms: Any, rows:
             r, t_ns = event.row, event.t_ns
             row, front, platform = rows[r], fronts[r], platforms[r]
             if event.kind == HEADING_EVENT:
-                if row.heading_source != IMU_ONLY:
-                    hear(platform, front, t_ns, event.value, event.std)
+                if row.settings.heading_source != IMU_ONLY:
+                    add_reading(platform, front, t_ns, event.value, event.std)
                 if front.running == 1 or not _is_long(front, platform, t_ns):
                     continue
             _close(front, platform, row, t_ns, node)

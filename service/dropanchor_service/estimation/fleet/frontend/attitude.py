@@ -13,10 +13,11 @@ Dryanovski & Xiao 2015, eq. 60). Own gravity: cheap accelerometers read 5 % high
 """
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
 
 ATTITUDE = np.dtype(
@@ -28,6 +29,7 @@ ATTITUDE = np.dtype(
         ("age", "f8"),  # s of accelerometer seen
     ]
 )
+Attitude: TypeAlias = Any  # a record of ATTITUDE
 
 TAU = 6.0  # s, of the tilt correction under motion
 TAU_REST = 0.5  # s, at confirmed rest
@@ -39,7 +41,7 @@ SMALL_ANGLE = 0.04  # rad^2: below, two terms of the series are exact to 1e-9
 
 
 @njit(cache=True, nogil=True)
-def rotate_by(q: Any, x: float, y: float, z: float) -> None:
+def rotate_by(q: Array, x: float, y: float, z: float) -> None:
     """q <- q * exp((x, y, z)/2): a small turn, rad, about body axes; keeps |q| = 1."""
     s = 0.25 * (x * x + y * y + z * z)
     if s < SMALL_ANGLE:
@@ -60,7 +62,7 @@ def rotate_by(q: Any, x: float, y: float, z: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def up_in_body(q: Any) -> tuple[float, float, float]:
+def up_in_body(q: Array) -> tuple[float, float, float]:
     """R(q)^T z."""
     return (
         2.0 * (q[1] * q[3] - q[0] * q[2]),
@@ -76,7 +78,7 @@ def down_weight(deviation: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def level(q: Any, ax: float, ay: float, az: float) -> None:
+def level_attitude(q: Array, ax: float, ay: float, az: float) -> None:
     """q <- the attitude with yaw 0 in which (ax, ay, az) points up."""
     n = math.sqrt(ax * ax + ay * ay + az * az)
     roll = math.atan2(ay, az)
@@ -87,7 +89,7 @@ def level(q: Any, ax: float, ay: float, az: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def turn(a: Any, dt: float, gyro: Any, rest: bool) -> None:
+def predict_attitude(a: Attitude, dt: float, gyro: Array, rest: bool) -> None:
     """Predict over dt with the mean of the last and this rate, rad/s; at confirmed rest only remember the rate."""
     if not rest:
         x = 0.5 * (a.gyro[0] + gyro[0]) - a.bias[0]
@@ -98,7 +100,7 @@ def turn(a: Any, dt: float, gyro: Any, rest: bool) -> None:
 
 
 @njit(cache=True, nogil=True)
-def correct_tilt(a: Any, dt: float, ax: float, ay: float, az: float, rest: bool) -> None:
+def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: bool) -> None:
     """Correct with one accelerometer sample, m/s^2."""
     n = math.sqrt(ax * ax + ay * ay + az * az)
     if n < 1.0 or dt == 0.0:
@@ -124,13 +126,13 @@ def correct_tilt(a: Any, dt: float, ax: float, ay: float, az: float, rest: bool)
 
 
 @njit(cache=True, nogil=True)
-def yaw_of(q: Any) -> float:
+def yaw_of(q: Array) -> float:
     """Azimuth of the body x axis, rad, counter-clockwise."""
     return math.atan2(2.0 * (q[1] * q[2] + q[0] * q[3]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
 
 
 @njit(cache=True, nogil=True)
-def spin(a: Any) -> float:
+def yaw_rate_of(a: Attitude) -> float:
     """d yaw / dt, rad/s, from the last body rates: (q sin roll + r cos roll) / cos pitch."""
     q = a.q
     ux, uy, uz = up_in_body(q)

@@ -9,39 +9,52 @@ start, zero arbitrary (RELATIVE_HEADING), with the variance it has gathered sinc
 """
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import (
     ATTITUDE,
     correct_tilt,
-    level,
-    spin,
-    turn,
+    level_attitude,
+    predict_attitude,
     up_in_body,
     yaw_of,
+    yaw_rate_of,
 )
-from dropanchor_service.estimation.fleet.frontend.magnetometer import MAGNETOMETER, feel, lose_yaw, north_of
-from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, NO_HEADING, RELATIVE_HEADING
+from dropanchor_service.estimation.fleet.frontend.magnetometer import (
+    MAGNETOMETER,
+    north_of,
+    spread_yaw_on_arc,
+    update_magnetometer,
+)
+from dropanchor_service.estimation.fleet.frontend.node import (
+    ABSOLUTE_HEADING,
+    MOVING,
+    NO_HEADING,
+    RELATIVE_HEADING,
+    RESTING,
+    Node,
+)
 from dropanchor_service.estimation.fleet.frontend.preintegration import (
     GYRO_NOISE,
     GYRO_SCALE,
     HORIZON,
     PREINTEGRATION,
-    accelerate,
+    add_acceleration,
     end_node,
-    unwatched_turn,
-    wrap,
+    unobserved_turn_var,
 )
 from dropanchor_service.estimation.fleet.frontend.standstill import (
     CONFIRM,
     STANDSTILL,
     at_rest,
-    learn_bias,
-    observe,
     start_standstill,
+    update_gyro_bias,
+    update_standstill_detector,
 )
 
 FRONTEND = np.dtype(
@@ -65,6 +78,7 @@ FRONTEND = np.dtype(
     ],
     align=True,
 )
+Frontend: TypeAlias = Any  # a record of FRONTEND
 
 GAP = 0.5  # s: a longer silence is not integrated over
 FROZEN = 0.25  # s of samples that are equal to the last bit: no sensor is so quiet, its driver repeats itself
@@ -75,7 +89,7 @@ HEADING_FLOOR = 2e-4  # rad^2: tilt and mounting, 0.8 deg
 
 
 @njit(cache=True, nogil=True)
-def start_frontend(f: Any, hard_iron: float, declination: float) -> None:
+def start_frontend(f: Frontend, hard_iron: float, declination: float) -> None:
     """Nothing known.
 
     hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
@@ -93,7 +107,7 @@ def start_frontend(f: Any, hard_iron: float, declination: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
+def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     """Level the attitude and begin the first node here."""
     a, p, s = f.attitude, f.preintegration, f.standstill
     a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
@@ -117,7 +131,7 @@ def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
     f.magnetometer.sum_m[:] = 0.0
     f.magnetometer.sum_R[:] = 0.0
     if math.isfinite(acc[0] + acc[1] + acc[2]):
-        level(a.q, acc[0], acc[1], acc[2])
+        level_attitude(a.q, acc[0], acc[1], acc[2])
     f.t_imu = t_ns
     if f.t_node == 0:
         f.t_node = t_ns
@@ -125,17 +139,17 @@ def first_sample(f: Any, t_ns: int, acc: Any, gyro: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def lose_turn(f: Any, gap: float) -> None:
+def lose_yaw_over_gap(f: Frontend, gap: float) -> None:
     """Nobody watched for `gap` s: yaw is uncertain by what it may have turned."""
     f.preintegration.silent += max(0.0, gap - f.preintegration.blind)
     f.standstill.quiet = 0.0
     if f.magnetometer.unit > 0.0:
-        lose_yaw(f.magnetometer, unwatched_turn(gap))
-    f.drift_var += unwatched_turn(gap)
+        spread_yaw_on_arc(f.magnetometer, unobserved_turn_var(gap))
+    f.drift_var += unobserved_turn_var(gap)
 
 
 @njit(cache=True, nogil=True)
-def is_frozen(f: Any, dt: float, acc: Any, gyro: Any) -> bool:
+def is_frozen(f: Frontend, dt: float, acc: Array, gyro: Array) -> bool:
     """Whether the IMU repeats its last sample, which must not pass for a tag at rest."""
     same = True
     for i in range(3):
@@ -146,12 +160,12 @@ def is_frozen(f: Any, dt: float, acc: Any, gyro: Any) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def feed(f: Any, t_ns: int, acc: Any, gyro: Any, mag: Any) -> None:
+def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> None:
     """One IMU sample (m/s^2, rad/s, any unit; acc and mag may be NaN). One not after the last is left out."""
     if not math.isfinite(gyro[0] + gyro[1] + gyro[2]):
         return
     if f.running == 0:
-        first_sample(f, t_ns, acc, gyro)
+        start_at(f, t_ns, acc, gyro)
         return
     dt = (t_ns - f.t_imu) * 1e-9
     if dt <= 0.0:
@@ -161,28 +175,28 @@ def feed(f: Any, t_ns: int, acc: Any, gyro: Any, mag: Any) -> None:
     f.t_imu = t_ns
     a, s, p = f.attitude, f.standstill, f.preintegration
     if dt > GAP:
-        lose_turn(f, dt)
+        lose_yaw_over_gap(f, dt)
         a.gyro[:] = gyro
         dt = 0.0
     p.blind = 0.0
     heard = math.isfinite(acc[0] + acc[1] + acc[2])
     if heard:
-        observe(s, dt, acc, gyro, a.bias)
+        update_standstill_detector(s, dt, acc, gyro, a.bias)
     else:
         s.quiet = 0.0
         p.deaf += dt
-    learn_bias(s, dt, gyro, a.bias)
+    update_gyro_bias(s, dt, gyro, a.bias)
     rest = s.quiet > CONFIRM
-    turn(a, dt, gyro, rest)
+    predict_attitude(a, dt, gyro, rest)
     if heard:
         correct_tilt(a, dt, acc[0], acc[1], acc[2], rest)
-        accelerate(p, dt, a.q, acc, a.gravity, s.acc_var)
-    p.yaw_rate = 0.0 if rest else spin(a)
-    feel(f.magnetometer, dt, a.q, mag, rest, f.hard_iron)
+        add_acceleration(p, dt, a.q, acc, a.gravity, s.acc_var)
+    p.yaw_rate = 0.0 if rest else yaw_rate_of(a)
+    update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron)
 
 
 @njit(cache=True, nogil=True)
-def gather_drift(f: Any, dt: float, turned: float) -> None:
+def accumulate_drift(f: Frontend, dt: float, turned: float) -> None:
     """Variance of the integrated yaw: white noise and a Gauss-Markov bias."""
     f.turned += turned
     if f.standstill.quiet > CONFIRM:
@@ -192,9 +206,9 @@ def gather_drift(f: Any, dt: float, turned: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def refer_heading(f: Any, psi: float, ahead: float, node: Any) -> None:
+def fill_heading(f: Frontend, psi: float, ahead: float, node: Node) -> None:
     """Heading of the node from psi, the yaw at its end."""
-    blind = unwatched_turn(max(0.0, ahead - HORIZON))
+    blind = unobserved_turn_var(max(0.0, ahead - HORIZON))
     north, variance = north_of(f.magnetometer)
     f.absolute = variance < (RELATIVE_ABOVE if f.absolute else ABSOLUTE_BELOW)
     if f.absolute:
@@ -208,29 +222,29 @@ def refer_heading(f: Any, psi: float, ahead: float, node: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def know_nothing(dt: float, node: Any) -> None:
+def fill_unknown(dt: float, node: Node) -> None:
     """A node before the first IMU sample."""
     node.dt_s = dt
-    node.dyaw, node.dyaw_var = 0.0, unwatched_turn(dt)
-    node.gyro_var, node.gyro_step = 0.0, 0.0
+    node.dyaw, node.dyaw_var = 0.0, unobserved_turn_var(dt)
+    node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
-    node.rest = 0
-    node.unheard_s = dt
+    node.rest = MOVING
+    node.unobserved_s = dt
 
 
 @njit(cache=True, nogil=True)
-def tell_bias(f: Any, node: Any) -> None:
+def fill_gyro_bias(f: Frontend, node: Node) -> None:
     """What is known of the gyroscope's bias about the vertical, and what was learned of it in this node."""
     x, y, z = up_in_body(f.attitude.q)
     bias = x * f.attitude.bias[0] + y * f.attitude.bias[1] + z * f.attitude.bias[2]
-    node.gyro_var = f.standstill.bias_var
-    node.gyro_step = bias - f.bias_end if at_rest(f.standstill) else 0.0
+    node.gyro_bias_var = f.standstill.bias_var
+    node.gyro_bias_step = bias - f.bias_end if at_rest(f.standstill) else 0.0
     f.bias_end = bias
 
 
 @njit(cache=True, nogil=True)
-def close_node(f: Any, t_ns: int, node: Any) -> None:
+def close_node(f: Frontend, t_ns: int, node: Node) -> None:
     """End a node at t_ns, not before the last IMU sample or node, and begin the next.
 
     Fills dt_s, dyaw, dv, heading and rest of `node` with their variances.
@@ -238,13 +252,13 @@ def close_node(f: Any, t_ns: int, node: Any) -> None:
     dt = (t_ns - f.t_node) * 1e-9 if f.t_node > 0 else 0.0
     if f.running == 0:
         f.t_node = t_ns
-        know_nothing(dt, node)
+        fill_unknown(dt, node)
         return
     ahead = (t_ns - f.t_imu) * 1e-9
     f.t_node = t_ns
     psi = end_node(f.preintegration, yaw_of(f.attitude.q), ahead, dt, node)
-    gather_drift(f, dt, node.dyaw)
+    accumulate_drift(f, dt, node.dyaw)
     node.dt_s = dt
-    tell_bias(f, node)
-    refer_heading(f, psi, ahead, node)
-    node.rest = at_rest(f.standstill) and ahead < GAP
+    fill_gyro_bias(f, node)
+    fill_heading(f, psi, ahead, node)
+    node.rest = RESTING if at_rest(f.standstill) and ahead < GAP else MOVING

@@ -12,12 +12,13 @@ import math
 from typing import Any
 
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node
 
 
 @njit(nogil=True)
-def swing(row: Any, node: Any) -> None:
+def apply_lever(row: Any, node: Node) -> None:
     """Fill the node's swing, and make its dv that of the pivot."""
-    x, y = row.lever_x, row.lever_y
+    x, y = row.settings.lever_x, row.settings.lever_y
     node.swing_forward, node.swing_left = 0.0, 0.0
     if x == 0.0 and y == 0.0:
         return

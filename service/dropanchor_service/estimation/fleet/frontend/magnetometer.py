@@ -17,10 +17,12 @@ used, so that the heading is the gyroscope's and its variance grows; if it lasts
 """
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import yaw_of
 
@@ -42,6 +44,7 @@ MAGNETOMETER = np.dtype(
         ("sum_R", "f8", (3, 3)),  # body -> level
     ]
 )
+Magnetometer: TypeAlias = Any  # a record of MAGNETOMETER
 
 PERIOD = 0.0999  # s between updates; samples between are averaged
 CORRELATION = 4.0  # s
@@ -61,7 +64,7 @@ REST_LEARNING = 3.0  # s
 
 
 @njit(cache=True, nogil=True)
-def start_magnetometer(g: Any, mx: float, my: float, mz: float, hard_iron: float) -> None:
+def start_magnetometer(g: Magnetometer, mx: float, my: float, mz: float, hard_iron: float) -> None:
     """First sample: scale, prior."""
     g.unit = math.sqrt(mx * mx + my * my + mz * mz)
     u2 = g.unit * g.unit
@@ -77,7 +80,7 @@ def start_magnetometer(g: Any, mx: float, my: float, mz: float, hard_iron: float
 
 
 @njit(cache=True, nogil=True)
-def spread_yaw(g: Any, variance: float) -> None:
+def spread_yaw(g: Magnetometer, variance: float) -> None:
     """Add yaw variance, rad^2, to the level frame: f gains it along its own tangent."""
     tx, ty = -g.x[1], g.x[0]
     g.P[0, 0] += variance * tx * tx
@@ -87,7 +90,7 @@ def spread_yaw(g: Any, variance: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def lose_yaw(g: Any, variance: float) -> None:
+def spread_yaw_on_arc(g: Magnetometer, variance: float) -> None:
     """The same for a turn of any size that nobody watched: mean and covariance of f on the arc over which it may lie.
 
     Along the tangent alone a turn by a right angle could only be explained by another hard iron.
@@ -108,7 +111,7 @@ def lose_yaw(g: Any, variance: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def drift(g: Any, dt: float, dyaw: float) -> None:
+def predict_field(g: Magnetometer, dt: float, dyaw: float) -> None:
     """Predict: f turns by phi = b dt + s dyaw."""
     phi = g.x[BIAS] * dt + g.x[SCALE] * dyaw
     c, s = math.cos(phi), math.sin(phi)
@@ -130,20 +133,20 @@ def drift(g: Any, dt: float, dyaw: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def innovation(g: Any, R: Any, m: Any, axis: int) -> float:
+def innovation(g: Magnetometer, R: Array, m: Array, axis: int) -> float:
     """m - (R^T f + h) of one body axis."""
     x = g.x
     return m[axis] - R[0, axis] * x[0] - R[1, axis] * x[1] - R[2, axis] * x[2] - x[3 + axis]  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def project(P: Any, R: Any, axis: int, i: int) -> float:
+def project(P: Array, R: Array, axis: int, i: int) -> float:
     """Row i of P times H^T of one body axis."""
     return P[i, 0] * R[0, axis] + P[i, 1] * R[1, axis] + P[i, 2] * R[2, axis] + P[i, 3 + axis]  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def predicted_variance(g: Any, R: Any, axis: int) -> float:
+def predicted_variance(g: Magnetometer, R: Array, axis: int) -> float:
     """H P H^T of one body axis."""
     s = project(g.P, R, axis, 3 + axis)
     for i in range(3):
@@ -152,7 +155,7 @@ def predicted_variance(g: Any, R: Any, axis: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def strain_of(g: Any, R: Any, m: Any) -> float:
+def mean_nis(g: Magnetometer, R: Array, m: Array) -> float:
     """Mean over the axes of innovation squared over its variance, without the inflation for correlation."""
     total = 0.0
     for axis in range(3):
@@ -162,7 +165,7 @@ def strain_of(g: Any, R: Any, m: Any) -> float:
 
 
 @njit(cache=True, nogil=True)
-def fuse_axis(g: Any, R: Any, m: Any, axis: int, inflation: float) -> None:
+def fuse_axis(g: Magnetometer, R: Array, m: Array, axis: int, inflation: float) -> None:
     """Scalar Kalman update with one body axis."""
     P = g.P
     e = innovation(g, R, m, axis)
@@ -186,7 +189,7 @@ def fuse_axis(g: Any, R: Any, m: Any, axis: int, inflation: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def judge(g: Any, dt: float, strain: float) -> bool:
+def is_disturbed(g: Magnetometer, dt: float, strain: float) -> bool:
     """Disturbed? A long disturbance makes field and hard iron unknown again."""
     decayed = g.strain * math.exp(-dt / STRAIN_TAU)
     g.strain = max(strain, decayed)
@@ -203,7 +206,7 @@ def judge(g: Any, dt: float, strain: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def learn_noise(g: Any, R: Any, m: Any, dt: float) -> None:
+def update_noise(g: Magnetometer, R: Array, m: Array, dt: float) -> None:
     """Follow r^2 with the residuals."""
     g.age = min(g.age + dt, NOISE_TAU)
     floor = NOISE_FLOOR * g.unit
@@ -213,7 +216,7 @@ def learn_noise(g: Any, R: Any, m: Any, dt: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def sum_sample(g: Any, q: Any, mx: float, my: float, mz: float) -> None:
+def add_to_sums(g: Magnetometer, q: Array, mx: float, my: float, mz: float) -> None:
     """Add one sample to the running sums: the mean of m = R^T f + h over a short time is exact in the mean of R."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     S = g.sum_R
@@ -233,7 +236,7 @@ def sum_sample(g: Any, q: Any, mx: float, my: float, mz: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def fuse(g: Any, dt: float, rest: bool) -> None:
+def fuse(g: Magnetometer, dt: float, rest: bool) -> None:
     """Update with the mean of the summed samples, which the sums become; dt s since the last update."""
     R, m = g.sum_R, g.sum_m
     for i in range(3):
@@ -242,17 +245,17 @@ def fuse(g: Any, dt: float, rest: bool) -> None:
             R[i, j] /= g.count
     if rest and g.age > NOISE_PRIOR + REST_LEARNING:
         return
-    if judge(g, dt, strain_of(g, R, m)):
+    if is_disturbed(g, dt, mean_nis(g, R, m)):
         return
     first = g.age == NOISE_PRIOR
     inflation = 1.0 if first else max(1.0, 2.0 * CORRELATION / dt)
     for axis in range(3):
         fuse_axis(g, R, m, axis, inflation)
-    learn_noise(g, R, m, dt)
+    update_noise(g, R, m, dt)
 
 
 @njit(cache=True, nogil=True)
-def feel(g: Any, dt: float, q: Any, mag: Any, rest: bool, hard_iron: float) -> None:
+def update_magnetometer(g: Magnetometer, dt: float, q: Array, mag: Array, rest: bool, hard_iron: float) -> None:
     """One IMU sample, after the attitude took it. `mag` may be NaN: a magnetometer slower than the IMU, or none."""
     known = math.isfinite(mag[0] + mag[1] + mag[2])
     if g.unit == 0.0:
@@ -262,14 +265,13 @@ def feel(g: Any, dt: float, q: Any, mag: Any, rest: bool, hard_iron: float) -> N
         g.yaw = yaw_of(q)
     g.elapsed += dt
     if known:
-        sum_sample(g, q, mag[0], mag[1], mag[2])
+        add_to_sums(g, q, mag[0], mag[1], mag[2])
     if g.elapsed < PERIOD or g.count == 0.0:
         return
     yaw = yaw_of(q)
-    dyaw = yaw - g.yaw
-    dyaw -= 2.0 * math.pi * math.floor(dyaw / (2.0 * math.pi) + 0.5)
+    dyaw = wrap(yaw - g.yaw)
     if not rest:
-        drift(g, g.elapsed, dyaw)
+        predict_field(g, g.elapsed, dyaw)
     fuse(g, g.elapsed, rest)
     g.yaw = yaw
     g.elapsed = 0.0
@@ -279,7 +281,7 @@ def feel(g: Any, dt: float, q: Any, mag: Any, rest: bool, hard_iron: float) -> N
 
 
 @njit(cache=True, nogil=True)
-def north_of(g: Any) -> tuple[float, float]:
+def north_of(g: Magnetometer) -> tuple[float, float]:
     """Azimuth of magnetic north in the level frame, rad, and its variance, rad^2."""
     x, y = g.x[0], g.x[1]
     n2 = x * x + y * y

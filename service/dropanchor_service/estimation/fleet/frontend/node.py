@@ -1,18 +1,23 @@
-"""What the front-end hands to the pose belief: one node per range, about 0.15 s long at most.
+"""What the front-end gives the pose belief: one node per range, 0.15 s long at most.
 
-A node is the pre-integrated IMU between two instants, together with what ended it.
-Rows of different tags may be mixed; the nodes of one row are in order of time.
+A node is the pre-integrated IMU between two instants, with the measurement that ended it. Nodes of different rows may
+be mixed; the nodes of one row are in order of time.
 """
 
-from typing import Final
+from typing import Any, Final, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 NO_HEADING: Final = 0
-ABSOLUTE_HEADING: Final = 1  # magnetic north; heading_var is of an error common to all nodes of a minute
-RELATIVE_HEADING: Final = 2  # gyro only: zero is arbitrary or given at the start
-MEASURED_HEADING: Final = 3  # the platform's readings beside an IMU; heading_var is what it claims
-DERIVED_HEADING: Final = 4  # the platform's, without an IMU: dyaw is its own increment; it may be stable or drift
+ABSOLUTE_HEADING: Final = 1  # from magnetic north; heading_var is of an error that lasts for minutes
+RELATIVE_HEADING: Final = 2  # from the gyroscope: its zero is arbitrary, or given at the start
+MEASURED_HEADING: Final = 3  # the platform's, beside an IMU; heading_var is what the platform claims
+DERIVED_HEADING: Final = 4  # the platform's alone: dyaw is its own increment
+
+MOVING: Final = 0  # what `rest` of a node says
+RESTING: Final = 1  # confirmed by the IMU
+NOT_MOVED: Final = 2  # has not moved since the start, so far as ranges and headings tell
 
 NO_MEASUREMENT: Final = 0
 RANGE: Final = 1
@@ -23,11 +28,11 @@ NODE: Final = np.dtype(
         ("row", np.int32),
         ("t_ns", np.int64),  # end of the interval
         ("dt_s", np.float64),
-        ("dyaw", np.float64),  # rad, body yaw increment about the vertical, bias-corrected
+        ("dyaw", np.float64),  # rad, increment of body yaw about the vertical, without the gyroscope's bias
         ("dyaw_var", np.float64),  # rad^2
-        ("gyro_var", np.float64),  # (rad/s)^2, of the bias that dyaw was corrected for; 0: not known
-        ("gyro_step", np.float64),  # rad/s, by which that bias about the vertical changed in the interval
-        ("dv_forward", np.float64),  # m/s, gravity removed, in the body-yaw frame at the start of the interval
+        ("gyro_bias_var", np.float64),  # (rad/s)^2, of the bias that was taken out of dyaw; 0: not known
+        ("gyro_bias_step", np.float64),  # rad/s, change of that bias in the interval
+        ("dv_forward", np.float64),  # m/s, without gravity, in the body-yaw frame at the start of the interval
         ("dv_left", np.float64),  # m/s
         ("swing_forward", np.float64),  # m, of the tag about the point that follows the course, in the same frame
         ("swing_left", np.float64),  # m
@@ -35,12 +40,15 @@ NODE: Final = np.dtype(
         ("heading", np.float64),  # rad, body yaw at the end of the interval
         ("heading_var", np.float64),  # rad^2
         ("heading_kind", np.uint8),
-        ("rest", np.uint8),  # 1: standstill, confirmed; 2: not moved since the start, so far as can be told
+        ("rest", np.uint8),  # MOVING, RESTING or NOT_MOVED
         ("kind", np.uint8),  # NO_MEASUREMENT, RANGE or BEARING
         ("anchor", np.int32),  # index into the anchor table
         ("z", np.float64),  # m (slant range) or rad (azimuth of the tag seen from the anchor)
         ("z_std", np.float64),  # m or rad; NaN: the tag's setting
-        ("unheard_s", np.float64),  # of the interval, without IMU and without the platform's heading
-        ("lag_s", np.float64),  # the measurement is that much older than the end of the interval (it came late)
+        ("unobserved_s", np.float64),  # s of the interval that neither the IMU nor the platform's heading observed
+        ("lag_s", np.float64),  # s by which the measurement is older than the end of the interval
     ]
 )
+
+Node: TypeAlias = Any  # a record of NODE
+Nodes: TypeAlias = npt.NDArray[np.void]  # NODE (n,)

@@ -5,14 +5,22 @@ rate. Beside an IMU, every reading is carried to the node's end by the gyroscope
 """
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import yaw_of
-from dropanchor_service.estimation.fleet.frontend.node import DERIVED_HEADING, MEASURED_HEADING, NO_HEADING
-from dropanchor_service.estimation.fleet.frontend.preintegration import wrap
+from dropanchor_service.estimation.fleet.frontend.inertial import Frontend
+from dropanchor_service.estimation.fleet.frontend.node import (
+    DERIVED_HEADING,
+    MEASURED_HEADING,
+    MOVING,
+    NO_HEADING,
+    NOT_MOVED,
+    Node,
+)
 
 PLATFORM = np.dtype(
     [
@@ -30,6 +38,7 @@ PLATFORM = np.dtype(
         ("first_range", "f8"),  # m, mean of the first ranges
     ]
 )
+Platform: TypeAlias = Any  # a record of PLATFORM
 
 NOISE = 1.6e-5  # rad^2/s, of a platform's increments
 READING_STD = 0.1  # rad, of a reading whose std is not told
@@ -39,7 +48,7 @@ STILL_RANGES = 5
 
 
 @njit(nogil=True)
-def hear(p: Any, front: Any, t_ns: int, heading: float, std: float) -> None:
+def add_reading(p: Platform, front: Frontend, t_ns: int, heading: float, std: float) -> None:
     """One reading of the platform's heading."""
     if p.heard > 0 and t_ns > p.t_heading:
         p.rate = wrap(heading - p.heading) / max((t_ns - p.t_heading) * 1e-9, 1e-3)
@@ -56,13 +65,13 @@ def hear(p: Any, front: Any, t_ns: int, heading: float, std: float) -> None:
 
 
 @njit(nogil=True)
-def derive_node(p: Any, t_ns: int, node: Any) -> None:
+def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
     """The node from the platform alone: no acceleration, yaw by its own increments."""
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
-    node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, 0
-    node.gyro_var, node.gyro_step = 0.0, 0.0
+    node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, MOVING
+    node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
-    node.unheard_s = 0.0
+    node.unobserved_s = 0.0
     if p.heard == 0:
         return
     ahead = (t_ns - p.t_heading) * 1e-9
@@ -70,14 +79,14 @@ def derive_node(p: Any, t_ns: int, node: Any) -> None:
     node.dt_s = max((t_ns - p.t_node) * 1e-9, 0.0)
     node.dyaw = wrap(heading - p.node_heading)
     node.dyaw_var = NOISE * node.dt_s + 1e-7 + (0.5 * max(ahead - 2.0 * EXTRAPOLATE, 0.0)) ** 2
-    node.unheard_s = node.dt_s if ahead > 2.0 * EXTRAPOLATE else 0.0
+    node.unobserved_s = node.dt_s if ahead > 2.0 * EXTRAPOLATE else 0.0
     std = p.std if math.isfinite(p.std) else 0.02
     node.heading, node.heading_var, node.heading_kind = heading, std * std, DERIVED_HEADING
     p.t_node, p.node_heading = t_ns, heading
 
 
 @njit(nogil=True)
-def watch_start(p: Any, node: Any, z: float, std: float) -> None:
+def detect_first_motion(p: Platform, node: Node, z: float, std: float) -> None:
     """Whether a tag that was put down at a known start has moved yet: by its range, or by turning."""
     if p.moved == 1:
         return
@@ -90,11 +99,11 @@ def watch_start(p: Any, node: Any, z: float, std: float) -> None:
     if node.dt_s > 0.0 and abs(node.dyaw) > STILL_RATE * node.dt_s + 1e-4:
         p.moved = 1
     if p.moved == 0 and node.dt_s > 0.0:
-        node.rest = 2
+        node.rest = NOT_MOVED
 
 
 @njit(nogil=True)
-def refer_to_platform(p: Any, front: Any, node: Any) -> None:
+def use_platform_heading(p: Platform, front: Frontend, node: Node) -> None:
     """Replace the heading of an IMU node by the mean of the platform's readings in it; none if there was none."""
     if p.readings == 0:
         node.heading_kind = NO_HEADING
@@ -103,6 +112,6 @@ def refer_to_platform(p: Any, front: Any, node: Any) -> None:
     node.heading = wrap(front.preintegration.yaw_end + p.lead)
     node.heading_var = std * std / p.readings
     node.heading_kind = MEASURED_HEADING
-    node.unheard_s = 0.0
+    node.unobserved_s = 0.0
     p.readings = 0
     p.lead = 0.0

@@ -8,11 +8,14 @@ Accelerations are scaled to the tag's own gravity (cheap accelerometers read 5 %
 """
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node
 
 PREINTEGRATION = np.dtype(
     [
@@ -27,38 +30,33 @@ PREINTEGRATION = np.dtype(
         ("deaf", "f8"),  # s without usable accelerometer since the last node
     ]
 )
+Preintegration: TypeAlias = Any  # a record of PREINTEGRATION
 
 G0 = 9.80665  # m/s^2
 HORIZON = 0.1  # s
 GYRO_NOISE = 4e-6  # rad^2/s: 0.02 rad/s white at 100 Hz
 GYRO_SCALE = 7e-3  # of the turn
-TURN_UNKNOWN = 1.0  # rad/s, sd of the rate of a tag whose IMU is silent
+UNOBSERVED_RATE = 1.0  # rad/s, sd of the rate of a tag whose IMU is silent
 ACC_FLOOR = 2e-4  # (m/s)^2/s
 ACC_ROUGH = 0.03  # s: what of the roughness leaks into the integral, measured on recordings
 ROUGH_TAU = 3.0  # s
-ACC_UNKNOWN = 1.0  # m/s^2, sd of the acceleration of a tag whose IMU is silent
+UNOBSERVED_ACC = 1.0  # m/s^2, sd of the acceleration of a tag whose IMU is silent
 
 
 @njit(cache=True, nogil=True)
-def wrap(angle: float) -> float:
-    """Angle in [-pi, pi), rad."""
-    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
-
-
-@njit(cache=True, nogil=True)
-def unwatched_turn(s: float) -> float:
+def unobserved_turn_var(s: float) -> float:
     """Variance, rad^2, of the turn in s seconds that no gyroscope watched; the rate lasts about a second."""
-    return TURN_UNKNOWN * TURN_UNKNOWN * s * max(s, 1.0)
+    return UNOBSERVED_RATE * UNOBSERVED_RATE * s * max(s, 1.0)
 
 
 @njit(cache=True, nogil=True)
-def unwatched_speed(s: float) -> float:
+def unobserved_speed_var(s: float) -> float:
     """Variance, (m/s)^2, of the change of speed in s seconds that no accelerometer watched."""
-    return ACC_UNKNOWN * ACC_UNKNOWN * s * max(s, 1.0)
+    return UNOBSERVED_ACC * UNOBSERVED_ACC * s * max(s, 1.0)
 
 
 @njit(cache=True, nogil=True)
-def accelerate(p: Any, dt: float, q: Any, acc: Any, gravity: float, variance: float) -> None:
+def add_acceleration(p: Preintegration, dt: float, q: Array, acc: Array, gravity: float, variance: float) -> None:
     """Add dt of acceleration (trapezoid); q is the attitude at the end of dt, variance that of standstill."""
     p.rough += dt / (ROUGH_TAU + dt) * (variance - p.rough)
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -72,7 +70,7 @@ def accelerate(p: Any, dt: float, q: Any, acc: Any, gravity: float, variance: fl
 
 
 @njit(cache=True, nogil=True)
-def end_node(p: Any, yaw: float, ahead: float, dt: float, node: Any) -> float:
+def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node) -> float:
     """Fill dyaw and dv of a node that lasts dt and ends `ahead` s after the last IMU sample; return psi at its end."""
     reach = min(ahead, HORIZON)
     end = yaw + p.yaw_rate * reach
@@ -85,9 +83,9 @@ def end_node(p: Any, yaw: float, ahead: float, dt: float, node: Any) -> float:
     beyond = max(0.0, ahead - HORIZON)
     unheard = p.silent + max(0.0, beyond - p.blind)
     p.blind = max(p.blind, beyond)
-    node.unheard_s = unheard
-    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unwatched_turn(unheard)
-    node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + unwatched_speed(unheard)
+    node.unobserved_s = unheard
+    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unobserved_turn_var(unheard)
+    node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + unobserved_speed_var(unheard)
     p.yaw_end = wrap(end)
     p.V_end[0], p.V_end[1] = vx, vy
     p.silent = 0.0

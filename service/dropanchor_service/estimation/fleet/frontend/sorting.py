@@ -1,57 +1,59 @@
-"""One compiled pass that puts a batch's samples, and those that have waited, in order of row and time.
+"""One compiled pass that puts a batch's samples, and those that are pending, in order of row and time.
 
-Every row that a batch touches gets a list of its samples; what is due of it is merged in order of time. A sample is an
-index: inertial ones, which never wait, into their own column, all others into the batch's events behind it. Loops are
-handed arrays: compiled code counts a reference, atomically, whenever it takes an array out of a tuple.
+Every row that a batch touches gets a list of its samples, and what is due of it is sorted by time. A sample is an
+index: below the number of IMU samples it points into their column, above it into the batch's events. IMU samples never
+wait. Loops get arrays rather than tuples of arrays, because compiled code counts a reference, atomically, whenever it
+takes an array out of a tuple.
 """
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.assembly import BEARING_EVENT, HEADING_EVENT, RANGE_EVENT
+from dropanchor_service.estimation.fleet.frontend.event import BEARING_EVENT, HEADING_EVENT, RANGE_EVENT, Event
 
-HOLD: Final = 250_000_000  # ns: the window in which late samples are put in order
-TOLERANCE: Final = 40_000_000  # ns that the IMU may lag behind a measurement
-SILENT: Final = 1_000_000_000  # ns without an IMU sample: nobody waits for it any more
+REORDER_WINDOW: Final = 250_000_000  # ns in which late samples are put in order
+TOLERANCE: Final = 40_000_000  # ns by which the IMU may lag behind a measurement
+IMU_TIMEOUT: Final = 1_000_000_000  # ns without an IMU sample after which no measurement waits for one
 
 NONE: Final = -1
 UNTOUCHED: Final = -2
 
-CLOCK: Final = np.dtype(
+ROW_QUEUE: Final = np.dtype(
     [
-        ("imu", np.int64),  # ns, newest inertial sample of the row
+        ("imu", np.int64),  # ns, newest IMU sample of the row
         ("newest", np.int64),  # ns, newest sample of the row
-        ("imu_next", np.int64),  # with those of the batch under way
+        ("imu_next", np.int64),  # the same two with the samples of the present batch
         ("newest_next", np.int64),
-        ("first", np.int32),  # of the row's samples in the batch; UNTOUCHED: it has none
+        ("first", np.int32),  # index of the row's first sample in the batch; UNTOUCHED: it has none
         ("last", np.int32),
-        ("waiting", np.int32),  # first and last slot of what waits
-        ("waiting_last", np.int32),
+        ("pending", np.int32),  # first and last slot of the row's pending events
+        ("pending_last", np.int32),
     ]
 )
+RowQueue: TypeAlias = Any  # a record of ROW_QUEUE
 
 EVENTS, TOUCHED, ANCHOR_UNKNOWN, NOT_FINITE, LATE = range(5)  # indices of the counts of a batch
-REASONS: Final = {"anchor_unknown": ANCHOR_UNKNOWN, "not_finite": NOT_FINITE, "late": LATE}
+REJECTIONS: Final = {"anchor_unknown": ANCHOR_UNKNOWN, "not_finite": NOT_FINITE, "late": LATE}
 
 
 class Batch(NamedTuple):
-    """Buffers of one pass, as long as it has samples and samples that wait."""
+    """Buffers of one pass, with room for all samples and all pending events."""
 
     events: Array  # EVENT
-    following: Array  # the next sample of the same row
+    following: Array  # index of the next sample of the same row
     times: Array  # ns, of the samples
-    order: Array  # the result: indices into the inertial samples and, behind them, the events
+    order: Array  # the result: indices of samples
     spare: Array
     touched: Array  # rows
     counts: Array
 
 
-class Held(NamedTuple):
-    """Slots of samples that wait, in lists; slot 0 heads the free ones. counts[0] are in use."""
+class Pending(NamedTuple):
+    """Slots of pending events, in one list per row. Slot 0 is the head of the free list; counts[0] are in use."""
 
     events: Array  # EVENT
     following: Array
@@ -59,39 +61,49 @@ class Held(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def arrange(
-    imu: Any, headings: Any, ranges: Any, bearings: Any, anchors: int, clocks: Any, held: Held, batch: Batch
+def order_samples(
+    imu: Array,
+    headings: Array,
+    ranges: Array,
+    bearings: Array,
+    anchors: int,
+    queues: Array,
+    pending: Pending,
+    batch: Batch,
 ) -> int:
-    """Fill batch.order and return how many are due; NONE, and nothing done, where a sample's row has no clock."""
-    rows = len(clocks)
+    """Fill batch.order and return how many samples are due.
+
+    Return NONE, with nothing changed, where a sample belongs to a row that is not configured.
+    """
+    rows = len(queues)
     if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
         return NONE
     batch.counts[:] = 0
-    _take_imu(imu, clocks, batch.following, batch.times, batch.touched, batch.counts)
+    _add_imu(imu, queues, batch.following, batch.times, batch.touched, batch.counts)
     for k in range(len(headings)):
         sample = headings[k]
-        _take_scalar(len(imu), sample, sample.heading, HEADING_EVENT, NONE, clocks, batch)
+        _add_event(len(imu), sample, sample.heading, HEADING_EVENT, NONE, queues, batch)
     for k in range(len(ranges)):
         sample = ranges[k]
         if _anchor_known(sample.anchor, anchors, batch):
-            _take_scalar(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, clocks, batch)
+            _add_event(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, queues, batch)
     for k in range(len(bearings)):
         sample = bearings[k]
         if _anchor_known(sample.anchor, anchors, batch):
             value = sample.bearing if sample.std > 0.0 else np.nan
-            _take_scalar(len(imu), sample, value, BEARING_EVENT, sample.anchor, clocks, batch)
+            _add_event(len(imu), sample, value, BEARING_EVENT, sample.anchor, queues, batch)
     due = 0
     for k in range(batch.counts[TOUCHED]):
-        start, clock = due, clocks[batch.touched[k]]
-        clock.imu, clock.newest = clock.imu_next, clock.newest_next
-        due = _release(len(imu), clock, held, batch, start)
-        due = _choose(len(imu), clock, held, batch.events, batch.following, batch.order, due)
+        start, queue = due, queues[batch.touched[k]]
+        queue.imu, queue.newest = queue.imu_next, queue.newest_next
+        due = _release_pending(len(imu), queue, pending, batch, start)
+        due = _release_new(len(imu), queue, pending, batch.events, batch.following, batch.order, due)
         _sort(batch, len(imu), start, due)
     return due
 
 
 @njit(nogil=True)
-def _within(column: Any, rows: int) -> bool:
+def _within(column: Array, rows: int) -> bool:
     within = True
     for k in range(len(column)):
         within = within and 0 <= column[k].row < rows
@@ -107,30 +119,32 @@ def _anchor_known(anchor: int, anchors: int, batch: Batch) -> bool:
 
 
 @njit(nogil=True)
-def _take_imu(imu: Any, clocks: Any, following: Any, times: Any, touched: Any, counts: Any) -> None:
+def _add_imu(imu: Array, queues: Array, following: Array, times: Array, touched: Array, counts: Array) -> None:
+    """Append every usable IMU sample to its row's list. One from before an earlier batch's is late."""
     for index in range(len(imu)):
         sample = imu[index]
         if not math.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
             counts[NOT_FINITE] += 1
             continue
-        clock, t_ns = clocks[sample.row], sample.t_ns
-        _touch(clock, sample.row, touched, counts)
-        if t_ns < clock.imu:  # of the batches before
+        queue, t_ns = queues[sample.row], sample.t_ns
+        _open_list(queue, sample.row, touched, counts)
+        if t_ns < queue.imu:
             counts[LATE] += 1
             continue
-        clock.imu_next = max(clock.imu_next, t_ns)
-        _enter(clock, t_ns, index, following, times)
+        queue.imu_next = max(queue.imu_next, t_ns)
+        _append_sample(queue, t_ns, index, following, times)
 
 
 @njit(nogil=True)
-def _take_scalar(inertial: int, sample: Any, value: float, kind: int, anchor: int, clocks: Any, batch: Batch) -> None:
+def _add_event(imu_count: int, sample: Any, value: float, kind: int, anchor: int, queues: Array, batch: Batch) -> None:
+    """Append a heading, range or bearing to its row's list, unless it is not finite or too late."""
     counts = batch.counts
     if not math.isfinite(value):
         counts[NOT_FINITE] += 1
         return
-    clock = clocks[sample.row]
-    _touch(clock, sample.row, batch.touched, counts)
-    if sample.t_ns < clock.newest - HOLD:
+    queue = queues[sample.row]
+    _open_list(queue, sample.row, batch.touched, counts)
+    if sample.t_ns < queue.newest - REORDER_WINDOW:
         counts[LATE] += 1
         return
     index = counts[EVENTS]
@@ -138,140 +152,142 @@ def _take_scalar(inertial: int, sample: Any, value: float, kind: int, anchor: in
     event = batch.events[index]
     event.row, event.t_ns, event.kind, event.anchor = sample.row, sample.t_ns, kind, anchor
     event.value, event.std = value, sample.std
-    _enter(clock, sample.t_ns, inertial + index, batch.following, batch.times)
+    _append_sample(queue, sample.t_ns, imu_count + index, batch.following, batch.times)
 
 
 @njit(nogil=True)
-def _touch(clock: Any, row: int, touched: Any, counts: Any) -> None:
-    """The batch has something of this row."""
-    if clock.first == UNTOUCHED:
-        clock.first = clock.last = NONE
-        clock.imu_next, clock.newest_next = clock.imu, clock.newest
+def _open_list(queue: RowQueue, row: int, touched: Array, counts: Array) -> None:
+    """Note that the batch has samples of this row."""
+    if queue.first == UNTOUCHED:
+        queue.first = queue.last = NONE
+        queue.imu_next, queue.newest_next = queue.imu, queue.newest
         touched[counts[TOUCHED]] = row
         counts[TOUCHED] += 1
 
 
 @njit(nogil=True)
-def _enter(clock: Any, t_ns: int, index: int, following: Any, times: Any) -> None:
-    """A sample at the end of the row's list."""
-    clock.newest_next = max(clock.newest_next, t_ns)
+def _append_sample(queue: RowQueue, t_ns: int, index: int, following: Array, times: Array) -> None:
+    queue.newest_next = max(queue.newest_next, t_ns)
     times[index] = t_ns
     following[index] = NONE
-    if clock.last == NONE:
-        clock.first = index
+    if queue.last == NONE:
+        queue.first = index
     else:
-        following[clock.last] = index
-    clock.last = index
+        following[queue.last] = index
+    queue.last = index
 
 
 @njit(nogil=True)
-def _is_due(clock: Any, event: Any) -> bool:
-    if clock.imu >= event.t_ns - TOLERANCE:
+def _is_due(queue: RowQueue, event: Event) -> bool:
+    """Return whether an event need not wait: the row's IMU has caught up, or the wait has been long enough."""
+    if queue.imu >= event.t_ns - TOLERANCE:
         return True
-    return bool(clock.newest - event.t_ns >= HOLD or clock.newest - clock.imu > SILENT)
+    return bool(queue.newest - event.t_ns >= REORDER_WINDOW or queue.newest - queue.imu > IMU_TIMEOUT)
 
 
 @njit(nogil=True)
-def _release(inertial: int, clock: Any, held: Held, batch: Batch, start: int) -> int:
-    """What has waited and is due to batch.order from `start` on; the others go on waiting. Returns the end."""
-    slot, end = clock.waiting, start
-    clock.waiting = NONE
+def _release_pending(imu_count: int, queue: RowQueue, pending: Pending, batch: Batch, start: int) -> int:
+    """Move the row's pending events that are due to batch.order, from `start` on. Return the end."""
+    slot, end = queue.pending, start
+    queue.pending = NONE
     while slot != NONE:
-        following = held.following[slot]
-        if _is_due(clock, held.events[slot]):
+        following = pending.following[slot]
+        if _is_due(queue, pending.events[slot]):
             index = batch.counts[EVENTS]
             batch.counts[EVENTS] += 1
-            batch.events[index] = held.events[slot]
-            batch.times[inertial + index] = held.events[slot].t_ns
-            batch.order[end] = inertial + index
+            batch.events[index] = pending.events[slot]
+            batch.times[imu_count + index] = pending.events[slot].t_ns
+            batch.order[end] = imu_count + index
             end += 1
-            _free(held, slot)
+            _free(pending, slot)
         else:
-            _append(clock, held, slot)
+            _append_slot(queue, pending, slot)
         slot = following
     return end
 
 
 @njit(nogil=True)
-def _choose(inertial: int, clock: Any, held: Held, events: Any, following: Any, order: Any, start: int) -> int:
-    """The row's fresh samples that are due to order from `start` on; the others wait. Returns the end."""
-    index, end = clock.first, start
-    clock.first = UNTOUCHED
+def _release_new(
+    imu_count: int, queue: RowQueue, pending: Pending, events: Array, following: Array, order: Array, start: int
+) -> int:
+    """Append the row's new samples that are due to `order`, from `start` on. The others become pending."""
+    index, end = queue.first, start
+    queue.first = UNTOUCHED
     while index != NONE:
-        if index < inertial or _is_due(clock, events[index - inertial]):
+        if index < imu_count or _is_due(queue, events[index - imu_count]):
             order[end] = index
             end += 1
         else:
-            hold(clock, held, events[index - inertial])
+            append_pending(queue, pending, events[index - imu_count])
         index = following[index]
     return end
 
 
 @njit(nogil=True)
-def _free(held: Held, slot: int) -> None:
-    held.following[slot] = held.following[0]
-    held.following[0] = slot
-    held.counts[0] -= 1
+def _free(pending: Pending, slot: int) -> None:
+    pending.following[slot] = pending.following[0]
+    pending.following[0] = slot
+    pending.counts[0] -= 1
 
 
 @njit(nogil=True)
-def _append(clock: Any, held: Held, slot: int) -> None:
-    if clock.waiting == NONE:
-        clock.waiting = slot
+def _append_slot(queue: RowQueue, pending: Pending, slot: int) -> None:
+    if queue.pending == NONE:
+        queue.pending = slot
     else:
-        held.following[clock.waiting_last] = slot
-    clock.waiting_last = slot
-    held.following[slot] = NONE
+        pending.following[queue.pending_last] = slot
+    queue.pending_last = slot
+    pending.following[slot] = NONE
 
 
 @njit(cache=True, nogil=True)
-def hold(clock: Any, held: Held, event: Any) -> None:
-    """Let the event wait, behind those of its row that wait already. There must be a free slot."""
-    slot = held.following[0]
-    held.following[0] = held.following[slot]
-    held.counts[0] += 1
-    held.events[slot] = event
-    _append(clock, held, slot)
+def append_pending(queue: RowQueue, pending: Pending, event: Event) -> None:
+    """Append the event to its row's pending ones. There must be a free slot."""
+    slot = pending.following[0]
+    pending.following[0] = pending.following[slot]
+    pending.counts[0] += 1
+    pending.events[slot] = event
+    _append_slot(queue, pending, slot)
 
 
 @njit(cache=True, nogil=True)
-def drop_held(clock: Any, held: Held) -> None:
-    """Forget what waits of a row."""
-    while clock.waiting != NONE:
-        slot = clock.waiting
-        clock.waiting = held.following[slot]
-        _free(held, slot)
+def drop_pending(queue: RowQueue, pending: Pending) -> None:
+    """Drop all pending events of a row."""
+    while queue.pending != NONE:
+        slot = queue.pending
+        queue.pending = pending.following[slot]
+        _free(pending, slot)
 
 
 @njit(nogil=True)
-def _after(a: int, b: int, times: Any, inertial: int, events: Any) -> bool:
-    """Sample a is later than sample b, or at the same time and of a later kind."""
-    if times[a] != times[b] or a < inertial:
+def _after(a: int, b: int, times: Array, imu_count: int, events: Array) -> bool:
+    """Return whether sample a is later than sample b, or at the same time and of a later kind."""
+    if times[a] != times[b] or a < imu_count:
         return bool(times[a] > times[b])
-    return b < inertial or bool(events[a - inertial].kind > events[b - inertial].kind)
+    return b < imu_count or bool(events[a - imu_count].kind > events[b - imu_count].kind)
 
 
 @njit(nogil=True)
-def _sort(batch: Batch, inertial: int, start: int, end: int) -> None:
-    """Stable, from the bottom up; two neighbouring runs that are in order are only looked at."""
+def _sort(batch: Batch, imu_count: int, start: int, end: int) -> None:
+    """Sort batch.order[start:end] by time: a stable bottom-up merge sort that skips runs already in order."""
     order, times, events = batch.order, batch.times, batch.events
     width = 1
     while width < end - start:
         for low in range(start, end - width, 2 * width):
             middle = low + width
-            if _after(order[middle - 1], order[middle], times, inertial, events):
-                _merge(batch, inertial, low, middle, min(middle + width, end))
+            if _after(order[middle - 1], order[middle], times, imu_count, events):
+                _merge(batch, imu_count, low, middle, min(middle + width, end))
         width *= 2
 
 
 @njit(nogil=True)
-def _merge(batch: Batch, inertial: int, low: int, middle: int, high: int) -> None:
+def _merge(batch: Batch, imu_count: int, low: int, middle: int, high: int) -> None:
     order, spare, times, events = batch.order, batch.spare, batch.times, batch.events
     for k in range(low, middle):
         spare[k] = order[k]
     left, right, k = low, middle, low
     while left < middle:
-        if right < high and _after(spare[left], order[right], times, inertial, events):
+        if right < high and _after(spare[left], order[right], times, imu_count, events):
             order[k] = order[right]
             right += 1
         else:

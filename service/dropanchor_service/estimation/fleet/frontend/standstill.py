@@ -9,17 +9,18 @@ Bias: scalar Kalman filter per axis, P += Q dt, block mean of rate with variance
 """
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
 
 STANDSTILL = np.dtype(
     [
         ("mean", "f8", 6),  # of acc and gyro, exponentially weighted
         ("acc_var", "f8"),  # sum over the axes, (m/s^2)^2
-        ("gyro_var", "f8"),  # sum over the axes, (rad/s)^2
+        ("gyro_bias_var", "f8"),  # sum over the axes, (rad/s)^2
         ("seen", "f8"),  # s of samples seen, up to a limit
         ("quiet", "f8"),  # s of quiet
         ("block", "f8", 4),  # time and integrated rate of the block of rest under way
@@ -28,13 +29,14 @@ STANDSTILL = np.dtype(
         ("moved", "u1"),  # 1: it has not been quiet all the time since the first sample
     ]
 )
+Standstill: TypeAlias = Any  # a record of STANDSTILL
 
 TAU = 0.12  # s
 ACC_SD = 0.08  # m/s^2, root of the sum over three axes: 0.045 per axis
 GYRO_SD = 0.05  # rad/s, likewise
 RATE = 0.08  # rad/s, of the mean rotation before the bias is known
 RATE_KNOWN = 0.02  # rad/s, afterwards
-HOLD = 0.2  # s of quiet that make rest
+REORDER_WINDOW = 0.2  # s of quiet that make rest
 CONFIRM = 0.5  # s of quiet before the bias is learned
 BLOCK = 0.5  # s
 FIRST_CONFIRM, FIRST_BLOCK = 0.2, 0.15  # s, of the rest at switch-on
@@ -46,13 +48,13 @@ WHITE = 3.0  # times the variance of white noise as large as what is seen
 
 
 @njit(cache=True, nogil=True)
-def start_standstill(s: Any, acc: Any, gyro: Any) -> None:
+def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
     """Nothing seen but one sample."""
     for i in range(3):
         s.mean[i] = acc[i] if math.isfinite(acc[i]) else 0.0
         s.mean[3 + i] = gyro[i]
     s.acc_var = 0.0
-    s.gyro_var = 0.0
+    s.gyro_bias_var = 0.0
     s.seen = 0.0
     s.quiet = 0.0
     s.block[:] = 0.0
@@ -62,7 +64,7 @@ def start_standstill(s: Any, acc: Any, gyro: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def watch(s: Any, k: float, i: int, value: float) -> float:
+def update_channel(s: Standstill, k: float, i: int, value: float) -> float:
     """Exponentially weighted mean of channel i; returns the squared deviation to be averaged."""
     d = value - s.mean[i]
     s.mean[i] += k * d
@@ -70,40 +72,40 @@ def watch(s: Any, k: float, i: int, value: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def observe(s: Any, dt: float, acc: Any, gyro: Any, bias: Any) -> None:
+def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array, bias: Array) -> None:
     """One IMU sample. `s.quiet` afterwards is the time, s, for which the tag has been quiet."""
     if dt == 0.0:
         return
     k = dt / (min(s.seen, TAU) + dt)
     s.seen += dt
-    va = watch(s, k, 0, acc[0]) + watch(s, k, 1, acc[1]) + watch(s, k, 2, acc[2])
-    vg = watch(s, k, 3, gyro[0]) + watch(s, k, 4, gyro[1]) + watch(s, k, 5, gyro[2])
+    va = update_channel(s, k, 0, acc[0]) + update_channel(s, k, 1, acc[1]) + update_channel(s, k, 2, acc[2])
+    vg = update_channel(s, k, 3, gyro[0]) + update_channel(s, k, 4, gyro[1]) + update_channel(s, k, 5, gyro[2])
     s.acc_var += k * (va - s.acc_var)
-    s.gyro_var += k * (vg - s.gyro_var)
+    s.gyro_bias_var += k * (vg - s.gyro_bias_var)
     x, y, z = s.mean[3] - bias[0], s.mean[4] - bias[1], s.mean[5] - bias[2]
     limit = RATE_KNOWN + min(RATE, 3.0 * math.sqrt(s.bias_var))
-    calm = s.acc_var < ACC_SD * ACC_SD and s.gyro_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
+    calm = s.acc_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
     s.quiet = s.quiet + dt if calm and s.seen > TAU else 0.0
     if s.quiet == 0.0 and s.seen > TAU:
         s.moved = 1
 
 
 @njit(cache=True, nogil=True)
-def at_rest(s: Any) -> bool:
+def at_rest(s: Standstill) -> bool:
     """Rest, for a zero-velocity update."""
-    return s.quiet > HOLD  # type: ignore[no-any-return]
+    return s.quiet > REORDER_WINDOW  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def block_noise(s: Any, dt: float) -> float:
+def block_noise(s: Standstill, dt: float) -> float:
     """Variance of the mean rate of a block of rest times its length, (rad/s)^2 s."""
     if s.moved == 1:
         return BIAS_NOISE
-    return min(BIAS_NOISE, FIRST_NOISE + WHITE * s.gyro_var / 3.0 * dt)  # type: ignore[no-any-return]
+    return min(BIAS_NOISE, FIRST_NOISE + WHITE * s.gyro_bias_var / 3.0 * dt)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def learn_bias(s: Any, dt: float, gyro: Any, bias: Any) -> None:
+def update_gyro_bias(s: Standstill, dt: float, gyro: Array, bias: Array) -> None:
     """Update `bias` from confirmed rest; call with every sample."""
     s.bias_var += BIAS_WALK * dt
     if s.quiet < (CONFIRM if s.moved == 1 else FIRST_CONFIRM):

@@ -5,16 +5,18 @@ the ranges: the posterior of that instant given the data up to `lag` later, no m
 """
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from dropanchor_service.estimation.fleet.belief.layout import V
-from dropanchor_service.estimation.fleet.belief.summary import course_of, planar
-from dropanchor_service.estimation.fleet.belief.update import wrap
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.layout import Anchors, Floats, Rows, V
+from dropanchor_service.estimation.fleet.belief.summary import course_of, planar_covariance
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Nodes
 from dropanchor_service.estimation.fleet.smoother.smoother import Track, smooth
-from dropanchor_service.estimation.fleet.smoother.trace import KEPT
+from dropanchor_service.estimation.fleet.smoother.trace import TRACED
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 STRIDE: Final = 0.095  # s
@@ -23,22 +25,22 @@ ITERATIONS: Final = 3
 
 
 @njit(nogil=True)
-def describe(s: Any, P: Any, point: Any, cov: Any) -> None:
+def to_planar(s: Floats, P: Floats, point: Floats, cov: Floats) -> None:
     """point: x, y from the anchor, course, speed; cov (3, 3): of x, y, course."""
     point[0], point[1] = s[0] * math.cos(s[1]), s[0] * math.sin(s[1])
     point[2], point[3] = course_of(s), s[V]
-    planar(s, P, cov)
+    planar_covariance(s, P, cov)
 
 
 @njit(nogil=True, cache=True)
-def describe_all(means: Any, covs: Any, points: Any, out: Any) -> None:
+def all_to_planar(means: Floats, covs: Floats, points: Floats, out: Floats) -> None:
     """`describe` for every node."""
     for k in range(len(means)):
-        describe(means[k], covs[k], points[k], out[k])
+        to_planar(means[k], covs[k], points[k], out[k])
 
 
 @njit(nogil=True)
-def mix(weights: Any, points: Any, covs: Any, point: Any, cov: Any) -> None:
+def _mix_mode(weights: Floats, points: Floats, covs: Floats, point: Floats, cov: Floats) -> None:
     """Moments of those near the heaviest (1 m + 2 sigma): its mode."""
     head = np.argmax(weights)
     spread = math.sqrt(max(covs[head, 0, 0] + covs[head, 1, 1], 0.0))
@@ -60,7 +62,7 @@ def mix(weights: Any, points: Any, covs: Any, point: Any, cov: Any) -> None:
 
 
 @njit(nogil=True)
-def _steady(traces: Any) -> bool:
+def _has_one_model(traces: Array) -> bool:
     """Whether one model of the heading error, and one north, held through the window."""
     for k in range(1, len(traces)):
         if traces[k].model != traces[0].model or traces[k].referred != traces[0].referred or traces[k].count == 0:
@@ -71,34 +73,50 @@ def _steady(traces: Any) -> bool:
 
 
 @njit(nogil=True)
-def _window(
-    track: Track, nodes: Any, traces: Any, block: int, rows: Any, anchors: Any, t: Tuning, points: Any, covs: Any
+def _smooth_window(
+    track: Track,
+    nodes: Nodes,
+    traces: Array,
+    block: int,
+    rows: Rows,
+    anchors: Anchors,
+    t: Tuning,
+    points: Floats,
+    covs: Floats,
 ) -> None:
     """Fill points (n, 4) and covs (n, 3, 3) of the first `block` nodes."""
     first = traces[0]
-    weights = np.full(KEPT, -math.inf)
-    own, own_cov = np.zeros((block, KEPT, 4)), np.zeros((block, KEPT, 3, 3))
-    rows[0].model, rows[0].north = first.model, first.north
+    weights = np.full(TRACED, -math.inf)
+    own, own_cov = np.zeros((block, TRACED, 4)), np.zeros((block, TRACED, 3, 3))
+    rows[0].heading.model, rows[0].heading.north = first.model, first.north
     for j in range(first.count):
         if first.log_weight[j] < first.log_weight[0] - DEPTH:
             continue
         track.mean[0], track.cov[0] = first.mean[j], first.cov[j]
-        track.blocked[:] = first.blocked[j]
-        likelihood = smooth(track, nodes, rows, anchors, first.kind[j], t, True, ITERATIONS)
+        track.nlos[:] = first.nlos[j]
+        likelihood = smooth(track, nodes, rows, anchors, first.heading_class[j], t, True, ITERATIONS)
         if math.isfinite(likelihood):
-            weights[j] = first.log_weight[j] + t.temper * likelihood
+            weights[j] = first.log_weight[j] + t.likelihood_power * likelihood
         for k in range(block):
-            describe(track.smooth[k], track.smooth_cov[k], own[k, j], own_cov[k, j])
+            to_planar(track.smooth[k], track.smooth_cov[k], own[k, j], own_cov[k, j])
     if np.max(weights) > -math.inf:
         shares = np.exp(weights - np.max(weights))
         used = shares > 0.0
         for k in range(block):
-            mix(shares[used], own[k][used], own_cov[k][used], points[k], covs[k])
+            _mix_mode(shares[used], own[k][used], own_cov[k][used], points[k], covs[k])
 
 
 @njit(nogil=True, cache=True)
 def smooth_lagged(
-    track: Track, nodes: Any, traces: Any, lag: float, rows: Any, anchors: Any, t: Tuning, points: Any, covs: Any
+    track: Track,
+    nodes: Nodes,
+    traces: Array,
+    lag: float,
+    rows: Rows,
+    anchors: Anchors,
+    t: Tuning,
+    points: Floats,
+    covs: Floats,
 ) -> None:
     """Fill points (n, 4) and covs (n, 3, 3); NaN where the engine had nothing, or changed its mind in between."""
     points[:] = np.nan
@@ -112,6 +130,6 @@ def smooth_lagged(
         end = b
         while end < len(nodes) and (nodes[end].t_ns - start) * 1e-9 <= lag + 1e-6:
             end += 1
-        if _steady(traces[a:end]):
-            _window(track, nodes[a:end], traces[a:end], b - a, rows, anchors, t, points[a:b], covs[a:b])
+        if _has_one_model(traces[a:end]):
+            _smooth_window(track, nodes[a:end], traces[a:end], b - a, rows, anchors, t, points[a:b], covs[a:b])
         a = b

@@ -5,24 +5,25 @@ later one is moved back by dead reckoning. It is where the iterated smoother beg
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
-from dropanchor_service.estimation.fleet.belief.layout import CRAB, MOUNT, PHI, YAW, N, R, V
-from dropanchor_service.estimation.fleet.belief.predict import move
-from dropanchor_service.estimation.fleet.belief.update import wrap
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, SLIP, YAW, Floats, N, R, V
+from dropanchor_service.estimation.fleet.belief.predict import predict_state
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node, Nodes
 
-REACH = 25.0  # squared distance up to which a hypothesis is the one before
+MAX_DISTANCE = 25.0  # squared distance up to which a hypothesis is the one before
 POSITION_VARIANCE = 0.25  # m^2, at most: one that is nowhere in particular is not the one before
-OTHER_KIND = 9.0  # added where the hypothesis has another model of the heading reference
+OTHER_CLASS = 9.0  # added where the hypothesis has another model of the heading reference
 SLACK = 0.01  # m^2, (m/s)^2
 YAW_SLACK = 1e-4  # rad^2
 
 
 @njit(nogil=True)
-def distance(s: Any, P: Any, target: Any) -> float:
+def distance(s: Floats, P: Floats, target: Floats) -> float:
     """Squared distance in position, speed and yaw, in standard deviations."""
     dx = s[R] * math.cos(s[PHI]) - target[R] * math.cos(target[PHI])
     dy = s[R] * math.sin(s[PHI]) - target[R] * math.sin(target[PHI])
@@ -34,10 +35,10 @@ def distance(s: Any, P: Any, target: Any) -> float:
 
 
 @njit(nogil=True)
-def before(s: Any, node: Any, out: Any) -> None:
+def step_back(s: Floats, node: Node, out: Floats) -> None:
     """Undo `move` by dead reckoning; the lower states stay."""
     out[:] = s
-    m = s[MOUNT] + s[CRAB]
+    m = s[MOUNT] + s[SLIP]
     f = node.dv_forward * math.cos(m) + node.dv_left * math.sin(m) if math.isfinite(node.dv_var) else 0.0
     out[V] = s[V] - f
     out[YAW] = s[YAW] - node.dyaw
@@ -51,39 +52,39 @@ def before(s: Any, node: Any, out: Any) -> None:
 
 
 @njit(nogil=True)
-def _unwind(reference: Any, nodes: Any, decay: Any) -> None:
+def _unwrap_angles(reference: Floats, nodes: Nodes, decay: Floats) -> None:
     """Bearing and yaw of every node on the branch on which the one before leads to it."""
     F, s = np.zeros((4, N)), np.zeros(N)
     for k in range(1, len(nodes)):
         s[:] = reference[k - 1]
-        move(s, nodes[k], decay, F)
+        predict_state(s, nodes[k], decay, F)
         for i in (PHI, YAW):
             reference[k, i] = s[i] + wrap(reference[k, i] - s[i])
 
 
 @njit(nogil=True, cache=True)
-def trace_back(nodes: Any, traces: Any, reference: Any, blocked: Any) -> int:
-    """Fill reference (n, N) and blocked (n,); returns which hypothesis of the first node it came from, -1 for none."""
+def trace_lineage(nodes: Nodes, traces: Array, reference: Floats, nlos: Array) -> int:
+    """Fill reference (n, N) and nlos (n,); returns which hypothesis of the first node it came from, -1 for none."""
     F, s, decay = np.zeros((4, N)), np.zeros(N), np.ones(N)
     n = len(nodes)
     reference[n - 1] = traces[n - 1].mean[0]
-    blocked[n - 1] = traces[n - 1].blocked[0]
-    kind, chosen = traces[n - 1].kind[0], 0
+    nlos[n - 1] = traces[n - 1].nlos[0]
+    heading_class, chosen = traces[n - 1].heading_class[0], 0
     for k in range(n - 1, 0, -1):
-        chosen, least = -1, REACH
+        chosen, least = -1, MAX_DISTANCE
         for j in range(traces[k - 1].count):
             s[:] = traces[k - 1].mean[j]
-            move(s, nodes[k], decay, F)
+            predict_state(s, nodes[k], decay, F)
             d2 = distance(s, traces[k - 1].cov[j], reference[k])
-            if traces[k - 1].kind[j] != kind:
-                d2 += OTHER_KIND
+            if traces[k - 1].heading_class[j] != heading_class:
+                d2 += OTHER_CLASS
             if d2 < least:
                 chosen, least = j, d2
         if chosen >= 0:
             reference[k - 1] = traces[k - 1].mean[chosen]
-            blocked[k - 1] = traces[k - 1].blocked[chosen]
+            nlos[k - 1] = traces[k - 1].nlos[chosen]
         else:
-            before(reference[k], nodes[k], reference[k - 1])
-            blocked[k - 1] = blocked[k]
-    _unwind(reference, nodes, decay)
+            step_back(reference[k], nodes[k], reference[k - 1])
+            nlos[k - 1] = nlos[k]
+    _unwrap_angles(reference, nodes, decay)
     return chosen

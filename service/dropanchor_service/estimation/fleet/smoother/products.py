@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from dropanchor_service.estimation.fleet.belief.layout import Floats
 from dropanchor_service.estimation.fleet.compiled import njit
 
 
 @njit(nogil=True)
-def times(A: Any, B: Any) -> Any:
+def multiply(A: Floats, B: Floats) -> Any:
     """A B, of (l, m) and (m, n)."""
     product = np.zeros((A.shape[0], B.shape[1]))
     for i in range(A.shape[0]):
@@ -23,7 +24,7 @@ def times(A: Any, B: Any) -> Any:
 
 
 @njit(nogil=True)
-def applied(A: Any, x: Any) -> Any:
+def apply(A: Floats, x: Floats) -> Any:
     """A x, of (m, n) and (n,)."""
     product = np.zeros(A.shape[0])
     for i in range(A.shape[0]):
@@ -33,7 +34,7 @@ def applied(A: Any, x: Any) -> Any:
 
 
 @njit(nogil=True)
-def inner(x: Any, y: Any) -> float:
+def dot(x: Floats, y: Any) -> float:
     """x^T y, of (n,) and (n,)."""
     product = 0.0
     for i in range(len(x)):

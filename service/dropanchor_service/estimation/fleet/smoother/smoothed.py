@@ -5,14 +5,23 @@ import math
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array, State, StateReason
-from dropanchor_service.estimation.fleet.belief.heading_models import error_of
-from dropanchor_service.estimation.fleet.belief.heading_reference import recount_yaw
-from dropanchor_service.estimation.fleet.belief.layout import COMMON, DRIFTING, OWN_ERROR, PHI, REF, STEADY, YAW, V
-from dropanchor_service.estimation.fleet.belief.summary import add_reference
+from dropanchor_service.estimation.fleet.belief.heading_models import reference_error
+from dropanchor_service.estimation.fleet.belief.heading_reference import adopt_reference
+from dropanchor_service.estimation.fleet.belief.layout import (
+    DRIFTING,
+    MAGNETOMETER_MODEL,
+    OWN_ERROR,
+    PHI,
+    PLATFORM_MODEL,
+    REFERENCE,
+    YAW,
+    V,
+)
+from dropanchor_service.estimation.fleet.belief.summary import add_reference_variance
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, RANGE
 from dropanchor_service.estimation.fleet.outputs import poses_of
-from dropanchor_service.estimation.fleet.smoother.lag import describe_all, smooth_lagged
-from dropanchor_service.estimation.fleet.smoother.lineage import trace_back
+from dropanchor_service.estimation.fleet.smoother.lag import all_to_planar, smooth_lagged
+from dropanchor_service.estimation.fleet.smoother.lineage import trace_lineage
 from dropanchor_service.estimation.fleet.smoother.smoother import Track, make_track, smooth
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -61,24 +70,28 @@ def _all(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning) -> 
     first = int(np.flatnonzero(traces["count"] == 0).max(initial=-1)) + 1
     nodes, traces = nodes[first:], traces[first:]
     track = make_track(len(nodes))
-    origin = trace_back(nodes, traces, track.reference, track.blocked)
-    kind = int(traces["kind"][-1, 0])
-    _set_prior(track, traces, max(origin, 0), now[0], _reference_variance(nodes, traces, now[0], kind, t))
-    likelihood = smooth(track, nodes, now, anchors, kind, t, False, ITERATIONS)
+    origin = trace_lineage(nodes, traces, track.reference, track.nlos)
+    heading_class = int(traces["heading_class"][-1, 0])
+    _set_prior(track, traces, max(origin, 0), now[0], _reference_variance(nodes, traces, now[0], heading_class, t))
+    likelihood = smooth(track, nodes, now, anchors, heading_class, t, False, ITERATIONS)
     if math.isfinite(likelihood):
-        describe_all(track.smooth, track.smooth_cov, points[first:], covs[first:])
+        all_to_planar(track.smooth, track.smooth_cov, points[first:], covs[first:])
     return points, covs
 
 
-def _reference_variance(nodes: Array, traces: Array, now: Array, kind: int, t: Tuning) -> float:
+def _reference_variance(nodes: Array, traces: Array, now: Array, heading_class: int, t: Tuning) -> float:
     """Variance of the error of the heading reference that the model at the end has, in rad^2."""
-    if kind == DRIFTING:
+    if heading_class == DRIFTING:
         return 0.0
     absolute = nodes["heading_var"][nodes["heading_kind"] == ABSOLUTE_HEADING]
-    model = int(now["model"])
-    claimed = float(absolute[0]) if model == COMMON and len(absolute) else 0.0
-    slow = error_of(now, claimed)[1] if model != STEADY else float(traces["cov"][0, 0, REF, REF]) ** 0.5
-    return slow**2 + (t.second_std**2 if kind == OWN_ERROR and model != STEADY else 0.0)
+    model = int(now["heading"]["model"])
+    claimed = float(absolute[0]) if model == MAGNETOMETER_MODEL and len(absolute) else 0.0
+    slow = (
+        reference_error(now, claimed)[1]
+        if model != PLATFORM_MODEL
+        else float(traces["cov"][0, 0, REFERENCE, REFERENCE]) ** 0.5
+    )
+    return slow**2 + (t.own_error_std**2 if heading_class == OWN_ERROR and model != PLATFORM_MODEL else 0.0)
 
 
 def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_variance: float) -> None:
@@ -87,15 +100,19 @@ def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_v
     With a given start and a magnetometer that yaw counts from later on, it counts from there all the time.
     """
     mean, cov, found = traces["mean"][0, origin].copy(), traces["cov"][0, origin].copy(), track.reference[0]
-    if now["start_known"] == 1 and now["model"] == COMMON and traces["model"][0] != COMMON:
-        recount_yaw(cov, UNKNOWN_ANGLE**2)
-        cov[REF, :] = cov[:, REF] = 0.0
-    cov[REF, REF] = max(cov[REF, REF], reference_variance)
-    if now["start_known"] == 0:
+    if (
+        now["start"]["known"] == 1
+        and now["heading"]["model"] == MAGNETOMETER_MODEL
+        and traces["model"][0] != MAGNETOMETER_MODEL
+    ):
+        adopt_reference(cov, UNKNOWN_ANGLE**2)
+        cov[REFERENCE, :] = cov[:, REFERENCE] = 0.0
+    cov[REFERENCE, REFERENCE] = max(cov[REFERENCE, REFERENCE], reference_variance)
+    if now["start"]["known"] == 0:
         mean[[PHI, V, YAW]] = found[[PHI, V, YAW]]
         cov[PHI, PHI] += UNKNOWN_ANGLE**2
         cov[V, V] += UNKNOWN_SPEED**2
-        if traces["referred"][0] != now["referred"]:
+        if traces["referred"][0] != now["heading"]["in_site_frame"]:
             cov[YAW, YAW] += UNKNOWN_ANGLE**2
     for angle in (PHI, YAW):
         mean[angle] = found[angle] + math.remainder(mean[angle] - found[angle], 2.0 * math.pi)
@@ -105,10 +122,10 @@ def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_v
 def _put(poses: Array, points: Array, covs: Array, seen: Array, now: Array, anchors: Array) -> None:
     """Smoothed numbers into the poses; `seen`: the belief that has seen the data of each."""
     good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2))
-    if now["start_known"] == 0:
-        std = float(now["reference_std"]) if now["referred"] == 1 else ARBITRARY_YAW
+    if now["start"]["known"] == 0:
+        std = float(now["settings"]["reference_std"]) if now["heading"]["in_site_frame"] == 1 else ARBITRARY_YAW
         for k in np.flatnonzero(good):
-            add_reference(covs[k], points[k, 0], points[k, 1], std**2)
+            add_reference_variance(covs[k], points[k, 0], points[k, 1], std**2)
     anchor = anchors[now["anchor"]]
     poses["x"][good], poses["y"][good] = points[good, 0] + anchor["x"], points[good, 1] + anchor["y"]
     poses["heading"][good], poses["speed"][good] = points[good, 2], points[good, 3]

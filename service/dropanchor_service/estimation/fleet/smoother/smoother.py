@@ -15,35 +15,55 @@ at first, then from the smoothed residual (expectation-maximisation), and weight
 """
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from dropanchor_service.estimation.fleet.belief.heading_models import error_of_class
-from dropanchor_service.estimation.fleet.belief.layout import GYRO, OFFSET, PHI, REF, STEADY, YAW, N, R, V
-from dropanchor_service.estimation.fleet.belief.predict import diffuse, fill_class, fill_decay, move, transport
-from dropanchor_service.estimation.fleet.belief.start import counts_from
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
+from dropanchor_service.estimation.fleet.belief.layout import (
+    EXACT,
+    GYRO_BIAS,
+    PHI,
+    PLATFORM_MODEL,
+    RANGE_BIAS,
+    REFERENCE,
+    YAW,
+    Anchors,
+    Floats,
+    N,
+    R,
+    Row,
+    Rows,
+    V,
+)
+from dropanchor_service.estimation.fleet.belief.measurements import range_variance
+from dropanchor_service.estimation.fleet.belief.predict import (
+    add_process_noise,
+    fill_class_noise,
+    fill_noise,
+    predict_covariance,
+    predict_state,
+)
+from dropanchor_service.estimation.fleet.belief.start import uses_heading
 from dropanchor_service.estimation.fleet.belief.update import (
-    correct,
     gaussian,
     predict_range,
     project,
-    rest_variance,
-    wrap,
+    pseudo_measurement_variance,
+    update_pda,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, RANGE
-from dropanchor_service.estimation.fleet.smoother.products import applied, inner, times
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
+from dropanchor_service.estimation.fleet.smoother.products import apply, dot, multiply
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 MEASUREMENTS: Final = 5  # of one node: heading, speed and gyro at rest, bound of the speed, range or bearing
 BOUND_STD: Final = 0.05  # m/s, softness of the bounds on the speed
 BEARING_STD: Final = 0.1  # rad, of a bearing whose std is not told
-BLOCK_STD: Final = 1.1  # m, of a range offset that appears or goes: the outlier's mean and spread
+NLOS_STD: Final = 1.1  # m, of a range offset that appears or goes: the outlier's mean and spread
 CONVERGED: Final = 1e-3  # m
-
-Floats = npt.NDArray[np.float64]
 
 
 class Track(NamedTuple):
@@ -60,7 +80,7 @@ class Track(NamedTuple):
     S: Floats  # (n, MEASUREMENTS)
     e: Floats  # (n, MEASUREMENTS)
     share: Floats  # (n, 2) probability that the range is clear, and that it is too long
-    blocked: npt.NDArray[np.int32]  # (n,) the line of sight is blocked
+    nlos: npt.NDArray[np.int32]  # (n,) 1: there is no line of sight
     smooth: Floats  # (n, N)
     smooth_cov: Floats  # (n, N, N)
 
@@ -86,20 +106,22 @@ def make_track(n: int) -> Track:
 
 
 @njit(nogil=True)
-def noise_of(node: Any, row: Any, kind: int, t: Tuning, decay: Any, growth: Any) -> None:
+def noise_of(node: Node, row: Row, heading_class: int, t: Tuning, decay: Floats, growth: Floats) -> None:
     """Decay of the states over the node and the variances it adds, as in the filter."""
-    fill_decay(decay, growth, node, row, t)
-    fill_class(decay, growth, node, row, kind, t)
+    fill_noise(decay, growth, node, row, t)
+    fill_class_noise(decay, growth, node, row, heading_class, t)
 
 
 @njit(nogil=True)
-def _predict(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, scratch: Any) -> None:
+def _predict(
+    track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, scratch: tuple[Floats, Floats, Floats]
+) -> None:
     growth, s, A = scratch
     F, decay, m, P = track.F[k], track.decay[k], track.mean[k], track.cov[k]
-    noise_of(node, row, kind, t, decay, growth)
+    noise_of(node, row, heading_class, t, decay, growth)
     s[:] = track.reference[k - 1]
     d = track.mean[k - 1] - s
-    move(s, node, decay, F)
+    predict_state(s, node, decay, F)
     m[:] = s
     for j in range(N):
         for i in range(4):
@@ -107,14 +129,14 @@ def _predict(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, sc
     for j in range(4, N):
         m[j] += decay[j] * d[j]
     P[:] = track.cov[k - 1]
-    transport(P, F, decay, A)
-    diffuse(s, P, F, growth, node, t, track.blocked[k])
-    if track.blocked[k] != track.blocked[k - 1]:
-        P[OFFSET, OFFSET] += BLOCK_STD**2
+    predict_covariance(P, F, decay, A)
+    add_process_noise(s, P, F, growth, node, t, track.nlos[k])
+    if track.nlos[k] != track.nlos[k - 1]:
+        P[RANGE_BIAS, RANGE_BIAS] += NLOS_STD**2
 
 
 @njit(nogil=True)
-def _measure(track: Track, k: int, H: Any, e: float, variance: float) -> None:
+def _measure(track: Track, k: int, H: Floats, e: float, variance: float) -> None:
     """Fuse z = h + noise; e = z - h(reference), H = dh/dx there."""
     m, P, n = track.mean[k], track.cov[k], track.used[k]
     PH = track.PH[k, n]
@@ -123,74 +145,70 @@ def _measure(track: Track, k: int, H: Any, e: float, variance: float) -> None:
         e -= H[i] * (m[i] - track.reference[k, i])
     track.H[k, n], track.S[k, n], track.e[k, n] = H, S, e
     track.used[k] += 1
-    correct(m, P, PH, S, e, 1.0)
+    update_pda(m, P, PH, S, e, 1.0)
 
 
 @njit(nogil=True)
-def _component(track: Track, k: int, index: int, z: float, variance: float, H: Any) -> None:
+def _component(track: Track, k: int, index: int, z: float, variance: float, H: Floats) -> None:
     H[:] = 0.0
     H[index] = 1.0
     _measure(track, k, H, z - track.reference[k, index], variance)
 
 
 @njit(nogil=True)
-def _inertial(track: Track, k: int, node: Any, row: Any, kind: int, t: Tuning, H: Any) -> None:
+def _inertial(track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, H: Floats) -> None:
     """Heading, standstill, and the bounds on the speed."""
     s = track.reference[k]
-    if counts_from(row, node) and (row.model != STEADY or kind == 0):
-        white, _, _ = error_of_class(row, kind, node.heading_var, t)
+    if uses_heading(row, node) and (row.heading.model != PLATFORM_MODEL or heading_class == EXACT):
+        white, _, _ = class_reference_error(row, heading_class, node.heading_var, t)
         H[:] = 0.0
-        H[YAW] = H[REF] = 1.0
-        _measure(track, k, H, wrap(node.heading - row.north - s[YAW] - s[REF]), white)
-    if node.rest == 1:
+        H[YAW] = H[REFERENCE] = 1.0
+        _measure(track, k, H, wrap(node.heading - row.heading.north - s[YAW] - s[REFERENCE]), white)
+    if node.rest == RESTING:
         _component(track, k, V, 0.0, t.rest_std**2, H)
-    if node.rest == 1 and node.gyro_var > 0.0:
-        prior = track.cov[k, GYRO, GYRO]
-        if prior > 1.001 * node.gyro_var:
-            _component(track, k, GYRO, 0.0, rest_variance(prior, node), H)
-    elif node.rest > 0 and node.dt_s > 0.0:
-        variance = node.dyaw_var / node.dt_s**2 + t.rest_rate_std**2
-        _component(track, k, GYRO, node.dyaw / node.dt_s, variance, H)
-    low = -row.v_max if row.reverse == 1 else -t.reverse_slack
+    if node.rest == RESTING and node.gyro_bias_var > 0.0:
+        prior = track.cov[k, GYRO_BIAS, GYRO_BIAS]
+        if prior > 1.001 * node.gyro_bias_var:
+            _component(track, k, GYRO_BIAS, 0.0, pseudo_measurement_variance(prior, node), H)
+    elif node.rest != MOVING and node.dt_s > 0.0:
+        variance = node.dyaw_var / node.dt_s**2 + t.rest_gyro_std**2
+        _component(track, k, GYRO_BIAS, node.dyaw / node.dt_s, variance, H)
+    low = -row.settings.speed_max if row.settings.reverse_allowed == 1 else -t.reverse_slack
     if s[V] < low:
         _component(track, k, V, low, BOUND_STD**2, H)
-    elif s[V] > row.v_max:
-        _component(track, k, V, row.v_max, BOUND_STD**2, H)
+    elif s[V] > row.settings.speed_max:
+        _component(track, k, V, row.settings.speed_max, BOUND_STD**2, H)
 
 
 @njit(nogil=True)
-def range_residual(s: Any, node: Any, row: Any, anchors: Any, H: Any) -> tuple[float, float]:
-    """(z - h(s), variance of a clear range); H receives dh/ds."""
-    anchor, primary = anchors[node.anchor], anchors[row.anchor]
-    dz = row.height - anchor.z
-    z = node.z / row.range_scale
-    std = node.z_std if math.isfinite(node.z_std) and node.z_std > 0.0 else row.range_std
-    variance = std * std + (dz * row.height_std / max(z, 0.1)) ** 2
-    if node.anchor != row.anchor:
-        variance += row.offset_std**2
-    return z - predict_range(s, anchor.x - primary.x, anchor.y - primary.y, dz, node.lag_s, H), variance
+def range_residual(s: Floats, node: Node, row: Row, anchors: Anchors, H: Floats) -> tuple[float, float]:
+    """Return z - h(s), m, and the variance, m^2, of a range with line of sight. Fill H with dh/ds."""
+    anchor, primary, settings = anchors[node.anchor], anchors[row.anchor], row.settings
+    ox, oy, dz = anchor.x - primary.x, anchor.y - primary.y, settings.height - anchor.z
+    predicted = predict_range(s, ox, oy, dz, node.lag_s, settings.range_scale, settings.range_bias, H)
+    return node.z - predicted, range_variance(row, node, anchor)
 
 
 @njit(nogil=True)
-def assign(share: Any, e2: float, e: float, clear: float, long: float, t: Tuning) -> float:
+def fill_shares(share: Floats, e2: float, e: float, clear: float, long: float, t: Tuning) -> float:
     """Shares of a clear and of a too long range, with these variances; returns the log likelihood. e2: e^2 expected."""
     spread = e2 - e * e
-    inside = (1.0 - t.outlier) * gaussian(math.sqrt(max(e2, 0.0)), clear)
-    outside = t.outlier * gaussian(math.sqrt((e - t.outlier_mean) ** 2 + spread), long)
-    total = inside + outside + t.outlier * t.outlier_floor
+    inside = (1.0 - t.outlier_probability) * gaussian(math.sqrt(max(e2, 0.0)), clear)
+    outside = t.outlier_probability * gaussian(math.sqrt((e - t.outlier_mean) ** 2 + spread), long)
+    total = inside + outside + t.outlier_probability * t.outlier_floor
     share[0], share[1] = inside / total, outside / total
     return math.log(total)
 
 
 @njit(nogil=True)
-def _range(track: Track, k: int, node: Any, row: Any, anchors: Any, t: Tuning, follow: bool, H: Any) -> float:
+def _range(track: Track, k: int, node: Node, row: Row, anchors: Anchors, t: Tuning, follow: bool, H: Floats) -> float:
     e, variance = range_residual(track.reference[k], node, row, anchors, H)
     innovation = e
     for i in range(N):
         innovation -= H[i] * (track.mean[k, i] - track.reference[k, i])
     S = project(track.cov[k], H, track.PH[k, track.used[k]]) + variance
     share = np.zeros(2)
-    likelihood = assign(share, innovation**2, innovation, S, S + t.outlier_std**2, t)
+    likelihood = fill_shares(share, innovation**2, innovation, S, S + t.outlier_std**2, t)
     if follow:
         track.share[k] = share
     clear = track.share[k, 0] / variance
@@ -201,7 +219,7 @@ def _range(track: Track, k: int, node: Any, row: Any, anchors: Any, t: Tuning, f
 
 
 @njit(nogil=True)
-def _bearing(track: Track, k: int, node: Any, row: Any, anchors: Any, H: Any) -> None:
+def _bearing(track: Track, k: int, node: Node, row: Row, anchors: Anchors, H: Floats) -> None:
     anchor, primary, s = anchors[node.anchor], anchors[row.anchor], track.reference[k]
     c, sn = math.cos(s[PHI]), math.sin(s[PHI])
     dx, dy = s[R] * c - (anchor.x - primary.x), s[R] * sn - (anchor.y - primary.y)
@@ -214,7 +232,9 @@ def _bearing(track: Track, k: int, node: Any, row: Any, anchors: Any, H: Any) ->
 
 
 @njit(nogil=True)
-def forward(track: Track, nodes: Any, row: Any, anchors: Any, kind: int, t: Tuning, follow: bool) -> float:
+def forward(
+    track: Track, nodes: Nodes, row: Row, anchors: Anchors, heading_class: int, t: Tuning, follow: bool
+) -> float:
     """Filter about the reference; `follow`: the reference is the filter itself. Returns the log likelihood."""
     scratch = (np.zeros(N), np.zeros(N), np.zeros((4, N)))
     H = np.zeros(N)
@@ -223,11 +243,11 @@ def forward(track: Track, nodes: Any, row: Any, anchors: Any, kind: int, t: Tuni
         node = nodes[k]
         if follow:
             track.reference[k - 1] = track.mean[k - 1]
-        _predict(track, k, node, row, kind, t, scratch)
+        _predict(track, k, node, row, heading_class, t, scratch)
         if follow:
             track.reference[k] = track.mean[k]
         track.used[k] = 0
-        _inertial(track, k, node, row, kind, t, H)
+        _inertial(track, k, node, row, heading_class, t, H)
         if node.kind == RANGE:
             likelihood += _range(track, k, node, row, anchors, t, follow, H)
         elif node.kind == BEARING:
@@ -236,11 +256,11 @@ def forward(track: Track, nodes: Any, row: Any, anchors: Any, kind: int, t: Tuni
 
 
 @njit(nogil=True)
-def _adjoin(H: Any, PH: Any, S: float, e: float, costate: Any, L: Any) -> None:
+def _step_back_over_measurement(H: Floats, PH: Floats, S: float, e: float, costate: Floats, L: Floats) -> None:
     """Costate l and its covariance L back over one scalar measurement."""
-    g = applied(L, PH) / S
-    c = (inner(PH, g) + 1.0) / S
-    pull = (inner(PH, costate) + e) / S
+    g = apply(L, PH) / S
+    c = (dot(PH, g) + 1.0) / S
+    pull = (dot(PH, costate) + e) / S
     for i in range(N):
         costate[i] -= H[i] * pull
         for j in range(N):
@@ -253,20 +273,20 @@ def backward(track: Track, n: int) -> None:
     costate, L, A = np.zeros(N), np.zeros((N, N)), np.zeros((N, N))
     for k in range(n - 1, -1, -1):
         P = track.cov[k]
-        track.smooth[k] = track.mean[k] - applied(P, costate)
-        track.smooth_cov[k] = P - times(P, times(L, P))
+        track.smooth[k] = track.mean[k] - apply(P, costate)
+        track.smooth_cov[k] = P - multiply(P, multiply(L, P))
         for m in range(track.used[k] - 1, -1, -1):
-            _adjoin(track.H[k, m], track.PH[k, m], track.S[k, m], track.e[k, m], costate, L)
+            _step_back_over_measurement(track.H[k, m], track.PH[k, m], track.S[k, m], track.e[k, m], costate, L)
         A[:] = 0.0
         A[:4] = track.F[k]
         for i in range(4, N):
             A[i, i] = track.decay[k, i]
-        costate[:] = applied(A.T, costate)
-        L[:] = times(A.T, times(L, A))
+        costate[:] = apply(A.T, costate)
+        L[:] = multiply(A.T, multiply(L, A))
 
 
 @njit(nogil=True)
-def _adopt(track: Track, nodes: Any, row: Any, anchors: Any, t: Tuning) -> float:
+def _relinearise(track: Track, nodes: Nodes, row: Row, anchors: Anchors, t: Tuning) -> float:
     """The smoothed track becomes the reference, ranges are judged anew; returns the largest step, m."""
     H, PH = np.zeros(N), np.zeros(N)
     largest = 0.0
@@ -279,20 +299,27 @@ def _adopt(track: Track, nodes: Any, row: Any, anchors: Any, t: Tuning) -> float
         if k > 0 and node.kind == RANGE:
             e, variance = range_residual(old, node, row, anchors, H)
             e2 = e * e + project(track.smooth_cov[k], H, PH)
-            assign(track.share[k], e2, e, variance, variance + t.outlier_std**2, t)
+            fill_shares(track.share[k], e2, e, variance, variance + t.outlier_std**2, t)
     return largest
 
 
 @njit(nogil=True, cache=True)
 def smooth(
-    track: Track, nodes: Any, rows: Any, anchors: Any, kind: int, t: Tuning, follow: bool, iterations: int
+    track: Track,
+    nodes: Nodes,
+    rows: Rows,
+    anchors: Anchors,
+    heading_class: int,
+    t: Tuning,
+    follow: bool,
+    iterations: int,
 ) -> float:
     """Iterate from the reference, or from a filter's track (`follow`); returns the log likelihood of the ranges."""
     row = rows[0]
     likelihood = -math.inf
     for i in range(iterations):
-        likelihood = forward(track, nodes, row, anchors, kind, t, follow and i == 0)
+        likelihood = forward(track, nodes, row, anchors, heading_class, t, follow and i == 0)
         backward(track, len(nodes))
-        if _adopt(track, nodes, row, anchors, t) < CONVERGED:
+        if _relinearise(track, nodes, row, anchors, t) < CONVERGED:
             break
     return likelihood

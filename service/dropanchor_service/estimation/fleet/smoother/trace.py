@@ -1,20 +1,20 @@
 """What a smoother needs of a run of the engine: its nodes, and the heaviest hypotheses after each of them."""
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.layout import BELIEF, KEEP, N, with_room
-from dropanchor_service.estimation.fleet.belief.mixture import put_in_order
-from dropanchor_service.estimation.fleet.belief.pool import load
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, MAX_HYPOTHESES, Anchors, Beliefs, N, Pool, Rows
+from dropanchor_service.estimation.fleet.belief.mixture import sort_by_weight
+from dropanchor_service.estimation.fleet.belief.pool import load, with_room
 from dropanchor_service.estimation.fleet.belief.step import advance
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.fleet.frontend.node import NODE
-from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.estimation.fleet.frontend.node import NODE, Nodes
+from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
-KEPT: Final = 8  # hypotheses of a node
+TRACED: Final = 8  # hypotheses of a node
 
 TRACE: Final = np.dtype(
     [
@@ -22,11 +22,11 @@ TRACE: Final = np.dtype(
         ("model", np.uint8),  # of the heading error, as in the row
         ("referred", np.uint8),
         ("north", np.float64),
-        ("log_weight", np.float64, (KEPT,)),  # heaviest first
-        ("kind", np.int32, (KEPT,)),
-        ("blocked", np.int32, (KEPT,)),
-        ("mean", np.float64, (KEPT, N)),
-        ("cov", np.float64, (KEPT, N, N)),
+        ("log_weight", np.float64, (TRACED,)),  # heaviest first
+        ("heading_class", np.int32, (TRACED,)),
+        ("nlos", np.int32, (TRACED,)),
+        ("mean", np.float64, (TRACED, N)),
+        ("cov", np.float64, (TRACED, N, N)),
     ]
 )
 
@@ -58,30 +58,39 @@ class TracingEngine(FleetEngine):
         own = nodes["row"] == row
         return nodes[own], beliefs[own], traces[own]
 
-    def _believe(self, nodes: Array) -> Array:
+    def _run_belief(self, nodes: Array) -> Array:
         beliefs, traces = np.zeros(len(nodes), BELIEF), np.zeros(len(nodes), TRACE)
-        self._pool = with_room(self._pool, KEEP * len(np.unique(nodes["row"])))
-        advance_traced(self._rows, self._pool, nodes, self._anchors, self._numbers, self._workspace, beliefs, traces)
+        self._pool = with_room(self._pool, MAX_HYPOTHESES * len(np.unique(nodes["row"])))
+        advance_traced(
+            self._rows, self._pool, nodes, self._anchors, self._tuning_record, self._workspace, beliefs, traces
+        )
         self._steps.append((nodes, beliefs, traces))
         return beliefs
 
 
 @njit(nogil=True, cache=True)
 def advance_traced(
-    rows: Any, pool: Any, nodes: Any, anchors: Any, tuning: Any, workspace: Any, beliefs: Any, traces: Any
+    rows: Rows,
+    pool: Pool,
+    nodes: Nodes,
+    anchors: Anchors,
+    tuning: TuningRecord,
+    workspace: Rows,
+    beliefs: Beliefs,
+    traces: Array,
 ) -> None:
     """`advance`, one node at a time, and a copy of the heaviest hypotheses after each."""
     work = workspace[0].hypotheses
     for k in range(len(nodes)):
         advance(rows, pool, nodes[k : k + 1], anchors, tuning, workspace, beliefs[k : k + 1])
         row, trace = rows[nodes[k].row], traces[k]
-        trace.model, trace.referred, trace.north = row.model, row.referred, row.north
+        trace.model, trace.referred, trace.north = row.heading.model, row.heading.in_site_frame, row.heading.north
         load(row, pool, work)
-        put_in_order(work, row.count)
-        trace.count = min(row.count, KEPT)
+        sort_by_weight(work, row.count)
+        trace.count = min(row.count, TRACED)
         for j in range(trace.count):
-            h = work[j].order
+            h = work[j].by_weight
             trace.log_weight[j] = work[h].log_weight
-            trace.kind[j], trace.blocked[j] = work[h].kind, work[h].blocked
+            trace.heading_class[j], trace.nlos[j] = work[h].heading_class, work[h].nlos
             trace.mean[j] = work[h].mean
             trace.cov[j] = work[h].cov

@@ -7,24 +7,24 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.fleet.belief.layout import (
-    ACC,
-    CRAB,
-    GYRO,
+    ACC_BIAS,
+    GYRO_BIAS,
     MOUNT,
-    OFFSET,
     PHI,
-    REF,
+    RANGE_BIAS,
+    REFERENCE,
+    SLIP,
     YAW,
     N,
     R,
     V,
     make_workspace,
 )
-from dropanchor_service.estimation.fleet.belief.predict import move, transport
+from dropanchor_service.estimation.fleet.belief.predict import predict_covariance, predict_state
 from dropanchor_service.estimation.fleet.belief.update import (
-    bound_speed,
     predict_range,
     project,
+    truncate_speed,
     update_bearing,
     update_heading,
     update_range,
@@ -48,9 +48,9 @@ def node_of(
 def readable_step(s: Any, node: Any) -> Any:
     """The same step in Cartesian coordinates, written from the motion and not from the polar formulas."""
     dt = node["dt_s"]
-    w = node["dyaw"] - s[GYRO] * dt
-    mount = s[MOUNT] + s[CRAB]
-    along = np.array([math.cos(mount), math.sin(mount)]) @ [node["dv_forward"], node["dv_left"]] - s[ACC] * dt
+    w = node["dyaw"] - s[GYRO_BIAS] * dt
+    mount = s[MOUNT] + s[SLIP]
+    along = np.array([math.cos(mount), math.sin(mount)]) @ [node["dv_forward"], node["dv_left"]] - s[ACC_BIAS] * dt
     course = s[YAW] + w / 2 + mount
     place = s[R] * np.array([math.cos(s[PHI]), math.sin(s[PHI])])
     place = place + (s[V] * dt + along * dt / 2) * np.array([math.cos(course), math.sin(course)])
@@ -65,7 +65,7 @@ def readable_step(s: Any, node: Any) -> Any:
 
 def stepped(s: Any, node: Any) -> tuple[Any, Any]:
     s, F = s.copy(), np.zeros((4, N))
-    move(s, node, DECAY, F)
+    predict_state(s, node, DECAY, F)
     return s, F
 
 
@@ -110,27 +110,36 @@ def test_the_covariance_is_carried_by_the_whole_jacobian() -> None:
     node, P = node_of(), covariance()
     A = jacobian_fd(lambda s: readable_step(s, node), STATE)
     expected = A @ P @ A.T
-    transport(P, stepped(STATE, node)[1], DECAY, np.zeros((4, N)))
+    predict_covariance(P, stepped(STATE, node)[1], DECAY, np.zeros((4, N)))
     np.testing.assert_allclose(P, expected, atol=1e-9)
+
+
+def predicted(s: Any, H: Any, ox: float = 0.0, oy: float = 0.0, dz: float = 1.5, lag: float = 0.0) -> float:
+    """Return the range to an anchor for a scale of 1.05 and a bias of -0.3 m, as measured."""
+    return float(predict_range(s, ox, oy, dz, lag, 1.05, -0.3, H))
 
 
 @pytest.mark.parametrize(("ox", "oy", "lag"), [(0.0, 0.0, 0.0), (3.0, -4.0, 0.0), (0.0, 0.0, 0.2), (3.0, -4.0, 0.1)])
 def test_the_jacobian_of_a_range_equals_finite_differences(ox: float, oy: float, lag: float) -> None:
     H = np.zeros(N)
-    predict_range(STATE, ox, oy, 1.5, lag, H)
-    expected = jacobian_fd(lambda s: np.array([predict_range(s, ox, oy, 1.5, lag, np.zeros(N))]), STATE)[0]
+    predicted(STATE, H, ox, oy, lag=lag)
+    expected = jacobian_fd(lambda s: np.array([predicted(s, np.zeros(N), ox, oy, lag=lag)]), STATE)[0]
     np.testing.assert_allclose(H, expected, atol=1e-7)
+
+
+@pytest.mark.parametrize(("ox", "bias"), [(0.0, STATE[RANGE_BIAS]), (3.0, -0.3)])
+def test_a_range_is_scale_times_distance_plus_bias(ox: float, bias: float) -> None:
+    distance = math.hypot(STATE[R] * math.cos(STATE[PHI]) - ox, STATE[R] * math.sin(STATE[PHI]), 1.5)
+    assert predicted(STATE, np.zeros(N), ox) == pytest.approx(1.05 * distance + bias)
 
 
 def test_a_late_range_is_compared_with_where_the_tag_was() -> None:
     node = node_of(dyaw=0.0, forward=0.0, left=0.0)
     s = STATE.copy()
-    s[GYRO] = s[ACC] = 0.0
+    s[GYRO_BIAS] = s[ACC_BIAS] = 0.0
     later = readable_step(s, node)
-    later[CRAB] = s[CRAB]
-    assert predict_range(later, 0.0, 0.0, 1.5, 0.1, np.zeros(N)) == pytest.approx(
-        predict_range(s, 0.0, 0.0, 1.5, 0.0, np.zeros(N)), abs=1e-9
-    )
+    later[SLIP] = s[SLIP]
+    assert predicted(later, np.zeros(N), lag=0.1) == pytest.approx(predicted(s, np.zeros(N)), abs=1e-9)
 
 
 def kalman(s: Any, P: Any, h: Any, e: float, variance: float) -> tuple[Any, Any]:
@@ -143,36 +152,35 @@ def kalman(s: Any, P: Any, h: Any, e: float, variance: float) -> tuple[Any, Any]
 def test_a_heading_update_is_the_kalman_filter() -> None:
     s, P = STATE.copy(), covariance()
     h = np.zeros(N)
-    h[YAW] = h[REF] = 1.0
+    h[YAW] = h[REFERENCE] = 1.0
     expected = kalman(s, P, h, 0.02, 0.01)
     one, scratch = hypothesis_of(s, P)
-    update_heading(one, scratch, STATE[YAW] + STATE[REF] + 0.02 + 2 * math.pi, 0.01)
+    update_heading(one, scratch, STATE[YAW] + STATE[REFERENCE] + 0.02 + 2 * math.pi, 0.01)
     np.testing.assert_allclose(one["mean"], expected[0], atol=1e-12)
     np.testing.assert_allclose(one["cov"], expected[1], atol=1e-12)
 
 
 def test_a_range_without_outliers_is_the_kalman_filter() -> None:
     s, P, H = STATE.copy(), covariance(), np.zeros(N)
-    predicted = predict_range(s, 0.0, 0.0, 0.0, 0.0, H)
-    assert predicted == pytest.approx(STATE[R] + STATE[OFFSET])
+    predicted(s, H, dz=0.0)
     expected = kalman(s, P, H, 0.05, 0.04)
     one, scratch = hypothesis_of(s, P, H)
-    update_range(one, scratch, 0.05, 0.04, Tuning()._replace(outlier=0.0))
+    update_range(one, scratch, 0.05, 0.04, Tuning()._replace(outlier_probability=0.0))
     np.testing.assert_allclose(one["mean"], expected[0], atol=1e-12)
     np.testing.assert_allclose(one["cov"], expected[1], atol=1e-12)
 
 
 def test_a_range_mixes_hit_and_outlier_by_their_probabilities() -> None:
     s, P, H, t = STATE.copy(), covariance(), np.zeros(N), Tuning()
-    predict_range(s, 0.0, 0.0, 0.0, 0.0, H)
+    predicted(s, H, dz=0.0)
     e, variance = 0.6, 0.04
     S = H @ P @ H + variance
 
     def density(x: float, var: float) -> float:
         return math.exp(-0.5 * x * x / var) / math.sqrt(2 * math.pi * var)
 
-    hit = (1 - t.outlier) * density(e, S)
-    miss = t.outlier * (density(e - t.outlier_mean, S + t.outlier_std**2) + t.outlier_floor)
+    hit = (1 - t.outlier_probability) * density(e, S)
+    miss = t.outlier_probability * (density(e - t.outlier_mean, S + t.outlier_std**2) + t.outlier_floor)
     taken = kalman(s, P, H, e, variance)
     beta = hit / (hit + miss)
     mean = beta * taken[0] + (1 - beta) * s
@@ -199,7 +207,7 @@ def test_a_negative_speed_is_cut_to_the_moments_of_the_truncated_gaussian() -> N
     s[V], P[V, V] = -0.3, 0.25
     draws = s[V] + 0.5 * np.random.default_rng(0).standard_normal(400_000)
     kept = draws[draws > 0.0]
-    log_mass = bound_speed(s, P, np.zeros(N), 0.0, 10.0)
+    log_mass = truncate_speed(s, P, np.zeros(N), 0.0, 10.0)
     assert s[V] == pytest.approx(kept.mean(), abs=2e-3)
     assert P[V, V] == pytest.approx(kept.var(), abs=2e-3)
     assert math.exp(log_mass) == pytest.approx(len(kept) / len(draws), abs=2e-3)
@@ -207,6 +215,6 @@ def test_a_negative_speed_is_cut_to_the_moments_of_the_truncated_gaussian() -> N
 
 def test_projection_is_the_matrix_product() -> None:
     P, H, PH = covariance(), np.zeros(N), np.zeros(N)
-    H[R], H[PHI], H[OFFSET] = 0.9, -0.3, 1.0
+    H[R], H[PHI], H[RANGE_BIAS] = 0.9, -0.3, 1.0
     assert project(P, H, PH) == pytest.approx(H @ P @ H)
     np.testing.assert_allclose(PH, P @ H, atol=1e-15)

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.columns import State, StateReason
-from dropanchor_service.estimation.fleet.belief.layout import KEEP, make_pool
+from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES
+from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from service.estimation.fleet.tracks import Drive, drive, rows_of, run, track
 
 
@@ -63,7 +64,7 @@ def test_a_row_that_is_fed_nonsense_starts_afresh_and_its_neighbour_notices_noth
     mixed = mixed[np.argsort(mixed["t_ns"], kind="stable")]
     rows = rows_of(2, known=True)
     beliefs = run(rows, make_pool(1024), mixed)
-    assert rows["fault"].tolist() == [1, 0]
+    assert rows["faults"].tolist() == [1, 0]
     assert beliefs[mixed["row"] == 1].tobytes() == alone.tobytes()
 
 
@@ -103,10 +104,10 @@ def test_ranges_alone_do_not_fix_a_tag_that_stands_still() -> None:
 def test_a_tag_that_may_reverse_is_found_too_or_stays_ambiguous() -> None:
     for truth in map(drive, range(2000, 2004)):
         rows = rows_of(1, known=False)
-        rows["reverse"] = 1
+        rows["settings"]["reverse_allowed"] = 1
         moving = truth.nodes[15:]  # first seen in motion: the ring has both directions of travel
         beliefs = run(rows, make_pool(512), moving)
-        assert rows["count"][0] <= KEEP
-        assert rows["fault"][0] == 0
+        assert rows["count"][0] <= MAX_HYPOTHESES
+        assert rows["faults"][0] == 0
         if beliefs["state"][-1] == State.TRACKING:
             assert np.hypot(beliefs["x"][-1] - truth.x[-1], beliefs["y"][-1] - truth.y[-1]) < 2.0

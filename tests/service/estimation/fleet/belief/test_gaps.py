@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import ANCHOR, IMU, POSE, RANGE, SampleBatch, State, default_settings
-from dropanchor_service.estimation.fleet.belief.gap import TURNS, WATCHED_ANYWHERE
+from dropanchor_service.estimation.fleet.belief.gap import RESTART_SPREAD, RESUME_ANYWHERE_AFTER
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from dropanchor_tag_client.simulator.sensors import preset
@@ -94,7 +94,7 @@ def test_after_gaps_it_begins_again_with_a_bounded_number_of_hypotheses_and_an_e
         most = max(most, int(engine.state()["rows"]["count"].max()))
     after = np.concatenate(poses)
     after = after[(after["t_ns"] > 50 * MESSAGE_NS) & (after["t_ns"] < 100 * MESSAGE_NS)]
-    assert most <= Tuning().keep_coarse
+    assert most <= Tuning().coarse_hypotheses
     assert {State.AMBIGUOUS, State.DEGRADED} <= set(after["state"].tolist())
     assert holds_truth(after, runs).mean() > 0.8
 
@@ -104,7 +104,7 @@ def test_tags_that_were_heard_in_pieces_begin_again_one_after_another(runs: list
     for batch in in_messages(samples_of(runs, lambda number: (number % 5 == 0) | (number > 100))):
         poses.append(engine.process(batch).poses)
         begun.append(int((engine.state()["rows"]["count"] > 0).sum()))
-    in_time = begun[101 : 101 + round((WATCHED_ANYWHERE + TURNS + 1.0) / 0.2)]
+    in_time = begun[101 : 101 + round((RESUME_ANYWHERE_AFTER + RESTART_SPREAD + 1.0) / 0.2)]
     assert begun[100] == 0
     assert in_time[-1] == len(runs)
     assert max(np.diff(in_time)) < len(runs) / 2

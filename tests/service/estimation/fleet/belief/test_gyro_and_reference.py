@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.heading_reference import recount_yaw
-from dropanchor_service.estimation.fleet.belief.layout import GYRO, MOUNT, REF, YAW, N, R
-from dropanchor_service.estimation.fleet.belief.update import update_rest
+from dropanchor_service.estimation.fleet.belief.heading_reference import adopt_reference
+from dropanchor_service.estimation.fleet.belief.layout import GYRO_BIAS, MOUNT, REFERENCE, YAW, N, R
+from dropanchor_service.estimation.fleet.belief.update import update_standstill
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.frontend import new_frontend, run
 from support.imu import Motion
 
-TUNING = Tuning().numbers()[0]
+TUNING = Tuning().record()[0]
 
 
 def covariance() -> Array:
@@ -20,37 +20,37 @@ def covariance() -> Array:
     return 0.01 * (A @ A.T)
 
 
-def resting(gyro_var: float) -> Array:
+def resting(gyro_bias_var: float) -> Array:
     node = np.zeros(1, NODE)
-    node["dt_s"], node["dyaw_var"], node["rest"], node["gyro_var"] = 0.1, 4e-7, 1, gyro_var
+    node["dt_s"], node["dyaw_var"], node["rest"], node["gyro_bias_var"] = 0.1, 4e-7, 1, gyro_bias_var
     return node[0]  # type: ignore[no-any-return]
 
 
 def test_however_long_a_tag_rests_its_bias_is_known_no_better_than_the_front_end_knows_it() -> None:
     s, P = np.zeros(N), np.eye(N)
-    s[GYRO], P[GYRO, GYRO] = 0.004, 0.01**2
+    s[GYRO_BIAS], P[GYRO_BIAS, GYRO_BIAS] = 0.004, 0.01**2
     for _ in range(50):
-        assert update_rest(s, P, np.zeros(N), resting(0.003**2), TUNING) == 0.0
-    assert P[GYRO, GYRO] == pytest.approx(0.003**2, rel=0.01)
-    assert 0.0 < s[GYRO] < 0.001
+        assert update_standstill(s, P, np.zeros(N), resting(0.003**2), TUNING) == 0.0
+    assert P[GYRO_BIAS, GYRO_BIAS] == pytest.approx(0.003**2, rel=0.01)
+    assert 0.0 < s[GYRO_BIAS] < 0.001
 
 
 def test_what_is_known_better_from_headings_than_from_rest_is_kept() -> None:
     s, P = np.zeros(N), np.eye(N)
-    s[GYRO], P[GYRO, GYRO] = 0.004, 0.001**2
-    update_rest(s, P, np.zeros(N), resting(0.01**2), TUNING)
-    assert (s[GYRO], P[GYRO, GYRO]) == (0.004, 0.001**2)
+    s[GYRO_BIAS], P[GYRO_BIAS, GYRO_BIAS] = 0.004, 0.001**2
+    update_standstill(s, P, np.zeros(N), resting(0.01**2), TUNING)
+    assert (s[GYRO_BIAS], P[GYRO_BIAS, GYRO_BIAS]) == (0.004, 0.001**2)
 
 
 def test_yaw_that_counts_from_the_reference_leaves_the_course_as_it_was() -> None:
     P, before = covariance(), covariance()
-    recount_yaw(P, 0.02)
+    adopt_reference(P, 0.02)
     course = np.zeros(N)
     course[[YAW, MOUNT]] = 1.0
     assert course @ P @ course == pytest.approx(course @ before @ course)
     assert (P @ course)[R] == pytest.approx((before @ course)[R])
     heading = np.zeros(N)
-    heading[[YAW, REF]] = 1.0
+    heading[[YAW, REFERENCE]] = 1.0
     assert heading @ P @ heading == pytest.approx(0.0, abs=1e-15)  # the reference agrees with it, exactly, now
     assert P[YAW, YAW] == pytest.approx(0.02)
     assert np.linalg.eigvalsh(P).min() > -1e-12
@@ -61,6 +61,6 @@ def test_what_a_rest_teaches_of_the_bias_is_told_with_its_step() -> None:
     acc = np.tile([0.0, 0.0, 9.80665], (len(t), 1)) + 0.01 * rng.standard_normal((len(t), 3))
     gyro = np.tile([0.0, 0.0, 0.006], (len(t), 1)) + 0.002 * rng.standard_normal((len(t), 3))
     nodes = run(new_frontend(), Motion(t, acc, gyro, np.full((len(t), 3), np.nan), None), np.arange(0.1, 5.9, 0.1))
-    assert nodes["gyro_var"][0] == pytest.approx(0.01**2, rel=0.05)
-    assert nodes["gyro_var"][-1] < 0.003**2
-    assert nodes["gyro_step"].sum() == pytest.approx(0.006, abs=0.001)
+    assert nodes["gyro_bias_var"][0] == pytest.approx(0.01**2, rel=0.05)
+    assert nodes["gyro_bias_var"][-1] < 0.003**2
+    assert nodes["gyro_bias_step"].sum() == pytest.approx(0.006, abs=0.001)

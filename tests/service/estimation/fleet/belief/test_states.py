@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.columns import State, StateReason
-from dropanchor_service.estimation.fleet.belief.layout import make_pool
+from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING
 from service.estimation.fleet.tracks import drive, rows_of, run, track
 
@@ -37,7 +37,7 @@ def test_ranges_without_any_heading_wait_for_one() -> None:
 
 def test_a_place_that_is_as_good_as_the_compass_says_that_it_is_the_heading() -> None:
     rows = rows_of(1, known=False)
-    rows["reference_std"] = 0.5  # a compass beside steel: 5 m at 10 m, whatever the ranges say
+    rows["settings"]["reference_std"] = 0.5  # a compass beside steel: 5 m at 10 m, whatever the ranges say
     beliefs = run(rows, make_pool(512), drive(2000).nodes)
     assert judged(beliefs)[-1] == (State.AMBIGUOUS, StateReason.HEADING_UNSURE)
     assert beliefs["sigma_pos"][-1] > 3.0

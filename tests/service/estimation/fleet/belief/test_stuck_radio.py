@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.estimation.fleet.belief.gap import repeats
+from dropanchor_service.estimation.fleet.belief.gap import is_stuck
 from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.frontend.node import NODE, RANGE
 
 
 def heard(anchors: list[int], ranges: list[float], count: int = 12, rest: int = 0) -> list[bool]:
-    """What `repeats` says of ranges to these anchors in turn, every 50 ms."""
+    """Return what `is_stuck` says about ranges to these anchors in turn, every 50 ms."""
     rows: Array = np.zeros(1, ROW)
     nodes = np.zeros(count, NODE)
     nodes["t_ns"] = np.arange(count) * 50_000_000
     nodes["kind"], nodes["rest"] = RANGE, rest
     nodes["anchor"], nodes["z"] = list(islice(cycle(anchors), count)), list(islice(cycle(ranges), count))
-    return [repeats(rows[0], node, 1.0) for node in nodes]
+    return [is_stuck(rows[0], node, 1.0) for node in nodes]
 
 
 @pytest.mark.parametrize("anchors", [[0], [0, 1], [2, 0, 1]])

@@ -14,8 +14,8 @@ from dropanchor_service.estimation.fleet.frontend.attitude import (
     ATTITUDE,
     correct_tilt,
     down_weight,
+    predict_attitude,
     rotate_by,
-    turn,
     yaw_of,
 )
 from dropanchor_service.estimation.paper.attitude import AttitudeFilter, AttitudeParameters
@@ -28,7 +28,7 @@ Array = NDArray[Any]
 def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Array) -> None:
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k else 0.0
-        turn(a, dt, gyro[k], t[k] < rest_until)
+        predict_attitude(a, dt, gyro[k], t[k] < rest_until)
         correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until)
         q[k] = a.q
 

@@ -8,7 +8,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import ANCHOR, IMU, RANGE, Array, SampleBatch, default_settings
 from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.estimation.fleet.frontend.lever import swing
+from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 
 G0 = 9.80665
@@ -22,9 +22,9 @@ def turn(angle: float) -> Array:
 
 def filled(rate_before: float, dyaw: float, lever: tuple[float, float] = LEVER) -> Any:
     rows, nodes = np.zeros(1, ROW), np.zeros(1, NODE)
-    rows["lever_x"], rows["lever_y"], rows["lever_rate"] = *lever, rate_before
+    rows["settings"]["lever_x"], rows["settings"]["lever_y"], rows["lever_rate"] = *lever, rate_before
     nodes["dt_s"], nodes["dyaw"], nodes["dv_forward"], nodes["dv_left"] = 0.1, dyaw, 0.2, -0.1
-    swing(rows[0], nodes[0])
+    apply_lever(rows[0], nodes[0])
     return nodes[0]
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from dropanchor_service.estimation.fleet.frontend.standstill import (
     STANDSTILL,
     at_rest,
-    learn_bias,
-    observe,
     start_standstill,
+    update_gyro_bias,
+    update_standstill_detector,
 )
 
 Array = NDArray[Any]
@@ -22,8 +22,8 @@ Array = NDArray[Any]
 def watch_all(s: Any, dt: float, acc: Array, gyro: Array, bias: Array, rest: Array) -> None:
     start_standstill(s, acc[0], gyro[0])
     for k in range(len(acc)):
-        observe(s, dt, acc[k], gyro[k], bias)
-        learn_bias(s, dt, gyro[k], bias)
+        update_standstill_detector(s, dt, acc[k], gyro[k], bias)
+        update_gyro_bias(s, dt, gyro[k], bias)
         rest[k] = at_rest(s)
 
 

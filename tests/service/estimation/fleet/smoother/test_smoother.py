@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import ANCHOR, State, default_settings
-from dropanchor_service.estimation.fleet.belief.layout import ACC, OFFSET, ROW, N, R, V
-from dropanchor_service.estimation.fleet.configure import configured
+from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, RANGE_BIAS, ROW, N, R, V
+from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import NODE, RANGE
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.smoother.smoother import Track, make_track, smooth
@@ -17,7 +17,7 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 from service.estimation.fleet.test_fleet_engine import cut, engine, error_of, in_pieces, samples, settings
 from service.estimation.fleet.tracks import CALIBRATED
 
-RADIAL = [R, V, ACC, OFFSET]
+RADIAL = [R, V, ACC_BIAS, RANGE_BIAS]
 SEEDS = range(2000, 2008)
 
 
@@ -41,7 +41,7 @@ def radial_track(nodes: Any, tuning: Tuning, follow: bool) -> Track:
     row = np.zeros(1, ROW)
     columns = default_settings()
     columns["mount_angle"] = 0.0
-    row[:] = configured(columns, tuning)
+    row[:] = configure_row(columns, tuning)
     row["anchor"] = 0
     smooth(track, nodes, row, np.zeros(1, ANCHOR), 0, tuning, follow, 4)
     return track
@@ -50,10 +50,10 @@ def radial_track(nodes: Any, tuning: Tuning, follow: bool) -> Track:
 def least_squares(nodes: Any, t: Tuning) -> tuple[Any, Any]:
     """(n, 4) and (n, 4, 4): all states of the radial drive in one dense system, written from its equations."""
     n, dt = len(nodes), float(nodes["dt_s"][0])
-    decay = math.exp(-dt / t.acc_tau)
+    decay = math.exp(-dt / t.acc_bias_tau)
     A = np.array([[1.0, dt, -dt * dt / 2, 0.0], [0.0, 1.0, -dt, 0.0], [0.0, 0.0, decay, 0.0], [0.0, 0.0, 0.0, 1.0]])
-    acc_var = t.acc_std**2 + t.acc_rough * 4e-4 / dt
-    q = [t.q_position * dt, 4e-4 + t.q_speed * dt, acc_var * (1 - decay**2), t.q_offset * dt]
+    acc_var = t.acc_bias_std**2 + t.acc_bias_roughness * 4e-4 / dt
+    q = [t.q_position * dt, 4e-4 + t.q_speed * dt, acc_var * (1 - decay**2), t.q_range_bias * dt]
     rows, values = [], []
 
     def add(block: Any, at: int, value: Any, sd: Any) -> None:
@@ -75,7 +75,7 @@ def least_squares(nodes: Any, t: Tuning) -> tuple[Any, Any]:
 
 @pytest.mark.parametrize("follow", [True, False])
 def test_on_a_linear_drive_it_is_the_batch_least_squares_solution_with_its_covariance(follow: bool) -> None:
-    tuning = Tuning(outlier=0.0)
+    tuning = Tuning(outlier_probability=0.0)
     nodes = radial_nodes()
     track = radial_track(nodes, tuning, follow)
     x, P = least_squares(nodes, tuning)

@@ -1,0 +1,22 @@
+"""A heading, range or bearing on its way to a node."""
+
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+
+IMU_EVENT: Final = 0  # samples of the same instant are taken in this order
+HEADING_EVENT: Final = 1
+RANGE_EVENT: Final = 2
+BEARING_EVENT: Final = 3
+
+EVENT: Final = np.dtype(
+    [
+        ("row", np.int32),
+        ("t_ns", np.int64),
+        ("kind", np.uint8),
+        ("anchor", np.int32),
+        ("value", np.float64),  # of the heading or bearing, rad, or of the range, m
+        ("std", np.float64),
+    ]
+)
+Event: TypeAlias = Any  # a record of EVENT
