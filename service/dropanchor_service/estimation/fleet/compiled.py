@@ -11,6 +11,6 @@ RELAXED = {"contract", "nsz"}  # fused multiply-add; infinities and NaN keep the
 
 
 def njit(**options: Any) -> Callable[[Kernel], Kernel]:
-    """numba's, for arithmetic that does not raise: a division by zero is inf or NaN, and the row's own fault."""
+    """Return numba's `njit` with arithmetic that does not raise: a division by zero gives inf or NaN."""
     compiled: Callable[[Kernel], Kernel] = numba.njit(error_model="numpy", fastmath=RELAXED, **options)
     return compiled

@@ -17,13 +17,13 @@ from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-HARD_IRON = 1.0  # prior of a magnetometer that nobody calibrated, in units of the field
+HARD_IRON = 1.0  # prior sd of an uncalibrated magnetometer's hard iron, in units of the field
 
 _BY_ROW = ("rows", "fronts", "platforms")
 
 
 class FleetEngine:
-    """Implements `Engine` and `Restorable`. Rows are plain arrays: a checkpoint is a copy of them and of the pool."""
+    """Implement `Engine` and `Restorable`. A checkpoint copies the rows, the pool and the pending samples."""
 
     name = "fleet"
 
@@ -40,11 +40,11 @@ class FleetEngine:
         self._queue = SampleQueue()
 
     def set_anchors(self, anchors: Array) -> None:
-        """ANCHOR, indexed by the `anchor` columns of samples."""
+        """Set ANCHOR, which the `anchor` columns of samples index."""
         self._anchors = anchors.astype(ANCHOR)
 
     def configure(self, row: int, settings: Array) -> None:
-        """Make `row` with these TAG_SETTINGS (0-d), or start it afresh with new ones."""
+        """Make `row` with these TAG_SETTINGS (0-d), or start it again with new ones."""
         self._reserve_rows(row + 1)
         release(self._rows[row], self._pool)
         self._rows[row] = configure_row(settings, self._tuning)
@@ -53,7 +53,7 @@ class FleetEngine:
         self._queue.forget(row)
 
     def process(self, samples: SampleBatch) -> PoseBatch:
-        """Fuse the samples that are due; measurements ahead of their row's IMU wait for it, 250 ms at most."""
+        """Fuse the samples that are due. Measurements ahead of their row's IMU wait for it, 250 ms at most."""
         rejected: Counter[str] = Counter()
         due = self._queue.due(samples, len(self._anchors), rejected)
         if not len(due.order):
@@ -71,7 +71,7 @@ class FleetEngine:
         )
 
     def _reserve_rows(self, rows: int) -> None:
-        """Room for this many rows, twice as much as before where it lacks."""
+        """Make room for this many rows: at least twice as many as before, if there is not enough."""
         self._configured = max(self._configured, rows)
         if rows <= len(self._rows):
             return
@@ -82,7 +82,7 @@ class FleetEngine:
             setattr(self, f"_{name}", room)
 
     def _run_belief(self, nodes: Array) -> Array:
-        """BELIEF, one per node."""
+        """Run the belief over the nodes. Return BELIEF, one per node."""
         beliefs = np.zeros(len(nodes), BELIEF)
         left = len(nodes)
         while left > 0:
@@ -92,12 +92,12 @@ class FleetEngine:
         return beliefs
 
     def state(self) -> dict[str, Array]:
-        """The rows, the pool, and the samples that wait; no copies."""
+        """Return the rows, the pool and the pending samples, without copying them."""
         kept = {name: getattr(self, f"_{name}")[: self._configured] for name in _BY_ROW}
         return kept | {"pool": self._pool} | self._queue.state()
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Take over a state. The settings are part of the rows; the anchors are not."""
+        """Take over what `state` returned. The settings are part of the rows; the anchors are not."""
         for name in (*_BY_ROW, "pool"):
             setattr(self, f"_{name}", state[name])
         self._configured = len(self._rows)

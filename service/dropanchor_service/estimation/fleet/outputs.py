@@ -1,4 +1,4 @@
-"""What leaves the engine: poses, innovations and modes, written out of nodes and beliefs in compiled code."""
+"""The output of the engine: poses, innovations and modes from nodes and beliefs, in compiled code."""
 
 from typing import Final
 
@@ -12,12 +12,12 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RANGE, Nodes
 
 MODES: Final = 8
-REJECTED_ABOVE: Final = 0.5  # probability of an outlier above which a measurement hardly moved the belief
+REJECTED_ABOVE: Final = 0.5  # outlier probability above which a measurement hardly moved the belief
 OF_RANGE, OF_BEARING = int(MeasurementKind.RANGE), int(MeasurementKind.BEARING)
 
 
 def poses_of(nodes: Array, beliefs: Array) -> Array:
-    """POSE of every node (NODE) that ended with a range, from its BELIEF."""
+    """Return POSE of every node that ended with a range, from its belief."""
     poses = np.zeros(len(nodes), POSE)
     return poses[: _write_poses(nodes, beliefs, poses)]
 
@@ -29,7 +29,7 @@ def innovations_of(nodes: Nodes, beliefs: Beliefs) -> Array:
 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
-    """HYPOTHESIS, the modes of each row whose last node left it ambiguous. A row's nodes are together."""
+    """Return HYPOTHESIS: the modes of each row that its last node left ambiguous. A row's nodes are together."""
     modes = np.zeros(MODES * _count_ambiguous(nodes, beliefs), HYPOTHESIS)
     return modes[: _write_modes(nodes, beliefs, rows, pool, anchors, workspace, modes)]
 

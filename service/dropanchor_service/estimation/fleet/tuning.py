@@ -1,4 +1,4 @@
-"""The numbers of the pose belief, in one value that is handed to the kernels."""
+"""The parameters of the pose belief, as one value that compiled code is given."""
 
 from typing import NamedTuple, TypeAlias
 
@@ -9,7 +9,10 @@ TuningRecord: TypeAlias = npt.NDArray[np.void]  # (1,), what `Tuning.record` ret
 
 
 class Tuning(NamedTuple):
-    """Defaults for every tag; what an operator knows of one tag is in its row instead."""
+    """Defaults for every tag. What an operator says about one tag is in the settings of its row.
+
+    Compiled code is given the record that `record` returns, with the same names: it is annotated as Tuning, too.
+    """
 
     q_position: float = 1e-4  # m^2/s
     q_speed: float = 1e-4  # m^2/s^3, with an accelerometer
@@ -17,7 +20,7 @@ class Tuning(NamedTuple):
     q_speed_no_acc_moving: float = 0.04  # per (m/s)^2 of speed, up to 1 m/s
     q_mount: float = 1e-6  # rad^2/s
     platform_mount_std: float = 0.02  # rad
-    platform_slip_std: float = 0.15  # rad, of a heading with no IMU beside it: lag of the readings, slip
+    platform_slip_std: float = 0.15  # rad, of a heading without an IMU: slip, and lag of the readings
     platform_slip_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
     aligned_log_prior: float = 3.0
@@ -26,38 +29,38 @@ class Tuning(NamedTuple):
     drift_log_prior: float = 0.0
     q_gyro: float = 1e-7  # (rad/s)^2/s, of a tag whose platform measures its heading beside it
     q_gyro_drift: float = 1e-4  # the same, of one that drifts
-    class_rejected_weight: float = 1e-3  # weight below which a class of hypotheses no longer counts for the ellipse
-    drift_again_log_prior: float = 0.0  # log prior of that, where heading and gyroscope drift apart
+    class_rejected_weight: float = 1e-3  # weight below which a heading class no longer counts for the ellipse
+    drift_again_log_prior: float = 0.0  # log prior of a drifting gyroscope, where heading and gyroscope drift apart
     q_gyro_own: float = 1e-6  # the same, of all others
     acc_bias_std: float = 0.11  # m/s^2
-    acc_bias_roughness: float = 0.7  # s: what the roughness of the motion adds to its variance, per dv_var / dt
+    acc_bias_roughness: float = 0.7  # s: its variance grows by this times dv_var / dt, the roughness of the motion
     acc_bias_tau: float = 5.0  # s
-    range_bias_std: float = 0.15  # m, of a tag and anchor pair that nobody calibrated: antenna delays
+    range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays
     q_range_bias: float = 1e-5  # m^2/s
-    q_nlos: float = 0.02  # m^2/s, offset while the line of sight is blocked
+    q_nlos: float = 0.02  # m^2/s, range bias without line of sight
     likelihood_power: float = 0.7
     outlier_probability: float = 0.02
     outlier_mean: float = 0.8  # m
     outlier_std: float = 0.8  # m
     outlier_floor: float = 1e-4
-    bilinear: float = 0.25  # of the product of the variances of speed and slip: added to that of a range
+    bilinear: float = 0.25  # second-order term: times the product of the variances of speed and slip, for a range
     nlos_log_prior: float = -2.5
-    nlos_depth: float = 6.0  # log weight below the best at which a hypothesis gets no alternative
-    nlos_min_bias: float = 0.15  # m, less than that is a clear line of sight
+    nlos_depth: float = 6.0  # log weight below the best at which a hypothesis gets no NLOS alternative
+    nlos_min_bias: float = 0.15  # m, extra bias below which there is a line of sight
     nlos_tau: float = 2.0  # s
     nlos_run: int = 4
-    own_error_log_prior: float = -1.0  # log prior of an error of the heading reference of its own
-    own_error_again_log_prior: float = -2.0  # on top of it, when it had been given up and is tried again
+    own_error_log_prior: float = -1.0  # log prior of a slow error of the heading reference
+    own_error_again_log_prior: float = -2.0  # added when that class is tried again after it had died out
     own_error_std: float = 0.15  # rad
     own_error_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
-    coarse_split_angle: float = 0.2  # rad, of a tag that begins again after a gap, until it is declared
+    coarse_split_angle: float = 0.2  # rad, of a tag that starts again after a gap, until it is resolved
     coarse_hypotheses: int = 48  # hypotheses of such a tag
     coarse_bearings: int = 24
     coarse_speeds: int = 3
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
-    merge_distance_at_rest: float = 1.0  # the same of a tag at rest: they differ in nothing that moves it
-    merge_light: float = 0.5  # by which that squared grows per unit of log weight that the lighter one lacks
+    merge_distance_at_rest: float = 1.0  # the same, of a tag at rest
+    merge_light: float = 0.5  # growth of its square per unit of log weight that the lighter one lacks
     tracking_hypotheses: int = 32
     prune_depth: float = 10.0  # log weight below the best
     rest_std: float = 0.02  # m/s
@@ -67,7 +70,7 @@ class Tuning(NamedTuple):
     start_bearings: int = 36
     start_speeds: int = 5
     start_speed_max: float = 5.0
-    mode_hysteresis: float = 2.0  # log weight by which a mode must win to be published instead of the last one
+    mode_hysteresis: float = 2.0  # log weight by which another mode must win to be published
     resolved_weight: float = 0.99
     resolved_s: float = 2.0
     model_forget: float = 60.0  # s
@@ -76,6 +79,6 @@ class Tuning(NamedTuple):
     obs_q_no_acc: float = 0.05
 
     def record(self) -> TuningRecord:
-        """As a structured array (1,): compiled code is handed one pointer instead of all the numbers."""
+        """Return the parameters as a structured array (1,): compiled code gets one pointer instead of all numbers."""
         kinds = [(name, np.int64 if kind is int else np.float64) for name, kind in type(self).__annotations__.items()]
         return np.array([tuple(self)], kinds)

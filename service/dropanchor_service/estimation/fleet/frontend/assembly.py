@@ -1,4 +1,4 @@
-"""Samples of many rows, in order of row and time, to nodes: one compiled pass over the front-ends."""
+"""One compiled pass that turns ordered samples of many rows into nodes."""
 
 from typing import Any, Final
 
@@ -24,7 +24,7 @@ AUTO, IMU_ONLY, PLATFORM_ONLY = 0, 1, 2
 
 @njit(nogil=True)
 def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node) -> None:
-    """End a node of the row at t_ns: inertial if it has an IMU, else the platform's."""
+    """End a node of the row at t_ns: from the IMU if there is one, else from the platform."""
     node.row = -1
     node.t_ns = t_ns
     node.kind = NO_MEASUREMENT
@@ -44,7 +44,7 @@ def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node)
 
 @njit(nogil=True)
 def _measure(node: Node, event: Event, row: Any, platform: Platform) -> None:
-    """Put the event's measurement into its node."""
+    """Put the event's measurement into the node."""
     node.kind = RANGE if event.kind == RANGE_EVENT else BEARING
     node.anchor = event.anchor
     node.z = event.value
@@ -58,12 +58,12 @@ def _measure(node: Node, event: Event, row: Any, platform: Platform) -> None:
 def _last_end(front: Frontend, platform: Platform) -> int:
     if front.running == 1:
         return int(front.t_node)
-    return int(platform.t_node) if platform.heard > 0 else -1
+    return int(platform.t_node) if platform.reading_count > 0 else -1
 
 
 @njit(nogil=True)
 def _is_long(front: Frontend, platform: Platform, t_ns: int) -> bool:
-    """The row's node has lasted long enough."""
+    """Return whether the row's node has lasted long enough to end without a measurement."""
     end = _last_end(front, platform)
     return end >= 0 and t_ns - end >= MAX_NODE_NS
 
@@ -72,7 +72,7 @@ def _is_long(front: Frontend, platform: Platform, t_ns: int) -> bool:
 def assemble_nodes(
     imu: Array, events: Array, order: Array, fronts: Array, platforms: Array, rows: Array, nodes: Nodes
 ) -> int:
-    """Fill nodes (at least as many as order) from the samples in this order, IMU and EVENT; returns their number."""
+    """Fill `nodes` from the samples in `order`, which index IMU and, behind it, EVENT. Return the number of nodes."""
     n = 0
     for k in range(len(order)):
         index = order[k]

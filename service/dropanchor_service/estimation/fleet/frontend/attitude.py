@@ -42,7 +42,7 @@ SMALL_ANGLE = 0.04  # rad^2: below, two terms of the series are exact to 1e-9
 
 @njit(cache=True, nogil=True)
 def rotate_by(q: Array, x: float, y: float, z: float) -> None:
-    """q <- q * exp((x, y, z)/2): a small turn, rad, about body axes; keeps |q| = 1."""
+    """Rotate q by a small angle (x, y, z), rad, about body axes: q <- q * exp((x, y, z)/2). Keep |q| = 1."""
     s = 0.25 * (x * x + y * y + z * z)
     if s < SMALL_ANGLE:
         c = 1.0 - s * (0.5 - s / 24.0)
@@ -63,7 +63,7 @@ def rotate_by(q: Array, x: float, y: float, z: float) -> None:
 
 @njit(cache=True, nogil=True)
 def up_in_body(q: Array) -> tuple[float, float, float]:
-    """R(q)^T z."""
+    """Return the direction of up in the body frame: R(q)^T z."""
     return (
         2.0 * (q[1] * q[3] - q[0] * q[2]),
         2.0 * (q[2] * q[3] + q[0] * q[1]),
@@ -73,13 +73,13 @@ def up_in_body(q: Array) -> tuple[float, float, float]:
 
 @njit(cache=True, nogil=True)
 def down_weight(deviation: float) -> float:
-    """Weight of an accelerometer sample in [0, 1] from the relative deviation of |a| from gravity."""
+    """Return the weight of an accelerometer sample, 0 to 1, from the relative deviation of |a| from gravity."""
     return min(1.0, max(0.0, (NO_WEIGHT - abs(deviation)) / (NO_WEIGHT - FULL_WEIGHT)))
 
 
 @njit(cache=True, nogil=True)
 def level_attitude(q: Array, ax: float, ay: float, az: float) -> None:
-    """q <- the attitude with yaw 0 in which (ax, ay, az) points up."""
+    """Set q to the attitude with yaw 0 in which (ax, ay, az) points up."""
     n = math.sqrt(ax * ax + ay * ay + az * az)
     roll = math.atan2(ay, az)
     pitch = math.asin(max(-1.0, min(1.0, -ax / n)))
@@ -90,7 +90,7 @@ def level_attitude(q: Array, ax: float, ay: float, az: float) -> None:
 
 @njit(cache=True, nogil=True)
 def predict_attitude(a: Attitude, dt: float, gyro: Array, rest: bool) -> None:
-    """Predict over dt with the mean of the last and this rate, rad/s; at confirmed rest only remember the rate."""
+    """Predict over dt, s, with the mean of the last and this rate, rad/s. At confirmed rest only keep the rate."""
     if not rest:
         x = 0.5 * (a.gyro[0] + gyro[0]) - a.bias[0]
         y = 0.5 * (a.gyro[1] + gyro[1]) - a.bias[1]
@@ -112,7 +112,7 @@ def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: 
     a.gravity += dt / (tau_g + dt) * (n - a.gravity)
     weight = down_weight(n / a.gravity - 1.0)
     if rest:
-        a.age = max(a.age, TAU)  # the tilt is known from now on, and what deviates from it is motion
+        a.age = max(a.age, TAU)  # from now on the tilt is known, and a deviation is motion
     ux, uy, uz = up_in_body(a.q)
     k = weight * dt / (min(a.age, TAU_REST if rest else TAU) + dt)
     s = 1.0 / n
@@ -127,13 +127,13 @@ def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: 
 
 @njit(cache=True, nogil=True)
 def yaw_of(q: Array) -> float:
-    """Azimuth of the body x axis, rad, counter-clockwise."""
+    """Return the azimuth of the body x axis, rad, counter-clockwise."""
     return math.atan2(2.0 * (q[1] * q[2] + q[0] * q[3]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]))
 
 
 @njit(cache=True, nogil=True)
 def yaw_rate_of(a: Attitude) -> float:
-    """d yaw / dt, rad/s, from the last body rates: (q sin roll + r cos roll) / cos pitch."""
+    """Return d yaw / dt, rad/s, from the last body rates: (q sin roll + r cos roll) / cos pitch."""
     q = a.q
     ux, uy, uz = up_in_body(q)
     rate = uy * (a.gyro[1] - a.bias[1]) + uz * (a.gyro[2] - a.bias[2])

@@ -1,10 +1,10 @@
-"""The IMU front-end of one tag: samples in, nodes out; one row of fixed size.
+"""The IMU front-end of one tag: IMU samples in, nodes out.
 
-Its results depend on the order of samples and node ends only, not on how they were cut into batches.
+The result depends on the order of samples and node ends, not on how they were cut into batches.
 
-What a node's heading is: with a calibrated magnetometer the azimuth of the body x axis from the long-term fusion of
-field and gyroscope (ABSOLUTE_HEADING). Its error hardly changes from node to node (it lasts minutes): `heading_var` is
-the variance of that common error, and averaging nodes does not lower it. Without, the integrated gyroscope since
+A node's heading is ABSOLUTE_HEADING once field and gyroscope together know where north is: the azimuth of the body x
+axis. Its error lasts for minutes, so `heading_var` is the variance of an error common to many nodes, which averaging
+does not lower. Until then it is RELATIVE_HEADING, the integrated gyroscope since
 start, zero arbitrary (RELATIVE_HEADING), with the variance it has gathered since.
 """
 
@@ -74,7 +74,7 @@ FRONTEND = np.dtype(
         ("drift_var", "f8"),  # rad^2, of yaw since start
         ("drift_cov", "f8"),  # rad^2/s, of yaw with the gyroscope's bias
         ("last", "f8", 6),  # acc and gyro of the last sample
-        ("same", "f8"),  # s for which it has been the same
+        ("frozen_s", "f8"),  # s for which it has been the same
     ],
     align=True,
 )
@@ -90,7 +90,7 @@ HEADING_FLOOR = 2e-4  # rad^2: tilt and mounting, 0.8 deg
 
 @njit(cache=True, nogil=True)
 def start_frontend(f: Frontend, hard_iron: float, declination: float) -> None:
-    """Nothing known.
+    """Reset the front-end.
 
     hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
     declination: rad, true minus magnetic north, positive east.
@@ -108,7 +108,7 @@ def start_frontend(f: Frontend, hard_iron: float, declination: float) -> None:
 
 @njit(cache=True, nogil=True)
 def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
-    """Level the attitude and begin the first node here."""
+    """Level the attitude with the first sample and begin the first node there."""
     a, p, s = f.attitude, f.preintegration, f.standstill
     a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
     a.gyro[:] = gyro
@@ -120,12 +120,12 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     p.V[:] = 0.0
     p.a[:] = 0.0
     p.V_end[:] = 0.0
-    p.rough = 0.0
+    p.acc_var = 0.0
     p.yaw_rate = 0.0
     p.yaw_end = 0.0
-    p.silent = 0.0
-    p.blind = 0.0
-    p.deaf = 0.0
+    p.gap_s = 0.0
+    p.extrapolated_s = 0.0
+    p.no_acc_s = 0.0
     f.magnetometer.elapsed = 0.0
     f.magnetometer.count = 0.0
     f.magnetometer.sum_m[:] = 0.0
@@ -140,8 +140,8 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def lose_yaw_over_gap(f: Frontend, gap: float) -> None:
-    """Nobody watched for `gap` s: yaw is uncertain by what it may have turned."""
-    f.preintegration.silent += max(0.0, gap - f.preintegration.blind)
+    """Add to the variance of yaw what it may have turned in `gap` s without samples."""
+    f.preintegration.gap_s += max(0.0, gap - f.preintegration.extrapolated_s)
     f.standstill.quiet = 0.0
     if f.magnetometer.unit > 0.0:
         spread_yaw_on_arc(f.magnetometer, unobserved_turn_var(gap))
@@ -150,18 +150,18 @@ def lose_yaw_over_gap(f: Frontend, gap: float) -> None:
 
 @njit(cache=True, nogil=True)
 def is_frozen(f: Frontend, dt: float, acc: Array, gyro: Array) -> bool:
-    """Whether the IMU repeats its last sample, which must not pass for a tag at rest."""
+    """Return whether the IMU repeats its last sample, which must not look like a tag at rest."""
     same = True
     for i in range(3):
         same = same and gyro[i] == f.last[3 + i] and (acc[i] == f.last[i] or math.isnan(acc[i]))
         f.last[i], f.last[3 + i] = acc[i], gyro[i]
-    f.same = f.same + dt if same else 0.0
-    return f.same > FROZEN  # type: ignore[no-any-return]
+    f.frozen_s = f.frozen_s + dt if same else 0.0
+    return f.frozen_s > FROZEN  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
 def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> None:
-    """One IMU sample (m/s^2, rad/s, any unit; acc and mag may be NaN). One not after the last is left out."""
+    """Take one IMU sample (m/s^2, rad/s, any unit of field; acc and mag may be NaN). Skip one that is not newer."""
     if not math.isfinite(gyro[0] + gyro[1] + gyro[2]):
         return
     if f.running == 0:
@@ -178,13 +178,13 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
         lose_yaw_over_gap(f, dt)
         a.gyro[:] = gyro
         dt = 0.0
-    p.blind = 0.0
+    p.extrapolated_s = 0.0
     heard = math.isfinite(acc[0] + acc[1] + acc[2])
     if heard:
         update_standstill_detector(s, dt, acc, gyro, a.bias)
     else:
         s.quiet = 0.0
-        p.deaf += dt
+        p.no_acc_s += dt
     update_gyro_bias(s, dt, gyro, a.bias)
     rest = s.quiet > CONFIRM
     predict_attitude(a, dt, gyro, rest)
@@ -197,7 +197,7 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
 
 @njit(cache=True, nogil=True)
 def accumulate_drift(f: Frontend, dt: float, turned: float) -> None:
-    """Variance of the integrated yaw: white noise and a Gauss-Markov bias."""
+    """Update the variance of the integrated yaw: white noise and a Gauss-Markov bias."""
     f.turned += turned
     if f.standstill.quiet > CONFIRM:
         return
@@ -207,7 +207,7 @@ def accumulate_drift(f: Frontend, dt: float, turned: float) -> None:
 
 @njit(cache=True, nogil=True)
 def fill_heading(f: Frontend, psi: float, ahead: float, node: Node) -> None:
-    """Heading of the node from psi, the yaw at its end."""
+    """Fill the heading of the node from psi, the yaw at its end."""
     blind = unobserved_turn_var(max(0.0, ahead - HORIZON))
     north, variance = north_of(f.magnetometer)
     f.absolute = variance < (RELATIVE_ABOVE if f.absolute else ABSOLUTE_BELOW)
@@ -223,7 +223,7 @@ def fill_heading(f: Frontend, psi: float, ahead: float, node: Node) -> None:
 
 @njit(cache=True, nogil=True)
 def fill_unknown(dt: float, node: Node) -> None:
-    """A node before the first IMU sample."""
+    """Fill a node before the first IMU sample."""
     node.dt_s = dt
     node.dyaw, node.dyaw_var = 0.0, unobserved_turn_var(dt)
     node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
@@ -235,7 +235,7 @@ def fill_unknown(dt: float, node: Node) -> None:
 
 @njit(cache=True, nogil=True)
 def fill_gyro_bias(f: Frontend, node: Node) -> None:
-    """What is known of the gyroscope's bias about the vertical, and what was learned of it in this node."""
+    """Fill the variance of the gyroscope's bias about the vertical, and its change in this node."""
     x, y, z = up_in_body(f.attitude.q)
     bias = x * f.attitude.bias[0] + y * f.attitude.bias[1] + z * f.attitude.bias[2]
     node.gyro_bias_var = f.standstill.bias_var
@@ -247,7 +247,7 @@ def fill_gyro_bias(f: Frontend, node: Node) -> None:
 def close_node(f: Frontend, t_ns: int, node: Node) -> None:
     """End a node at t_ns, not before the last IMU sample or node, and begin the next.
 
-    Fills dt_s, dyaw, dv, heading and rest of `node` with their variances.
+    Fill dt_s, dyaw, dv, heading and rest of `node` with their variances.
     """
     dt = (t_ns - f.t_node) * 1e-9 if f.t_node > 0 else 0.0
     if f.running == 0:

@@ -1,7 +1,7 @@
-"""A tag that is not where the point is that follows the course: on a mast, or held out in front.
+"""A tag beside the point that follows the course: on a mast, or held out in front.
 
-The pivot (a rear axle, the feet of whoever carries it) moves along the course; the tag, a lever (x, y) of the body
-frame away, swings about it when it turns. With w the rate and R(a) a turn by a, over a node:
+The pivot (a rear axle, a person's feet) moves along the course. The tag is a lever (x, y) away, in the body frame, and
+swings about the pivot when that turns. With w the rate and R(a) a turn by a, over a node:
 
     swing = (R(dyaw) - I) lever,   dv of the pivot = dv of the tag - (R(dyaw) w x lever at the end - w x lever before).
 
@@ -17,7 +17,7 @@ from dropanchor_service.estimation.fleet.frontend.node import Node
 
 @njit(nogil=True)
 def apply_lever(row: Any, node: Node) -> None:
-    """Fill the node's swing, and make its dv that of the pivot."""
+    """Fill the node's swing, and turn its dv into that of the pivot."""
     x, y = row.settings.lever_x, row.settings.lever_y
     node.swing_forward, node.swing_left = 0.0, 0.0
     if x == 0.0 and y == 0.0:

@@ -4,16 +4,16 @@ Model, linear in field f (level frame) and hard iron h (body frame), with R from
   m = R^T f + h + v
 State x = (f, h, b, s): the level frame itself turns slowly about the vertical, by phi = b dt + s dyaw, because the
 gyroscope has a residual bias b (rad/s) and scale error s; then f <- R_z(phi) f, which makes b and s observable. A
-Kalman filter with f ~ N(0, l^2), h ~ N(0, (hard_iron l)^2), l = |m| of the first sample, so a magnetometer without
-units will do. Soft iron cannot be told from the field's own distortion on a level track; it stays in v.
+Kalman filter with f ~ N(0, l^2), h ~ N(0, (hard_iron l)^2), l = |m| of the first sample, so the
+unit of the magnetometer does not matter. On a level track soft iron looks like distortion by the place; it stays in v.
 
 v is the distortion of the field by the place. It is correlated along the path (a few seconds at walking speed) and
-constant at rest: hence its variance is inflated by 2 tau / dt, and nothing is learned from a resting tag after its
-first seconds. Its size r, per body axis, is the tag's own: the running mean square of the residuals while calm.
+constant at rest. Its variance is therefore inflated by 2 tau / dt, and a resting tag teaches nothing after its first
+seconds. Its size r is learned per body axis, as the running mean square of the residuals of undisturbed samples.
 
-A disturbance is an innovation far beyond r and the state's own uncertainty. This test contains field norm and dip (two
-of the three components) and the third as well, because the gyroscope knows the heading. A disturbed sample is not
-used, so that the heading is the gyroscope's and its variance grows; if it lasts, the field is taken to be new.
+A disturbance is an innovation far beyond r and the uncertainty of the state. The test covers all three components of
+the field, because the gyroscope knows the heading. A disturbed sample is not used: the heading is then the
+gyroscope's, and its variance grows. A disturbance that lasts is taken for a new field.
 """
 
 import math
@@ -35,7 +35,7 @@ MAGNETOMETER = np.dtype(
         ("noise", "f8", 3),  # r^2 per body axis, field units squared
         ("unit", "f8"),  # |m| of the first sample; 0: none yet
         ("age", "f8"),  # s of field seen in motion, up to a limit
-        ("strain", "f8"),  # normalised innovation squared, largest of late
+        ("nis", "f8"),  # normalised innovation squared, largest of late
         ("disturbed", "f8"),  # s for which it has been disturbed
         ("yaw", "f8"),  # rad, of the level frame at the last update
         ("elapsed", "f8"),  # s since the last update
@@ -65,7 +65,7 @@ REST_LEARNING = 3.0  # s
 
 @njit(cache=True, nogil=True)
 def start_magnetometer(g: Magnetometer, mx: float, my: float, mz: float, hard_iron: float) -> None:
-    """First sample: scale, prior."""
+    """Set unit and prior from the first sample."""
     g.unit = math.sqrt(mx * mx + my * my + mz * mz)
     u2 = g.unit * g.unit
     g.x[:] = 0.0
@@ -81,7 +81,7 @@ def start_magnetometer(g: Magnetometer, mx: float, my: float, mz: float, hard_ir
 
 @njit(cache=True, nogil=True)
 def spread_yaw(g: Magnetometer, variance: float) -> None:
-    """Add yaw variance, rad^2, to the level frame: f gains it along its own tangent."""
+    """Add a variance of the level frame's yaw, rad^2: f gains it along its own tangent."""
     tx, ty = -g.x[1], g.x[0]
     g.P[0, 0] += variance * tx * tx
     g.P[0, 1] += variance * tx * ty
@@ -91,9 +91,9 @@ def spread_yaw(g: Magnetometer, variance: float) -> None:
 
 @njit(cache=True, nogil=True)
 def spread_yaw_on_arc(g: Magnetometer, variance: float) -> None:
-    """The same for a turn of any size that nobody watched: mean and covariance of f on the arc over which it may lie.
+    """Add the variance, rad^2, of an unobserved turn of any size: f may lie anywhere on an arc.
 
-    Along the tangent alone a turn by a right angle could only be explained by another hard iron.
+    Along the tangent alone only another hard iron could explain a turn by a right angle.
     """
     keeps = math.exp(-0.5 * variance)  # mean cosine of a turn ~ N(0, variance)
     cos2, sin2 = 0.5 * (1.0 + math.exp(-2.0 * variance)), 0.5 * (1.0 - math.exp(-2.0 * variance))
@@ -112,7 +112,7 @@ def spread_yaw_on_arc(g: Magnetometer, variance: float) -> None:
 
 @njit(cache=True, nogil=True)
 def predict_field(g: Magnetometer, dt: float, dyaw: float) -> None:
-    """Predict: f turns by phi = b dt + s dyaw."""
+    """Predict over dt, s: f turns by phi = b dt + s dyaw."""
     phi = g.x[BIAS] * dt + g.x[SCALE] * dyaw
     c, s = math.cos(phi), math.sin(phi)
     g.x[0], g.x[1] = c * g.x[0] - s * g.x[1], s * g.x[0] + c * g.x[1]
@@ -134,20 +134,20 @@ def predict_field(g: Magnetometer, dt: float, dyaw: float) -> None:
 
 @njit(cache=True, nogil=True)
 def innovation(g: Magnetometer, R: Array, m: Array, axis: int) -> float:
-    """m - (R^T f + h) of one body axis."""
+    """Return m - (R^T f + h) of one body axis."""
     x = g.x
     return m[axis] - R[0, axis] * x[0] - R[1, axis] * x[1] - R[2, axis] * x[2] - x[3 + axis]  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
 def project(P: Array, R: Array, axis: int, i: int) -> float:
-    """Row i of P times H^T of one body axis."""
+    """Return row i of P times H^T of one body axis."""
     return P[i, 0] * R[0, axis] + P[i, 1] * R[1, axis] + P[i, 2] * R[2, axis] + P[i, 3 + axis]  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
 def predicted_variance(g: Magnetometer, R: Array, axis: int) -> float:
-    """H P H^T of one body axis."""
+    """Return H P H^T of one body axis."""
     s = project(g.P, R, axis, 3 + axis)
     for i in range(3):
         s += R[i, axis] * project(g.P, R, axis, i)
@@ -156,7 +156,7 @@ def predicted_variance(g: Magnetometer, R: Array, axis: int) -> float:
 
 @njit(cache=True, nogil=True)
 def mean_nis(g: Magnetometer, R: Array, m: Array) -> float:
-    """Mean over the axes of innovation squared over its variance, without the inflation for correlation."""
+    """Return the mean over the axes of squared innovation over variance, without the inflation for correlation."""
     total = 0.0
     for axis in range(3):
         e = innovation(g, R, m, axis)
@@ -166,7 +166,7 @@ def mean_nis(g: Magnetometer, R: Array, m: Array) -> float:
 
 @njit(cache=True, nogil=True)
 def fuse_axis(g: Magnetometer, R: Array, m: Array, axis: int, inflation: float) -> None:
-    """Scalar Kalman update with one body axis."""
+    """Update with one body axis, as a scalar."""
     P = g.P
     e = innovation(g, R, m, axis)
     k = (
@@ -190,10 +190,10 @@ def fuse_axis(g: Magnetometer, R: Array, m: Array, axis: int, inflation: float) 
 
 @njit(cache=True, nogil=True)
 def is_disturbed(g: Magnetometer, dt: float, strain: float) -> bool:
-    """Disturbed? A long disturbance makes field and hard iron unknown again."""
-    decayed = g.strain * math.exp(-dt / STRAIN_TAU)
-    g.strain = max(strain, decayed)
-    if g.strain <= GATE:
+    """Return whether the sample is disturbed. A long disturbance makes field and hard iron unknown again."""
+    decayed = g.nis * math.exp(-dt / STRAIN_TAU)
+    g.nis = max(strain, decayed)
+    if g.nis <= GATE:
         g.disturbed = 0.0
         return False
     g.disturbed += dt
@@ -201,13 +201,13 @@ def is_disturbed(g: Magnetometer, dt: float, strain: float) -> bool:
         for i in range(6):
             g.P[i, i] += g.unit * g.unit
         g.disturbed = 0.0
-        g.strain = 0.0
+        g.nis = 0.0
     return True
 
 
 @njit(cache=True, nogil=True)
 def update_noise(g: Magnetometer, R: Array, m: Array, dt: float) -> None:
-    """Follow r^2 with the residuals."""
+    """Update r^2 with the squared residuals."""
     g.age = min(g.age + dt, NOISE_TAU)
     floor = NOISE_FLOOR * g.unit
     for axis in range(3):
@@ -217,7 +217,7 @@ def update_noise(g: Magnetometer, R: Array, m: Array, dt: float) -> None:
 
 @njit(cache=True, nogil=True)
 def add_to_sums(g: Magnetometer, q: Array, mx: float, my: float, mz: float) -> None:
-    """Add one sample to the running sums: the mean of m = R^T f + h over a short time is exact in the mean of R."""
+    """Add one sample to the sums. m = R^T f + h is linear in R, so the means over a short time satisfy it, too."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     S = g.sum_R
     S[0, 0] += 1.0 - 2.0 * (y * y + z * z)
@@ -237,7 +237,7 @@ def add_to_sums(g: Magnetometer, q: Array, mx: float, my: float, mz: float) -> N
 
 @njit(cache=True, nogil=True)
 def fuse(g: Magnetometer, dt: float, rest: bool) -> None:
-    """Update with the mean of the summed samples, which the sums become; dt s since the last update."""
+    """Update with the mean of the samples since the last update, dt s ago. The sums become these means."""
     R, m = g.sum_R, g.sum_m
     for i in range(3):
         m[i] /= g.count
@@ -256,7 +256,7 @@ def fuse(g: Magnetometer, dt: float, rest: bool) -> None:
 
 @njit(cache=True, nogil=True)
 def update_magnetometer(g: Magnetometer, dt: float, q: Array, mag: Array, rest: bool, hard_iron: float) -> None:
-    """One IMU sample, after the attitude took it. `mag` may be NaN: a magnetometer slower than the IMU, or none."""
+    """Take one IMU sample, after the attitude. `mag` is NaN where there is no sample of the field."""
     known = math.isfinite(mag[0] + mag[1] + mag[2])
     if g.unit == 0.0:
         if not known or mag[0] == mag[1] == mag[2] == 0.0:
@@ -282,7 +282,7 @@ def update_magnetometer(g: Magnetometer, dt: float, q: Array, mag: Array, rest: 
 
 @njit(cache=True, nogil=True)
 def north_of(g: Magnetometer) -> tuple[float, float]:
-    """Azimuth of magnetic north in the level frame, rad, and its variance, rad^2."""
+    """Return the azimuth of magnetic north in the level frame, rad, and its variance, rad^2."""
     x, y = g.x[0], g.x[1]
     n2 = x * x + y * y
     if n2 == 0.0:

@@ -1,7 +1,7 @@
-"""Nodes' headings from a platform that has one already (a robot, a phone), with an IMU beside it or alone.
+"""The headings of a platform (a robot, a phone), alone or beside an IMU.
 
-Alone, the yaw increment of a node is the increment of the heading itself, extrapolated to the node's end with its last
-rate. Beside an IMU, every reading is carried to the node's end by the gyroscope and the readings are averaged.
+Alone, the yaw increment of a node is the increment of the heading, extrapolated to the node's end with its last rate.
+Beside an IMU, the gyroscope carries every reading to the node's end, where the readings are averaged.
 """
 
 import math
@@ -24,14 +24,14 @@ from dropanchor_service.estimation.fleet.frontend.node import (
 
 PLATFORM = np.dtype(
     [
-        ("heard", "u1"),  # readings so far: 0, 1, or 2 for more
+        ("reading_count", "u1"),  # readings so far: 0, 1, or 2 for more
         ("t_heading", "i8"),  # ns, of the last reading
         ("heading", "f8"),
         ("rate", "f8"),  # rad/s, between the last two readings
         ("std", "f8"),  # rad, of the last reading, NaN: not told
         ("t_node", "i8"),  # ns, end of the last node
         ("node_heading", "f8"),
-        ("lead", "f8"),  # rad, mean of reading minus the gyroscope's yaw, of this node's readings
+        ("gyro_offset", "f8"),  # rad, mean of reading minus the gyroscope's yaw, of this node's readings
         ("readings", "i4"),
         ("moved", "u1"),  # 1: the tag has moved since the start
         ("first_ranges", "i4"),
@@ -49,30 +49,30 @@ STILL_RANGES = 5
 
 @njit(nogil=True)
 def add_reading(p: Platform, front: Frontend, t_ns: int, heading: float, std: float) -> None:
-    """One reading of the platform's heading."""
-    if p.heard > 0 and t_ns > p.t_heading:
+    """Take one reading of the platform's heading, rad, with its standard deviation or NaN."""
+    if p.reading_count > 0 and t_ns > p.t_heading:
         p.rate = wrap(heading - p.heading) / max((t_ns - p.t_heading) * 1e-9, 1e-3)
-        p.heard = 2
-    if p.heard == 0:
-        p.heard = 1
+        p.reading_count = 2
+    if p.reading_count == 0:
+        p.reading_count = 1
         p.t_node = t_ns
         p.node_heading = heading
     p.t_heading, p.heading, p.std = t_ns, heading, std
     if front.running == 1:
         lead = wrap(heading - yaw_of(front.attitude.q))
         p.readings += 1
-        p.lead += wrap(lead - p.lead) / p.readings
+        p.gyro_offset += wrap(lead - p.gyro_offset) / p.readings
 
 
 @njit(nogil=True)
 def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
-    """The node from the platform alone: no acceleration, yaw by its own increments."""
+    """Fill a node from the platform alone: no acceleration, and yaw from the increments of the heading."""
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, MOVING
     node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.unobserved_s = 0.0
-    if p.heard == 0:
+    if p.reading_count == 0:
         return
     ahead = (t_ns - p.t_heading) * 1e-9
     heading = wrap(p.heading + p.rate * max(min(ahead, EXTRAPOLATE), -EXTRAPOLATE))
@@ -87,7 +87,7 @@ def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
 
 @njit(nogil=True)
 def detect_first_motion(p: Platform, node: Node, z: float, std: float) -> None:
-    """Whether a tag that was put down at a known start has moved yet: by its range, or by turning."""
+    """Mark the node as not moved until range or heading show that a tag has left its known start."""
     if p.moved == 1:
         return
     if math.isfinite(z):
@@ -104,14 +104,14 @@ def detect_first_motion(p: Platform, node: Node, z: float, std: float) -> None:
 
 @njit(nogil=True)
 def use_platform_heading(p: Platform, front: Frontend, node: Node) -> None:
-    """Replace the heading of an IMU node by the mean of the platform's readings in it; none if there was none."""
+    """Replace the heading of an IMU node by the mean of the platform's readings in it, or by none."""
     if p.readings == 0:
         node.heading_kind = NO_HEADING
         return
     std = p.std if math.isfinite(p.std) and p.std > 0.0 else READING_STD
-    node.heading = wrap(front.preintegration.yaw_end + p.lead)
+    node.heading = wrap(front.preintegration.yaw_end + p.gyro_offset)
     node.heading_var = std * std / p.readings
     node.heading_kind = MEASURED_HEADING
     node.unobserved_s = 0.0
     p.readings = 0
-    p.lead = 0.0
+    p.gyro_offset = 0.0

@@ -1,9 +1,9 @@
-"""The IMU between two ranges: what the pose belief predicts with.
+"""The IMU between two ranges, pre-integrated: the pose belief predicts with it.
 
 Yaw psi and the velocity integral V = int (R a)_xy dt live in the level frame of `attitude`; gravity has no horizontal
-part there. A node is a difference of psi and V between its two ends, so nodes telescope: however the ranges fall,
-nothing is counted twice. A range falls between IMU samples: both ends are extrapolated with the last rates, for HORIZON
-at most. dv is in the body-yaw frame at the start of the node.
+part there. A node is a difference of psi and V between its two ends, so nothing is counted twice wherever
+the ranges fall. A range comes between two IMU samples: both ends are extrapolated with the last rates, by HORIZON at
+most. dv is in the body-yaw frame at the start of the node.
 Accelerations are scaled to the tag's own gravity (cheap accelerometers read 5 % high).
 """
 
@@ -21,13 +21,13 @@ PREINTEGRATION = np.dtype(
     [
         ("V", "f8", 2),  # m/s, level frame
         ("a", "f8", 2),  # m/s^2, last horizontal acceleration, level frame
-        ("rough", "f8"),  # (m/s^2)^2, variance of the acceleration within tenths of a second, slowly averaged
+        ("acc_var", "f8"),  # (m/s^2)^2, variance of the acceleration within tenths of a second, slowly averaged
         ("yaw_rate", "f8"),  # rad/s, last
         ("yaw_end", "f8"),  # rad, where the last node ended
         ("V_end", "f8", 2),
-        ("silent", "f8"),  # s without usable IMU since the last node
-        ("blind", "f8"),  # s since the last IMU sample that earlier nodes have already counted as silent
-        ("deaf", "f8"),  # s without usable accelerometer since the last node
+        ("gap_s", "f8"),  # s without usable IMU since the last node
+        ("extrapolated_s", "f8"),  # s since the last IMU sample that earlier nodes have already counted as silent
+        ("no_acc_s", "f8"),  # s without usable accelerometer since the last node
     ]
 )
 Preintegration: TypeAlias = Any  # a record of PREINTEGRATION
@@ -45,20 +45,20 @@ UNOBSERVED_ACC = 1.0  # m/s^2, sd of the acceleration of a tag whose IMU is sile
 
 @njit(cache=True, nogil=True)
 def unobserved_turn_var(s: float) -> float:
-    """Variance, rad^2, of the turn in s seconds that no gyroscope watched; the rate lasts about a second."""
+    """Return the variance, rad^2, of the turn in s seconds without a gyroscope. A rate lasts about a second."""
     return UNOBSERVED_RATE * UNOBSERVED_RATE * s * max(s, 1.0)
 
 
 @njit(cache=True, nogil=True)
 def unobserved_speed_var(s: float) -> float:
-    """Variance, (m/s)^2, of the change of speed in s seconds that no accelerometer watched."""
+    """Return the variance, (m/s)^2, of the change of speed in s seconds without an accelerometer."""
     return UNOBSERVED_ACC * UNOBSERVED_ACC * s * max(s, 1.0)
 
 
 @njit(cache=True, nogil=True)
 def add_acceleration(p: Preintegration, dt: float, q: Array, acc: Array, gravity: float, variance: float) -> None:
-    """Add dt of acceleration (trapezoid); q is the attitude at the end of dt, variance that of standstill."""
-    p.rough += dt / (ROUGH_TAU + dt) * (variance - p.rough)
+    """Add dt of acceleration by the trapezoidal rule. q: attitude at the end of dt; variance: that of `standstill`."""
+    p.acc_var += dt / (ROUGH_TAU + dt) * (variance - p.acc_var)
     w, x, y, z = q[0], q[1], q[2], q[3]
     k = G0 / gravity
     ax, ay, az = k * acc[0], k * acc[1], k * acc[2]
@@ -71,7 +71,7 @@ def add_acceleration(p: Preintegration, dt: float, q: Array, acc: Array, gravity
 
 @njit(cache=True, nogil=True)
 def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node) -> float:
-    """Fill dyaw and dv of a node that lasts dt and ends `ahead` s after the last IMU sample; return psi at its end."""
+    """Fill dyaw and dv of a node that lasts dt and ends `ahead` s after the last IMU sample. Return psi at its end."""
     reach = min(ahead, HORIZON)
     end = yaw + p.yaw_rate * reach
     vx, vy = p.V[0] + p.a[0] * reach, p.V[1] + p.a[1] * reach
@@ -81,13 +81,15 @@ def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node)
     node.dv_forward = c * dx + s * dy
     node.dv_left = c * dy - s * dx
     beyond = max(0.0, ahead - HORIZON)
-    unheard = p.silent + max(0.0, beyond - p.blind)
-    p.blind = max(p.blind, beyond)
-    node.unobserved_s = unheard
-    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unobserved_turn_var(unheard)
-    node.dv_var = math.inf if p.deaf > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.rough) * dt + unobserved_speed_var(unheard)
+    gap_s = p.gap_s + max(0.0, beyond - p.extrapolated_s)
+    p.extrapolated_s = max(p.extrapolated_s, beyond)
+    node.unobserved_s = gap_s
+    node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unobserved_turn_var(gap_s)
+    node.dv_var = (
+        math.inf if p.no_acc_s > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.acc_var) * dt + unobserved_speed_var(gap_s)
+    )
     p.yaw_end = wrap(end)
     p.V_end[0], p.V_end[1] = vx, vy
-    p.silent = 0.0
-    p.deaf = 0.0
+    p.gap_s = 0.0
+    p.no_acc_s = 0.0
     return end  # type: ignore[no-any-return]

@@ -1,10 +1,10 @@
-"""Standstill: is the tag at rest, and what does the gyroscope read then.
+"""Standstill: whether the tag is at rest, and what the gyroscope reads then.
 
-Quiet = the exponentially weighted standard deviation of the accelerometer and of the gyroscope and the mean
-rotation are small. Rest is quiet for HOLD seconds. The gyroscope's bias is learned late and in blocks: only from blocks
-of rest that were followed by another block of rest, so that neither the run-out nor the start of a motion gets in.
-A tag that has not moved since it was switched on has no run-out: its first rest is learned from sooner, in shorter
-blocks, and with the noise that its gyroscope shows. Many a tag rests for no more than a second.
+A tag is quiet while the exponentially weighted standard deviations of accelerometer and gyroscope and the mean rotation
+are small. It is at rest when it has been quiet for HOLD seconds. The gyroscope's bias is learned in blocks of rest, and
+only from blocks that another block of rest followed, so that neither the end nor the start of a motion counts. The
+first rest after switch-on has no motion before it: it is used sooner, in shorter blocks, with the noise that the
+gyroscope shows. Many tags rest for no more than a second.
 Bias: scalar Kalman filter per axis, P += Q dt, block mean of rate with variance R.
 """
 
@@ -49,7 +49,7 @@ WHITE = 3.0  # times the variance of white noise as large as what is seen
 
 @njit(cache=True, nogil=True)
 def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
-    """Nothing seen but one sample."""
+    """Start with one sample."""
     for i in range(3):
         s.mean[i] = acc[i] if math.isfinite(acc[i]) else 0.0
         s.mean[3 + i] = gyro[i]
@@ -65,7 +65,7 @@ def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def update_channel(s: Standstill, k: float, i: int, value: float) -> float:
-    """Exponentially weighted mean of channel i; returns the squared deviation to be averaged."""
+    """Update the exponentially weighted mean of channel i. Return the squared deviation to be averaged."""
     d = value - s.mean[i]
     s.mean[i] += k * d
     return (1.0 - k) * d * d  # type: ignore[no-any-return]
@@ -73,7 +73,7 @@ def update_channel(s: Standstill, k: float, i: int, value: float) -> float:
 
 @njit(cache=True, nogil=True)
 def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array, bias: Array) -> None:
-    """One IMU sample. `s.quiet` afterwards is the time, s, for which the tag has been quiet."""
+    """Update with one IMU sample. Then `s.quiet` is the time, s, for which the tag has been quiet."""
     if dt == 0.0:
         return
     k = dt / (min(s.seen, TAU) + dt)
@@ -92,13 +92,13 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
 
 @njit(cache=True, nogil=True)
 def at_rest(s: Standstill) -> bool:
-    """Rest, for a zero-velocity update."""
+    """Return whether the tag is at rest, for a zero-velocity update."""
     return s.quiet > REORDER_WINDOW  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
 def block_noise(s: Standstill, dt: float) -> float:
-    """Variance of the mean rate of a block of rest times its length, (rad/s)^2 s."""
+    """Return the variance of the mean rate of a block of rest times its length, (rad/s)^2 s."""
     if s.moved == 1:
         return BIAS_NOISE
     return min(BIAS_NOISE, FIRST_NOISE + WHITE * s.gyro_bias_var / 3.0 * dt)  # type: ignore[no-any-return]
@@ -106,7 +106,7 @@ def block_noise(s: Standstill, dt: float) -> float:
 
 @njit(cache=True, nogil=True)
 def update_gyro_bias(s: Standstill, dt: float, gyro: Array, bias: Array) -> None:
-    """Update `bias` from confirmed rest; call with every sample."""
+    """Update `bias` from confirmed rest. Call it with every sample."""
     s.bias_var += BIAS_WALK * dt
     if s.quiet < (CONFIRM if s.moved == 1 else FIRST_CONFIRM):
         s.block[0] = 0.0

@@ -1,4 +1,4 @@
-"""The fixed-lag track: what the next seconds say of the hypotheses that the filter had.
+"""The fixed-lag track: what the next seconds say about the hypotheses of the filter.
 
 Each hypothesis kept of a node is carried over the nodes of the lag, smoothed back, and weighted by the likelihood of
 the ranges: the posterior of that instant given the data up to `lag` later, no more. Nodes within STRIDE share a window.
@@ -26,7 +26,7 @@ ITERATIONS: Final = 3
 
 @njit(nogil=True)
 def to_planar(s: Floats, P: Floats, point: Floats, cov: Floats) -> None:
-    """point: x, y from the anchor, course, speed; cov (3, 3): of x, y, course."""
+    """Fill point (x, y from the anchor, course, speed) and cov (3, 3) of x, y, course."""
     point[0], point[1] = s[0] * math.cos(s[1]), s[0] * math.sin(s[1])
     point[2], point[3] = course_of(s), s[V]
     planar_covariance(s, P, cov)
@@ -41,7 +41,7 @@ def all_to_planar(means: Floats, covs: Floats, points: Floats, out: Floats) -> N
 
 @njit(nogil=True)
 def _mix_mode(weights: Floats, points: Floats, covs: Floats, point: Floats, cov: Floats) -> None:
-    """Moments of those near the heaviest (1 m + 2 sigma): its mode."""
+    """Fill point and cov with the moments of the mode of the heaviest: all within 1 m + 2 sigma of it."""
     head = np.argmax(weights)
     spread = math.sqrt(max(covs[head, 0, 0] + covs[head, 1, 1], 0.0))
     total = 0.0
@@ -63,7 +63,7 @@ def _mix_mode(weights: Floats, points: Floats, covs: Floats, point: Floats, cov:
 
 @njit(nogil=True)
 def _has_one_model(traces: Array) -> bool:
-    """Whether one model of the heading error, and one north, held through the window."""
+    """Return whether the window has hypotheses throughout, with one model of the heading error and one north."""
     for k in range(1, len(traces)):
         if traces[k].model != traces[0].model or traces[k].referred != traces[0].referred or traces[k].count == 0:
             return False
@@ -118,7 +118,7 @@ def smooth_lagged(
     points: Floats,
     covs: Floats,
 ) -> None:
-    """Fill points (n, 4) and covs (n, 3, 3); NaN where the engine had nothing, or changed its mind in between."""
+    """Fill points (n, 4) and covs (n, 3, 3). They are NaN where there is no belief, or its heading model changed."""
     points[:] = np.nan
     covs[:] = np.nan
     a = 0

@@ -1,7 +1,7 @@
-"""Backwards from the heaviest hypothesis of the last node: the track that the surviving mode came along.
+"""The track of the surviving mode, traced back from the heaviest hypothesis of the last node.
 
-Of the hypotheses that were kept of the node before, the one that moves to where the later one is; where none does, the
-later one is moved back by dead reckoning. It is where the iterated smoother begins.
+The predecessor is the hypothesis of the node before whose prediction is closest to the later one. Where none is close,
+the later one is moved back by dead reckoning. The iterated smoother starts from this track.
 """
 
 import math
@@ -24,7 +24,7 @@ YAW_SLACK = 1e-4  # rad^2
 
 @njit(nogil=True)
 def distance(s: Floats, P: Floats, target: Floats) -> float:
-    """Squared distance in position, speed and yaw, in standard deviations."""
+    """Return the squared distance in position, speed and yaw, in variances."""
     dx = s[R] * math.cos(s[PHI]) - target[R] * math.cos(target[PHI])
     dy = s[R] * math.sin(s[PHI]) - target[R] * math.sin(target[PHI])
     spread = min(P[R, R] + s[R] ** 2 * P[PHI, PHI], POSITION_VARIANCE)
@@ -36,7 +36,7 @@ def distance(s: Floats, P: Floats, target: Floats) -> float:
 
 @njit(nogil=True)
 def step_back(s: Floats, node: Node, out: Floats) -> None:
-    """Undo `move` by dead reckoning; the lower states stay."""
+    """Undo `predict_state` by dead reckoning. The other states stay."""
     out[:] = s
     m = s[MOUNT] + s[SLIP]
     f = node.dv_forward * math.cos(m) + node.dv_left * math.sin(m) if math.isfinite(node.dv_var) else 0.0
@@ -53,7 +53,7 @@ def step_back(s: Floats, node: Node, out: Floats) -> None:
 
 @njit(nogil=True)
 def _unwrap_angles(reference: Floats, nodes: Nodes, decay: Floats) -> None:
-    """Bearing and yaw of every node on the branch on which the one before leads to it."""
+    """Unwrap bearing and yaw of every node to the branch that the node before predicts."""
     F, s = np.zeros((4, N)), np.zeros(N)
     for k in range(1, len(nodes)):
         s[:] = reference[k - 1]
@@ -64,7 +64,7 @@ def _unwrap_angles(reference: Floats, nodes: Nodes, decay: Floats) -> None:
 
 @njit(nogil=True, cache=True)
 def trace_lineage(nodes: Nodes, traces: Array, reference: Floats, nlos: Array) -> int:
-    """Fill reference (n, N) and nlos (n,); returns which hypothesis of the first node it came from, -1 for none."""
+    """Fill reference (n, N) and nlos (n,). Return the index of the first node's hypothesis, -1 for none."""
     F, s, decay = np.zeros((4, N)), np.zeros(N), np.ones(N)
     n = len(nodes)
     reference[n - 1] = traces[n - 1].mean[0]

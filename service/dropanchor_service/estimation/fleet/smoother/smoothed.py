@@ -1,4 +1,4 @@
-"""A track that has seen what came after: offline, from all of a recording, or with a fixed lag."""
+"""Smoothed poses: from all of a recording, or with a fixed lag."""
 
 import math
 
@@ -34,11 +34,10 @@ RESOLVED = (State.TRACKING, State.COASTING, State.DEGRADED)
 
 
 def smoothed_poses(engine: TracingEngine, row: int, lag: float | None) -> Array:
-    """POSE, one per range as the engine gave them, with x, y, heading, speed and covariance smoothed.
+    """Return the engine's POSE with x, y, heading, speed and covariance smoothed.
 
-    lag: s of data after each pose that may be used; None: all. A pose is as sure of its mode as the belief that has
-    seen that data: where that one is resolved, an ambiguous pose is `tracking`. What cannot be smoothed stays as the
-    filter had it.
+    lag: s of later data that each pose may use; None: all. The belief at the end of that data decides about the mode:
+    where it is resolved, an ambiguous pose becomes `tracking`. What cannot be smoothed stays as the filter gave it.
     """
     nodes, beliefs, traces = engine.traced(row)
     chosen = nodes["kind"] == RANGE
@@ -57,7 +56,7 @@ def smoothed_poses(engine: TracingEngine, row: int, lag: float | None) -> Array:
 
 
 def _lagged(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning, lag: float) -> tuple[Array, Array]:
-    """points (n, 4): x, y from the anchor, course, speed; covs (n, 3, 3). NaN where there is nothing."""
+    """Return points (n, 4): x, y from the anchor, course, speed; and covs (n, 3, 3). NaN where there is no belief."""
     points, covs = np.empty((len(nodes), 4)), np.empty((len(nodes), 3, 3))
     most = np.searchsorted(nodes["t_ns"], nodes["t_ns"] + round((lag + 1.0) * 1e9)) - np.arange(len(nodes))
     smooth_lagged(make_track(int(most.max()) + 1), nodes, traces, lag, now.copy(), anchors, t, points, covs)
@@ -65,7 +64,7 @@ def _lagged(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning, 
 
 
 def _all(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning) -> tuple[Array, Array]:
-    """As `_lagged`, from the whole of the data since the engine last began."""
+    """Return what `_lagged` does, from all data since the engine last started."""
     points, covs = np.full((len(nodes), 4), np.nan), np.full((len(nodes), 3, 3), np.nan)
     first = int(np.flatnonzero(traces["count"] == 0).max(initial=-1)) + 1
     nodes, traces = nodes[first:], traces[first:]
@@ -80,7 +79,7 @@ def _all(nodes: Array, traces: Array, now: Array, anchors: Array, t: Tuning) -> 
 
 
 def _reference_variance(nodes: Array, traces: Array, now: Array, heading_class: int, t: Tuning) -> float:
-    """Variance of the error of the heading reference that the model at the end has, in rad^2."""
+    """Return the variance, rad^2, of the heading reference's error by the model at the end."""
     if heading_class == DRIFTING:
         return 0.0
     absolute = nodes["heading_var"][nodes["heading_kind"] == ABSOLUTE_HEADING]
@@ -95,9 +94,10 @@ def _reference_variance(nodes: Array, traces: Array, now: Array, heading_class: 
 
 
 def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_variance: float) -> None:
-    """The hypothesis that began the lineage; with an unknown start bearing, speed and yaw are those found, loosely.
+    """Set the prior to the hypothesis that began the lineage.
 
-    With a given start and a magnetometer that yaw counts from later on, it counts from there all the time.
+    With an unknown start, bearing, speed and yaw are those that were found, with a wide variance. Where yaw counts from
+    a magnetometer later on, it does so from the beginning.
     """
     mean, cov, found = traces["mean"][0, origin].copy(), traces["cov"][0, origin].copy(), track.reference[0]
     if (
@@ -120,7 +120,7 @@ def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_v
 
 
 def _put(poses: Array, points: Array, covs: Array, seen: Array, now: Array, anchors: Array) -> None:
-    """Smoothed numbers into the poses; `seen`: the belief that has seen the data of each."""
+    """Put the smoothed numbers into the poses. seen: BELIEF at the end of the data of each."""
     good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2))
     if now["start"]["known"] == 0:
         std = float(now["settings"]["reference_std"]) if now["heading"]["in_site_frame"] == 1 else ARBITRARY_YAW

@@ -1,4 +1,4 @@
-"""Iterated Kalman smoother over nodes: the state and models of the belief, one hypothesis, all of the nodes at once.
+"""Iterated Kalman smoother of one hypothesis over all nodes, with the state and models of the belief.
 
 About a reference track x~ every node is linear,  x_k = f(x~_{k-1}) + A_k (x_{k-1} - x~_{k-1}) + q_k,  and so is every
 measurement,  z = h(x~_k) + H (x_k - x~_k) + r.  A forward Kalman filter and the backward recursion of Bryson and
@@ -86,7 +86,7 @@ class Track(NamedTuple):
 
 
 def make_track(n: int) -> Track:
-    """Room for n nodes."""
+    """Return room for n nodes."""
     return Track(
         np.zeros((n, N)),
         np.zeros((n, N)),
@@ -157,7 +157,7 @@ def _component(track: Track, k: int, index: int, z: float, variance: float, H: F
 
 @njit(nogil=True)
 def _inertial(track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, H: Floats) -> None:
-    """Heading, standstill, and the bounds on the speed."""
+    """Fuse heading, standstill and the bounds on the speed."""
     s = track.reference[k]
     if uses_heading(row, node) and (row.heading.model != PLATFORM_MODEL or heading_class == EXACT):
         white, _, _ = class_reference_error(row, heading_class, node.heading_var, t)
@@ -191,7 +191,10 @@ def range_residual(s: Floats, node: Node, row: Row, anchors: Anchors, H: Floats)
 
 @njit(nogil=True)
 def fill_shares(share: Floats, e2: float, e: float, clear: float, long: float, t: Tuning) -> float:
-    """Shares of a clear and of a too long range, with these variances; returns the log likelihood. e2: e^2 expected."""
+    """Fill the probabilities that a range is clear and that it is too long. Return the log likelihood.
+
+    e2: expected e^2; clear, long: the variances of the two.
+    """
     spread = e2 - e * e
     inside = (1.0 - t.outlier_probability) * gaussian(math.sqrt(max(e2, 0.0)), clear)
     outside = t.outlier_probability * gaussian(math.sqrt((e - t.outlier_mean) ** 2 + spread), long)
@@ -235,7 +238,7 @@ def _bearing(track: Track, k: int, node: Node, row: Row, anchors: Anchors, H: Fl
 def forward(
     track: Track, nodes: Nodes, row: Row, anchors: Anchors, heading_class: int, t: Tuning, follow: bool
 ) -> float:
-    """Filter about the reference; `follow`: the reference is the filter itself. Returns the log likelihood."""
+    """Filter about the reference, or about the filter itself with `follow`. Return the log likelihood."""
     scratch = (np.zeros(N), np.zeros(N), np.zeros((4, N)))
     H = np.zeros(N)
     likelihood = 0.0
@@ -257,7 +260,7 @@ def forward(
 
 @njit(nogil=True)
 def _step_back_over_measurement(H: Floats, PH: Floats, S: float, e: float, costate: Floats, L: Floats) -> None:
-    """Costate l and its covariance L back over one scalar measurement."""
+    """Step the costate l and its covariance L back over one scalar measurement."""
     g = apply(L, PH) / S
     c = (dot(PH, g) + 1.0) / S
     pull = (dot(PH, costate) + e) / S
@@ -269,7 +272,7 @@ def _step_back_over_measurement(H: Floats, PH: Floats, S: float, e: float, costa
 
 @njit(nogil=True)
 def backward(track: Track, n: int) -> None:
-    """Fill smooth and smooth_cov of the first n nodes from what `forward` left."""
+    """Fill smooth and smooth_cov of the first n nodes from the result of `forward`."""
     costate, L, A = np.zeros(N), np.zeros((N, N)), np.zeros((N, N))
     for k in range(n - 1, -1, -1):
         P = track.cov[k]
@@ -287,7 +290,7 @@ def backward(track: Track, n: int) -> None:
 
 @njit(nogil=True)
 def _relinearise(track: Track, nodes: Nodes, row: Row, anchors: Anchors, t: Tuning) -> float:
-    """The smoothed track becomes the reference, ranges are judged anew; returns the largest step, m."""
+    """Make the smoothed track the reference and update the shares of its ranges. Return the largest step, m."""
     H, PH = np.zeros(N), np.zeros(N)
     largest = 0.0
     for k in range(len(nodes)):
@@ -314,7 +317,7 @@ def smooth(
     follow: bool,
     iterations: int,
 ) -> float:
-    """Iterate from the reference, or from a filter's track (`follow`); returns the log likelihood of the ranges."""
+    """Iterate from the reference, or from a filter's track with `follow`. Return the log likelihood of the ranges."""
     row = rows[0]
     likelihood = -math.inf
     for i in range(iterations):

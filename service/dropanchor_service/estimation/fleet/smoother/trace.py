@@ -1,4 +1,4 @@
-"""What a smoother needs of a run of the engine: its nodes, and the heaviest hypotheses after each of them."""
+"""What a smoother needs from a run of the engine: its nodes, and the heaviest hypotheses after each of them."""
 
 from typing import Final
 
@@ -32,7 +32,7 @@ TRACE: Final = np.dtype(
 
 
 class TracingEngine(FleetEngine):
-    """The engine `fleet`, same poses to the last bit, that remembers all it did: for offline use."""
+    """The engine `fleet` with the same poses, which keeps all nodes and hypotheses. For offline use."""
 
     def __init__(self, tuning: Tuning | None = None) -> None:
         super().__init__(tuning)
@@ -48,11 +48,11 @@ class TracingEngine(FleetEngine):
         return self._anchors
 
     def row(self, row: int) -> Array:
-        """A copy of the ROW (1,) as it is now."""
+        """Return a copy of ROW (1,) as it is now."""
         return self._rows[row : row + 1].copy()
 
     def traced(self, row: int) -> tuple[Array, Array, Array]:
-        """NODE, BELIEF and TRACE of the row's nodes so far, in order of time."""
+        """Return NODE, BELIEF and TRACE of the row's nodes so far, in order of time."""
         empty = (np.zeros(0, NODE), np.zeros(0, BELIEF), np.zeros(0, TRACE))
         nodes, beliefs, traces = (np.concatenate(parts) for parts in zip(empty, *self._steps, strict=True))
         own = nodes["row"] == row
@@ -79,7 +79,7 @@ def advance_traced(
     beliefs: Beliefs,
     traces: Array,
 ) -> None:
-    """`advance`, one node at a time, and a copy of the heaviest hypotheses after each."""
+    """Run `advance` one node at a time, and copy the heaviest hypotheses after each."""
     work = workspace[0].hypotheses
     for k in range(len(nodes)):
         advance(rows, pool, nodes[k : k + 1], anchors, tuning, workspace, beliefs[k : k + 1])
