@@ -11,8 +11,8 @@ import pytest
 from ahrs.filters import AQUA
 
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.paper import attitude
 from dropanchor_service.estimation.paper.attitude import AttitudeFilter, AttitudeParameters, Quaternion
-from dropanchor_service.estimation.paper.engine import attitude
 
 DT = 0.01
 GAIN = 0.02

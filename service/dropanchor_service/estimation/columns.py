@@ -1,4 +1,4 @@
-"""The columns between an engine and the rest: samples in, poses out; one row of state per tag.
+"""What an engine takes and gives: columns of samples in, columns of poses out. A tag is a row number.
 
 Units: SI and rad; times int64 ns on one clock; the site frame is ENU with x east; the body frame is x forward,
 y left, z up. An unknown float is NaN.
@@ -65,7 +65,7 @@ POSE = np.dtype(
         ("t_ns", "i8"),
         ("state", "u1"),
         ("reason", "u1"),
-        ("anchor", "i4"),  # of the last range fused, -1: none
+        ("anchor", "i4"),  # of the last range that was fused, -1: none
         ("range", "f8"),  # that range, as measured
         ("x", "f8"),
         ("y", "f8"),
@@ -108,14 +108,14 @@ INNOVATION = np.dtype(
 
 
 class MeasurementKind(IntEnum):
-    """What an innovation is of; its numbers are in m or rad."""
+    """What an innovation belongs to; it is in m or rad accordingly."""
 
     RANGE = 0
     BEARING = 1
 
 
 class HeadingSource(IntEnum):
-    """AUTO: the IMU where it is sent, else the platform's heading."""
+    """Where the heading comes from. AUTO: from the IMU if there is one, else from the platform."""
 
     AUTO = 0
     IMU = 1
@@ -136,7 +136,7 @@ class State(IntEnum):
 class StateReason(IntEnum):
     """The machine reason of a state."""
 
-    NO_RANGE = 0  # nothing heard yet
+    NO_RANGE = 0  # no range has come yet
     NO_HEADING = 1  # neither attitude nor platform heading yet
     START_UNKNOWN = 2  # the engine cannot find the start by itself
     SEVERAL_MODES = 3  # more than one place explains the data
@@ -146,13 +146,13 @@ class StateReason(IntEnum):
     RANGES_REJECTED = 7
     HEADING_DISTURBED = 8
     UNCERTAIN = 9  # the ellipse has grown too large
-    FAULT = 10  # the row's numbers were not finite; it starts afresh
-    HEADING_UNSURE = 11  # only the direction from the anchor is: the heading may be wrong by a constant
+    FAULT = 10  # the row's numbers were not finite; it starts again
+    HEADING_UNSURE = 11  # the heading may be wrong by a constant, and with it the direction from the anchor
 
 
 @dataclass(frozen=True)
 class SampleBatch:
-    """Samples of many tags. Per row and kind in order of arrival; the engine puts kinds in order of time."""
+    """Samples of many tags, per row and kind in order of arrival. The engine puts the kinds in order of time."""
 
     imu: Array = field(default_factory=lambda: np.empty(0, IMU))
     ranges: Array = field(default_factory=lambda: np.empty(0, RANGE))
@@ -162,7 +162,7 @@ class SampleBatch:
 
 @dataclass(frozen=True)
 class PoseBatch:
-    """poses: POSE, one for every range that was fused or refused, per row in order of time.
+    """poses: POSE, one for every range that was fused or rejected, per row in order of time.
 
     hypotheses: HYPOTHESIS, the modes behind the last pose of each row that is ambiguous.
     innovations: INNOVATION of the likeliest hypothesis, one for every range or bearing that met a running belief, per
@@ -177,34 +177,36 @@ class PoseBatch:
 
 
 class Engine(Protocol):
-    """One estimator instance per row. Not thread-safe: one thread owns an engine."""
+    """One estimator per row. An engine is not thread-safe: one thread owns it."""
 
     name: str
 
     def set_anchors(self, anchors: Array) -> None:
-        """ANCHOR, indexed by the `anchor` columns of samples. Existing indices keep their meaning."""
+        """Set ANCHOR, which the `anchor` columns of samples index. Existing indices keep their meaning."""
 
     def configure(self, row: int, settings: Array) -> None:
-        """Make `row` (any non-negative int, dense) with these TAG_SETTINGS (0-d), or start it afresh with new ones."""
+        """Make `row` (0, 1, 2, …) with these TAG_SETTINGS (0-d), or start it again with new ones."""
 
     def process(self, samples: SampleBatch) -> PoseBatch:
-        """Fuse the samples. Rows must have been configured."""
+        """Fuse the samples. Their rows must be configured."""
 
 
 @runtime_checkable
 class Restorable(Protocol):
-    """An engine whose state can be kept: restored, it gives the same poses to the last bit."""
+    """An engine whose state can be saved. After `restore` it gives the same poses to the last bit."""
 
     def state(self) -> dict[str, Array]:
-        """All that samples have changed, to be copied before the next call. Names and dtypes are the same for every
-        state of one version."""
+        """Return all that samples have changed, to be copied before the next call.
+
+        Names and dtypes are the same for every state of one version.
+        """
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Take over what `state` gave, in an engine that has processed nothing."""
+        """Take over what `state` returned. The engine must not have processed any sample."""
 
 
 def default_settings() -> Array:
-    """TAG_SETTINGS (0-d) of a tag about which nothing is known."""
+    """Return TAG_SETTINGS (0-d) of a tag about which nothing is known."""
     settings = np.zeros((), TAG_SETTINGS)
     settings["range_scale"] = 1.0
     for name in UNKNOWN:

@@ -1,4 +1,4 @@
-"""Poses between two known ones, and a little ahead of the last: POSE (0-d) in and out."""
+"""Poses between two known ones, and shortly after the last one. POSE (0-d) in and out."""
 
 import math
 
@@ -14,7 +14,7 @@ TURN_STD = 0.5  # rad/s², of the yaw rate's change
 
 
 def propagated(pose: Array, t_ns: int) -> Array:
-    """The pose dt s later at constant speed and yaw rate, with m = heading + w dt/2:
+    """Return the pose dt s later at constant speed and yaw rate, with m = heading + w dt/2:
 
         x' = x + v dt cos m,  y' = y + v dt sin m,  heading' = heading + w dt,  P' = F P F^T + G Q G^T,
         Q = diag((SPEED_STD dt)² + (ACCELERATION_STD dt²/2)², (YAW_RATE_STD dt)² + (TURN_STD dt²/2)²),
@@ -40,7 +40,7 @@ def propagated(pose: Array, t_ns: int) -> Array:
 
 
 def interpolated(before: Array, after: Array, t_ns: int) -> Array:
-    """The pose at t_ns between two, linear in all that is continuous; the rest from the one that claims less."""
+    """Return the pose at t_ns between two: linear in continuous fields, the others from the pose that claims less."""
     share = (t_ns - int(before["t_ns"])) / (int(after["t_ns"]) - int(before["t_ns"]))
     between = (before if after["state"] == State.TRACKING else after).copy()
     between["t_ns"] = t_ns
@@ -53,8 +53,9 @@ def interpolated(before: Array, after: Array, t_ns: int) -> Array:
 
 
 def bridged(before: Array, after: Array, t_ns: int) -> Array:
-    """As `interpolated`, over a gap T in which the tag may have accelerated and turned: at the share u of the gap a
-    motion of constant acceleration a is a u (1 - u) T²/2 away from the straight one, so that
+    """Return what `interpolated` does, over a gap T in which the tag may have accelerated and turned.
+
+    At the share u of the gap a motion of constant acceleration a is a u (1 - u) T²/2 off the straight one, so that
 
         P' = P + diag(p², p², h²),  p = ACCELERATION_STD u (1 - u) T²/2,  h = TURN_STD u (1 - u) T²/2 <= pi/sqrt(3),
 

@@ -178,7 +178,7 @@ class RecordingSettings(_Section):
 
 
 class PaperSettings(_Section):
-    """Parameters of the engine `paper`; `estimation/paper_parameters.py` gives names, units and sources."""
+    """Parameters of the engine `paper`; `estimation/paper/parameters.py` gives names, units and sources."""
 
     preset: Literal["published", "tuned"] = Field(
         default="published", description="The values of the paper and its authors, or values for realistic noise."

@@ -47,7 +47,7 @@ class Algorithm1:
     """The filters of one tag. Times are ns on the clock of the samples and must not decrease."""
 
     def __init__(self, parameters: PaperParameters, tag: Tag, faulted: bool = False) -> None:
-        """faulted: the tag's filters had to be thrown away; where the tag is now is not where it started."""
+        """faulted: the filters before these had to be dropped; the tag is no longer where it started."""
         self._p = parameters
         self._tag = tag
         self._faulted = faulted
@@ -57,27 +57,30 @@ class Algorithm1:
         self._attitude_ns: int | None = None  # of the newest attitude fused
         self._tracks: dict[int, RangeTrack] = {}
         self._speed = NAN  # newest estimate from ranges alone, m/s
-        self._heard_ns: int | None = None  # of the newest range
+        self._newest_range_ns: int | None = None  # of the newest range
         self._fused_ns = 0  # of the newest range fused
         self._fused = (-1, NAN)  # its anchor, and the range as measured
         self._lost = False
         self.innovation: Innovation | None = None  # of the last range, None if it met no belief
 
     def take_imu(self, t_ns: int, acc: Vector, gyro: Vector, mag: Vector) -> None:
-        """An IMU sample: line 10; and lines 11-12 with the heading alone while ranges are missing."""
+        """Take an IMU sample: line 10, and lines 11-12 with the heading alone while ranges are missing."""
         self._course.take_imu(t_ns, acc, gyro, mag)
         if self._ekf is not None and (t_ns - self._ekf_ns) * S_PER_NS >= self._p.heading_interval:
             self._advance(self._ekf, t_ns)
 
     def take_heading(self, t_ns: int, heading: float, std: float) -> None:
-        """A heading of the platform, rad, with its standard deviation or NaN."""
+        """Take a heading of the platform, rad, with its standard deviation or NaN."""
         course = self._course.take_platform(t_ns, heading)
         if self._ekf is not None and not self._course.from_imu and self._course.newest is not None:
             self._advance(self._ekf, t_ns)
             self._ekf.update_heading(course, _first_std(std, self._p.heading_std) ** 2)
 
     def take_range(self, t_ns: int, index: int, anchor: Position, measured: float, std: float) -> PoseRow:
-        """A range, m, with its standard deviation or NaN, to the anchor of this index and (x, y, height above tag)."""
+        """Take a range, m, with its standard deviation or NaN. Return the pose after it.
+
+        anchor: (x, y, height above the tag). measured = scale * distance + bias: z and R are those of the distance.
+        """
         z = (measured - self._tag.range_bias) / self._tag.range_scale
         self.innovation = None
         R = (_first_std(std, self._tag.range_std, self._p.range_std) / self._tag.range_scale) ** 2
@@ -89,12 +92,12 @@ class Algorithm1:
             self._correct_speed(self._ekf, t_ns, index, z)
             self._fused_ns, self._fused = t_ns, (index, measured)
         pose = self._pose(t_ns, z)
-        self._heard_ns = t_ns
+        self._newest_range_ns = t_ns
         return pose
 
     @property
     def finite(self) -> bool:
-        """Whether the belief still holds numbers."""
+        """Return whether all numbers of the belief are finite."""
         return self._ekf is None or self._ekf.finite
 
     def _start(self, t_ns: int) -> None:
@@ -170,7 +173,7 @@ class Algorithm1:
         return (t_ns, state, reason, *self._fused, x, y, heading, v, w, cov, NAN, sigma, NAN)
 
     def pose_before_start(self, t_ns: int) -> PoseRow:
-        """The pose of a tag that may be anywhere."""
+        """Return the pose of a tag that may be anywhere."""
         state, reason = self._state_before_start()
         course = self._course.newest
         heading = NAN if course is None else wrapped(course[1] - self._tag.mount_angle)
@@ -189,7 +192,7 @@ class Algorithm1:
         backwards is believed to, the mark of the mirror image (p, v) -> (-p, -v); or sigma_pos too large for use.
         """
         p = self._p
-        silent = self._heard_ns is not None and (t_ns - self._heard_ns) * S_PER_NS > p.coasting_after
+        silent = self._newest_range_ns is not None and (t_ns - self._newest_range_ns) * S_PER_NS > p.coasting_after
         why = StateReason.RANGES_MISSING if silent else StateReason.RANGES_REJECTED
         if self._lost:
             return State.LOST, why
@@ -206,5 +209,5 @@ class Algorithm1:
 
 
 def _first_std(*candidates: float) -> float:
-    """The first that can be a standard deviation: the sample's own, else the tag's, else the default."""
+    """Return the first that can be a standard deviation: the sample's own, the tag's, or the default."""
     return next(s for s in candidates if 0 < s < LARGEST_STD)

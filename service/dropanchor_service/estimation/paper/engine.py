@@ -1,7 +1,7 @@
 """The engine `paper`: Algorithm 1 of "Accurate position tracking with a single UWB anchor", one instance per tag.
 
-It is written to be read beside the paper and to be compared with, not to be fast. Its filter has one mode and does
-not know of the mirror image of its track, so `p_mode` and `sigma_obs` of its poses are NaN.
+It is written to be read beside the paper, not to be fast. Its filter has one mode and does not know the mirror image of
+its track, so `p_mode` and `sigma_obs` of its poses are NaN.
 """
 
 import math
@@ -33,7 +33,7 @@ Event = tuple[int, int, int, tuple[Any, ...]]
 
 
 class PaperEngine:
-    """Implements `Engine`."""
+    """Implement `Engine`."""
 
     name = "paper"
 
@@ -45,26 +45,26 @@ class PaperEngine:
         self._times: dict[int, int] = {}  # of the newest sample of each row, ns
 
     def set_anchors(self, anchors: Array) -> None:
-        """ANCHOR, indexed by the `anchor` columns of samples."""
+        """Set ANCHOR, which the `anchor` columns of samples index."""
         self._anchors = anchors.astype(ANCHOR).tolist()
 
     def configure(self, row: int, settings: Array) -> None:
-        """Make `row` with these TAG_SETTINGS (0-d), or start it afresh with new ones."""
+        """Make `row` with these TAG_SETTINGS (0-d), or start it again with new ones."""
         self._tags[row] = Tag.of(settings)
         self._filters[row] = Algorithm1(self._parameters, self._tags[row])
         self._times.pop(row, None)
 
     def process(self, samples: SampleBatch) -> PoseBatch:
-        """Take the samples of each row in order of time; what is older than its row is late and not used.
+        """Take the samples of each row in order of time. A sample older than its row's newest is late and not used.
 
-        Bearings are not part of the paper and are passed over.
+        Bearings are not part of the paper and are ignored.
         """
         rejected: Counter[str] = Counter()
         poses = []
         innovations: list[tuple[Any, ...]] = []
-        with np.errstate(all="ignore"):  # numbers out of bounds are a fault of their row, not a warning
+        with np.errstate(all="ignore"):  # numbers out of range are a fault of their row, not a warning
             for event in _in_order(samples):
-                reason = self._refusal(event)
+                reason = self._rejection(event)
                 if reason is not None:
                     rejected[reason] += 1
                     continue
@@ -75,17 +75,17 @@ class PaperEngine:
         return PoseBatch(np.array(poses, POSE), innovations=np.array(innovations, INNOVATION), rejected=dict(rejected))
 
     def _innovation(self, event: Event) -> Iterator[tuple[Any, ...]]:
-        """INNOVATION of a range that met a belief, in metres as measured."""
+        """Yield INNOVATION of a range that met a belief, in metres as measured."""
         row, t_ns, _, (anchor, measured, _) = event
-        told = self._filters[row].innovation
-        if told is not None:
+        innovation = self._filters[row].innovation
+        if innovation is not None:
             scale = self._tags[row].range_scale
-            y = told.y * scale
-            S = told.S * scale**2
-            yield row, t_ns, MeasurementKind.RANGE, anchor, measured, measured - y, y, S, math.nan, told.fused
+            y = innovation.y * scale
+            S = innovation.S * scale**2
+            yield row, t_ns, MeasurementKind.RANGE, anchor, measured, measured - y, y, S, math.nan, innovation.fused
 
-    def _refusal(self, event: Event) -> str | None:
-        """Why a sample is not used. Values are screened before; this keeps the state safe all the same."""
+    def _rejection(self, event: Event) -> str | None:
+        """Return why a sample is not used, or None. The ingest screens values first; this keeps the state safe."""
         row, t_ns, kind, values = event
         if t_ns < self._times.get(row, t_ns):
             return "late"
@@ -94,7 +94,7 @@ class PaperEngine:
         return _fault_of(kind, values)
 
     def _take(self, event: Event) -> PoseRow | None:
-        """One sample into its row. Numbers that blow up cost the row its state, and no other row anything."""
+        """Take one sample into its row. Numbers that overflow cost that row its state, and no other row anything."""
         row, t_ns, kind, _ = event
         self._times[row] = t_ns
         try:
@@ -122,7 +122,7 @@ class PaperEngine:
 
 
 def _in_order(samples: SampleBatch) -> Iterator[Event]:
-    """All samples by row, then time, then kind; what is equal in all three stays in order of arrival."""
+    """Yield all samples by row, then time, then kind, then arrival."""
     events: list[Event] = []
     for kind, columns, names in (
         (IMU, samples.imu, ("acc", "gyro", "mag")),
@@ -137,7 +137,7 @@ def _in_order(samples: SampleBatch) -> Iterator[Event]:
 
 
 def _fault_of(kind: int, values: tuple[Any, ...]) -> str | None:
-    """What is wrong with the numbers that a sample must have; a magnetic field and a std may be missing."""
+    """Return what is wrong with the numbers of a sample, or None. A magnetic field and a std may be missing."""
     needed = (*values[0], *values[1]) if kind == IMU else values[:1] if kind == HEADING else values[1:2]
     if not all(map(math.isfinite, needed)):
         return "not_finite"

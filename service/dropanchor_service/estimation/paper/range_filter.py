@@ -24,7 +24,7 @@ class RangeFilter:
         self._filter.H = np.eye(1)
 
     def step(self, dt: float, z: float) -> float:
-        """The smoothed range, m, after the range z, m, dt s after the one before."""
+        """Return the smoothed range, m, after a range z, m, that comes dt s after the one before."""
         self._filter.predict(Q=np.array([[self._q * dt]]))
         self._filter.update(z)
         return float(self._filter.x[0, 0])

@@ -8,13 +8,13 @@ from dropanchor_service.estimation.columns import Array
 
 @dataclass(frozen=True)
 class Tag:
-    """TAG_SETTINGS."""
+    """The fields of TAG_SETTINGS that the paper's engine uses."""
 
     height: float  # m
     range_std: float  # m, NaN: not given
     range_bias: float  # m
     range_scale: float
-    mount_angle: float  # rad; not known: 0
+    mount_angle: float  # rad; 0 if it is not known
     reverse_allowed: bool  # the published filter does not use it; it only judges the state
     heading_source: int
     start_known: bool
@@ -26,7 +26,7 @@ class Tag:
 
     @classmethod
     def of(cls, settings: Array) -> "Tag":
-        """From TAG_SETTINGS (0-d)."""
+        """Return the tag with these TAG_SETTINGS (0-d)."""
         values = {name: settings[name].item() for name in cls.__dataclass_fields__}
         if not math.isfinite(values["mount_angle"]):
             values["mount_angle"] = 0.0
