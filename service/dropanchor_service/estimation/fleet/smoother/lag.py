@@ -15,8 +15,9 @@ from dropanchor_service.estimation.fleet.belief.layout import Anchors, Floats, R
 from dropanchor_service.estimation.fleet.belief.summary import course_of, planar_covariance
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Nodes
-from dropanchor_service.estimation.fleet.smoother.smoother import Track, smooth
+from dropanchor_service.estimation.fleet.smoother.smoother import smooth
 from dropanchor_service.estimation.fleet.smoother.trace import TRACED
+from dropanchor_service.estimation.fleet.smoother.track import Track
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 STRIDE: Final = 0.095  # s

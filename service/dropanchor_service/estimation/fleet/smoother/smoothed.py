@@ -22,8 +22,9 @@ from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, 
 from dropanchor_service.estimation.fleet.outputs import poses_of
 from dropanchor_service.estimation.fleet.smoother.lag import all_to_planar, smooth_lagged
 from dropanchor_service.estimation.fleet.smoother.lineage import trace_lineage
-from dropanchor_service.estimation.fleet.smoother.smoother import Track, make_track, smooth
+from dropanchor_service.estimation.fleet.smoother.smoother import smooth
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
+from dropanchor_service.estimation.fleet.smoother.track import Track, make_track
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 ITERATIONS = 20

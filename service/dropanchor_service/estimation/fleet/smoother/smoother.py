@@ -15,10 +15,9 @@ at first, then from the smoothed residual (expectation-maximisation), and weight
 """
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
@@ -57,52 +56,13 @@ from dropanchor_service.estimation.fleet.belief.update import (
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
 from dropanchor_service.estimation.fleet.smoother.products import apply, dot, multiply
+from dropanchor_service.estimation.fleet.smoother.track import Track
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-MEASUREMENTS: Final = 5  # of one node: heading, speed and gyro at rest, bound of the speed, range or bearing
 BOUND_STD: Final = 0.05  # m/s, softness of the bounds on the speed
 BEARING_STD: Final = 0.1  # rad, of a bearing whose std is not told
 NLOS_STD: Final = 1.1  # m, of a range offset that appears or goes: the outlier's mean and spread
 CONVERGED: Final = 1e-3  # m
-
-
-class Track(NamedTuple):
-    """One hypothesis over up to n nodes. mean[0], cov[0]: the prior at node 0, whose measurements are not used."""
-
-    reference: Floats  # (n, N)
-    mean: Floats  # (n, N) filtered
-    cov: Floats  # (n, N, N)
-    F: Floats  # (n, 4, N)
-    decay: Floats  # (n, N)
-    used: npt.NDArray[np.int32]  # (n,) measurements of the node
-    H: Floats  # (n, MEASUREMENTS, N)
-    PH: Floats  # (n, MEASUREMENTS, N)
-    S: Floats  # (n, MEASUREMENTS)
-    e: Floats  # (n, MEASUREMENTS)
-    share: Floats  # (n, 2) probability that the range is clear, and that it is too long
-    nlos: npt.NDArray[np.int32]  # (n,) 1: there is no line of sight
-    smooth: Floats  # (n, N)
-    smooth_cov: Floats  # (n, N, N)
-
-
-def make_track(n: int) -> Track:
-    """Return room for n nodes."""
-    return Track(
-        np.zeros((n, N)),
-        np.zeros((n, N)),
-        np.zeros((n, N, N)),
-        np.zeros((n, 4, N)),
-        np.ones((n, N)),
-        np.zeros(n, np.int32),
-        np.zeros((n, MEASUREMENTS, N)),
-        np.zeros((n, MEASUREMENTS, N)),
-        np.ones((n, MEASUREMENTS)),
-        np.zeros((n, MEASUREMENTS)),
-        np.tile([1.0, 0.0], (n, 1)),
-        np.zeros(n, np.int32),
-        np.zeros((n, N)),
-        np.zeros((n, N, N)),
-    )
 
 
 @njit(nogil=True)

@@ -11,8 +11,9 @@ from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, RANGE_BI
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import NODE, RANGE
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
-from dropanchor_service.estimation.fleet.smoother.smoother import Track, make_track, smooth
+from dropanchor_service.estimation.fleet.smoother.smoother import smooth
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
+from dropanchor_service.estimation.fleet.smoother.track import Track, make_track
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from service.estimation.fleet.test_fleet_engine import cut, engine, error_of, in_pieces, samples, settings
 from service.estimation.fleet.tracks import CALIBRATED
