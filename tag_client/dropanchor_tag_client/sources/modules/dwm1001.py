@@ -12,7 +12,7 @@ from dropanchor_tag_client.sources.modules.report import Drop, Range, Report, pl
 
 _NUMBER = r"-?\d{1,4}\.\d{2}"
 _ID = r"[0-9A-F]{4}"
-_DIST = re.compile(r"DIST,(\d{1,2}),(.*)")
+_DIST = re.compile(r"DIST,(\d{1,2})(?:,(.*))?")
 _LEC_ANCHOR = re.compile(rf"AN(\d{{1,2}}),({_ID}),{_NUMBER},{_NUMBER},{_NUMBER},({_NUMBER})(?:,|$)")
 _LEC_END = re.compile(rf"(?:POS,{_NUMBER},{_NUMBER},{_NUMBER},\d{{1,3}})?")
 _LES_ANCHOR = re.compile(rf"({_ID})\[{_NUMBER},{_NUMBER},{_NUMBER}\]=({_NUMBER})(?: |$)")
@@ -56,7 +56,7 @@ def _lec(text: str) -> _Anchors | None:
     head = _DIST.fullmatch(text)
     if head is None:
         return None
-    rest, anchors = head[2], _Anchors()
+    rest, anchors = head[2] or "", _Anchors()
     while found := _LEC_ANCHOR.match(rest):
         if int(found[1]) != len(anchors):
             return None

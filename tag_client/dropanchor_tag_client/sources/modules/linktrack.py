@@ -11,7 +11,7 @@ from collections import Counter
 from dropanchor_tag_client.sources.modules.report import Drop, Imu, Range, Report, plausible
 
 _HEADER = 0x55
-_MIN_LENGTH, _MAX_LENGTH = 8, 4096
+_MIN_LENGTH, _MAX_LENGTH = 8, 1024  # the longest frame has some 650 bytes
 _ANCHOR, _TAG = 1, 2
 _G_MAX, _GYRO_MAX = 400.0, 100.0  # m/s², rad/s: beyond what the sensor can say
 
