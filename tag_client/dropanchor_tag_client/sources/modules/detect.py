@@ -21,15 +21,14 @@ def detect(port: serial.Serial, baud: int | None, say: Callable[[str], None]) ->
         heard = dict.fromkeys(rates, 0)
         for rate in rates:
             port.baudrate = rate
-            for candidate in (None, *(module for module in MODULES.values() if module.baud == rate and module.wake)):
-                if candidate is not None and heard[rate]:
-                    break  # something talks, but not at this rate, or not in a way that is known: do not disturb it
-                if candidate is not None:
+            found, heard[rate] = yield from _listen(port)
+            silent = () if heard[rate] else (module for module in MODULES.values() if module.baud == rate)
+            for candidate in silent:  # what talks in a way that is not known is not disturbed
+                if found is None and candidate.wake:
                     yield from write(port, candidate.wake)
-                found, heard_bytes = yield from _listen(port)
-                heard[rate] += heard_bytes
-                if found is not None:
-                    return found
+                    found, _ = yield from _listen(port)
+            if found is not None:
+                return found
         say(f"{port.port}: no module recognised yet ({_what_was_heard(heard)}). --module says which it is.")
 
 

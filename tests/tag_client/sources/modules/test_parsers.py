@@ -48,7 +48,7 @@ def test_what_a_module_is_documented_to_print_becomes_its_ranges(
 ) -> None:
     whole = parser()
     assert parsed(whole, text) == [expected]
-    assert whole.dropped.total() == (said.NOTIFICATION_FOUR == text)
+    assert whole.dropped.total() == (text == said.NOTIFICATION_FOUR)
 
 
 @pytest.mark.parametrize(("parser", "text", "expected"), DOCUMENTED)
