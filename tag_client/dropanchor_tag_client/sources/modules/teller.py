@@ -51,7 +51,7 @@ class Teller:
         self.say(f"left out: {_counts(news)}{''.join(f' ({_HINTS[r]})' for r in news if r in _HINTS)}")
 
     def summary(self, dropped: Counter[Drop]) -> str:
-        left_out = f"; left out: {_counts(dropped)}" if dropped else ""
+        left_out = f"; left out: {_counts(dropped)}" if dropped.total() else ""
         return f"{self.ranges} ranges and {self.imu} IMU samples published{left_out}"
 
     def _speak(self) -> None:
