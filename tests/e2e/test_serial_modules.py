@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from math import hypot
 from pathlib import Path
+from random import gauss
 from threading import Event, Thread
 
 import pytest
@@ -39,7 +40,7 @@ def makerfabs(range_m: float) -> bytes:
 
 
 def linktrack(range_m: float) -> bytes:
-    frame = bytearray(struct.pack("<BBHBB 34x 6f 38x", 0x55, 4, 133, 2, 1, 0, 0, 0, 0, 0, 9.81))
+    frame = bytearray(struct.pack("<BBHBB 34x 6f 38x", 0x55, 4, 133, 2, 1, 0, 0, 0, 0, 0, gauss(9.81, 0.02)))
     frame += struct.pack("<I 12x B", time.monotonic_ns() // 1_000_000 % 2**32, 1)
     frame += struct.pack("<BB", 1, 7) + round(range_m * 1000).to_bytes(3, "little") + bytes(8)
     return bytes(frame) + bytes([sum(frame) & 0xFF])
@@ -60,7 +61,7 @@ def publish_imu(endpoint: str, stop: Event) -> None:
         clients = [stack.enter_context(TagClient(tag, connect=endpoint)) for tag in MODULES if tag != "linktrack"]
         while not stop.wait(0.02):
             for client in clients:
-                client.publish_imu((0.0, 0.0, 9.81), (0.0, 0.0, 0.0), (20.0, 0.0, -40.0))
+                client.publish_imu((0.0, 0.0, gauss(9.81, 0.02)), (0.0, 0.0, gauss(0.0, 1e-3)), (20.0, 0.0, -40.0))
 
 
 def moving(text: Callable[[float], bytes], began_s: float) -> Answer:
