@@ -135,6 +135,13 @@ class Frame:
         return [sample.t_ns for group in groups for sample in group]
 
 
+def payload_encoding(zenoh_encoding: str) -> str:
+    """Return the encoding of a payload from the Zenoh encoding of its message.
+
+    zenoh-pico cannot send an encoding that Zenoh has no number for: it sends it as the schema of `zenoh/bytes`."""
+    return zenoh_encoding.removeprefix("zenoh/bytes;")
+
+
 def anchor_number(anchor: int | str) -> int:
     """The u32 that names an anchor in packed payloads.
 

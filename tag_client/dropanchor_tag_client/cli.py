@@ -13,12 +13,17 @@ from dropanchor_tag_client.recording import RecordingError
 from dropanchor_tag_client.session import ConnectError
 
 _TEACH = argparse.RawDescriptionHelpFormatter
+_EXTRAS = {
+    "numpy": ("the simulator needs numpy", "numpy"),
+    "serial": ("modules on a serial port need pyserial", "pyserial"),
+}
 _INTERRUPTED, _TERMINATED = 130, 143
 
 _EXAMPLES = """examples:
   dropanchor-tag simulate                                     tags that drive around the anchor
   dropanchor-tag replay recordings/yard --anchor 1            a recording, in real time
   dropanchor-tag replay recordings/yard --speed 10 --tag cart ten times as fast, as the tag "cart"
+  dropanchor-tag serial /dev/ttyACM0 --tag cart               a UWB module on a serial port
   echo '{"anchor": 1, "range_m": 3.21}' | dropanchor-tag publish --tag cart
 
 `dropanchor-tag COMMAND --help` explains each of them.
@@ -46,6 +51,18 @@ example:
   my_uwb_reader | dropanchor-tag publish --tag cart
   my_uwb_reader | dropanchor-tag publish --credentials cart/      with the folder that `dropanchor tag add cart` made
 """
+_SERIAL = """Publishes what a UWB module on a serial port reports: the module is a tag, or an anchor that hears tags."""
+_SERIAL_EXAMPLES = """examples:
+  dropanchor-tag serial /dev/ttyACM0 --tag cart-1                       finds out which module it is
+  dropanchor-tag serial /dev/ttyACM0 --tag cart-1 --module dwm1001 --name 022E=yard
+                                                                        anchor 022E is the site's anchor "yard"
+  dropanchor-tag serial /dev/ttyACM0 --tag cart-1 --module dwm3001 --start "INITF -ADDR=0 -PADDR=1"
+  dropanchor-tag serial /dev/ttyUSB0 --tag arm-1 --module linktrack --forward=-x --up=y
+  dropanchor-tag serial /dev/ttyUSB0 --tag-from-id --tag cart-          the module is the anchor: tags cart-0, cart-1, …
+
+It names the anchors that it hears; the site must know them by these names. It goes on when the module is unplugged and
+comes back. What it leaves out, and why, it says at most once per second.
+"""
 _SIMULATE = """Publishes what the sensors of simulated tags measure while they drive around one anchor."""
 _SIMULATE_EXAMPLES = """examples:
   dropanchor-tag simulate --tags 5                              five tags, live, until Ctrl-C
@@ -64,9 +81,10 @@ def main(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _INTERRUPTED
     except ModuleNotFoundError as error:
-        if error.name != "numpy":
+        if error.name not in _EXTRAS:
             raise
-        return _failed(f"the simulator needs numpy: {shlex.quote(sys.executable)} -m pip install numpy")
+        needs, package = _EXTRAS[error.name]
+        return _failed(f"{needs}: {shlex.quote(sys.executable)} -m pip install {package}")
     except (ConnectError, RecordingError, ValueError) as error:
         return _failed(str(error))
 
@@ -84,6 +102,7 @@ def parser(command: str) -> argparse.ArgumentParser:
         ("replay", _REPLAY, _REPLAY_EXAMPLES),
         ("simulate", _SIMULATE, _SIMULATE_EXAMPLES),
         ("publish", _PUBLISH, _PUBLISH_EXAMPLES),
+        ("serial", _SERIAL, _SERIAL_EXAMPLES),
     ):
         one = commands.add_parser(name, help=about, description=about, epilog=examples, formatter_class=_TEACH)
         if name == command:

@@ -110,6 +110,12 @@ def test_one_query_with_wildcards_asks_for_many_tags_and_each_answer_has_its_own
     assert list(ask(session, f"{keys.PREFIX}/default/tag/a$*/pose")) == [keys.pose_key("default", "a")]
 
 
+def test_samples_in_the_encoding_that_zenoh_pico_sends_are_used(service: Running, session: zenoh.Session) -> None:
+    frame, encoding = straight_north(3), f"zenoh/bytes;{ENCODING_PACKED}"
+    session.put(keys.samples_key("default", "pico"), encode_packed(frame), encoding=encoding)
+    wait_until(lambda: samples_of(service, "pico") == {"imu": 3, "range": 3, "heading": 3})
+
+
 def test_a_query_that_has_no_answer_says_why(session: zenoh.Session) -> None:
     assert ask(session, keys.pose_key("default", "nobody")) == {"error": {"error": "no tag 'nobody' is known"}}
     assert "anchor '99'" in str(ask(session, keys.anchor_key("default", "99"))["error"])

@@ -7,7 +7,7 @@ import zenoh
 import zenoh.ext
 
 from dropanchor_schemas import decode_json, keys
-from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed
+from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed, payload_encoding
 from support.zenoh_router import connected_session
 
 
@@ -19,7 +19,7 @@ class Heard:
         self.keys: list[str] = []
 
     def take(self, message: zenoh.Sample) -> None:
-        packed = str(message.encoding) == ENCODING_PACKED
+        packed = payload_encoding(str(message.encoding)) == ENCODING_PACKED
         frame = (decode_packed if packed else decode_json)(bytes(message.payload))
         assert isinstance(frame, Frame), frame
         self.frames.append(frame)

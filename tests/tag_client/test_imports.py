@@ -30,8 +30,8 @@ def test_publishing_loads_neither_numpy_nor_pydantic(encoding: str) -> None:
     assert heavy_in(done.stdout) == set()
 
 
-@pytest.mark.parametrize("source", ["replay", "publish"])
-def test_the_commands_for_recordings_and_scripts_load_neither_as_well(source: str) -> None:
+@pytest.mark.parametrize("source", ["replay", "publish", "serial"])
+def test_the_commands_for_recordings_scripts_and_modules_load_neither_as_well(source: str) -> None:
     done = python(
         "-c", f"import sys, dropanchor_tag_client.cli, dropanchor_tag_client.sources.{source}\nprint(*sys.modules)"
     )

@@ -18,6 +18,7 @@ import numpy as np
 import zenoh
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.wire import payload_encoding
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.ingest.publishers import Publishers, SequenceState
@@ -164,7 +165,8 @@ class ZenohCaches:
         message = reply.ok
         if message is not None:
             now_ns = self._clock.now_ns()
-            self.catch_up.fetch(str(message.key_expr), bytes(message.payload), str(message.encoding), now_ns)
+            encoding = payload_encoding(str(message.encoding))
+            self.catch_up.fetch(str(message.key_expr), bytes(message.payload), encoding, now_ns)
 
     def _finish(self, answered: Callable[[], int], asked_s: float) -> None:
         messages = answered()

@@ -13,6 +13,7 @@ import zenoh
 import zenoh.ext
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.wire import payload_encoding
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.turn import Ingest
@@ -87,7 +88,8 @@ class ZenohIntake:
 
     def _hear(self, message: zenoh.Sample) -> None:
         now_ns = self._clock.now_ns()
-        self._caches.catch_up.hear(str(message.key_expr), bytes(message.payload), str(message.encoding), now_ns)
+        encoding = payload_encoding(str(message.encoding))
+        self._caches.catch_up.hear(str(message.key_expr), bytes(message.payload), encoding, now_ns)
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)

@@ -1,0 +1,108 @@
+"""A UWB module on a serial port is a tag, or an anchor that reports the ranges of several tags."""
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+
+from dropanchor_tag_client.options import add_connection_options, opened_client, opened_session
+from dropanchor_tag_client.sources.axes import AXES, mounting
+from dropanchor_tag_client.sources.modules.catalogue import MODULES
+from dropanchor_tag_client.sources.modules.detect import Arrived
+from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
+from dropanchor_tag_client.sources.modules.outlet import ManyTags, OneTag, Outlet
+from dropanchor_tag_client.sources.modules.reader import Reader
+from dropanchor_tag_client.sources.modules.teller import Teller
+
+_FLUSH_S = 0.1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("port", metavar="PORT", help="such as /dev/ttyACM0 or /dev/serial/by-id/…; COM3 on Windows")
+    parser.add_argument("--tag", help="id of the tag (default: the one of --credentials)")
+    parser.add_argument(
+        "--module", choices=["auto", *MODULES], default="auto", help="auto: listen and find out (default: %(default)s)"
+    )
+    parser.add_argument("--baud", type=int, help="baud rate (default: as the module is delivered)")
+    parser.add_argument("--start", metavar="COMMAND", help="what to send to a module that reports nothing")
+    parser.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        metavar="ID=NAME",
+        help="the site's NAME of the anchor that the module calls ID; may be given several times",
+    )
+    gateway = parser.add_argument_group("when the module is an anchor")
+    gateway.add_argument(
+        "--tag-from-id", action="store_true", help="publish each tag that it reports under its own id, after --tag"
+    )
+    gateway.add_argument("--as-anchor", metavar="NAME", help="the module is this anchor, what it names are tags")
+    imu = parser.add_argument_group("how its IMU is mounted")
+    imu.add_argument(
+        "--forward", choices=AXES, default="x", help="the axis that points forward; --forward=-y (default: %(default)s)"
+    )
+    imu.add_argument("--up", choices=AXES, default="z", help="the axis that points up (default: %(default)s)")
+    add_connection_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Raises PortError, ConnectError, ValueError. Runs until it is interrupted."""
+    _check(arguments)
+    teller = Teller()
+    module = MODULES.get(arguments.module)
+    reader = Reader(arguments.port, module, arguments.baud, arguments.start, teller.say)
+    reports = reader.reports()
+    next(reports)  # a port that cannot be opened is said before the router is waited for
+    try:
+        with _outlet(arguments, teller) as outlet:
+            publish(reader, reports, outlet, teller)
+    finally:
+        sys.stderr.write(f"{teller.summary(reader.dropped)}\n")
+    return 0
+
+
+def publish(reader: Reader, reports: Iterator[Arrived], outlet: Outlet, teller: Teller) -> None:
+    """Publish whatever comes, for ever."""
+    clock, flushed_s = DeviceClock(), time.monotonic()
+    for arrival_ns, found in reports:
+        for report in found:
+            t_ns = arrival_ns if report.device_ms is None else clock.utc_ns(arrival_ns, report.device_ms)
+            outlet.publish(report, t_ns)
+        if time.monotonic() - flushed_s > _FLUSH_S:
+            flushed_s = time.monotonic()
+            outlet.flush()
+            teller.tell_dropped(reader.dropped)
+
+
+@contextmanager
+def _outlet(arguments: argparse.Namespace, teller: Teller) -> Iterator[Outlet]:
+    names = dict(_name(text) for text in arguments.name)
+    mounted = mounting(arguments.forward, arguments.up)
+    with ExitStack() as stack:
+        if not arguments.tag_from_id:
+            client = stack.enter_context(opened_client(arguments, arguments.tag))
+            yield OneTag(client, names, mounted, teller)
+            return
+        session = stack.enter_context(opened_session(arguments))
+        options = {"site": arguments.site, "connect": session, "encoding": arguments.encoding, "batch_s": None}
+        many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, teller)
+        stack.callback(many.close)
+        yield many
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    if arguments.tag is None and not arguments.tag_from_id:
+        raise ValueError("whose ranges are these? --tag says so, or --credentials, or --tag-from-id")
+    if arguments.as_anchor is not None and not arguments.tag_from_id:
+        raise ValueError("--as-anchor needs --tag-from-id")
+    mounting(arguments.forward, arguments.up)
+    for text in arguments.name:
+        _name(text)
+
+
+def _name(text: str) -> tuple[str, str]:
+    called, equals, name = text.partition("=")
+    if not called or not equals or not name:
+        raise ValueError(f"--name {text}: ID=NAME was expected, such as 022E=yard")
+    return called, name

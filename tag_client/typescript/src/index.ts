@@ -1,0 +1,3 @@
+export * from "./api.js";
+export * from "./keys.js";
+export * from "./samples.js";

@@ -1,0 +1,64 @@
+"""The example for microcontrollers against the real zenoh-pico, where there is one."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from support.listening import listening
+from support.zenoh_router import wait_until
+
+EXAMPLES = Path(__file__).parents[3] / "tag_client/c/examples"
+SOURCES = ("zenoh_pico_tag.c", "posix_main.c")
+WARNINGS = ("-std=gnu11", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-DZENOH_LINUX")
+PREFIXES = [os.environ.get("ZENOH_PICO_PREFIX", ""), "/usr/local", "/usr"]
+
+
+def prefix() -> Path:
+    """Where zenoh-pico is installed."""
+    for folder in PREFIXES:
+        if folder and (Path(folder) / "include/zenoh-pico.h").is_file():
+            return Path(folder)
+    pytest.skip("zenoh-pico is not installed: set ZENOH_PICO_PREFIX to where its include/zenoh-pico.h is")
+
+
+def compiler() -> str:
+    found = shutil.which("gcc") or shutil.which("clang")
+    if found is None:
+        pytest.skip("there is no C compiler: gcc or clang is needed to compile the example")
+    return found
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_the_example_compiles_without_a_warning(tmp_path: Path, source: str) -> None:
+    include = f"-isystem{prefix() / 'include'}"
+    command = [compiler(), *WARNINGS, include, "-c", str(EXAMPLES / source), "-o", str(tmp_path / "example.o")]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+
+
+def test_the_example_publishes_ranges_and_imu_samples(tmp_path: Path, router_endpoint: str) -> None:
+    library = prefix() / "lib/libzenohpico.a"
+    if not library.is_file():
+        pytest.skip(f"{library} is not there: the example can be compiled but not run")
+    program = tmp_path / "tag"
+    sources = [str(EXAMPLES / source) for source in SOURCES]
+    include = f"-isystem{prefix() / 'include'}"
+    command = [compiler(), *WARNINGS, include, *sources, str(library), "-lm", "-lpthread", "-o", str(program)]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr
+    with listening(router_endpoint) as heard:
+        process = subprocess.Popen([program, router_endpoint, "cart-1"])
+        try:
+            wait_until(lambda: len(heard.ranges()) >= 10)
+        finally:
+            process.kill()
+            process.wait()
+    assert {key.split("/")[-2] for key in heard.keys} == {"cart-1"}
+    numbers = [frame.sequence or 0 for frame in heard.frames]  # the first may be gone before anybody is known to listen
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers)))
+    assert len({frame.boot_id for frame in heard.frames}) == 1
+    assert all(frame.boot_clock for frame in heard.frames)
+    assert heard.frames[-1].imu[0].acc == pytest.approx((0.0, 0.2, 9.81))
