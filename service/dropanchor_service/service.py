@@ -12,6 +12,7 @@ from typing import Self
 import zenoh
 from pydantic import ValidationError
 
+from dropanchor_schemas.keys import samples_key
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
@@ -24,7 +25,9 @@ from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
+from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
@@ -35,6 +38,7 @@ from dropanchor_service.security.credentials import authenticator_of, certificat
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
 from dropanchor_service.zenoh_io.intake import ZenohIntake
@@ -76,10 +80,12 @@ class Service:
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         engine = GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics)
+        self._publishers = Publishers()
         self._ingest = Ingest(
             self._buffer,
             Admission(settings, self.site, self.tags, pending_tags),
             engine,
+            self._publishers,
             self.site,
             self.tags,
             self.latest,
@@ -174,7 +180,7 @@ class Service:
         folder = self._settings.data_dir
         if folder is None or not engine.keeps_state:
             return None
-        state = ServiceState(self.site, self.tags, self.latest, engine, self._ingest.reader.publishers)
+        state = ServiceState(self.site, self.tags, self.latest, engine, self._publishers)
         kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
         return CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
@@ -187,20 +193,32 @@ class Service:
     def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
         return [
-            ZenohIntake(
-                session,
-                self.site.site.id,
-                self._buffer,
-                self._ingest,
-                self.tags,
-                self.metrics,
-                self.clock,
-                self._settings.max_tags,
-                self._ingest.reader.publishers,
-            ),
+            self._intake(session),
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),
         ]
+
+    def _intake(self, session: zenoh.Session) -> ZenohIntake:
+        site = self.site.site.id
+        caches = ZenohCaches(session, site, self.tags, self.metrics, self.clock)
+        catch_up = CatchUp(
+            self._buffer,
+            expected=[samples_key(site, tag.name) for tag in self.tags.all()],
+            states_of=sequence_states(self.tags, self._publishers),
+            ask=caches.ask,
+            new_publisher_limit=caches.new_publisher_limit,
+        )
+        return ZenohIntake(
+            session,
+            site,
+            self._ingest,
+            catch_up,
+            caches,
+            self.tags,
+            self.metrics,
+            self.clock,
+            self._settings.max_tags,
+        )
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         app = create_app(

@@ -70,14 +70,14 @@ class Run:
 
     def catch_up(self, cached: Iterable[Message], live: Iterable[Message], asked_ns: int) -> None:
         """Fetch what was missed from caches, which answer at `asked_ns`; what is live waits for that."""
-        publishers, tags = self.bench.ingest.reader.publishers, self.bench.tags
-        passed = {samples_key("default", tag.name): publishers.sequence_states(tag.row) for tag in tags.all()}
-        caught = CatchUp(self.bench.buffer, KEYS, lambda key: passed[key], lambda *_: None, 1000)
+        publishers, tags = self.bench.publishers, self.bench.tags
+        states = {samples_key("default", tag.name): publishers.sequence_states(tag.row) for tag in tags.all()}
+        caught = CatchUp(self.bench.buffer, KEYS, lambda key: states[key], lambda *_: None, 1000)
         for message in live:
-            caught.hear(samples_key("default", message.tag), message.payload, ENCODING_PACKED, message.due_ns)
+            caught.on_live(samples_key("default", message.tag), message.payload, ENCODING_PACKED, message.due_ns)
         for message in cached:
-            caught.fetch(samples_key("default", message.tag), message.payload, ENCODING_PACKED, asked_ns)
-        caught.first_round_answered(10_000)
+            caught.on_cached(samples_key("default", message.tag), message.payload, ENCODING_PACKED, asked_ns)
+        caught.on_first_round_answer(10_000)
         self.clock.t_ns = asked_ns + S
         while self.bench.buffer.depth:
             self.turn()

@@ -17,6 +17,7 @@ from dropanchor_service.estimation.columns import POSE, Array, Engine, PoseBatch
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
@@ -74,10 +75,12 @@ class Bench:
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
         self.estimators = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
+        self.publishers = Publishers()
         self.ingest = Ingest(
             self.buffer,
             Admission(settings, self.site, self.tags, self.pending_tags),
             self.estimators,
+            self.publishers,
             self.site,
             self.tags,
             self.latest,
@@ -86,7 +89,7 @@ class Bench:
         )
 
     def whole_state(self) -> ServiceState:
-        return ServiceState(self.site, self.tags, self.latest, self.estimators, self.ingest.reader.publishers)
+        return ServiceState(self.site, self.tags, self.latest, self.estimators, self.publishers)
 
     def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
         data = encode_packed(payload) if isinstance(payload, Frame) else payload
@@ -101,9 +104,9 @@ class Bench:
         """All counters of rejections that are not zero."""
         return {s.labels["reason"]: s.value for s in _totals(self.metrics.rejected) if s.value}
 
-    def total(self, counter: Counter) -> float:
-        """Over all of its labels."""
-        return sum(s.value for s in _totals(counter))
+    def total(self, counter: Counter, **labels: str) -> float:
+        """Return the sum of a counter over all of its labels, or over these."""
+        return sum(s.value for s in _totals(counter) if labels.items() <= s.labels.items())
 
     def x_of(self, tags: Sequence[str]) -> list[float | None]:
         rows = [self.tags.find(tag) for tag in tags]

@@ -1,1 +1,1 @@
-"""What REST and Zenoh answer with: poses and their age, JSON, poses at a time, explanations, pages of a track."""
+"""Build the answers of REST and Zenoh: aged poses, JSON, poses at a time, explanations, pages of a track."""

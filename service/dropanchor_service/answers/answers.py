@@ -1,7 +1,7 @@
-"""Rows of the store as the answers of the contract; REST, the stream and Zenoh all read here.
+"""Turn rows of the store into the answers of the contract, for REST, the stream and Zenoh.
 
-Answers are plain dictionaries and columns that `to_json` writes: at ten thousand tags a model object per tag would
-cost more than all the rest. Unknown floats are NaN in them, null in JSON.
+Answers are plain dictionaries and columns that `to_json` writes, because at ten thousand tags a model object per tag
+would cost more than all the rest. Unknown floats are NaN in them, and null in JSON.
 """
 
 import time
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-from dropanchor_service.answers.columns import PoseColumns, columns_of, ellipse_95, with_age
+from dropanchor_service.answers.columns import PoseColumns, aged_poses, columns_of, ellipse_95
 from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
 from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
@@ -30,12 +30,12 @@ _AMBIGUOUS = State.AMBIGUOUS.name.lower()
 
 
 def to_json(answer: Any) -> bytes:
-    """Floats in their shortest form that reads back equal; NaN and infinity as null."""
+    """Return an answer as JSON: floats in the shortest form that reads back equal, NaN and infinity as null."""
     return orjson.dumps(answer, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 class Answers:
-    """Reads only; any thread may ask."""
+    """The answers of the service, read from the store. Thread-safe."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class Answers:
         tracks: Tracks | None = None,
         pending_tags: PendingTags | None = None,
     ) -> None:
-        """tracks: where poses are kept for long, None for nowhere. pending_tags: tags that have no row yet."""
+        """tracks: the history on disk, None if there is none. pending_tags: tags that have no row yet."""
         self.site = site
         self.tags = tags
         self.latest = latest
@@ -55,19 +55,19 @@ class Answers:
         self.pending_tags = PendingTags(0) if pending_tags is None else pending_tags
 
     def hint_of(self, tag: Tag) -> str:
-        """What a person can do so that more of what the tag sends is used; empty when there is nothing."""
+        """Return what a person can do so that more of the tag's samples are used; empty if there is nothing to do."""
         unknown = self.tags.unknown_anchors.of(tag.row, self.now_ns())
         return hint_about(unknown[1]) if unknown is not None and self.site.lacks(unknown[0]) else ""
 
     def pose_of(self, tag: Tag) -> Answer | None:
-        """`Pose`, None before the tag's first one."""
+        """Return the `Pose` of a tag, None before its first one."""
         row = self.latest.row(tag.row)
         return None if row is None else self.poses_of(row[None], self.now_ns())[0]
 
     def pose_at(self, name: str, t_ns: int, from_disk: bool = True) -> Answer | None:
-        """`Pose` of a tag at a time, None when there never was one. Raises NoPoseThenError.
+        """Return the `Pose` of a tag at a time, None if the tag never had one. Raises NoPoseThenError.
 
-        from_disk: look into the history too, which takes a millisecond.
+        from_disk: read the history on disk too, which takes a millisecond.
         """
         tracks = self.tracks if from_disk else None
         tag = self.tags.find(name)
@@ -84,55 +84,57 @@ class Answers:
             pose = pose_in_tracks(tracks, self.site, name, memory, t_ns)
         if pose is None:
             return None
-        return self._poses(pose[None], now_ns, then=True, names=[name])[0] | {"hypotheses": []}
+        return self._poses(pose[None], now_ns, historical=True, names=[name])[0] | {"hypotheses": []}
 
     def _pose_in_memory(self, latest: Array, t_ns: int, now_ns: int) -> Array:
-        aged = with_age(latest[None], self.tags.age_s(latest[None], now_ns))[0]
+        aged = aged_poses(latest[None], self.tags.age_s(latest[None], now_ns))[0]
         return pose_at(self.latest.history(int(latest["row"])), latest if t_ns <= latest["t_ns"] else aged, t_ns)
 
     def _memory(self, latest: Array) -> Array:
         return np.append(self.latest.history(int(latest["row"])), latest)
 
     def pose_list(self, tags: Sequence[Tag] | None = None) -> Answer:
-        """`PoseList` of these tags, or of all, as far as they have a pose."""
+        """Return the `PoseList` of these tags, or of all tags. Tags without a pose are left out."""
         now_ns = self.now_ns()
         return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
 
     def pose_list_json(self, tags: Sequence[Tag] | None = None) -> Iterator[bytes | memoryview]:
-        """The JSON of `pose_list`, in chunks and without an object per tag."""
+        """Yield the JSON of `pose_list` in chunks, without an object per tag."""
         now_ns = self.now_ns()
         return list_json(now_ns, (filled for _, filled in self._filled(self.rows(tags), now_ns)))
 
     def pose_jsons(self, poses: Array, now_ns: int) -> Iterator[tuple[str, bytes]]:
-        """Tag, and JSON of its `Pose`, for each of the POSE rows, which are the latest."""
+        """Yield the tag and the JSON of its `Pose` for each of these POSE rows, which are the latest."""
         for names, filled in self._filled(poses, now_ns):
             yield from zip(names, filled.each, strict=True)
 
     def _filled(self, poses: Array, now_ns: int) -> Iterator[tuple[list[str], Filled]]:
-        """Tags, and JSON of their poses, in chunks."""
+        """Yield the tags and the JSON of their poses, in chunks."""
         for begin in range(0, len(poses), CHUNK):
             columns = columns_of(poses[begin : begin + CHUNK], self.site, self.tags, now_ns)
             yield columns.tags, poses_json(columns, self._hypotheses_json(columns.poses))
 
     def _hypotheses_json(self, poses: Array) -> list[bytes]:
-        """Of those of the POSE rows that are ambiguous."""
+        """Return the JSON of the hypotheses of each POSE row that is ambiguous."""
         rows = poses["row"][poses["state"] == State.AMBIGUOUS]
         return hypotheses_json(*self.latest.hypotheses_of(rows)) if len(rows) else []
 
     def poses_of(self, poses: Array, now_ns: int) -> list[Answer]:
-        """`Pose` for each of the POSE rows, which are the latest."""
+        """Return the `Pose` for each of these POSE rows, which are the latest."""
         answers = self._poses(poses, now_ns)
         for answer, row in zip(answers, poses["row"].tolist(), strict=True):
             answer["hypotheses"] = self._hypotheses_of(row, answer["state"]) or []
         return answers
 
-    def _poses(self, poses: Array, now_ns: int, then: bool = False, names: Sequence[str] | None = None) -> list[Answer]:
-        """`Pose` for each of the POSE rows, without hypotheses."""
-        columns = columns_of(poses, self.site, self.tags, now_ns, then, names)
+    def _poses(
+        self, poses: Array, now_ns: int, historical: bool = False, names: Sequence[str] | None = None
+    ) -> list[Answer]:
+        """Return the `Pose` for each of these POSE rows, without hypotheses."""
+        columns = columns_of(poses, self.site, self.tags, now_ns, historical, names)
         return [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
 
     def frame_of(self, poses: Array, now_ns: int) -> Answer:
-        """`PoseFrame` of the POSE rows: columns, for many tags many times a second."""
+        """Return the `PoseFrame` of these POSE rows: columns, cheap for many tags many times a second."""
         columns = columns_of(poses, self.site, self.tags, now_ns)
         frame: Answer = {
             "t_ns": now_ns,
@@ -151,19 +153,19 @@ class Answers:
         frame["angle_rad"] = np.round(columns.angle_rad, 4)
         modes = map(orjson.Fragment, self._hypotheses_json(columns.poses))
         ambiguous = columns.poses["state"] == State.AMBIGUOUS
-        frame["hypotheses"] = [next(modes) if several else None for several in ambiguous.tolist()]
+        frame["hypotheses"] = [next(modes) if is_ambiguous else None for is_ambiguous in ambiguous.tolist()]
         if columns.lat is not None and columns.lon is not None:
             frame["lat"], frame["lon"] = np.round(columns.lat, 9), np.round(columns.lon, 9)
         return frame
 
     def rows(self, tags: Sequence[Tag] | None = None) -> Array:
-        """POSE of these tags, or of all, as far as they have one."""
+        """Return the latest POSE rows of these tags, or of all tags. Tags without a pose are left out."""
         if tags is None:
             return self.latest.since()[1]
         return self.latest.of(np.array([tag.row for tag in tags], np.int64))
 
     def _hypotheses_of(self, row: int, state: str) -> list[Answer] | None:
-        """The modes of a tag that is ambiguous, None of another."""
+        """Return the hypotheses of an ambiguous tag, None for another."""
         return _hypotheses(self.latest.hypotheses(row)) if state == _AMBIGUOUS else None
 
 
@@ -188,10 +190,10 @@ _POSE_NAMES = (
 
 
 def _pose_values(columns: PoseColumns) -> tuple[Sequence[Any], ...]:
-    """One sequence per name in _POSE_NAMES."""
+    """Return one sequence per name in _POSE_NAMES."""
     poses = columns.poses
     known = np.isfinite(poses["cov"]).all(axis=(1, 2))
-    nowhere = [None] * len(poses)
+    nulls = [None] * len(poses)
     return (
         *(columns.tags, poses["t_ns"].tolist(), columns.age_s.tolist(), columns.states, columns.reasons, columns.hints),
         *(poses[field].tolist() for field in ("x", "y", "heading", "speed", "yaw_rate")),
@@ -199,15 +201,15 @@ def _pose_values(columns: PoseColumns) -> tuple[Sequence[Any], ...]:
         _ellipses(columns.semi_major_m, columns.semi_minor_m, columns.angle_rad),
         *(poses[field].tolist() for field in ("p_mode", "sigma_pos", "sigma_obs", "range")),
         columns.anchors,
-        nowhere,
-        nowhere if columns.lat is None else columns.lat.tolist(),
-        nowhere if columns.lon is None else columns.lon.tolist(),
+        nulls,
+        nulls if columns.lat is None else columns.lat.tolist(),
+        nulls if columns.lon is None else columns.lon.tolist(),
         columns.online.tolist(),
     )
 
 
 def _ellipses(major: Array, minor: Array, angle: Array) -> list[Answer | None]:
-    """`Ellipse` for each, None where it is NaN."""
+    """Return an `Ellipse` for each, None where it is NaN."""
     return [
         {"semi_major_m": a, "semi_minor_m": b, "angle_rad": c} if a == a else None
         for a, b, c in zip(major.tolist(), minor.tolist(), angle.tolist(), strict=True)
@@ -215,7 +217,7 @@ def _ellipses(major: Array, minor: Array, angle: Array) -> list[Answer | None]:
 
 
 def _hypotheses(modes: Array) -> list[Answer]:
-    """`Hypothesis` for each HYPOTHESIS."""
+    """Return a `Hypothesis` for each HYPOTHESIS."""
     fields = zip(*(modes[name].tolist() for name in ("weight", "x", "y", "heading", "speed")), strict=True)
     return [
         {"weight": weight, "x": x, "y": y, "heading_rad": heading, "speed_mps": speed, "ellipse_95": ellipse}

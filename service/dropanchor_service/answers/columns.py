@@ -1,4 +1,4 @@
-"""Poses as columns of the contract: what an engine wrote, with everything an answer derives from it."""
+"""Turn poses into columns of the contract: what an engine wrote, and what an answer derives from it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.answers.geodesy import lat_lon
-from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, ellipses, grow_old
+from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, age_poses, ellipses
 from dropanchor_service.estimation.columns import Array, State, StateReason
 from dropanchor_service.store.records import copied
 from dropanchor_service.store.site import SiteStore
@@ -18,31 +18,33 @@ from dropanchor_service.store.unknown_anchors import hint_about
 STATES = [TrackingState[state.name].value for state in State]
 REASONS = [ReasonName[reason.name].value for reason in StateReason]
 
-_MOVE_HINT = "Walk a few metres, not straight towards the anchor or away from it."
+_MOVE_HINT = "Walk a few metres, but not straight towards the anchor or away from it."
 _HINTS = {
-    StateReason.NO_RANGE: "Too few ranges have come in: is the anchor on, and the tag within its reach?",
-    StateReason.NO_HEADING: "No heading yet: the tag has to send IMU samples or a platform heading.",
-    StateReason.START_UNKNOWN: "Say where the tag starts (`start` in its settings), or let the engine fleet find it.",
+    StateReason.NO_RANGE: "Too few ranges have arrived: is the anchor on, and is the tag in range?",
+    StateReason.NO_HEADING: "There is no heading yet: the tag must send IMU samples or a platform heading.",
+    StateReason.START_UNKNOWN: "Set where the tag starts (`start` in its settings), or use the engine fleet.",
     StateReason.SEVERAL_MODES: _MOVE_HINT,
     StateReason.RESOLVED: "",
-    StateReason.RANGES_MISSING: "No range comes in any more: is the anchor on, and the tag within its reach?",
-    StateReason.IMU_MISSING: "No IMU samples came in for a while: check the tag, then walk a few metres.",
+    StateReason.RANGES_MISSING: "No more ranges arrive: is the anchor on, and is the tag in range?",
+    StateReason.IMU_MISSING: "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
     StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
     "the site says it is?",
-    StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move away from it.",
+    StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move the tag away from it.",
     StateReason.UNCERTAIN: _MOVE_HINT,
-    StateReason.FAULT: "The estimate had to start afresh; if this repeats, check what the tag sends.",
-    StateReason.HEADING_UNSURE: "How far it is and what it has walked is known, but not where north is: say where the "
-    "tag starts, or add a second anchor.",
+    StateReason.FAULT: "The estimate had to start again. If this repeats, check what the tag sends.",
+    StateReason.HEADING_UNSURE: "North is not known: set where the tag starts, or add a second anchor.",
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
-_LACK_OF_RANGES = [StateReason.NO_RANGE, StateReason.RANGES_MISSING]
+_RANGES_LACKING = [StateReason.NO_RANGE, StateReason.RANGES_MISSING]
 
 
 @dataclass(frozen=True)
 class PoseColumns:
-    """One entry per pose. poses: POSE; the others derived; an unknown float is NaN. hint: by its index in `hint_texts`.
-    anchor_ids: by the index that the poses have of them. lat, lon: None without a georeference."""
+    """Columns with one entry per pose. An unknown float is NaN.
+
+    poses: POSE; the other columns are derived from it. hint: index into `hint_texts`. anchor_ids: by the index that
+    the poses hold. lat, lon: degrees, None without a georeference.
+    """
 
     poses: Array
     tags: list[str]
@@ -80,16 +82,19 @@ def columns_of(
     site: SiteStore,
     tags: TagTable,
     now_ns: int,
-    then: bool = False,
+    historical: bool = False,
     names: Sequence[str] | None = None,
 ) -> PoseColumns:
-    """poses: POSE, of any rows that `tags` knows, or of the tags of these names; then: they hold for their own time,
-    and do not get old."""
-    age_s = (now_ns - poses["t_ns"]) * 1e-9 if then else tags.age_s(poses, now_ns)
-    aged = poses if then else with_age(poses, age_s)
+    """Return the columns of these poses.
+
+    poses: POSE, of rows in `tags`. historical: the poses are for their own time, so they are not aged. names: the
+    tags of the poses, if they may have no row.
+    """
+    age_s = (now_ns - poses["t_ns"]) * 1e-9 if historical else tags.age_s(poses, now_ns)
+    aged = poses if historical else aged_poses(poses, age_s)
     of_tags = tags.names(aged["row"].tolist()) if names is None else list(names)
     ellipse = ellipse_95(aged["cov"])
-    hint_texts, hint = (HINTS, aged["reason"]) if then else _hints(aged, site, tags, now_ns)
+    hint_texts, hint = (HINTS, aged["reason"]) if historical else _hints(aged, site, tags, now_ns)
     origin = site.site.georeference
     lat, lon = (None, None) if origin is None else lat_lon(origin, aged["x"], aged["y"])
     return PoseColumns(
@@ -109,10 +114,12 @@ def columns_of(
 
 
 def _hints(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> tuple[Sequence[str], Array]:
-    """Texts, and the index of the one that fits each POSE: a tag that lacks ranges and hears an unknown anchor is told
-    so."""
+    """Return all hint texts, and the index of the hint of each POSE.
+
+    A tag that lacks ranges gets a hint about the unknown anchor that it ranges to, if there is one.
+    """
     unknown = {row: name for row, number, name in tags.unknown_anchors.fresh(now_ns) if site.lacks(number)}
-    lacking = np.isin(poses["reason"], _LACK_OF_RANGES) if unknown else np.zeros(len(poses), bool)
+    lacking = np.isin(poses["reason"], _RANGES_LACKING) if unknown else np.zeros(len(poses), bool)
     if not lacking.any():
         return HINTS, poses["reason"]
     hint = poses["reason"].astype(np.int64)
@@ -124,19 +131,23 @@ def _hints(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> tuple[
     return [*HINTS, *map(hint_about, places)], hint
 
 
-def with_age(poses: Array, age_s: Array) -> Array:
-    """The poses (POSE) as they may be shown at this age: no engine runs while a tag is silent, yet an old pose must
-    not look like a good one."""
+def aged_poses(poses: Array, age_s: Array) -> Array:
+    """Return these POSE with the state and reason that they have at this age.
+
+    No engine runs while a tag is silent, and an old pose must not look like a good one.
+    """
     if age_s.max(initial=0.0) <= STALE_AFTER_S:
         return poses
     aged = copied(poses)
-    grow_old(aged, age_s)
+    age_poses(aged, age_s)
     return aged
 
 
 def ellipse_95(cov: Array) -> Array:
-    """Semi-major and semi-minor axis [m] and direction [rad] of the 95 % ellipses of cov, n × 2 × 2 or more, NaN where
-    cov is not finite."""
+    """Return semi-major axis [m], semi-minor axis [m] and direction [rad] of 95 % ellipses, NaN where not finite.
+
+    cov: n × 2 × 2 or more, of which the first two rows and columns are those of (x, y).
+    """
     axes = np.empty((3, len(cov)))
     ellipses(np.ascontiguousarray(cov), axes)
     return axes

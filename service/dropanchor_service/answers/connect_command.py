@@ -1,4 +1,4 @@
-"""The command that starts a simulated tag of a site, and where it connects."""
+"""Build the command that starts a simulated tag of a site, and the endpoint that it connects to."""
 
 import shlex
 import sys
@@ -6,19 +6,25 @@ import sysconfig
 from collections.abc import Sequence
 from pathlib import Path
 
-_EVERYWHERE = ("0.0.0.0", "[::]", "*")
+_ALL_ADDRESSES = ("0.0.0.0", "[::]", "*")
 SIMULATED_ANCHOR = "1"
 
 
-def reached_at(endpoint: str, host: str = "localhost") -> str:
-    """The endpoint to connect to. host: a name of the machine, for a router that listens at all of its addresses."""
+def reachable_endpoint(endpoint: str, host: str = "localhost") -> str:
+    """Return the endpoint to connect to.
+
+    host: name of the machine, used for a router that listens on all of its addresses.
+    """
     protocol, _, address = endpoint.partition("/")
     name, _, port = address.rpartition(":")
-    return f"{protocol}/{host}:{port}" if name in _EVERYWHERE else endpoint
+    return f"{protocol}/{host}:{port}" if name in _ALL_ADDRESSES else endpoint
 
 
 def tag_command(*, show_path: bool) -> str:
-    """How `dropanchor-tag` is called: of this environment with its path, which is for people on this machine only."""
+    """Return the command to call `dropanchor-tag`.
+
+    show_path: with the path of this environment, for people on this machine only.
+    """
     if not show_path:
         return "dropanchor-tag"
     script = Path(sysconfig.get_path("scripts")) / "dropanchor-tag"
@@ -28,7 +34,10 @@ def tag_command(*, show_path: bool) -> str:
 def simulate_command(
     program: str, endpoints: Sequence[str], site: str, anchors: Sequence[str], credentials: str | None
 ) -> str:
-    """Starts a simulated tag of this site. credentials: the folder of the tag sim-1, where tags need one."""
+    """Return the command that starts a simulated tag of this site.
+
+    credentials: folder of the tag sim-1, if tags need credentials.
+    """
     words = [program, "simulate"]
     words += ["--connect", shlex.quote(endpoints[0])] if endpoints else []
     words += ["--site", shlex.quote(site)] if site != "default" else []

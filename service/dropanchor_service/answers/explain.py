@@ -1,4 +1,4 @@
-"""Why the latest pose of a tag is what it is: the answer `Explanation`."""
+"""Explain the latest pose of a tag: build the answer `Explanation`."""
 
 import numpy as np
 
@@ -7,36 +7,36 @@ from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.estimation.columns import Array, MeasurementKind
 from dropanchor_service.store.tags import Tag
 
-RATE_NS = 2_000_000_000  # over which the rate of the ranges is taken
-FEWEST = 4  # ranges that make a rate
+RATE_NS = 2_000_000_000  # window of the range rate
+MIN_RANGES = 4  # of a range rate
 MINUTE_NS = 60_000_000_000
 
 _KINDS = [KindName[kind.name].value for kind in MeasurementKind]
 
 
 def explanation_of(answers: Answers, tag: Tag, last: int) -> Answer | None:
-    """`Explanation` with the last innovations, None before the tag's first pose."""
+    """Return the `Explanation` of a tag with its last innovations, None before its first pose."""
     pose = answers.pose_of(tag)
     if pose is None:
         return None
     innovations = answers.latest.innovations(tag.row)
     history = answers.latest.history(tag.row)
     minute = history[history["t_ns"] > pose["t_ns"] - MINUTE_NS]
-    shown = innovations[-last:]
+    latest = innovations[-last:]
     return {
         "pose": pose,
         "hypotheses": pose["hypotheses"],
         "speed": {"speed_mps": pose["speed_mps"]} | _rates(innovations),
         "speed_track": {"t_ns": minute["t_ns"].tolist(), "speed_mps": minute["speed"].tolist()},
-        "innovations": _innovations(shown, [anchor.id for anchor in answers.site.anchors_by_index()]),
-        "refused": int(np.count_nonzero(~shown["fused"])),
+        "innovations": _innovations(latest, [anchor.id for anchor in answers.site.anchors_by_index()]),
+        "refused": int(np.count_nonzero(~latest["fused"])),
         "samples": dict(tag.samples),
         "rejected": dict(tag.rejected),
     }
 
 
 def _innovations(records: Array, anchors: list[str]) -> list[Answer]:
-    """`Innovation` for each INNOVATION."""
+    """Return an `Innovation` for each INNOVATION."""
     return [
         {
             "t_ns": t_ns,
@@ -55,7 +55,7 @@ def _innovations(records: Array, anchors: list[str]) -> list[Answer]:
 
 
 def _rates(innovations: Array) -> Answer:
-    """Slopes over the last ranges to the anchor of the last one."""
+    """Return the rates of the last ranges to the anchor of the newest one, measured and predicted."""
     ranges = innovations[innovations["kind"] == MeasurementKind.RANGE]
     if len(ranges):
         newest = ranges[-1]
@@ -67,8 +67,8 @@ def _rates(innovations: Array) -> Answer:
 
 
 def _slope(t_ns: Array, values: Array) -> float | None:
-    """Of the straight line of least squares, per second."""
-    if len(t_ns) < FEWEST or t_ns[0] == t_ns[-1]:
+    """Return the slope of the least-squares line, per second; None if there are too few values."""
+    if len(t_ns) < MIN_RANGES or t_ns[0] == t_ns[-1]:
         return None
     t = (t_ns - t_ns[0]) * 1e-9
     t = t - t.mean()

@@ -1,4 +1,4 @@
-"""Positions in the site frame as WGS 84 latitude and longitude."""
+"""Convert positions in the site frame to WGS 84 latitude and longitude."""
 
 import numpy as np
 from pymap3d.enu import enu2geodetic
@@ -8,9 +8,9 @@ from dropanchor_service.estimation.columns import Array
 
 
 def lat_lon(origin: Georeference, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return degrees of points (x, y) [m] on the plane that touches the ellipsoid at the site's origin; NaN stays NaN.
+    """Return latitude and longitude, degrees, of points (x, y) [m]; the longitude is in [-180, 180]. NaN stays NaN.
 
-    The longitude is in [-180, 180].
+    The points lie on the plane that touches the ellipsoid at the site's origin.
     """
     cos_r, sin_r = np.cos(origin.rotation_rad), np.sin(origin.rotation_rad)
     east, north = cos_r * x - sin_r * y, sin_r * x + cos_r * y

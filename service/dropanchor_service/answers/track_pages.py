@@ -1,4 +1,4 @@
-"""What is kept on disk, as answers: a page of a track, or the pose at a time long ago."""
+"""Answer from the history on disk: a page of a track, or the pose at a time long ago."""
 
 import sqlite3
 from dataclasses import dataclass
@@ -17,8 +17,10 @@ from dropanchor_service.store.site import SiteStore
 
 @dataclass(frozen=True)
 class TrackPage:
-    """Some poses of one tag in order of time, as columns of `TrackPose`; next_ns: where the next page begins, None
-    after the last."""
+    """Poses of one tag in order of time.
+
+    columns: those of `TrackPose`. next_ns: start of the next page, None after the last page.
+    """
 
     columns: dict[str, list[Any]]
     next_ns: int | None
@@ -27,21 +29,22 @@ class TrackPage:
         return len(self.columns["t_ns"])
 
     def rows(self) -> list[dict[str, Any]]:
+        """Return a `TrackPose` for each pose."""
         names = list(self.columns)
         return [dict(zip(names, row, strict=True)) for row in zip(*self.columns.values(), strict=True)]
 
 
 def track_page(tracks: Tracks, site: SiteStore, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
-    """The first `limit` poses from `from_ns` to `to_ns`, both included. Raises sqlite3.Error."""
+    """Return the first `limit` poses from `from_ns` to `to_ns`, both included. Raises sqlite3.Error."""
     found = tracks.poses(tag, from_ns, to_ns, limit + 1)
     next_ns = int(found.poses["t_ns"][limit]) if len(found.poses) > limit else None
     return TrackPage(_columns(Stored(found.poses[:limit], found.anchors[:limit]), site), next_ns)
 
 
 def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_ns: int) -> Array | None:
-    """POSE (0-d) at a time, from the kept poses before it and after it; None of a tag that was never kept.
+    """Return POSE (0-d) at a time, from the stored poses before and after it; None for a tag without a history.
 
-    memory: POSE, poses that may not have been written yet. Raises NoPoseThenError.
+    memory: POSE that may not have been written to disk yet. Raises NoPoseThenError.
     """
     try:
         before = tracks.poses(tag, max(0, t_ns - FAR_NS), t_ns, 1, newest_first=True)
@@ -60,14 +63,14 @@ def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_n
 
 
 def _indexed(stored: Stored, site: SiteStore) -> Array:
-    """POSE with the index that the site has for the anchor of each."""
+    """Return the stored POSE with the site's index of the anchor of each, -1 for none."""
     index = {anchor.id: number for number, anchor in enumerate(site.anchors_by_index())}
     stored.poses["anchor"] = [-1 if anchor is None else index.get(anchor, -1) for anchor in stored.anchors]
     return stored.poses
 
 
 def _columns(stored: Stored, site: SiteStore) -> dict[str, list[Any]]:
-    """Rounded to what was stored: float32."""
+    """Return the columns of `TrackPose`, with the digits of a float32, as it was stored."""
     poses = stored.poses
     known = np.isfinite(poses["cov"]).all(axis=(1, 2)).tolist()
     covariances = _short(poses["cov"].reshape(-1)).reshape(-1, 3, 3).tolist()
@@ -97,11 +100,11 @@ ESTIMATED = {
     "sigma_obs_m": "sigma_obs",
     "range_m": "range",
 }
-"""Numbers of an estimate, and the fields of POSE that they come from."""
+"""Numbers of an estimate, and the fields of POSE that hold them."""
 
 
 def _short(values: Array) -> Array:
-    """float64 with no more digits than the float32 had that they come from."""
+    """Round float64 values to the digits of the float32 that they were read from."""
     with np.errstate(invalid="ignore", divide="ignore"):
         digits = 7 - np.ceil(np.log10(np.abs(values)))
     scale = 10.0 ** np.where(np.isfinite(digits), digits, 0.0)

@@ -1,1 +1,1 @@
-"""What a restarted service needs to go on: taken between turns, written by a thread of its own."""
+"""Save and restore the state of the service: snapshots between turns, written by a thread of its own."""

@@ -1,7 +1,7 @@
-"""Checkpoints in a folder: each whole and told apart from a torn one by its checksum, the last two kept.
+"""Write and read checkpoints in a folder. A checksum detects damaged files, and the last two checkpoints are kept.
 
-A file is one line of JSON (layout, names and shapes of the arrays, what is not an array), the arrays, little-endian as
-in memory, and the BLAKE2b digest of all before it.
+A file is one line of JSON (layout, names and shapes of the arrays, and the document), then the arrays, little-endian as
+in memory, then the BLAKE2b digest of everything before it.
 """
 
 import hashlib
@@ -23,26 +23,32 @@ _DIGEST_BYTES = 32
 
 
 class CheckpointError(Exception):
-    """A file that is not used; the message says why."""
+    """A checkpoint cannot be used; the message says why."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """arrays: by name, with an agreed dtype each; document: what JSON can hold."""
+    """The content of a checkpoint. arrays: by name, each with a fixed dtype. document: values that JSON can hold."""
 
     arrays: dict[str, Array] = field(default_factory=dict)
     document: dict[str, Any] = field(default_factory=dict)
 
 
 def layout_of(snapshot: Snapshot, meaning: str) -> str:
-    """A name for the dtypes and keys of a snapshot. meaning: what changes when the same numbers mean something else."""
+    """Return an identifier of the dtypes and keys of a snapshot.
+
+    meaning: text that differs between versions in which the same numbers have another meaning.
+    """
     dtypes = [(name, str(np.lib.format.dtype_to_descr(array.dtype))) for name, array in snapshot.arrays.items()]
     text = repr((meaning, sorted(dtypes), sorted(snapshot.document)))
     return hashlib.blake2b(text.encode(), digest_size=8).hexdigest()
 
 
 class CheckpointFolder:
-    """Not locked: its owner is. template: any snapshot of this layout, for its dtypes."""
+    """Checkpoints of one layout in a folder. Not thread-safe.
+
+    template: any snapshot of this layout, for its dtypes.
+    """
 
     def __init__(self, folder: Path, layout: str, template: Snapshot) -> None:
         self._folder = folder
@@ -51,7 +57,10 @@ class CheckpointFolder:
         self._next = max((_number(path) for path in self._files()), default=0) + 1
 
     def write(self, snapshot: Snapshot) -> int:
-        """The newest from now on; its size. Raises OSError, and then the newest is the one before."""
+        """Write the newest checkpoint. Return its size in bytes.
+
+        Raises OSError; the previous checkpoint is then still the newest.
+        """
         parts = _parts(snapshot, self._layout)
         path = self._folder / f"{_PREFIX}{self._next:012d}"
         self._next += 1
@@ -62,7 +71,7 @@ class CheckpointFolder:
         return sum(memoryview(part).nbytes for part in parts)
 
     def newest(self) -> tuple[Snapshot | None, list[str]]:
-        """The newest that is whole, and why those newer than it are not used."""
+        """Return the newest undamaged snapshot, None if there is none, and why each newer file is not used."""
         complaints: list[str] = []
         for path in reversed(self._files()):
             try:
@@ -75,11 +84,11 @@ class CheckpointFolder:
         whole = path.read_bytes()
         content, digest = memoryview(whole)[:-_DIGEST_BYTES], whole[-_DIGEST_BYTES:]
         if hashlib.blake2b(content, digest_size=_DIGEST_BYTES).digest() != digest:
-            raise CheckpointError("it is torn (its checksum is wrong)")
+            raise CheckpointError("it is damaged (its checksum is wrong)")
         start = whole.index(b"\n") + 1
         header = orjson.loads(content[:start])
         if header["layout"] != self._layout:
-            raise CheckpointError(f"its layout is {header['layout']}, that of this version is {self._layout}")
+            raise CheckpointError(f"its layout is {header['layout']}, but this version uses {self._layout}")
         return Snapshot(dict(self._arrays(header["shapes"], content[start:])), header["document"])
 
     def _arrays(self, shapes: Mapping[str, list[int]], content: memoryview) -> Iterator[tuple[str, Array]]:
@@ -91,7 +100,7 @@ class CheckpointFolder:
             start += array.nbytes
 
     def _files(self) -> list[Path]:
-        """Oldest first."""
+        """Return the checkpoints, the oldest first."""
         found = [path for path in self._folder.glob(f"{_PREFIX}*") if path.name[len(_PREFIX) :].isdecimal()]
         return sorted(found, key=_number)
 

@@ -1,4 +1,4 @@
-"""All that a restarted service must know to go on as if it had not been away: what a checkpoint holds."""
+"""Collect and restore the state that a service needs to continue after a restart."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from dropanchor_service.store.records import put
 
 
 class ServiceState:
-    """Owned by the ingest thread while it runs."""
+    """The state of the service. Owned by the ingest thread while that runs."""
 
     def __init__(
         self, site: SiteStore, tags: TagTable, latest: LatestPoses, engine: GuardedEngine, publishers: Publishers
@@ -29,12 +29,15 @@ class ServiceState:
 
     @property
     def messages(self) -> int:
-        """How many have come in: nothing else changes the state."""
+        """Number of messages so far. Only messages change the state."""
         return int(self._tags.copy_counts()["messages"].sum())
 
     def snapshot(self) -> Snapshot:
-        """Copies: what comes in later does not change them. The next snapshot does, for it uses the same memory: pages
-        that are fresh from the operating system cost ten times as much as copying into them."""
+        """Return a copy of the state.
+
+        The next call overwrites it: the memory is reused, because fresh pages from the operating system cost ten times
+        as much as copying into them.
+        """
         arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns}
         arrays["times"] = self._publishers.times
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
@@ -44,7 +47,7 @@ class ServiceState:
         return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, document)
 
     def keep_buffers_apart(self) -> None:
-        """The next snapshot leaves the last one as it is."""
+        """Use new memory for the next snapshot, so that it does not overwrite the last one."""
         self._buffers = {}
 
     def _copied(self, name: str, array: Array) -> Array:
@@ -56,7 +59,7 @@ class ServiceState:
         return buffer[: len(array)]
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Take over a snapshot of this layout, before anything has come in."""
+        """Restore a snapshot of this layout, before the first message."""
         self._site.remember([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
         self._tags.restore(snapshot.document["tags"], snapshot.arrays["counts"])
         self._publishers.columns = snapshot.arrays["publishers"]

@@ -1,4 +1,4 @@
-"""Takes snapshots between two turns of the ingest thread, where nothing changes, and writes them on another."""
+"""Take snapshots between two turns of the ingest thread, when nothing changes, and write them on another thread."""
 
 import logging
 import threading
@@ -9,15 +9,15 @@ from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 
-OLD_S = 5.0  # beyond it the age of the newest checkpoint is a problem
-REST = 3  # times as long as it took to write the last one: a slow disk gets more time to itself
-_TURN_S = 1.0  # for the ingest thread to come round
+OLD_S = 5.0  # an older newest checkpoint is a problem
+REST = 3  # pause, relative to the duration of the last write, so that a slow disk is not always busy
+_TURN_S = 1.0  # wait for a turn of the ingest thread
 
 _log = logging.getLogger(__name__)
 
 
 class CheckpointThread:
-    """A thread of its own between `start` and `stop`. `between_turns` is called by the ingest thread."""
+    """Writes checkpoints on a thread of its own. The ingest thread calls `between_turns`."""
 
     def __init__(self, state: ServiceState, folder: CheckpointFolder, metrics: Metrics, period_s: float) -> None:
         self._log = RareLog(_log)
@@ -25,24 +25,24 @@ class CheckpointThread:
         self._folder = folder
         self._metrics = metrics
         self._period_s = period_s
-        self._wanted = threading.Event()
+        self._requested = threading.Event()
         self._taken = threading.Event()
         self._stop = threading.Event()
         self._snapshot: Snapshot | None = None
         self._messages = -1  # in the newest checkpoint
-        self._current_s = time.monotonic()  # when the newest checkpoint, or what was loaded, was all there was
+        self._current_s = time.monotonic()  # when the newest checkpoint, or the loaded one, was last up to date
         self._error: str | None = None
         self._took_s = 0.0
         self._thread = threading.Thread(target=self._run, name="checkpoints", daemon=True)
         metrics.checkpoint_age.set_function(lambda: self.age_s)
 
     def load(self) -> None:
-        """Take over the newest checkpoint, and say what became of it. Before anything has come in."""
+        """Restore the newest checkpoint, if there is one, and log the result. Call it before the first message."""
         snapshot, complaints = self._folder.newest()
         for complaint in complaints:
             _log.warning("%s", complaint)
         if snapshot is None:
-            _log.info("there is no checkpoint to go on from: all tags start afresh")
+            _log.info("there is no usable checkpoint: all tags start afresh")
             return
         self._state.restore(snapshot)
         _log.info("going on from a checkpoint with %d tags", len(snapshot.document["tags"]))
@@ -52,13 +52,13 @@ class CheckpointThread:
         self._thread.start()
 
     def stop(self) -> None:
-        """Writes the last checkpoint. The ingest thread has stopped."""
+        """Stop, and write the last checkpoint. Call it after the ingest thread has stopped."""
         self._stop.set()
         self._thread.join(_TURN_S)
         if self._thread.is_alive():
             self._state.keep_buffers_apart()
         self._snapshot = None
-        self._wanted.set()
+        self._requested.set()
         self.between_turns()
         self._write()
 
@@ -68,21 +68,21 @@ class CheckpointThread:
 
     @property
     def age_s(self) -> float:
-        """How much of the past a killed service would have to make up for."""
+        """Seconds of tracking that would be lost if the service were killed now."""
         return time.monotonic() - self._current_s
 
     @property
     def problem(self) -> str | None:
-        """Why a killed service could not go on from here; None when it could."""
+        """Return why a killed service would lose its state, None if it would not."""
         if self.age_s < OLD_S:
             return None
-        return f"the newest checkpoint is {self.age_s:.0f} s old: {self._error or 'none could be taken'}"
+        return f"the newest checkpoint is {self.age_s:.0f} s old: {self._error or 'no snapshot could be taken'}"
 
     def between_turns(self) -> None:
-        """Copies the state if one is wanted, and something has come in since the last."""
-        if not self._wanted.is_set():
+        """Copy the state if a snapshot is requested and messages have arrived since the last one."""
+        if not self._requested.is_set():
             return
-        self._wanted.clear()
+        self._requested.clear()
         try:
             self._take()
         finally:
@@ -98,8 +98,8 @@ class CheckpointThread:
     def _run(self) -> None:
         while not self._stop.wait(max(self._period_s, REST * self._took_s)):
             self._taken.clear()
-            self._wanted.set()
-            # Not asked for again before it was taken: a snapshot must not be overwritten while it is written.
+            self._requested.set()
+            # Request no other one before: a snapshot must not be overwritten while it is being written.
             while not self._taken.wait(_TURN_S):
                 if self._stop.is_set():
                     return

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
-from dropanchor_service.answers.connect_command import reached_at
+from dropanchor_service.answers.connect_command import reachable_endpoint
 from dropanchor_service.commands.options import positive
 from dropanchor_service.security.folder import SecurityError, SecurityFolder, Table
 
@@ -122,6 +122,6 @@ Next:
   1. a tag:      dropanchor tag add NAME --security {folder}
                  and give the folder {folder}/tags/NAME to it, over a channel that you trust
   2. the router: dropanchor router --security {folder}        again after tags were added or revoked
-  3. the service: dropanchor serve --security {folder} --zenoh-connect {reached_at(table.listen[0])}{of_site}
+  3. the service: dropanchor serve --security {folder} --zenoh-connect {reachable_endpoint(table.listen[0])}{of_site}
   4. the page and REST (https, with the certificate {folder}/ca.pem): dropanchor key add NAME --security {folder}
 """

@@ -138,7 +138,7 @@ def _pass(payloads: list[bytes]) -> None:
     publishers, arrivals = Publishers(), np.zeros(len(payloads), np.int64)
     sequenced = publishers.sequence(read.forms, np.zeros(len(payloads), np.int32), arrivals, 0)
     decoded, _ = screen(read_samples(read, sequenced.due))
-    samples = [(decoded.imu["row"], decoded.imu["t_ns"]), (decoded.ranges["message"], decoded.ranges["t_ns"])]
+    samples = [(decoded.imu["message"], decoded.imu["t_ns"]), (decoded.ranges["message"], decoded.ranges["t_ns"])]
     offsets, _ = publishers.time_offsets(read.forms, sequenced, arrivals, samples)
     for messages, t_ns in samples:
         shift_times(t_ns, messages, offsets)

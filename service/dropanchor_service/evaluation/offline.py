@@ -12,6 +12,7 @@ from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.observers import Observers
+from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.turn import MESSAGES_PER_TURN, Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.recording.reading import Turn
@@ -53,6 +54,7 @@ class OfflineService:
             self._buffer,
             Admission(settings, self.site, self.tags, PendingTags(0)),
             GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics),
+            Publishers(),
             self.site,
             self.tags,
             LatestPoses(),

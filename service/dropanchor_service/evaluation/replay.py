@@ -12,7 +12,7 @@ from dropanchor_service.estimation.columns import ANCHOR, HEADING, IMU, POSE, RA
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
 from dropanchor_service.evaluation.accuracy import Truth
-from dropanchor_service.ingest.decode import SCALAR, Decoded
+from dropanchor_service.ingest.decode import IMU_SAMPLE, SCALAR, Decoded
 from dropanchor_service.ingest.kernels.packed import FORM
 from dropanchor_service.ingest.screening import screen
 from dropanchor_tag_client.recording import Recording
@@ -77,7 +77,7 @@ def samples_of(recording: Recording, anchors: Sequence[str]) -> Samples:
     headings["t_ns"], headings["heading"], headings["std"] = (
         decoded.headings[name] for name in ("t_ns", "value", "std")
     )
-    return Samples(SampleBatch(imu=decoded.imu, ranges=fused, headings=headings), rejected)
+    return Samples(SampleBatch(imu=decoded.imu.view(IMU), ranges=fused, headings=headings), rejected)
 
 
 def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) -> Iterator[tuple[float, Array]]:
@@ -131,7 +131,7 @@ def _times(batch: SampleBatch) -> list[Array]:
 
 
 def _imu(columns: dict[str, "array[float]"]) -> Array:
-    imu = np.zeros(len(columns["t_s"]), IMU)
+    imu = np.zeros(len(columns["t_s"]), IMU_SAMPLE)
     imu["t_ns"] = _t_ns(columns["t_s"])
     for name, parts in (("acc", ("ax", "ay", "az")), ("gyro", ("gx", "gy", "gz")), ("mag", ("mx", "my", "mz"))):
         imu[name] = np.column_stack([np.asarray(columns[part]) for part in parts])

@@ -1,1 +1,1 @@
-"""From messages to poses: buffer, order, decode, screen, fuse, store."""
+"""Turn messages into poses: buffer, decode, order, screen, fuse, store."""

@@ -1,4 +1,4 @@
-"""Which tags get a row."""
+"""Decide which tags get a row."""
 
 import numpy as np
 
@@ -14,10 +14,11 @@ _REFUSALS = {"refuse": Reason.TAG_UNKNOWN, "quarantine": Reason.TAG_QUARANTINED}
 
 
 class Admission:
-    """Tags that an operator has listed always get a row; others as the settings say.
+    """Give rows to the tags that an operator has listed, and to other tags as the settings say.
 
-    A row costs kilobytes and is never taken back, so strangers get one at once only while few rows belong to tags that
-    were heard no more than once. Beyond that their first message waits until another one comes. Owned by one thread.
+    A row takes kilobytes and is never freed. An unlisted tag therefore gets a row with its first message only while few
+    rows belong to unconfirmed tags, which have sent one message. Otherwise its first message is kept until the second
+    arrives. Owned by one thread.
     """
 
     def __init__(self, settings: Settings, site: SiteStore, tags: TagTable, pending_tags: PendingTags) -> None:
@@ -27,22 +28,22 @@ class Admission:
         self._site = site
         self._tags = tags
         self._pending_tags = pending_tags
-        self._unconfirmed = np.zeros(0, np.int64)  # rows of strangers who had not proven themselves
+        self._unconfirmed = np.zeros(0, np.int64)  # rows of unlisted tags that sent one message so far
 
-    def hear(self, stranger: UnregisteredMessage) -> Tag | Reason | None:
-        """Who sent this, with a row; or why it is not used; None: it waits."""
-        key, message = stranger[0], stranger[1:]
+    def admit_message(self, unregistered: UnregisteredMessage) -> Tag | Reason | None:
+        """Return the tag that sent a message, with a row, or why it is rejected; None when the message is kept."""
+        key, message = unregistered[0], unregistered[1:]
         try:
             name = tag_from_key(key)
         except InvalidKeyError:
             return Reason.KEY_INVALID
-        found = self.by_name(name)
+        found = self.admit(name)
         if found is Reason.TAG_QUARANTINED:
             self._pending_tags.hear(name, message[2])
         return self._confirm(name, message) if found is Reason.TAG_UNPROVEN else found
 
-    def by_name(self, name: str) -> Tag | Reason:
-        """The tag of this name, registered when it may be without a confirmed, or why it may not."""
+    def admit(self, name: str) -> Tag | Reason:
+        """Return the tag with this name, registering it if it needs no confirmation, or why it gets no row."""
         tag = self._tags.find(name)
         if tag is not None:
             return tag
@@ -58,23 +59,23 @@ class Admission:
         self._unconfirmed = np.append(self._unconfirmed, tag.row)
         return tag
 
-    def waited(self, tag: Tag) -> list[Waiting]:
-        """What came from this tag before it got its row, in order of arrival."""
+    def take_kept(self, tag: Tag) -> list[Waiting]:
+        """Take out the messages that were kept until this tag got its row, in order of arrival."""
         return self._pending_tags.take(tag.name)
 
     def take_expired(self) -> int:
-        """Messages of tags that did not send another one, since the last call."""
+        """Return how many kept messages were dropped since the last call, because no second one arrived."""
         return self._pending_tags.take_gone()
 
     def review(self) -> None:
-        """Rows whose tags have proven themselves make room for other strangers."""
+        """Stop counting tags as unconfirmed once they have sent enough, so that other unlisted tags get rows."""
         if len(self._unconfirmed) >= self._max_unconfirmed:
             counts = self._tags.counts(self._unconfirmed)
             confirmed = is_confirmed(counts["messages"], counts["first_heard_ns"], counts["last_heard_ns"])
             self._unconfirmed = self._unconfirmed[~(confirmed & counts["samples"].any(axis=1))]
 
     def register_listed(self) -> None:
-        """A row for every tag that the operator has listed."""
+        """Give a row to every tag that the operator has listed."""
         for name in self._site.tags:
             self._tags.register(name)
 

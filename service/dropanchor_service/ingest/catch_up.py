@@ -1,7 +1,7 @@
-"""Put what tags published while nobody listened, fetched from their caches, before what is live.
+"""Put messages from the tags' caches, which were published while the service was away, before live ones.
 
-The first messages of a tag are suspended until its caches have answered; then all go on in one order. No I/O: the
-caller says what is live, what was fetched, and when an answer is complete.
+The first live messages of a tag are suspended until its caches have answered. Then all of its messages go to the buffer
+in one order. This module does no I/O: the caller passes live and cached messages, and says when an answer is complete.
 """
 
 from collections import Counter
@@ -9,20 +9,22 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from threading import Lock
 from typing import NamedTuple
 
+from dropanchor_schemas.keys import tag_from_key
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, Rejection, read_header
 from dropanchor_service.ingest.buffer import MESSAGE_OVERHEAD, MessageBuffer
-from dropanchor_service.ingest.publishers import SequenceState
+from dropanchor_service.ingest.publishers import Publishers, SequenceState
+from dropanchor_service.store import TagTable
 
-MOST_BYTES = 64 * 2**20  # of suspended messages; beyond it they go on as they are
-TRIES = 10  # of asking again
+MAX_BYTES = 64 * 2**20  # of suspended messages; beyond it all of them are released
+MAX_RETRIES = 10
 
 StatesOf = Callable[[str], Mapping[int, SequenceState]]
-"""What was fused before the restart of the tag with this key, by boot id."""
+"""Return what was fused before the restart, by boot id, for the tag with this key."""
 
 
 class _Number(NamedTuple):
-    """t_ns: of a sample, on the publisher's own clock."""
+    """t_ns: time of a sample, on the publisher's own clock."""
 
     boot_id: int
     sequence: int
@@ -38,13 +40,13 @@ class _Suspended(NamedTuple):
 
 
 class CatchUp:
-    """Between the session and the buffer. Its methods may be called from any thread; none of them waits.
+    """Stands between the Zenoh session and the buffer. Its methods are thread-safe, and none of them blocks for long.
 
-    expected: keys of tags that the last process knew or an operator has listed. ask: called for each of them that is
-    heard after the first round, and again where an answer lacks something, with the number of messages that are
-    missing, 0 when it is not known, and how often it was asked for them before; `answered` is to be called when all
-    that was asked for is `fetched`. most_of_new: so many are asked for of a publisher that the last process did not
-    know.
+    expected: keys of tags that the last process knew or an operator has listed. ask: called with the key of a tag, the
+    number of missing messages (0: unknown) and the number of earlier retries. It is called when an expected tag first
+    sends after the first round, and again when an answer is incomplete. After passing all replies to `on_cached`, the
+    caller calls `on_answer`. new_publisher_limit: number of messages to ask for from a publisher that the last process
+    did not know.
     """
 
     def __init__(
@@ -53,121 +55,134 @@ class CatchUp:
         expected: Iterable[str],
         states_of: StatesOf,
         ask: Callable[[str, int, int], None],
-        most_of_new: int,
+        new_publisher_limit: int,
     ) -> None:
         self._lock = Lock()
         self._buffer = buffer
         self._expected = set(expected)
         self._states_of = states_of
         self._ask = ask
-        self._most_of_new = most_of_new
-        self._first_round = True  # all caches are being asked, all messages are suspended
+        self._new_publisher_limit = new_publisher_limit
+        self._first_round = True  # all caches are being asked, and all messages are suspended
         self._suspended: dict[str, list[_Suspended]] = {}
-        self._fetched: Counter[str] = Counter()  # since the key was asked last
-        self._tries: Counter[str] = Counter()  # of asking again
+        self._cached: Counter[str] = Counter()  # cached messages since the caches of a key were last asked
+        self._retries: Counter[str] = Counter()
         self._bytes = 0
 
-    def hear(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
-        """A live message."""
-        if self._waits(key):
+    def on_live(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
+        """Suspend a live message while its tag is catching up, or pass it to the buffer."""
+        if self._suspends(key):
             suspended = _Suspended(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
             with self._lock:
-                waits = self._waits(key) and not self._is_first(suspended)
-                if waits:
+                suspends = self._suspends(key) and not self._is_first(suspended)
+                if suspends:
                     self._suspend(suspended)
-            if waits:
+            if suspends:
                 self._bound()
                 return
         self._buffer.append(key, payload, encoding, arrival_ns)
 
-    def appear(self, key: str) -> None:
-        """The tag is there, though it may have nothing to say any more."""
+    def on_alive(self, key: str) -> None:
+        """Ask the caches of an expected tag that is online, though it may not send anything new."""
         with self._lock:
             if key in self._expected:
                 self._open(key)
 
-    def fetch(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
-        """A message from a cache."""
+    def on_cached(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
+        """Suspend a message from a cache, if its tag is catching up."""
         suspended = _Suspended(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
         with self._lock:
             if self._first_round or key in self._suspended:
-                self._fetched[key] += 1
+                self._cached[key] += 1
                 self._suspend(suspended)
         self._bound()
 
-    def answered(self, key: str, most: int) -> int:
-        """The caches of this tag have told all, or their newest `most`. Returns how many messages go on."""
+    def on_answer(self, key: str, limit: int) -> int:
+        """Release the messages of a tag whose caches have answered, or ask again if something is missing.
+
+        limit: number of messages that each cache was asked for. Returns the number of released messages.
+        """
         with self._lock:
-            if self._lacks(key, most):
+            if self._is_incomplete(key, limit):
                 self._ask_again(key)
                 return 0
         return self._release(key)
 
-    def first_round_answered(self, most: int) -> int:
-        """All caches that could be reached have told all, or their newest `most`. Tags that were heard without one are
-        asked once more: a session that has just been opened tells of its caches last."""
+    def on_first_round_answer(self, limit: int) -> int:
+        """Release the messages of all tags when every cache in reach has answered, and ask incomplete ones again.
+
+        A tag that sends live messages but whose caches did not answer is asked again too: a session that was just
+        opened announces its caches last. limit: number of messages that each cache was asked for. Returns the number
+        of released messages.
+        """
         with self._lock:
             self._first_round = False
-            unheard = {key for key in self._suspended if key in self._expected and not self._fetched[key]}
-            again = unheard | {key for key in self._suspended if self._lacks(key, most)}
+            unanswered = {key for key in self._suspended if key in self._expected and not self._cached[key]}
+            again = unanswered | {key for key in self._suspended if self._is_incomplete(key, limit)}
             for key in again:
                 self._ask_again(key)
             complete = self._suspended.keys() - again
         return self._release(*complete)
 
-    def _waits(self, key: str) -> bool:
+    def _suspends(self, key: str) -> bool:
         return self._first_round or key in self._expected or key in self._suspended
 
     def _is_first(self, message: _Suspended) -> bool:
-        """Whether a tag that is new begins with it, so that there is nothing to ask its caches for."""
+        """Return whether this is the first message of a new tag, so that its caches hold nothing else."""
         number, key = message.number, message.key
         if self._first_round or key in self._suspended or number is None or number.sequence or self._states_of(key):
             return False
         self._expected.discard(key)
         return True
 
-    def _lacks(self, key: str, most: int) -> bool:
-        """Whether the answer is worth another question: it was cut short, nothing came although something is missing,
-        or there is a hole in it. A publisher that learns of our subscription while it publishes may send a message
-        neither to us nor to its cache in time."""
-        if self._tries[key] >= TRIES:
+    def _is_incomplete(self, key: str, limit: int) -> bool:
+        """Return whether to ask again: the answer was cut short, was empty although messages are missing, or has a gap.
+
+        A publisher that learns of our subscription while it publishes may send a message neither to us nor, in time, to
+        its cache.
+        """
+        if self._retries[key] >= MAX_RETRIES:
             return False
         distances = self._distances(key)
         missing = self._missing(key)
-        cut_short, silent = self._fetched[key] >= most, not self._fetched[key]
-        return (missing > most and cut_short) or any(
-            max(numbers) - min(numbers) >= len(numbers) or (silent and known and min(numbers) > 0)
+        cut_short, empty = self._cached[key] >= limit, not self._cached[key]
+        return (missing > limit and cut_short) or any(
+            max(numbers) - min(numbers) >= len(numbers) or (empty and known and min(numbers) > 0)
             for known, numbers in distances
         )
 
     def _distances(self, key: str) -> list[tuple[bool, set[int]]]:
-        """For each publisher, whether the last process knew it, and the numbers that were not fused, counted from the
-        one that it expected, or from any."""
-        passed, found = self._states_of(key), dict[int, set[int]]()
+        """Return for each publisher whether the last process knew it, and the numbers of its messages to fuse.
+
+        The numbers are relative to the expected one or, for a new publisher, to its first suspended one.
+        """
+        states, found = self._states_of(key), dict[int, set[int]]()
         first: dict[int, SequenceState] = {}
         for message in self._suspended.get(key, ()):
             if message.number:
                 boot_id, sequence, _ = message.number
-                origin = passed.get(boot_id) or first.setdefault(boot_id, SequenceState(sequence, 0))
+                origin = states.get(boot_id) or first.setdefault(boot_id, SequenceState(sequence, 0))
                 ahead = origin.ahead(sequence)
                 if ahead >= 0 or boot_id in first:
                     found.setdefault(boot_id, set()).add(ahead)
-        return [(boot_id in passed, numbers) for boot_id, numbers in found.items()]
+        return [(boot_id in states, numbers) for boot_id, numbers in found.items()]
 
     def _missing(self, key: str) -> int:
-        """How many messages one of its publishers has sent that were not fused, as far as their numbers tell."""
-        passed = self._states_of(key)
+        """Return the largest number of messages that one of the tag's publishers has sent and that were not fused."""
+        states = self._states_of(key)
         numbers = [suspended.number for suspended in self._suspended.get(key, ()) if suspended.number]
-        return max((self._missing_to(number, passed) for number in numbers), default=0)
+        return max((self._missing_to(number, states) for number in numbers), default=0)
 
-    def _missing_to(self, number: _Number, passed: Mapping[int, SequenceState]) -> int:
-        known = passed.get(number.boot_id)
-        return max(0, known.ahead(number.sequence)) + 1 if known else min(number.sequence + 1, self._most_of_new)
+    def _missing_to(self, number: _Number, states: Mapping[int, SequenceState]) -> int:
+        known = states.get(number.boot_id)
+        return (
+            max(0, known.ahead(number.sequence)) + 1 if known else min(number.sequence + 1, self._new_publisher_limit)
+        )
 
     def _ask_again(self, key: str) -> None:
-        self._ask(key, self._missing(key), self._tries[key])
-        self._fetched[key] = 0
-        self._tries[key] += 1
+        self._ask(key, self._missing(key), self._retries[key])
+        self._cached[key] = 0
+        self._retries[key] += 1
 
     def _suspend(self, message: _Suspended) -> None:
         self._open(message.key)
@@ -175,7 +190,7 @@ class CatchUp:
         self._bytes += _size(message)
 
     def _bound(self) -> None:
-        if self._bytes > MOST_BYTES:
+        if self._bytes > MAX_BYTES:
             self._release(*list(self._suspended))
 
     def _open(self, key: str) -> None:
@@ -185,11 +200,14 @@ class CatchUp:
                 self._ask(key, 0, 0)
 
     def _release(self, *keys: str) -> int:
-        """In the order in which they would have arrived: one message of a tag is fused at a time, but of many tags at
-        once. Nobody who hears something waits for the sorting; what is heard meanwhile follows."""
+        """Pass the suspended messages to the buffer in the order in which they would have arrived live.
+
+        The order mixes the tags, because a batch holds one message of each tag. The lock is not held while sorting:
+        messages that arrive meanwhile stay suspended and follow.
+        """
         with self._lock:
             taken = {key: self._suspended[key] for key in keys if key in self._suspended}
-            cached = any(self._fetched[key] or self._tries[key] for key in taken)
+            cached = any(self._cached[key] or self._retries[key] for key in taken)
             self._suspended |= {key: [] for key in taken}
         released = [
             message for key, suspended in taken.items() for message in _in_order(suspended, self._states_of(key))
@@ -197,19 +215,29 @@ class CatchUp:
         released.sort(key=lambda message: message.arrival_ns)
         for message in released:
             self._buffer.append(message.key, message.payload, message.encoding, message.arrival_ns, cached)
-        gone = {(message.key, message.number) for message in released if message.number}
+        released_numbers = {(message.key, message.number) for message in released if message.number}
         with self._lock:
             for key, suspended in taken.items():
                 self._expected.discard(key)
-                self._fetched.pop(key, None)
-                self._tries.pop(key, None)
+                self._cached.pop(key, None)
+                self._retries.pop(key, None)
                 meanwhile = self._suspended[key]
                 self._bytes -= sum(map(_size, suspended)) + sum(map(_size, meanwhile))
                 for message in meanwhile:
-                    if (key, message.number) not in gone:
+                    if (key, message.number) not in released_numbers:
                         self._buffer.append(key, message.payload, message.encoding, message.arrival_ns)
-                del self._suspended[key]  # from now on what is heard does not wait for the lock
+                del self._suspended[key]  # live messages now bypass the lock
         return len(released)
+
+
+def sequence_states(tags: TagTable, publishers: Publishers) -> StatesOf:
+    """Return a function that looks up the publishers of a tag by the tag's key."""
+
+    def states_of(key: str) -> Mapping[int, SequenceState]:
+        tag = tags.find(tag_from_key(key))
+        return {} if tag is None else publishers.sequence_states(tag.row)
+
+    return states_of
 
 
 def _size(message: _Suspended) -> int:
@@ -219,9 +247,11 @@ def _size(message: _Suspended) -> int:
 _Numbered = tuple[_Number, _Suspended]
 
 
-def _in_order(suspended: list[_Suspended], passed: Mapping[int, SequenceState]) -> list[_Suspended]:
-    """Every message once, as they would have arrived: each publisher's in the order of their numbers, with the delay
-    that its newest one has."""
+def _in_order(suspended: list[_Suspended], states: Mapping[int, SequenceState]) -> list[_Suspended]:
+    """Return every message once, with the arrival that it would have had live.
+
+    Those of each publisher are in the order of their numbers, and have the delay of its newest message.
+    """
     by_publisher: dict[int, dict[int, _Numbered]] = {}
     others: list[_Suspended] = []
     for message in suspended:
@@ -229,7 +259,7 @@ def _in_order(suspended: list[_Suspended], passed: Mapping[int, SequenceState]) 
         if number is None:
             others.append(message)
             continue
-        known = passed.get(number.boot_id)
+        known = states.get(number.boot_id)
         if known is None or not known.has(number.sequence):
             by_publisher.setdefault(number.boot_id, {}).setdefault(number.sequence, (number, message))
     for messages in by_publisher.values():
@@ -238,7 +268,10 @@ def _in_order(suspended: list[_Suspended], passed: Mapping[int, SequenceState]) 
 
 
 def _as_if_live(messages: list[_Numbered]) -> Iterator[_Suspended]:
-    """One publisher's, with the arrivals that they would have had; clocks that jump move none behind the next one."""
+    """Yield the messages of one publisher with the arrivals that they would have had live.
+
+    The arrivals are in the order of the numbers, even if a clock jumped.
+    """
     first = messages[0][0].sequence
     ordered = sorted(messages, key=lambda entry: (entry[0].sequence - first + 2**31) % 2**32)
     newest, last = ordered[-1]
@@ -252,7 +285,7 @@ def _as_if_live(messages: list[_Numbered]) -> Iterator[_Suspended]:
 
 
 def _number_of(payload: bytes, encoding: str) -> _Number | None:
-    """None where it is not numbered."""
+    """Return boot id, sequence and time of a message, None if it is not numbered."""
     kind = encoding.partition(";")[0]
     if kind == ENCODING_PACKED:
         header = read_header(payload)

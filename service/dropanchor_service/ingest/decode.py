@@ -1,7 +1,7 @@
-"""Payloads of many messages to columns at once: no Python step per sample for packed payloads.
+"""Decode the payloads of many messages to columns at once, without a Python step per sample for packed payloads.
 
-Agrees exactly with `dropanchor_schemas.wire.decode_packed` and `decode_json`, which define the contract; values are
-not judged here, only the form.
+The results equal those of `dropanchor_schemas.wire.decode_packed` and `decode_json`, which define the contract. Only
+the form is checked here, not the values.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,13 @@ from dropanchor_schemas.wire import (
     Rejection,
     read_header,
 )
-from dropanchor_service.estimation.columns import IMU, Array
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.kernels import packed
 from dropanchor_service.ingest.kernels.packed import FORM
 
-# A range, heading or bearing; `message` is the index of its payload, `anchor` the number on the wire.
+# `message` is the index of the payload. An IMU_SAMPLE has the memory layout of the engine's IMU, to be viewed as it.
+IMU_SAMPLE = np.dtype([("message", "i4"), ("t_ns", "i8"), ("acc", "f8", 3), ("gyro", "f8", 3), ("mag", "f8", 3)])
+# A range, heading or bearing; `anchor` is the number on the wire.
 SCALAR = np.dtype([("message", "i4"), ("t_ns", "i8"), ("anchor", "u4"), ("value", "f8"), ("std", "f8")])
 
 _NO_FIELD = (np.nan, np.nan, np.nan)
@@ -36,10 +38,10 @@ _WORD = 4
 
 @dataclass(frozen=True)
 class Forms:
-    """The form of each of a list of payloads, and what is needed to read their samples.
+    """The form of each payload of a list, and what is needed to read their samples.
 
-    forms: FORM, one per payload. rejected: index of the payload and why, for each that has no samples.
-    blob: the packed payloads end to end. frames: those that were JSON, by index.
+    forms: FORM, one per payload. rejected: index and reason of each payload that is not used.
+    blob: the packed payloads end to end. frames: the decoded JSON payloads, by index.
     """
 
     forms: Array
@@ -53,14 +55,14 @@ class Decoded:
     """Columns of a list of payloads; samples are in the order of their payloads.
 
     forms: FORM, one per payload.
-    rejected: index of the payload and why, for each that has no samples.
-    imu: IMU, whose `row` is the index of the payload. ranges, headings, bearings: SCALAR.
-    anchor_names: number → text of the anchors that were named by text.
+    rejected: index and reason of each payload that is not used.
+    imu: IMU_SAMPLE. ranges, headings, bearings: SCALAR.
+    anchor_names: name by number, of the anchors that are named by text.
     """
 
     forms: Array
     rejected: list[tuple[int, Reason]] = field(default_factory=list)
-    imu: Array = field(default_factory=lambda: np.empty(0, IMU))
+    imu: Array = field(default_factory=lambda: np.empty(0, IMU_SAMPLE))
     ranges: Array = field(default_factory=lambda: np.empty(0, SCALAR))
     headings: Array = field(default_factory=lambda: np.empty(0, SCALAR))
     bearings: Array = field(default_factory=lambda: np.empty(0, SCALAR))
@@ -68,13 +70,13 @@ class Decoded:
 
 
 def decode(payloads: Sequence[bytes], encodings: Sequence[str]) -> Decoded:
-    """The columns of these payloads, each in its Zenoh encoding."""
+    """Return the columns of these payloads, each in its Zenoh encoding."""
     forms = read_forms(payloads, encodings)
     return read_samples(forms, np.flatnonzero(forms.forms["accepted"]))
 
 
 def read_forms(payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
-    """What these payloads are, each in its Zenoh encoding."""
+    """Return the forms of these payloads, each in its Zenoh encoding."""
     forms = np.zeros(len(payloads), FORM)
     forms["start"] = -1
     if encodings.count(ENCODING_PACKED) == len(encodings):
@@ -90,11 +92,11 @@ def read_forms(payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
 
 
 def read_samples(read: Forms, chosen: Array) -> Decoded:
-    """The columns of the payloads `chosen`, which were accepted, in that order."""
+    """Return the columns of the payloads with the indices `chosen`, which were accepted, in that order."""
     words, floats = np.frombuffer(read.blob, "<u4"), np.frombuffer(read.blob, "<f4")
-    rooms = read.forms["counts"][chosen].sum(axis=0)
-    imu = np.empty(rooms[0], IMU)
-    ranges, headings, bearings = (np.empty(room, SCALAR) for room in rooms[1:])
+    counts = read.forms["counts"][chosen].sum(axis=0)
+    imu = np.empty(counts[0], IMU_SAMPLE)
+    ranges, headings, bearings = (np.empty(count, SCALAR) for count in counts[1:])
     packed.read_samples(words, floats, read.forms, chosen, imu, ranges, headings, bearings)
     decoded = Decoded(read.forms, read.rejected, imu, ranges, headings, bearings)
     return _with_json(decoded, read.frames, chosen) if read.frames else decoded
@@ -103,8 +105,10 @@ def read_samples(read: Forms, chosen: Array) -> Decoded:
 def _packed_forms(
     payloads: Sequence[bytes], indices: Sequence[int], forms: Array
 ) -> tuple[bytes, list[tuple[int, Reason]]]:
-    """Fills the forms of these payloads, and returns them end to end. What has not the right form throughout is put
-    to `read_header`, which names the reason."""
+    """Fill the forms of the payloads with these indices.
+
+    Returns the payloads end to end, and index and reason of those that are rejected, which `read_header` names.
+    """
     chosen = payloads if len(indices) == len(payloads) else [payloads[index] for index in indices]
     sizes = np.fromiter(map(len, chosen), np.int64, len(chosen))
     whole = (sizes >= HEADER.size) & (sizes <= MAX_PAYLOAD_BYTES) & (sizes % _WORD == 0)
@@ -141,7 +145,7 @@ def _json_forms(
 
 
 def _with_json(decoded: Decoded, all_frames: dict[int, Frame], chosen: Array) -> Decoded:
-    """The samples of JSON payloads put between those of packed ones."""
+    """Merge the samples of JSON payloads into those of packed ones, in the order of `chosen`."""
     frames = [(index, all_frames[index]) for index in chosen.tolist() if index in all_frames]
     place = np.zeros(len(decoded.forms), np.int64)
     place[chosen] = np.arange(len(chosen))
@@ -149,10 +153,10 @@ def _with_json(decoded: Decoded, all_frames: dict[int, Frame], chosen: Array) ->
     return Decoded(
         decoded.forms,
         decoded.rejected,
-        imu=_together(decoded.imu, imu, "row", place),
-        ranges=_together(decoded.ranges, [_scalar(i, s) for i, f in frames for s in f.ranges], "message", place),
-        headings=_together(decoded.headings, [_scalar(i, s) for i, f in frames for s in f.headings], "message", place),
-        bearings=_together(decoded.bearings, [_scalar(i, s) for i, f in frames for s in f.bearings], "message", place),
+        imu=_merged(decoded.imu, imu, place),
+        ranges=_merged(decoded.ranges, [_scalar(i, s) for i, f in frames for s in f.ranges], place),
+        headings=_merged(decoded.headings, [_scalar(i, s) for i, f in frames for s in f.headings], place),
+        bearings=_merged(decoded.bearings, [_scalar(i, s) for i, f in frames for s in f.bearings], place),
         anchor_names={number: name for _, f in frames for number, name in f.anchor_names.items()},
     )
 
@@ -165,8 +169,8 @@ def _scalar(index: int, sample: RangeSample | HeadingSample | BearingSample) -> 
             return index, t_ns, anchor, value, std
 
 
-def _together(column: Array, samples: Sequence[tuple[object, ...]], message: str, place: Array) -> Array:
+def _merged(column: Array, samples: Sequence[tuple[object, ...]], place: Array) -> Array:
     if not samples:
         return column
     both = np.concatenate([column, np.array(samples, column.dtype)])
-    return both[np.argsort(place[both[message]], kind="stable")]
+    return both[np.argsort(place[both["message"]], kind="stable")]

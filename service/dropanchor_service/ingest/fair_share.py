@@ -1,4 +1,4 @@
-"""How much of a bounded place each of several may take: those that ask for least get all of it."""
+"""Divide a bounded space fairly: owners that need less than their share get all that they need."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from dropanchor_service.estimation.columns import Array
 
 
 def fair_cap(sizes: Array, target: float) -> int:
-    """The largest share c with sum(min(size, c)) <= target."""
+    """Return the largest share c with sum(min(size, c)) <= target."""
     left = int(target)
     ascending: Sequence[float] = np.sort(sizes[sizes > 0]).tolist()
     for index, size in enumerate(ascending):
@@ -19,8 +19,8 @@ def fair_cap(sizes: Array, target: float) -> int:
     return int(target)
 
 
-def newer_of_same(owners: Array, sizes: Array) -> Array:
-    """The sum of the sizes of each entry and of all later ones of its owner."""
+def sizes_from_newest(owners: Array, sizes: Array) -> Array:
+    """Return for each entry the sum of its size and the sizes of all later entries of its owner."""
     order = np.argsort(owners[::-1], kind="stable")
     ordered, summed = owners[::-1][order], np.cumsum(sizes[::-1][order])
     first = np.append(True, ordered[1:] != ordered[:-1])

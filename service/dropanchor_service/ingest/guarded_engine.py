@@ -1,4 +1,4 @@
-"""The engine, kept in step with the site and guarded: one row's fault stays its own."""
+"""Run the engine so that it follows changes of the site, and so that a fault of one row harms no other row."""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -39,7 +39,7 @@ class _Faults(NamedTuple):
 
 
 class GuardedEngine:
-    """Owned by one thread."""
+    """An engine that follows the site and isolates rows that make it fail. Owned by one thread."""
 
     def __init__(self, engine: Engine, site: SiteStore, tags: TagTable, metrics: Metrics) -> None:
         self._log = RareLog(logging.getLogger(__name__))
@@ -49,27 +49,30 @@ class GuardedEngine:
         self._metrics = metrics
         self._version = 0
         self._anchors = anchor_columns([])
-        self._numbers = np.zeros(0, np.int64)  # of the anchors, ascending, and their indices
+        self._numbers = np.zeros(0, np.int64)  # of the anchors, ascending; their indices are in _indices
         self._indices = np.zeros(0, np.int32)
         self._configured: dict[int, _Configured] = {}
-        self._settings = np.zeros(0, TAG_SETTINGS)  # what each row was configured with
+        self._settings = np.zeros(0, TAG_SETTINGS)  # by row
         self._has_configured = np.zeros(0, bool)  # by row
         self._faults: dict[int, _Faults] = {}
 
     @property
     def keeps_state(self) -> bool:
-        """Whether the engine can go on after a restart."""
+        """Return whether the engine's state can be saved and restored."""
         return isinstance(self._engine, Restorable)
 
     def state(self) -> dict[str, Array]:
-        """The engine's state and what it was made with, to be copied. Empty where the engine keeps none."""
+        """Return the engine's state, anchors and settings, to be copied; empty if the engine keeps no state."""
         if not isinstance(self._engine, Restorable):
             return {}
         settings = self._settings[: len(self._tags)]
         return {"anchors": self._anchors, "settings": settings} | self._engine.state()
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Take over what `state` gave. Rows start afresh where an anchor has moved or their settings differ since."""
+        """Restore what `state` returned.
+
+        All rows start afresh if an anchor has moved since, and single rows if their settings have changed.
+        """
         assert isinstance(self._engine, Restorable)
         self.follow_site()
         anchors, settings = state.pop("anchors"), state.pop("settings")
@@ -78,16 +81,16 @@ class GuardedEngine:
         self._engine.restore(state)
         self._settings = settings
         for row, known in enumerate(settings):
-            wanted = self._wanted(row)
-            if tag_columns(wanted.tag, wanted.declination_rad).tobytes() == known.tobytes():
-                self._configured[row] = wanted
+            current = self._current(row)
+            if tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes():
+                self._configured[row] = current
         self._has_configured = np.zeros(len(settings), bool)
         self._has_configured[list(self._configured)] = True
 
     def follow_site(self) -> bool:
-        """Take over what changed in the site since the last call; True when something did.
+        """Apply the changes of the site since the last call. Return whether there were any.
 
-        An anchor that moved makes every track wrong, so all start afresh; so does a tag whose settings changed.
+        All rows start afresh if an anchor has moved, and single rows if their settings have changed.
         """
         if self._version == self._site.version:
             return False
@@ -101,12 +104,12 @@ class GuardedEngine:
         self._numbers = np.array([number for number, _ in known], np.int64)
         self._indices = np.array([index for _, index in known], np.int32)
         for row, configured in list(self._configured.items()):
-            if moved or configured != self._wanted(row):
+            if moved or configured != self._current(row):
                 self._configure(row)
         return True
 
     def anchor_indices(self, numbers: Array) -> Array:
-        """The engine's index for each anchor number, -1 where the site has no such anchor."""
+        """Return the engine's index for each anchor number, -1 for an anchor that the site does not have."""
         if not len(self._numbers):
             return np.full(len(numbers), -1, np.int32)
         place = np.minimum(np.searchsorted(self._numbers, numbers), len(self._numbers) - 1)
@@ -114,31 +117,32 @@ class GuardedEngine:
         return indices
 
     def any_quarantined(self, now_ns: int) -> bool:
+        """Return whether any row is in quarantine."""
         return any(faults.until_ns > now_ns for faults in self._faults.values())
 
     def quarantined(self, rows: Array, now_ns: int) -> Array:
-        """Which of the rows are left alone for a while, because their samples made the engine fail again and again."""
-        shut = [row for row, faults in self._faults.items() if faults.until_ns > now_ns]
-        return np.isin(rows, shut) if shut else np.zeros(len(rows), bool)
+        """Return which of the rows are in quarantine, because their samples made the engine fail repeatedly."""
+        quarantined = [row for row, faults in self._faults.items() if faults.until_ns > now_ns]
+        return np.isin(rows, quarantined) if quarantined else np.zeros(len(rows), bool)
 
-    def make_ready(self, row: int) -> None:
-        """Configure a row before anything is heard of it, so that nobody waits for that then."""
+    def prepare(self, row: int) -> None:
+        """Configure a row before its first message arrives, so that the message does not wait for it."""
         if row not in self._configured:
-            self._reach(row + 1)
+            self._reserve(row + 1)
             self._configure(row)
 
     def process(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
-        """The poses of all rows but those that fail, which start afresh."""
+        """Yield the poses of all rows. A row that makes the engine fail starts afresh."""
         for row in self._new_rows(samples):
             self._configure(row)
         yield from self._bisected(samples, now_ns)
 
     def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
         rows = [column["row"] for column in _columns(samples)]
-        self._reach(max(int(column.max(initial=-1)) for column in rows) + 1)
+        self._reserve(max(int(column.max(initial=-1)) for column in rows) + 1)
         return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
 
-    def _reach(self, rows: int) -> None:
+    def _reserve(self, rows: int) -> None:
         missing = rows - len(self._has_configured)
         if missing > 0:
             spare = max(missing, len(self._has_configured))
@@ -162,32 +166,33 @@ class GuardedEngine:
         self._metrics.faults.labels("estimator").inc()
         self._log.exception(f"estimator of tag {self._tags.at(row).name}", error)
         times = self._faults.get(row, _Faults(0, 0)).times + 1
-        shut = times % FAULTS_BEFORE_QUARANTINE == 0
-        self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if shut else 0)
+        quarantine = times % FAULTS_BEFORE_QUARANTINE == 0
+        self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if quarantine else 0)
         self._configure(row, start_known=False)
         t_ns = max(int(column["t_ns"].max()) for column in _columns(samples) if len(column))
         return PoseBatch(poses=_lost(row, t_ns))
 
     def _configure(self, row: int, start_known: bool = True) -> None:
-        wanted = self._wanted(row)
-        self._configured[row] = wanted
+        current = self._current(row)
+        self._configured[row] = current
         self._has_configured[row] = True
         # After a fault the tag is no longer where it started.
-        tag = wanted.tag if start_known else wanted.tag.model_copy(update={"start": None})
-        self._engine.configure(row, tag_columns(tag, wanted.declination_rad))
-        self._keep_settings(row, tag_columns(wanted.tag, wanted.declination_rad))
+        tag = current.tag if start_known else current.tag.model_copy(update={"start": None})
+        self._engine.configure(row, tag_columns(tag, current.declination_rad))
+        self._keep_settings(row, tag_columns(current.tag, current.declination_rad))
 
     def _keep_settings(self, row: int, settings: Array) -> None:
         if row >= len(self._settings):
             self._settings = enlarged(self._settings, max(row + 1, 2 * len(self._settings)))
         self._settings[row] = settings
 
-    def _wanted(self, row: int) -> _Configured:
+    def _current(self, row: int) -> _Configured:
+        """Return the settings that the site has now for this row."""
         return _Configured(self._site.tag_settings(self._tags.at(row).name), self._site.site.declination_rad)
 
 
 def _lost(row: int, t_ns: int) -> Array:
-    """POSE (1) of a row whose numbers are gone."""
+    """Return POSE (1) of a row whose estimate is lost."""
     pose = np.zeros(1, POSE)
     for name in POSE.names or ():
         if pose[name].dtype.kind == "f":
@@ -205,6 +210,6 @@ def _rows(samples: SampleBatch) -> Array:
     return np.unique(np.concatenate([column["row"] for column in _columns(samples)]))
 
 
-def _selected(samples: SampleBatch, wanted: Callable[[Array], Array]) -> SampleBatch:
-    imu, ranges, headings, bearings = (column[wanted(column["row"])] for column in _columns(samples))
+def _selected(samples: SampleBatch, selects: Callable[[Array], Array]) -> SampleBatch:
+    imu, ranges, headings, bearings = (column[selects(column["row"])] for column in _columns(samples))
     return SampleBatch(imu, ranges, headings, bearings)

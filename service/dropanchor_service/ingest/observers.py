@@ -1,4 +1,4 @@
-"""Who else is told of what comes in and what comes out."""
+"""Pass messages and poses to observers, such as the recorder and the history."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,20 +6,20 @@ from dataclasses import dataclass
 from dropanchor_service.estimation.columns import Array
 
 
-def _nobody(*_: object) -> None:
+def _ignore(*_: object) -> None:
     pass
 
 
 @dataclass(frozen=True)
 class Observers:
-    """Called by the ingest thread, which cannot wait for them.
+    """Functions that the ingest thread calls. They must return at once.
 
-    messages: with the admitted messages of a turn: row, payload, encoding, arrival. poses: with POSE as the engine
-    gave them, per row in order of time, after `messages` of the same turn.
+    messages: receives the admitted messages of a turn: row, payload, encoding, arrival (UTC, ns). poses: receives POSE
+    from the engine, per row in order of time, after the messages of the same turn.
     """
 
-    messages: Callable[[Sequence[tuple[int, bytes, str, int]]], None] = _nobody
-    poses: Callable[[Array], None] = _nobody
+    messages: Callable[[Sequence[tuple[int, bytes, str, int]]], None] = _ignore
+    poses: Callable[[Array], None] = _ignore
 
 
 NO_OBSERVERS = Observers()

@@ -1,4 +1,4 @@
-"""What is known of each publisher of a tag: which of its messages have come, in which order, and its clock."""
+"""Track each publisher of a tag: which of its messages have arrived, in which order, and its clock."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,8 +15,11 @@ from dropanchor_service.store.records import enlarged
 
 @dataclass(frozen=True)
 class Sequenced:
-    """Indices of messages. due: to be fused now, in this order; pending: to be put in again, before newer ones, until
-    they are due. missing: messages that are given up. slots: the publisher of each message, -1 without one."""
+    """The result of `Publishers.sequence`, as indices of messages.
+
+    due: to fuse now, in this order. pending: to pass in again, before newer messages, until they are due. duplicates:
+    arrived before. missing: number of messages that are given up. slots: publisher of each message, -1 for none.
+    """
 
     due: Array
     pending: Array
@@ -26,27 +29,27 @@ class Sequenced:
 
 
 class SequenceState(NamedTuple):
-    """next: the number that is expected; seen: bit n % WINDOW is set when the message n has come."""
+    """next: the expected number. seen: bit n % WINDOW is set if message n has arrived."""
 
     next: int
     seen: int
 
     def ahead(self, sequence: int) -> int:
-        """How many numbers lie from the expected one to this one; negative when it is behind."""
+        """Return how far a number is ahead of the expected one; negative if it is behind."""
         return (sequence - self.next + 2**31) % 2**32 - 2**31
 
     def has(self, sequence: int) -> bool:
-        """Whether this message was fused already, or is older than what is remembered."""
+        """Return whether this message was fused before, or is older than the window of remembered numbers."""
         behind = -self.ahead(sequence)
         return behind > 0 and (behind > WINDOW or bool(self.seen >> sequence % WINDOW & 1))
 
 
 class Publishers:
-    """The last few publishers of every tag; memory is bounded whatever boot ids a tag makes up.
+    """The last few publishers of every tag. Memory stays bounded, whatever boot ids a tag makes up.
 
-    `columns` and `times` are all there is to know: a checkpoint is a copy of them. One that was restored expects the
-    number after the last that passed, so what is fetched from caches meanwhile fills the gap, as long as the window
-    that `sequence` is called with is wide enough to wait for it.
+    `columns` and `times` are the whole state: a checkpoint is a copy of them. After a restore, each publisher is
+    expected to continue after its last fused number. Messages from caches fill the gap, if `due_ns` of `sequence`
+    leaves them enough time.
     """
 
     def __init__(self) -> None:
@@ -72,8 +75,11 @@ class Publishers:
         self._times = times.copy()
 
     def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int) -> Sequenced:
-        """Put messages (FORM, row of their tag, ns of arrival; earlier arrivals first) into their publishers' order.
-        Nobody waits any longer for what is missing before a message that arrived until `due_ns`."""
+        """Put messages into the order of their publishers.
+
+        forms: FORM. rows: of their tags. arrivals: ns, ascending. due_ns: give up on messages that are missing before
+        one that arrived by then.
+        """
         self._grow(rows)
         n = len(rows)
         slots, distances, verdicts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
@@ -89,7 +95,7 @@ class Publishers:
         return Sequenced(due, waiting, again, missing, slots)
 
     def sequence_states(self, row: int) -> dict[int, SequenceState]:
-        """By boot id, of this tag's publishers."""
+        """Return the state of each publisher of this tag, by boot id."""
         of_tag = self._columns[row * PER_TAG : (row + 1) * PER_TAG]
         return {
             int(publisher["boot_id"]): SequenceState(
@@ -99,17 +105,17 @@ class Publishers:
         }
 
     def allow_gap(self, rows: Array) -> None:
-        """Messages of these rows were shed before they got here: nobody need wait for them."""
+        """Do not wait for the next missing messages of these rows, because the buffer has shed them."""
         known = rows[(rows + 1) * PER_TAG <= len(self._columns)]
         self._columns["gap_allowed"].reshape(-1, PER_TAG)[known] = True
 
     def time_offsets(
         self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]
     ) -> tuple[Array, int]:
-        """Return the estimator's time minus the clock of each message's publisher, ns, empty when all are the same,
-        and how many clocks jumped.
+        """Return the estimator's time minus the publisher's clock for each message, and how many clocks jumped.
 
-        samples: of each kind the index of the message and the time of every sample.
+        The offsets are in ns; the array is empty if all of them are 0. samples: for each kind, the index of the message
+        and the time of every sample.
         """
         newest, offsets = np.full(len(forms), -1, np.int64), np.zeros(len(forms), np.int64)
         for messages, t_ns in samples:
@@ -120,7 +126,7 @@ class Publishers:
         return offsets if offsets.any() else np.zeros(0, np.int64), jumps
 
     def to_utc(self, outcomes: Array) -> None:
-        """Change the times of POSE or INNOVATION from the estimators' time to UTC."""
+        """Convert the times of POSE or INNOVATION from the estimators' time to UTC, in place."""
         if self._times["correction_ns"].any():
             known = outcomes["row"] < len(self._times)
             outcomes["t_ns"][known] += self._times["correction_ns"][outcomes["row"][known]]

@@ -1,4 +1,4 @@
-"""What is not used, counted by cause: for its tag, and in the metrics."""
+"""Count what is not used by reason, for its tag and in the metrics."""
 
 import logging
 
@@ -10,49 +10,49 @@ from dropanchor_service.store import TagTable
 
 
 class Rejections:
-    """Owned by one thread."""
+    """Counters of rejected messages and samples, and of faults. Owned by one thread."""
 
     def __init__(self, tags: TagTable, metrics: Metrics) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._tags = tags
         self._metrics = metrics
 
-    def reject(self, reason: Reason, rows: Array) -> None:
-        """A message or sample of each of `rows`."""
+    def count_rejected(self, reason: Reason, rows: Array) -> None:
+        """Count a rejected message or sample for each entry of `rows`."""
         if len(rows):
             self._tags.count_rejected(reason, rows)
             self._metrics.rejected.labels(reason).inc(len(rows))
 
-    def refuse(self, reason: Reason, key: str) -> None:
-        """A message of nobody who is known."""
+    def count_refused(self, reason: Reason, key: str) -> None:
+        """Count and log a rejected message of a tag without a row."""
         self._metrics.rejected.labels(reason).inc()
-        self._log.warning(f"message refused ({reason})", key[:200])
+        self._log.warning(f"a message is rejected ({reason})", key[:200])
 
-    def shed(self, rows: Array, samples: int) -> None:
-        """A message of each of `rows`, in all with so many samples."""
-        self.reject(Reason.SHED, rows)
+    def count_shed(self, rows: Array, samples: int) -> None:
+        """Count a shed message for each entry of `rows`, with `samples` packed samples in total."""
+        self.count_rejected(Reason.SHED, rows)
         self._metrics.shed_samples.inc(samples)
 
     def count_unregistered(self, reason: Reason, messages: int) -> None:
-        """Messages of tags without a row."""
+        """Count rejected messages of tags without a row."""
         self._metrics.rejected.labels(reason).inc(messages)
 
-    def give_up(self, messages: int) -> None:
-        """Messages that were waited for and did not come."""
+    def count_given_up(self, messages: int) -> None:
+        """Count missing messages that the service no longer waits for."""
         if messages:
             self._metrics.given_up.inc(messages)
 
-    def clocks_jumped(self, times: int) -> None:
-        """Clocks of tags that were set, and whose samples go on without the jump."""
+    def count_clock_jumps(self, times: int) -> None:
+        """Count jumps of tags' clocks, which are removed from the times of the samples."""
         if times:
             self._metrics.clock_jumps.inc(times)
 
     def observer_failed(self, error: Exception) -> None:
-        """An error of ours."""
-        self._metrics.faults.labels("tap").inc()
-        self._log.exception("tap", error)
+        """Count and log an error in an observer."""
+        self._metrics.faults.labels("observer").inc()
+        self._log.exception("observer", error)
 
     def decoder_failed(self, error: Exception) -> None:
-        """An error of ours."""
+        """Count and log an error in the decoder."""
         self._metrics.faults.labels("decoder").inc()
         self._log.exception("decoder", error)

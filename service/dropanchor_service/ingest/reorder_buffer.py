@@ -1,13 +1,16 @@
-"""Messages that wait for one before them."""
+"""Keep messages that wait for one numbered before them."""
 
 from dropanchor_service.ingest.buffer import Message
 
 
 class ReorderBuffer:
-    """Put aside behind a gap in their publisher's numbers. Bounded in time by who wakes them, in bytes by `is_full`."""
+    """Messages behind a gap in the numbers of their publisher.
 
-    def __init__(self, most_bytes: int) -> None:
-        self._most_bytes = most_bytes
+    The caller bounds the time that they wait, and their size when `is_full`.
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
         self._messages: list[Message] = []
         self._bytes = 0
 
@@ -16,22 +19,26 @@ class ReorderBuffer:
 
     @property
     def is_full(self) -> bool:
-        """Nobody should wait any longer."""
-        return self._bytes > self._most_bytes
+        """Return whether the messages exceed the capacity, so that none should wait any longer."""
+        return self._bytes > self._max_bytes
 
     def add(self, messages: list[Message]) -> None:
+        """Add messages, the oldest first."""
         self._messages += messages
         self._bytes += sum(len(message[1]) for message in messages)
 
     def take_due(self, others: list[Message], due_ns: int) -> list[Message]:
-        """Take out, in order of arrival, all of the rows that `others` are of or that have one from until `due_ns`."""
+        """Take out all messages of the rows that have a message in `others`, or one that arrived by `due_ns`.
+
+        They are in the order of arrival.
+        """
         if not self._messages:
             return []
         rows, _, _, arrivals = zip(*self._messages, strict=True)
-        awake = {message[0] for message in others}
-        awake.update(row for row, arrival_ns in zip(rows, arrivals, strict=True) if arrival_ns <= due_ns)
-        taken = [message for message in self._messages if message[0] in awake]
+        due_rows = {message[0] for message in others}
+        due_rows.update(row for row, arrival_ns in zip(rows, arrivals, strict=True) if arrival_ns <= due_ns)
+        taken = [message for message in self._messages if message[0] in due_rows]
         if taken:
-            self._messages = [message for message in self._messages if message[0] not in awake]
+            self._messages = [message for message in self._messages if message[0] not in due_rows]
             self._bytes -= sum(len(message[1]) for message in taken)
         return taken

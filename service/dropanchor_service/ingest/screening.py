@@ -1,4 +1,4 @@
-"""Judges the values of samples, all of them at once: every sample that is not used is counted under one reason."""
+"""Screen the values of samples in bulk. Every sample that is rejected has exactly one reason."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,14 +24,14 @@ _OF_BEARINGS = _COMMON | dict.fromkeys((values.NEGATIVE, values.ABSURD), Reason.
 
 @dataclass(frozen=True)
 class Rejected:
-    """Samples that were not used; messages: the index of the payload of each."""
+    """Rejected samples. messages: index of the message of each."""
 
     reason: Reason
     messages: Array
 
 
 def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
-    """The samples whose values a sensor can have measured, and the others by reason."""
+    """Return the samples with values that a sensor can have measured, and the others by reason."""
     rejected: list[Rejected] = []
     of_ranges, of_angles = (*RANGE_LIMITS, *RANGE_STD_LIMITS), (*ANGLE_LIMITS, *ANGLE_STD_LIMITS)
     return replace(
@@ -43,11 +43,11 @@ def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
     ), rejected
 
 
-def keep(samples: Array, messages: Array, bad: Array, reason: Reason, rejected: list[Rejected]) -> Array:
-    """The samples that are not `bad`; the others are added to `rejected`."""
+def keep(samples: Array, bad: Array, reason: Reason, rejected: list[Rejected]) -> Array:
+    """Return the samples that are not `bad`, and add the others to `rejected`."""
     if not bad.any():
         return samples
-    rejected.append(Rejected(reason, messages[bad]))
+    rejected.append(Rejected(reason, samples["message"][bad]))
     return samples[~bad]
 
 
@@ -55,7 +55,7 @@ def _screened_imu(imu: Array, rejected: list[Rejected]) -> Array:
     verdicts = np.empty(len(imu), np.uint8)
     if not len(imu) or not values.judge_imu(imu, verdicts):
         return imu
-    return _good(imu, imu["row"], verdicts, _OF_IMU, rejected)
+    return _good(imu, verdicts, _OF_IMU, rejected)
 
 
 def _screened(
@@ -64,19 +64,17 @@ def _screened(
     verdicts = np.empty(len(samples), np.uint8)
     if not len(samples) or not values.judge_scalars(samples["value"], samples["std"], *limits, verdicts):
         return samples
-    return _good(samples, samples["message"], verdicts, reasons, rejected)
+    return _good(samples, verdicts, reasons, rejected)
 
 
-def _good(
-    samples: Array, messages: Array, verdicts: Array, reasons: Mapping[int, Reason], rejected: list[Rejected]
-) -> Array:
+def _good(samples: Array, verdicts: Array, reasons: Mapping[int, Reason], rejected: list[Rejected]) -> Array:
     for verdict in np.unique(verdicts[verdicts != values.GOOD]).tolist():
-        rejected.append(Rejected(reasons[verdict], messages[verdicts == verdict]))
+        rejected.append(Rejected(reasons[verdict], samples["message"][verdicts == verdict]))
     good: Array = samples[verdicts == values.GOOD]
     return good
 
 
 def within_time(t_ns: Array) -> Array:
-    """Which UTC times can be one."""
+    """Return which times lie in the range of valid UTC times."""
     inside: Array = (t_ns >= 0) & (t_ns < MAX_T_NS)
     return inside

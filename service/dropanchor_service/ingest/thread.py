@@ -1,4 +1,4 @@
-"""The only thread that runs engine. It survives errors, and says so when it does not."""
+"""Run the ingest on a thread of its own, which survives errors and reports when it is stuck."""
 
 import logging
 import threading
@@ -11,16 +11,19 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 
 IDLE_S = 0.25
-PENDING_S = 0.02  # of waiting while a held message may become due
-BACKLOG = 1000  # messages beyond which there is no waiting for more
-SILENT_S = 5.0  # without a turn the thread counts as stuck
-TURN_S = 0.1  # that a turn may take when more waits than it takes
-FEWEST, MOST = 100, 2000  # messages of such a turn
-TELLING = 50  # messages of a turn from which on its time tells what another one will take
+PENDING_S = 0.02  # longest wait while messages are pending, which may become due
+BACKLOG = 1000  # messages from which on a turn starts at once
+SILENT_S = 5.0  # without a turn: then the thread counts as stuck
+TURN_S = 0.1  # duration of a turn to aim at when there is a backlog
+MIN_MESSAGES, MAX_MESSAGES = 100, 2000  # limits of such a turn
+MIN_MEASURED = 50  # messages of a turn whose duration predicts that of the next one
 
 
 class IngestThread:
-    """Takes a turn every `period_s` while messages come in, from the beginning of one to that of the next."""
+    """Takes a turn every `period_s` while messages arrive.
+
+    between_turns: called after each turn, on the same thread.
+    """
 
     def __init__(
         self,
@@ -38,7 +41,7 @@ class IngestThread:
         self._between_turns = between_turns
         self._stop = threading.Event()
         self._turned_s = time.monotonic()
-        self._most = FEWEST
+        self._limit = MIN_MESSAGES
         self._thread = threading.Thread(target=self._run, name="ingest", daemon=True)
 
     def start(self) -> None:
@@ -54,26 +57,26 @@ class IngestThread:
 
     @property
     def problem(self) -> str | None:
-        """Why samples are not fused at this moment; None when they are."""
+        """Return why samples are not fused now, None if they are."""
         if not self.is_alive:
-            return "the ingest thread does not run"
+            return "the ingest thread is not running"
         silent_s = time.monotonic() - self._turned_s
         return f"the ingest thread has been stuck for {silent_s:.0f} s" if silent_s > SILENT_S else None
 
     def _run(self) -> None:
-        self._turn()  # tags that are known are admitted before anything comes in
+        self._turn()  # admits the listed tags before the first message
         while not self._stop.is_set():
             if self._buffer.wait(PENDING_S if self._ingest.has_pending else IDLE_S) and self._buffer.depth < BACKLOG:
-                # so that one call fuses many messages
+                # Gather messages, so that one call fuses many of them.
                 self._stop.wait(self._turned_s + self._period_s - time.monotonic())
             self._turn()
-        self._turn()  # what has come in before the end
+        self._turn()  # fuses what arrived before the stop
 
     def _turn(self) -> None:
         self._turned_s = time.monotonic()
         try:
-            taken = self._ingest.turn(self._most)
-            if taken >= TELLING:
+            taken = self._ingest.turn(self._limit)
+            if taken >= MIN_MEASURED:
                 self._adapt(taken / (time.monotonic() - self._turned_s))
             self._between_turns()
         except Exception as error:
@@ -82,4 +85,4 @@ class IngestThread:
             self._stop.wait(self._period_s)
 
     def _adapt(self, messages_per_s: float) -> None:
-        self._most = min(max(round(TURN_S * messages_per_s), FEWEST), MOST)
+        self._limit = min(max(round(TURN_S * messages_per_s), MIN_MESSAGES), MAX_MESSAGES)

@@ -1,4 +1,4 @@
-"""From messages to poses: admit, prepare, fuse, store, and count whatever is lost."""
+"""Turn messages into poses: admit, read, fuse, store, and count what is lost."""
 
 import time
 from collections import deque
@@ -13,6 +13,7 @@ from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import Message, MessageBuffer, UnregisteredMessage
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
+from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.samples import SampleReader
 from dropanchor_service.metrics.registry import Metrics
@@ -23,13 +24,17 @@ MESSAGES_PER_TURN = 1000
 
 
 class Ingest:
-    """Owned by one thread, except for `announce`."""
+    """The path of a message from the buffer to the stored pose. Owned by one thread, except for `announce`.
+
+    reorder_ns: time that a message waits for those that its publisher numbered before it.
+    """
 
     def __init__(
         self,
         buffer: MessageBuffer,
         admission: Admission,
         engine: GuardedEngine,
+        publishers: Publishers,
         site: SiteStore,
         tags: TagTable,
         latest: LatestPoses,
@@ -39,12 +44,13 @@ class Ingest:
         reorder_ns: int = 250_000_000,
     ) -> None:
         self._rejections = Rejections(tags, metrics)
-        self.reader = SampleReader(site, tags, engine, self._rejections, reorder_ns)
+        self._reader = SampleReader(site, tags, engine, self._rejections, publishers, reorder_ns)
         self._buffer = buffer
         self._admission = admission
         self._site = site
-        self._known_tags = 0  # rows whose keys the buffer knows
+        self._registered_tags = 0  # rows whose keys are registered with the buffer
         self._engine = engine
+        self._publishers = publishers
         self._tags = tags
         self._latest = latest
         self._metrics = metrics
@@ -53,64 +59,66 @@ class Ingest:
         self._announced: deque[str] = deque(maxlen=1024)
 
     def announce(self, name: str) -> None:
-        """A tag has said that it is alive. From any thread."""
+        """Admit a tag that is online, in the next turn. Thread-safe."""
         self._announced.append(name)
 
     @property
     def has_pending(self) -> bool:
-        """Whether a message waits for one before it, so that a turn may be due although nothing comes in."""
-        return self.reader.has_pending > 0
+        """Return whether messages are pending, so that a turn may be due although nothing arrives."""
+        return self._reader.pending > 0
 
-    def turn(self, most: int = MESSAGES_PER_TURN) -> int:
-        """So many of the messages that wait, at most. Returns how many of tags that are known were taken."""
+    def turn(self, limit: int = MESSAGES_PER_TURN) -> int:
+        """Process up to `limit` messages of registered tags. Return how many."""
         if self._engine.follow_site():
             self._admission.register_listed()
         self._admission.review()
         while self._announced:
-            self._admission.by_name(self._announced.popleft())
-        waited = list(self._know_new_tags())
-        fresh, strangers = self._buffer.drain(most, self._clock.now_ns())
+            self._admission.admit(self._announced.popleft())
+        kept = list(self._register_new_tags())
+        fresh, unregistered = self._buffer.drain(limit, self._clock.now_ns())
         self._count_shed()
-        known = [*waited, *fresh, *self._admitted(strangers)]
-        if known:
-            self._tell(self._observers.messages, known)
-            self._metrics.messages.inc(len(known))
-            self._tags.count_messages(np.array([message[0] for message in known], np.int32), known[-1][3])
-        if known or self.has_pending:
-            self._fuse(known)
+        messages = [*kept, *fresh, *self._admitted(unregistered)]
+        if messages:
+            self._notify(self._observers.messages, messages)
+            self._metrics.messages.inc(len(messages))
+            self._tags.count_messages(np.array([message[0] for message in messages], np.int32), messages[-1][3])
+        if messages or self.has_pending:
+            self._fuse(messages)
         return len(fresh)
 
-    def _know_new_tags(self) -> Iterator[Message]:
-        """Messages of tags that have a row already wait neither among those of strangers nor for their estimator.
-        Returns what waited of tags that others gave a row."""
-        for tag in self._tags.all()[self._known_tags :] if len(self._tags) > self._known_tags else ():
-            self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
-            self._engine.make_ready(tag.row)
-            self._known_tags = tag.row + 1
-            yield from self._waited(tag)
+    def _register_new_tags(self) -> Iterator[Message]:
+        """Register the keys of new tags with the buffer and prepare their rows. Yield the messages kept for them.
 
-    def _admitted(self, strangers: Sequence[UnregisteredMessage]) -> Iterator[Message]:
-        for stranger in strangers:
-            key, payload, encoding, arrival_ns = stranger
+        From then on, their messages wait neither among those of unregistered tags nor for their estimator.
+        """
+        for tag in self._tags.all()[self._registered_tags :] if len(self._tags) > self._registered_tags else ():
+            self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
+            self._engine.prepare(tag.row)
+            self._registered_tags = tag.row + 1
+            yield from self._kept(tag)
+
+    def _admitted(self, unregistered: Sequence[UnregisteredMessage]) -> Iterator[Message]:
+        for message in unregistered:
+            key, payload, encoding, arrival_ns = message
             row = self._buffer.row_of(key)
             if row is None:
-                tag = self._admission.hear(stranger)
+                tag = self._admission.admit_message(message)
                 if isinstance(tag, Reason):
-                    self._rejections.refuse(tag, key)
+                    self._rejections.count_refused(tag, key)
                 if not isinstance(tag, Tag):
                     continue
                 self._buffer.admit(key, tag.row)
-                yield from self._waited(tag)
+                yield from self._kept(tag)
                 row = tag.row
             yield row, payload, encoding, arrival_ns
 
-    def _waited(self, tag: Tag) -> Iterator[Message]:
-        for payload, encoding, arrival_ns in self._admission.waited(tag):
+    def _kept(self, tag: Tag) -> Iterator[Message]:
+        for payload, encoding, arrival_ns in self._admission.take_kept(tag):
             yield tag.row, payload, encoding, arrival_ns
 
     def _fuse(self, messages: list[Message]) -> None:
         now_ns = self._clock.now_ns()
-        for samples in self.reader.batches_of(messages, now_ns):
+        for samples in self._reader.batches(messages, now_ns):
             self._fuse_batch(self._outside_quarantine(samples, now_ns), now_ns)
         if messages:
             self._metrics.delay_seconds.observe((self._clock.now_ns() - messages[0][3]) * 1e-9)
@@ -130,38 +138,38 @@ class Ingest:
     def _outside_quarantine(self, samples: SampleBatch, now_ns: int) -> SampleBatch:
         if not self._engine.any_quarantined(now_ns):
             return samples
-        free: dict[str, Array] = {}
+        accepted: dict[str, Array] = {}
         for kind, column in _by_kind(samples):
-            shut = self._engine.quarantined(column["row"], now_ns)
-            self._rejections.reject(Reason.ESTIMATOR_FAULT, column["row"][shut])
-            free[kind] = column[~shut] if shut.any() else column
-        return SampleBatch(free["imu"], free["range"], free["heading"], free["bearing"])
+            quarantined = self._engine.quarantined(column["row"], now_ns)
+            self._rejections.count_rejected(Reason.ESTIMATOR_FAULT, column["row"][quarantined])
+            accepted[kind] = column[~quarantined] if quarantined.any() else column
+        return SampleBatch(accepted["imu"], accepted["range"], accepted["heading"], accepted["bearing"])
 
     def _store(self, batch: PoseBatch) -> None:
         for outcomes in (batch.poses, batch.innovations):
-            self.reader.publishers.to_utc(outcomes)
+            self._publishers.to_utc(outcomes)
         self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
         self._metrics.poses.inc(len(batch.poses))
         for reason, count in batch.rejected.items():
             self._metrics.rejected.labels(reason).inc(count)
-        self._tell(self._observers.poses, batch.poses)
+        self._notify(self._observers.poses, batch.poses)
 
-    def _tell(self, tap: Callable[..., None], *what: object) -> None:
-        """What only listens must not cost a sample."""
+    def _notify(self, observer: Callable[..., None], *values: object) -> None:
+        """Call an observer. If it fails, no sample is lost."""
         try:
-            tap(*what)
+            observer(*values)
         except Exception as error:
             self._rejections.observer_failed(error)
 
     def _count_shed(self) -> None:
-        by_row, samples, strangers = self._buffer.take_shed()
-        self._rejections.count_unregistered(Reason.SHED, strangers)
+        by_row, samples, unregistered = self._buffer.take_shed()
+        self._rejections.count_unregistered(Reason.SHED, unregistered)
         self._rejections.count_unregistered(Reason.TAG_UNPROVEN, self._admission.take_expired())
         if by_row:
             rows = np.fromiter(by_row, np.int64, len(by_row))
             times = np.fromiter(by_row.values(), np.int64, len(by_row))
-            self._rejections.shed(np.repeat(rows, times), samples)
-            self.reader.publishers.allow_gap(rows)
+            self._rejections.count_shed(np.repeat(rows, times), samples)
+            self._publishers.allow_gap(rows)
 
 
 def _by_kind(samples: SampleBatch) -> tuple[tuple[str, Array], ...]:

@@ -8,7 +8,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.answers.columns import STATES, with_age
+from dropanchor_service.answers.columns import STATES, aged_poses
 from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.pending_tags import PendingTags
 from dropanchor_service.store.tags import KINDS, TagTable
@@ -101,7 +101,7 @@ class FleetGauges(Collector):
 
     def collect(self) -> Iterable[Metric]:
         poses = self._latest.since()[1]
-        shown = with_age(poses, self._tags.age_s(poses, self._now_ns()))
+        shown = aged_poses(poses, self._tags.age_s(poses, self._now_ns()))
         by_state = np.bincount(shown["state"], minlength=len(STATES))
         tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
         for state, count in zip(STATES, by_state, strict=True):

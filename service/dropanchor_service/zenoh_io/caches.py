@@ -8,20 +8,17 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from queue import Empty, SimpleQueue
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import zenoh
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.wire import payload_encoding
-from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp
-from dropanchor_service.ingest.publishers import Publishers, SequenceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
@@ -40,16 +37,14 @@ _log = logging.getLogger(__name__)
 
 
 class ZenohCaches:
-    """A thread of its own while it is open, since callbacks of Zenoh must not call it. Open it once samples are
-    subscribed to: what is published from then on comes by itself."""
+    """Asks on a thread of its own, since callbacks of Zenoh must not call it. Start it once samples are subscribed to:
+    what is published from then on arrives live."""
 
     def __init__(
         self,
         session: zenoh.Session,
         site: str,
-        buffer: MessageBuffer,
         tags: TagTable,
-        publishers: Publishers,
         metrics: Metrics,
         clock: UtcClock,
     ) -> None:
@@ -57,41 +52,33 @@ class ZenohCaches:
         self._session = session
         self._site = site
         self._tags = tags
-        self._publishers = publishers
         self._metrics = metrics
         self._clock = clock
         self._later: deque[tuple[float, str, int]] = deque()  # to be asked again, and when
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        expected = [keys.samples_key(site, tag.name) for tag in tags.all()]
         self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # by the last process
-        self.catch_up = CatchUp(
-            buffer,
-            expected,
-            self._sequence_states,
-            self._want,
-            self._most(self._newest_ns),
-        )
         self._thread = threading.Thread(target=self._run, name="caches", daemon=True)
 
-    def __enter__(self) -> Self:
+    @property
+    def new_publisher_limit(self) -> int:
+        """Number of messages to ask for from a publisher that the last process did not know."""
+        return self._most(self._newest_ns)
+
+    def start(self, catch_up: CatchUp) -> None:
+        """Ask all caches, and pass their replies to `catch_up`."""
+        self._catch_up = catch_up
         self._tasks.put(self._ask_all)
         self._thread.start()
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def stop(self) -> None:
         self._tasks.put(None)
         self._thread.join(1.0)
 
-    def _sequence_states(self, key: str) -> Mapping[int, SequenceState]:
-        tag = self._tags.find(keys.tag_from_key(key))
-        return {} if tag is None else self._publishers.sequence_states(tag.row)
-
-    def _want(self, key: str, missing: int, tries: int) -> None:
-        if tries:
+    def ask(self, key: str, missing: int, retries: int) -> None:
+        """Ask the caches of a tag for `missing` messages (0: unknown), on the thread; a retry waits for a moment."""
+        if retries:
             self._later.append((time.monotonic() + PAUSE_S, key, missing))
-        self._tasks.put(self._ask_later if tries else partial(self._ask, key, missing))
+        self._tasks.put(self._ask_later if retries else partial(self._ask, key, missing))
 
     def _run(self) -> None:
         while True:
@@ -120,13 +107,13 @@ class ZenohCaches:
             for reply in received(replies):
                 self._on_reply(reply)
         finally:
-            self._finish(partial(self.catch_up.first_round_answered, most), asked_s)
+            self._finish(partial(self._catch_up.on_first_round_answer, most), asked_s)
 
     def _ask(self, key: str, missing: int) -> None:
         tag = self._tags.find(keys.tag_from_key(key))
         heard_ns = None if tag is None else tag.last_heard_ns
         most = FEWEST + missing if missing else self._most(heard_ns or 0)
-        answered = partial(self.catch_up.answered, key, most)
+        answered = partial(self._catch_up.on_answer, key, most)
         done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
         try:
             self._asked(key, most, zenoh.handlers.Callback(self._on_reply, done))
@@ -166,7 +153,7 @@ class ZenohCaches:
         if message is not None:
             now_ns = self._clock.now_ns()
             encoding = payload_encoding(str(message.encoding))
-            self.catch_up.fetch(str(message.key_expr), bytes(message.payload), encoding, now_ns)
+            self._catch_up.on_cached(str(message.key_expr), bytes(message.payload), encoding, now_ns)
 
     def _finish(self, answered: Callable[[], int], asked_s: float) -> None:
         messages = answered()

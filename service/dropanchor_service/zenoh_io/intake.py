@@ -14,8 +14,7 @@ import zenoh.ext
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.wire import payload_encoding
-from dropanchor_service.ingest.buffer import MessageBuffer
-from dropanchor_service.ingest.publishers import Publishers
+from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
@@ -35,13 +34,13 @@ class ZenohIntake:
         self,
         session: zenoh.Session,
         site: str,
-        buffer: MessageBuffer,
         ingest: Ingest,
+        catch_up: CatchUp,
+        caches: ZenohCaches,
         tags: TagTable,
         metrics: Metrics,
         clock: UtcClock,
         max_tags: int,
-        publishers: Publishers,
     ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._session = session
@@ -51,7 +50,8 @@ class ZenohIntake:
         self._metrics = metrics
         self._clock = clock
         self._max_tokens = 2 * max_tags
-        self._caches = ZenohCaches(session, site, buffer, tags, publishers, metrics, clock)
+        self._catch_up = catch_up
+        self._caches = caches
         self._declared: list[Any] = []
 
     def __enter__(self) -> Self:
@@ -70,13 +70,13 @@ class ZenohIntake:
         self._declared = [misses, samples, tokens]
         self._thread = threading.Thread(target=self._take_all, args=(samples.handler,), name="samples", daemon=True)
         self._thread.start()
-        self._caches.__enter__()
+        self._caches.start(self._catch_up)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._caches.__exit__(kind, error, traceback)
+        self._caches.stop()
         for declared in self._declared:
             declared.undeclare()
         self._thread.join(1.0)
@@ -89,7 +89,7 @@ class ZenohIntake:
     def _hear(self, message: zenoh.Sample) -> None:
         now_ns = self._clock.now_ns()
         encoding = payload_encoding(str(message.encoding))
-        self._caches.catch_up.hear(str(message.key_expr), bytes(message.payload), encoding, now_ns)
+        self._catch_up.on_live(str(message.key_expr), bytes(message.payload), encoding, now_ns)
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)
@@ -105,4 +105,4 @@ class ZenohIntake:
         elif self._tags.online_names < self._max_tokens:
             self._tags.set_online(name, True)
             self._ingest.announce(name)
-            self._caches.catch_up.appear(keys.samples_key(self._site, name))
+            self._catch_up.on_alive(keys.samples_key(self._site, name))

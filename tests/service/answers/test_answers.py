@@ -1,4 +1,4 @@
-"""What the service answers, from the rows of the store."""
+"""The answers of the service, from the rows of the store."""
 
 import json
 import math
@@ -33,7 +33,7 @@ def make_answers(site: Site | None = None, age_s: float = 0.25) -> Answers:
     return Answers(store, TagTable(), LatestPoses(), now_ns=lambda: T_NS + round(age_s * 1e9))
 
 
-def asked(answers: Answers, name: str = "a") -> Any:
+def pose_of(answers: Answers, name: str = "a") -> Any:
     return json.loads(to_json(answers.pose_of(answers.tags.register(name))))
 
 
@@ -48,21 +48,21 @@ def test_an_answer_is_a_pose_of_the_contract() -> None:
     answers.tags.register("a")
     answers.tags.set_online("a", True)
     answers.latest.write(make_pose(x=1.5, y=-2.5, heading=0.1, speed=1.2, range=2.9, sigma_pos=0.2), NO_MODES)
-    pose = Pose.model_validate(asked(answers))
+    pose = Pose.model_validate(pose_of(answers))
     assert (pose.tag, pose.t_ns, pose.age_s, pose.online, pose.anchor) == ("a", T_NS, 0.25, True, "17")
     assert (pose.x, pose.y, pose.heading_rad, pose.speed_mps, pose.range_m) == (1.5, -2.5, 0.1, 1.2, 2.9)
     assert (pose.state, pose.reason, pose.hint) == ("tracking", "resolved", "")
     assert pose.covariance == [[0.04, 0, 0], [0, 0.01, 0], [0, 0, 0.001]]
 
 
-def test_what_is_unknown_is_null() -> None:
+def test_unknown_values_are_null() -> None:
     answers = make_answers()
     answers.tags.register("a")
     unknown: dict[str, Any] = dict.fromkeys(
         ("x", "y", "heading", "speed", "yaw_rate", "range", "sigma_pos", "sigma_obs"), np.nan
     )
     answers.latest.write(make_pose(**unknown, cov=np.inf, anchor=-1), NO_MODES)
-    pose = asked(answers)
+    pose = pose_of(answers)
     nulls = {name for name, value in pose.items() if value is None}
     assert nulls >= {"x", "y", "heading_rad", "covariance", "ellipse_95", "range_m", "anchor", "lat", "lon"}
     Pose.model_validate(pose)
@@ -72,7 +72,7 @@ def test_numbers_read_back_bit_for_bit() -> None:
     answers = make_answers()
     answers.tags.register("a")
     answers.latest.write(make_pose(x=math.pi, y=1e-17, cov=np.eye(3) / 3), NO_MODES)
-    pose = asked(answers)
+    pose = pose_of(answers)
     assert (pose["x"], pose["y"], pose["covariance"][0][0], pose["t_ns"]) == (math.pi, 1e-17, 1 / 3, T_NS)
 
 
@@ -80,23 +80,23 @@ def test_numbers_read_back_bit_for_bit() -> None:
     ("age_s", "state", "reason"),
     [(0.9, "tracking", "resolved"), (1.1, "coasting", "ranges_missing"), (10.1, "lost", "ranges_missing")],
 )
-def test_an_old_pose_is_not_shown_as_a_good_one(age_s: float, state: str, reason: str) -> None:
+def test_an_old_pose_does_not_look_like_a_good_one(age_s: float, state: str, reason: str) -> None:
     answers = make_answers(age_s=age_s)
     answers.tags.register("a")
     answers.latest.write(make_pose(), NO_MODES)
-    pose = asked(answers)
+    pose = pose_of(answers)
     assert (pose["state"], pose["reason"]) == (state, reason)
     frame = answers.frame_of(answers.rows(), answers.now_ns())
     assert (frame["state"], frame["reason"]) == ([state], [reason])
 
 
-def test_an_ambiguous_tag_shows_its_hypotheses() -> None:
+def test_the_pose_of_an_ambiguous_tag_has_its_hypotheses() -> None:
     answers = make_answers()
     answers.tags.register("a")
     modes = np.zeros(2, HYPOTHESIS)
     modes["weight"], modes["x"], modes["cov"] = [0.7, 0.3], [1.0, -1.0], np.eye(2) * 0.01
     answers.latest.write(make_pose(state=State.AMBIGUOUS, reason=StateReason.SEVERAL_MODES), modes)
-    pose = Pose.model_validate(asked(answers))
+    pose = Pose.model_validate(pose_of(answers))
     assert [(mode.weight, mode.x) for mode in pose.hypotheses] == [(0.7, 1.0), (0.3, -1.0)]
     assert pose.hypotheses[0].ellipse_95 is not None
     assert pose.hint
@@ -106,7 +106,7 @@ def test_every_reason_but_a_good_one_has_a_hint() -> None:
     assert {reason for reason, hint in zip(REASONS, HINTS, strict=True) if not hint} == {"resolved"}
 
 
-def test_the_ellipse_is_that_of_the_eigenvectors() -> None:
+def test_the_ellipse_follows_from_the_eigenvectors() -> None:
     rng = np.random.default_rng(7)
     roots = rng.normal(size=(200, 2, 2))
     cov = roots @ roots.swapaxes(1, 2)
@@ -117,7 +117,7 @@ def test_the_ellipse_is_that_of_the_eigenvectors() -> None:
     assert across.max() < 1e-6
 
 
-def test_a_list_holds_the_tags_that_have_a_pose_or_the_chosen_ones() -> None:
+def test_a_list_holds_all_tags_with_a_pose_or_the_chosen_ones() -> None:
     answers = make_answers()
     tags = [answers.tags.register(name) for name in "abc"]
     answers.latest.write(np.concatenate([make_pose(0), make_pose(2, x=7.0)]), NO_MODES)

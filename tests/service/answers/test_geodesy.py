@@ -1,4 +1,4 @@
-"""Latitude and longitude against the textbook's other direction, which shares no code with what we call."""
+"""Latitude and longitude, checked with the inverse conversion of the textbook, which shares no code with ours."""
 
 import numpy as np
 import pytest
@@ -18,10 +18,10 @@ def ecef(lat_deg: Array, lon_deg: Array, height_m: Array) -> Array:
 
 @pytest.mark.parametrize("lat0", [-89.9, -45.0, 0.0, 52.5, 85.0])
 @pytest.mark.parametrize("lon0", [-179.999, 0.0, 13.4])
-def test_points_of_the_plane_are_found_again_within_a_millimetre(lat0: float, lon0: float) -> None:
+def test_points_of_the_plane_convert_back_within_a_millimetre(lat0: float, lon0: float) -> None:
     x, y = np.meshgrid(np.linspace(-2000, 2000, 5), np.linspace(-2000, 2000, 5))
     lat, lon = lat_lon(Georeference(lat=lat0, lon=lon0), x, y)
-    # The plane rises above the ellipsoid with the distance; the height of its points moves along the normal only.
+    # The plane rises above the ellipsoid with the distance. The height moves its points along the normal only.
     height = np.hypot(x, y) ** 2 / (2 * 6.371e6)
     offset = ecef(lat, lon, height) - ecef(np.array(lat0), np.array(lon0), np.array(0.0))[:, None, None]
     phi, lam = np.radians(lat0), np.radians(lon0)
@@ -32,7 +32,7 @@ def test_points_of_the_plane_are_found_again_within_a_millimetre(lat0: float, lo
     assert np.abs(north - y).max() < 1e-3
 
 
-def test_a_turned_site_turns_around_its_origin() -> None:
+def test_a_rotated_site_turns_around_its_origin() -> None:
     turned = Georeference(lat=52.5, lon=13.4, rotation_rad=np.pi / 2)
     straight = Georeference(lat=52.5, lon=13.4)
     one, none = np.array([100.0]), np.array([0.0])

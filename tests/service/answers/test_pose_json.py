@@ -1,4 +1,4 @@
-"""Poses written by columns are those written one by one, but for digits that mean nothing."""
+"""Poses written from columns equal those written one by one, except for digits beyond the accuracy."""
 
 import json
 import math
@@ -41,7 +41,7 @@ def answers_with(count: int, site: Site) -> Answers:
 
 
 def rounded(value: Any, decimals: int = DECIMALS) -> Any:
-    """What is expected of a number in an answer."""
+    """Return what is expected of a number in an answer, rounded."""
     match value:
         case dict():
             return {name: rounded(inner, FINE_DECIMALS if name in FINE else DECIMALS) for name, inner in value.items()}
@@ -57,14 +57,14 @@ FINE = ("covariance", "lat", "lon")
 
 @pytest.mark.parametrize("georeference", [None, Georeference(lat=48.0, lon=11.0)])
 @pytest.mark.parametrize("count", [0, 1, 8, CHUNK + 1])
-def test_the_answers_are_those_of_dictionaries(count: int, georeference: Georeference | None) -> None:
+def test_the_answers_equal_those_from_dictionaries(count: int, georeference: Georeference | None) -> None:
     answers = answers_with(count, Site(anchors=[Anchor(id="17"), Anchor(id='"')], georeference=georeference))
     written, expected = json.loads(b"".join(answers.pose_list_json())), json.loads(to_json(answers.pose_list()))
     assert [list(pose) for pose in written["poses"]] == [list(pose) for pose in expected["poses"]]
     assert written == rounded(expected)
 
 
-def test_each_pose_is_that_of_the_list() -> None:
+def test_each_pose_equals_that_in_the_list() -> None:
     answers = answers_with(8, Site(anchors=[Anchor(id="17")]))
     each = list(answers.pose_jsons(answers.rows(), T_NS))
     assert [name for name, _ in each] == NAMES
@@ -97,7 +97,7 @@ def test_a_number_has_six_decimals_at_most(number: float, text: str) -> None:
     assert bytes(one.all).decode() == text
 
 
-def test_a_covariance_that_no_number_can_hold_is_unknown() -> None:
+def test_a_covariance_that_is_too_large_to_write_is_unknown() -> None:
     answers = answers_with(1, Site())
     poses = answers.rows()
     poses["cov"] = 1e300
@@ -106,7 +106,7 @@ def test_a_covariance_that_no_number_can_hold_is_unknown() -> None:
     assert pose["covariance"] is pose["ellipse_95"] is None
 
 
-def test_chosen_tags_come_in_the_order_in_which_they_were_asked_for() -> None:
+def test_chosen_tags_are_in_the_order_of_the_request() -> None:
     answers = answers_with(8, Site(anchors=[Anchor(id="17"), Anchor(id="18")]))
     chosen = [tag for name in ("null", "plain", ",") if (tag := answers.tags.find(name)) is not None]
     poses = json.loads(b"".join(answers.pose_list_json(chosen)))["poses"]

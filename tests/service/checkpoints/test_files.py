@@ -1,4 +1,4 @@
-"""A checkpoint is whole or not used, whatever happens while it is written and to the file afterwards."""
+"""A damaged checkpoint is never used, whatever happens while it is written or to the file afterwards."""
 
 import errno
 import os
@@ -14,7 +14,7 @@ from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot, lay
 from dropanchor_service.estimation.columns import HYPOTHESIS
 from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE
 
-WRITING = 8  # operations until the new name is there: open, writes of head, three arrays and digest, fsync, replace
+WRITING = 8  # file operations until the new name exists: open, writes of head, three arrays and digest, fsync, replace
 
 
 def snapshot(value: int) -> Snapshot:
@@ -39,7 +39,7 @@ def value_in(folder: CheckpointFolder) -> int | None:
     return None if found is None else int(found.document["value"])
 
 
-def test_what_is_written_is_read_to_the_last_bit(tmp_path: Path) -> None:
+def test_a_checkpoint_is_read_as_it_was_written_to_the_last_bit(tmp_path: Path) -> None:
     written = snapshot(7)
     folder_of(tmp_path).write(written)
     found, complaints = folder_of(tmp_path).newest()
@@ -53,14 +53,14 @@ def test_what_is_written_is_read_to_the_last_bit(tmp_path: Path) -> None:
         assert found.arrays[name].tobytes() == array.tobytes()
 
 
-def test_the_last_two_are_kept_and_numbers_go_on_after_a_restart(tmp_path: Path) -> None:
+def test_the_last_two_checkpoints_are_kept_and_the_numbers_continue_after_a_restart(tmp_path: Path) -> None:
     for value in range(1, 4):
         folder_of(tmp_path).write(snapshot(value))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["checkpoint-000000000002", "checkpoint-000000000003"]
     assert value_in(folder_of(tmp_path)) == 3
 
 
-def test_a_checkpoint_of_another_layout_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_checkpoint_of_another_layout_is_rejected_and_both_layouts_are_named(tmp_path: Path) -> None:
     old, new = folder_of(tmp_path, "old"), folder_of(tmp_path, "new")
     old.write(snapshot(1))
     found, complaints = new.newest()
@@ -71,7 +71,7 @@ def test_a_checkpoint_of_another_layout_is_refused_by_name(tmp_path: Path) -> No
     assert layout_of(snapshot(0), "new") in complaints[0]
 
 
-def test_a_checkpoint_that_is_cut_at_any_byte_is_not_used_and_the_one_before_is(tmp_path: Path) -> None:
+def test_the_previous_checkpoint_is_used_when_the_newest_is_cut_at_any_byte(tmp_path: Path) -> None:
     folder = folder_of(tmp_path)
     folder.write(snapshot(1))
     folder.write(snapshot(2))
@@ -84,7 +84,7 @@ def test_a_checkpoint_that_is_cut_at_any_byte_is_not_used_and_the_one_before_is(
     assert value_in(folder) == 2
 
 
-def test_a_checkpoint_with_any_byte_changed_is_not_used(tmp_path: Path) -> None:
+def test_the_previous_checkpoint_is_used_when_any_byte_of_the_newest_is_changed(tmp_path: Path) -> None:
     folder = folder_of(tmp_path)
     folder.write(snapshot(1))
     folder.write(snapshot(2))
@@ -96,7 +96,7 @@ def test_a_checkpoint_with_any_byte_changed_is_not_used(tmp_path: Path) -> None:
 
 
 class Disk:
-    """The operations on files, of which the one with the number `fails_at` fails, as does each after it."""
+    """File operations that fail from the one with the number `fails_at` on."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, error: int, fails_at: int) -> None:
         self.tried = 0
@@ -116,7 +116,7 @@ class Disk:
 
 
 @pytest.mark.parametrize("error", [errno.ENOSPC, errno.EIO])
-def test_whichever_operation_of_writing_fails_a_whole_checkpoint_is_there(
+def test_an_undamaged_checkpoint_exists_whichever_operation_of_writing_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: int
 ) -> None:
     folder = folder_of(tmp_path)
@@ -136,7 +136,9 @@ def test_whichever_operation_of_writing_fails_a_whole_checkpoint_is_there(
     assert fails_at == disk.tried + 1
 
 
-def test_a_disk_that_takes_a_few_bytes_at_a_time_gets_them_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_checkpoint_is_complete_when_each_write_takes_a_few_bytes_only(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     write = os.write
     monkeypatch.setattr(os, "write", lambda descriptor, left: write(descriptor, left[:1000]))
     folder_of(tmp_path).write(snapshot(3))

@@ -1,4 +1,4 @@
-"""Checkpoints are taken while samples come in, and a disk that fails is told, and does no harm beyond."""
+"""Checkpoints are taken while samples arrive. A failing disk is reported and does no other harm."""
 
 import errno
 import os
@@ -21,8 +21,8 @@ from support.zenoh_router import wait_until
 T = 1_760_000_000_000_000_000
 
 
-class KeepingEngine(TransparentEngine):
-    """Its state is which rows it has."""
+class RestorableEngine(TransparentEngine):
+    """An engine whose state is the set of its rows."""
 
     def state(self) -> dict[str, Array]:
         return {"rows": np.array(list(self.configured), np.int32)}
@@ -31,20 +31,20 @@ class KeepingEngine(TransparentEngine):
         self.configured = {row: [] for row in state["rows"].tolist()}
 
     def started_afresh(self) -> list[int]:
-        """Rows that were configured, not restored."""
+        """Return the rows that were configured, not restored."""
         return [row for row, settings in self.configured.items() if settings]
 
 
-class Kept:
-    """A bench whose state is kept in a folder."""
+class CheckpointBench:
+    """A bench that writes checkpoints to a folder."""
 
     def __init__(self, folder: Path) -> None:
-        self.engine = KeepingEngine()
+        self.engine = RestorableEngine()
         self.bench = Bench(engine=self.engine, folder=folder)
         self.bench.estimators.follow_site()
         state = self.bench.whole_state()
-        kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
-        self.checkpoints = CheckpointThread(state, kept, self.bench.metrics, period_s=0.01)
+        checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
+        self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, period_s=0.01)
         self.thread = IngestThread(
             self.bench.ingest, self.bench.buffer, self.bench.metrics, 0.001, self.checkpoints.between_turns
         )
@@ -58,26 +58,29 @@ class Kept:
         self.checkpoints.stop()
 
     def count(self, outcome: str) -> float:
-        return float(self.bench.metrics.checkpoints.labels(outcome)._value.get())
+        """Return how many checkpoints had this outcome."""
+        return self.bench.total(self.bench.metrics.checkpoints, outcome=outcome)
 
-    def hear(self, tag: str, value: float) -> None:
+    def send(self, tag: str, value: float) -> None:
         self.bench.put(tag, Frame(ranges=[RangeSample(T, 7, value)]))
 
 
 @pytest.fixture
-def kept(tmp_path: Path) -> Iterator[Kept]:
-    running = Kept(tmp_path)
-    running.start()
-    yield running
+def running(tmp_path: Path) -> Iterator[CheckpointBench]:
+    bench = CheckpointBench(tmp_path)
+    bench.start()
+    yield bench
+    bench.stop()
+
+
+def test_poses_are_restored_after_a_restart_but_do_not_count_as_tracking(
+    running: CheckpointBench, tmp_path: Path
+) -> None:
+    running.send("a", 4.0)
+    running.send("b", 5.0)
+    wait_until(lambda: running.bench.x_of("ab") == [4.0, 5.0])
     running.stop()
-
-
-def test_what_was_heard_is_there_after_a_restart_and_does_not_count_as_tracking(kept: Kept, tmp_path: Path) -> None:
-    kept.hear("a", 4.0)
-    kept.hear("b", 5.0)
-    wait_until(lambda: kept.bench.x_of("ab") == [4.0, 5.0])
-    kept.stop()
-    after = Kept(tmp_path)
+    after = CheckpointBench(tmp_path)
     after.checkpoints.load()
     assert after.bench.x_of("ab") == [4.0, 5.0]
     assert after.bench.latest.since()[1]["state"].tolist() == [State.COASTING, State.COASTING]
@@ -86,20 +89,20 @@ def test_what_was_heard_is_there_after_a_restart_and_does_not_count_as_tracking(
     assert after.engine.configured == {0: [], 1: []}
 
 
-def test_rows_whose_settings_have_changed_since_start_afresh_and_all_when_an_anchor_has_moved(
-    kept: Kept, tmp_path: Path
+def test_rows_with_changed_settings_start_afresh_and_all_rows_do_after_an_anchor_has_moved(
+    running: CheckpointBench, tmp_path: Path
 ) -> None:
-    kept.hear("a", 4.0)
-    kept.hear("b", 5.0)
-    wait_until(lambda: kept.bench.x_of("ab") == [4.0, 5.0])
-    kept.stop()
-    changed = Kept(tmp_path)
+    running.send("a", 4.0)
+    running.send("b", 5.0)
+    wait_until(lambda: running.bench.x_of("ab") == [4.0, 5.0])
+    running.stop()
+    changed = CheckpointBench(tmp_path)
     changed.bench.site.set_tag("b", changed.bench.site.tag_settings("b").model_copy(update={"height_m": 3.0}))
     changed.checkpoints.load()
     for tag in "ab":
         changed.bench.send(tag, Frame(ranges=[RangeSample(T + 1, 7, 6.0)]))
     assert changed.engine.started_afresh() == [1]
-    moved = Kept(tmp_path)
+    moved = CheckpointBench(tmp_path)
     moved.bench.site.set_anchor(moved.bench.site.site.anchors[0].model_copy(update={"x": 1.0}))
     moved.checkpoints.load()
     for tag in "ab":
@@ -107,18 +110,18 @@ def test_rows_whose_settings_have_changed_since_start_afresh_and_all_when_an_anc
     assert moved.engine.started_afresh() == [0, 1]
 
 
-def test_nothing_is_written_while_nothing_comes_in(kept: Kept) -> None:
-    kept.hear("a", 4.0)
-    wait_until(lambda: kept.count("written") >= 1)
-    wait_until(lambda: kept.checkpoints.age_s < 0.05)
-    written = kept.count("written")
-    before = kept.checkpoints.age_s
-    wait_until(lambda: kept.checkpoints.age_s < before)  # it looked again
-    assert kept.count("written") == written
+def test_no_checkpoint_is_written_while_no_message_arrives(running: CheckpointBench) -> None:
+    running.send("a", 4.0)
+    wait_until(lambda: running.count("written") >= 1)
+    wait_until(lambda: running.checkpoints.age_s < 0.05)
+    written = running.count("written")
+    before = running.checkpoints.age_s
+    wait_until(lambda: running.checkpoints.age_s < before)  # it looked again
+    assert running.count("written") == written
 
 
-def test_a_full_disk_is_told_and_counted_and_forgotten_when_there_is_room_again(
-    kept: Kept, monkeypatch: pytest.MonkeyPatch
+def test_a_full_disk_is_reported_and_counted_until_there_is_space_again(
+    running: CheckpointBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checkpointer, "OLD_S", 0.3)
 
@@ -127,17 +130,17 @@ def test_a_full_disk_is_told_and_counted_and_forgotten_when_there_is_room_again(
 
     with monkeypatch.context() as disk:
         disk.setattr(os, "write", full)
-        kept.hear("a", 4.0)
-        wait_until(lambda: "No space left on device" in (kept.checkpoints.problem or ""))
-        assert kept.bench.x_of("a") == [4.0]
-        assert kept.count("failed") >= 1
-        assert kept.thread.problem is None
-    wait_until(lambda: kept.checkpoints.problem is None)
-    assert kept.count("written") >= 1
+        running.send("a", 4.0)
+        wait_until(lambda: "No space left on device" in (running.checkpoints.problem or ""))
+        assert running.bench.x_of("a") == [4.0]
+        assert running.count("failed") >= 1
+        assert running.thread.problem is None
+    wait_until(lambda: running.checkpoints.problem is None)
+    assert running.count("written") >= 1
 
 
-def test_a_state_that_cannot_be_copied_stops_neither_ingest_nor_the_checkpoints(
-    kept: Kept, monkeypatch: pytest.MonkeyPatch
+def test_a_state_that_cannot_be_copied_stops_neither_the_ingest_nor_later_checkpoints(
+    running: CheckpointBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checkpointer, "OLD_S", 0.3)
     monkeypatch.setattr(checkpointer, "_TURN_S", 0.05)
@@ -146,9 +149,9 @@ def test_a_state_that_cannot_be_copied_stops_neither_ingest_nor_the_checkpoints(
         raise RuntimeError("a bug")
 
     with monkeypatch.context() as fault:
-        fault.setattr(kept.engine, "state", broken)
-        kept.hear("a", 4.0)
-        wait_until(lambda: kept.checkpoints.problem)
-        kept.hear("a", 6.0)
-        wait_until(lambda: kept.bench.x_of("a") == [6.0])
-    wait_until(lambda: kept.checkpoints.problem is None)
+        fault.setattr(running.engine, "state", broken)
+        running.send("a", 4.0)
+        wait_until(lambda: running.checkpoints.problem)
+        running.send("a", 6.0)
+        wait_until(lambda: running.bench.x_of("a") == [6.0])
+    wait_until(lambda: running.checkpoints.problem is None)

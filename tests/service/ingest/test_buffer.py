@@ -1,4 +1,4 @@
-"""The buffer between receiving and fusing: bounded, fair, and deaf to floods of strangers."""
+"""The buffer between receiving and fusing is bounded, fair, and safe from floods of unregistered tags."""
 
 import threading
 from collections import Counter
@@ -24,12 +24,12 @@ def put(buffer: MessageBuffer, key: str, number: int) -> None:
 
 
 def admit(buffer: MessageBuffer, keys: Iterable[str]) -> None:
-    """Their rows are 0, 1, …"""
+    """Register the keys with the rows 0, 1, …"""
     for row, key in enumerate(keys):
         buffer.admit(key, row)
 
 
-def test_messages_come_out_in_the_order_in_which_they_came() -> None:
+def test_messages_are_drained_in_the_order_of_arrival() -> None:
     buffer = MessageBuffer(10**6)
     admit(buffer, "ab")
     for number in range(10):
@@ -39,7 +39,7 @@ def test_messages_come_out_in_the_order_in_which_they_came() -> None:
     assert buffer.drain(1) == ([], [])
 
 
-def test_when_it_is_full_the_busiest_tag_loses_its_oldest_and_the_quiet_ones_lose_nothing() -> None:
+def test_a_full_buffer_sheds_the_oldest_messages_of_the_busiest_tag_only() -> None:
     buffer = MessageBuffer(100_000)
     quiet = [f"quiet{i}" for i in range(10)]
     admit(buffer, ["busy", *quiet])
@@ -47,14 +47,14 @@ def test_when_it_is_full_the_busiest_tag_loses_its_oldest_and_the_quiet_ones_los
         put(buffer, key, -1)
     for number in range(1000):
         put(buffer, "busy", number)
-    shed, _, strangers = buffer.take_shed()
+    shed, _, unregistered = buffer.take_shed()
     messages, _ = buffer.drain(10**9)
     busy = [message[3] for message in messages if message[0] == 0]
     assert busy == list(range(1000 - len(busy), 1000))
     assert 60 <= len(busy) <= 90
     assert shed == {0: 1000 - len(busy)}
     assert Counter(message[0] for message in messages if message[0] != 0) == dict.fromkeys(range(1, 11), 1)
-    assert strangers == 0
+    assert unregistered == 0
 
 
 def test_equally_busy_tags_lose_equally() -> None:
@@ -71,19 +71,19 @@ def test_equally_busy_tags_lose_equally() -> None:
 
 
 def overload(
-    buffer: MessageBuffer, seconds: float, keys: list[str], per_turn: int, most: int = 100, since_s: float = 0.0
+    buffer: MessageBuffer, seconds: float, keys: list[str], per_turn: int, limit: int = 100, since_s: float = 0.0
 ) -> list[Message]:
-    """A turn every 10 ms takes `most` messages while `per_turn` of these keys, one after the other, come in."""
+    """Drain `limit` messages every 10 ms, while `per_turn` messages of these keys arrive, one key after the other."""
     taken: list[Message] = []
     for turn in range(round(seconds * 100)):
         now_ns = turn * 10_000_000 + round(since_s * S)
         for number in range(turn * per_turn, (turn + 1) * per_turn):
             buffer.append(keys[number % len(keys)], PAYLOAD, "e", now_ns)
-        taken += buffer.drain(most, now_ns)[0]
+        taken += buffer.drain(limit, now_ns)[0]
     return taken
 
 
-def test_in_an_overload_what_waits_is_taken_in_a_quarter_of_a_second_and_the_newest_is_kept() -> None:
+def test_an_overloaded_buffer_keeps_the_newest_quarter_of_a_second() -> None:
     buffer = MessageBuffer(10**9)
     keys = [str(i) for i in range(10)]
     admit(buffer, keys)
@@ -97,7 +97,7 @@ def test_in_an_overload_what_waits_is_taken_in_a_quarter_of_a_second_and_the_new
     assert max(lost.values()) - min(lost.values()) < 100
 
 
-def test_an_overload_that_pauses_is_known_at_once_when_it_goes_on() -> None:
+def test_an_overload_is_recognised_at_once_when_it_continues_after_a_pause() -> None:
     buffer = MessageBuffer(10**9)
     keys = [str(i) for i in range(10)]
     admit(buffer, keys)
@@ -126,7 +126,7 @@ def test_in_an_overload_of_more_tags_than_are_taken_in_that_time_they_take_turns
     assert buffer.depth <= len(keys)
 
 
-def test_a_tag_that_floods_sheds_its_own_and_nobody_elses() -> None:
+def test_a_tag_that_floods_loses_only_its_own_messages() -> None:
     buffer = MessageBuffer(10**9)
     admit(buffer, ["flood", *map(str, range(50))])
     keys = ["flood"] * 2950 + [str(i) for i in range(50)]
@@ -135,7 +135,7 @@ def test_a_tag_that_floods_sheds_its_own_and_nobody_elses() -> None:
     assert Counter(message[0] for message in taken)[50] >= 45
 
 
-def test_a_backlog_from_before_is_no_overload_as_long_as_it_gets_less() -> None:
+def test_an_old_backlog_is_no_overload_while_it_shrinks() -> None:
     buffer = MessageBuffer(10**9)
     keys = [str(i) for i in range(10)]
     admit(buffer, keys)
@@ -146,7 +146,7 @@ def test_a_backlog_from_before_is_no_overload_as_long_as_it_gets_less() -> None:
     assert not buffer.take_shed().by_row
 
 
-def test_what_caches_gave_is_never_shed_and_neither_is_what_comes_behind_it() -> None:
+def test_messages_from_caches_and_those_behind_them_are_never_shed() -> None:
     buffer = MessageBuffer(10**9)
     keys = [str(i) for i in range(10)]
     admit(buffer, keys)
@@ -158,7 +158,7 @@ def test_what_caches_gave_is_never_shed_and_neither_is_what_comes_behind_it() ->
     assert not buffer.take_shed().by_row
 
 
-def test_when_it_is_full_of_single_messages_the_oldest_are_lost() -> None:
+def test_a_buffer_full_of_single_messages_sheds_the_oldest() -> None:
     buffer = MessageBuffer(100_000)
     keys = [str(i) for i in range(150)]
     admit(buffer, keys)
@@ -169,7 +169,7 @@ def test_when_it_is_full_of_single_messages_the_oldest_are_lost() -> None:
     assert kept == list(range(150 - len(kept), 150))
 
 
-def test_the_samples_of_what_was_shed_are_counted() -> None:
+def test_the_samples_of_shed_messages_are_counted() -> None:
     buffer = MessageBuffer(10_000)
     admit(buffer, "a")
     payload = encode_packed(Frame(ranges=[RangeSample(1, 7, 1.0)] * 3, headings=[HeadingSample(1, 1.0)] * 2))
@@ -181,26 +181,26 @@ def test_the_samples_of_what_was_shed_are_counted() -> None:
     assert abs(samples - 5 * by_row[0] / 2) <= 5
 
 
-def test_strangers_push_out_only_each_other() -> None:
+def test_messages_of_unregistered_tags_displace_only_each_other() -> None:
     buffer = MessageBuffer(10**6)
     admit(buffer, ["known"])
     put(buffer, "known", 0)
     for number in range(100_000):
-        put(buffer, f"stranger{number}", number)
+        put(buffer, f"new{number}", number)
     shed = buffer.take_shed().unregistered
-    messages, strangers = buffer.drain(10**9)
+    messages, unregistered = buffer.drain(10**9)
     assert [message[0] for message in messages] == [0]
-    assert len(strangers) == UNREGISTERED_PER_TURN
+    assert len(unregistered) == UNREGISTERED_PER_TURN
     while more := buffer.drain(10**9)[1]:
         assert len(more) <= UNREGISTERED_PER_TURN
-        strangers += more
+        unregistered += more
     assert not buffer.wait(0.0)
-    assert len(strangers) == 100_000 - shed
-    assert len(strangers) * MESSAGE_OVERHEAD < UNREGISTERED_BYTES
-    assert strangers[-1][0] == "stranger99999"
+    assert len(unregistered) == 100_000 - shed
+    assert len(unregistered) * MESSAGE_OVERHEAD < UNREGISTERED_BYTES
+    assert unregistered[-1][0] == "new99999"
 
 
-def test_waiting_ends_when_a_message_comes_and_goes_on_when_all_are_taken() -> None:
+def test_waiting_ends_with_a_message_and_starts_again_once_all_are_drained() -> None:
     buffer = MessageBuffer(10**6)
     admit(buffer, ["a"])
     assert not buffer.wait(0.0)
@@ -210,7 +210,7 @@ def test_waiting_ends_when_a_message_comes_and_goes_on_when_all_are_taken() -> N
     assert not buffer.wait(0.0)
 
 
-def test_nothing_is_lost_or_doubled_between_threads() -> None:
+def test_no_message_is_lost_or_duplicated_between_threads() -> None:
     buffer = MessageBuffer(10**9)
     admit(buffer, [str(i) for i in range(4)])
 

@@ -1,4 +1,4 @@
-"""Clocks of tags that are wrong or jump: their samples go on at the time at which they were taken."""
+"""Samples of tags whose clocks are wrong or jump keep the time at which they were taken."""
 
 import random
 import time
@@ -20,8 +20,8 @@ T = 1_760_000_000 * S
 class Tag:
     """A publisher that sends ten messages a second over a network that delays them."""
 
-    def __init__(self, boot_clock: bool = False, boot_id: int = 5) -> None:
-        self._publishers = Publishers()
+    def __init__(self, boot_clock: bool = False, boot_id: int = 5, publishers: Publishers | None = None) -> None:
+        self._publishers = publishers or Publishers()
         self._boot_clock = boot_clock
         self._boot_id = boot_id
         self._sequence = 0
@@ -29,13 +29,11 @@ class Tag:
         self.estimator_ns = 0  # time of the last message for the estimator
 
     def another(self, boot_id: int) -> "Tag":
-        """A second publisher of the same tag."""
-        other = Tag(self._boot_clock, boot_id)
-        other._publishers = self._publishers
-        return other
+        """Return a second publisher of the same tag."""
+        return Tag(self._boot_clock, boot_id, self._publishers)
 
     def send(self, true_ns: int, error_ns: int, delay_ns: int = 20 * MS) -> int:
-        """One message from a clock with this error; returns the error of the time that it gets."""
+        """Send a message from a clock with this error. Return the error of the time that its pose gets."""
         form, zero = np.zeros(1, FORM), np.zeros(1, np.int32)
         form["accepted"] = form["numbered"] = True
         form["boot_id"], form["sequence"], form["boot_clock"] = self._boot_id, self._sequence, self._boot_clock
@@ -51,13 +49,14 @@ class Tag:
         return int(pose["t_ns"][0]) - true_ns
 
     def errors(self, begin_s: float, end_s: float, error_ns: int) -> list[int]:
+        """Send messages for some seconds. Return the errors of their times, ns."""
         delays = (5 * MS, 40 * MS, 15 * MS)
         steps = range(round(begin_s * 10), round(end_s * 10))
         return [self.send(T + step * S // 10, error_ns, delays[step % 3]) for step in steps]
 
 
 @pytest.mark.parametrize("jump_ns", [HOUR, -HOUR, -T])
-def test_a_clock_that_jumps_goes_on_within_a_delay_and_is_right_again_when_it_is_set_right(jump_ns: int) -> None:
+def test_times_of_a_clock_that_jumps_stay_within_a_delay_and_are_exact_once_it_is_set_right(jump_ns: int) -> None:
     tag = Tag()
     assert set(tag.errors(0, 5, 0)) == {0}
     assert max(map(abs, tag.errors(5, 10, jump_ns))) < 100 * MS
@@ -67,13 +66,13 @@ def test_a_clock_that_jumps_goes_on_within_a_delay_and_is_right_again_when_it_is
 
 
 @pytest.mark.parametrize("error_ns", [HOUR, -T])
-def test_a_clock_that_is_ahead_or_was_never_set_is_taken_by_arrival_until_it_is_set(error_ns: int) -> None:
+def test_times_of_a_clock_that_is_ahead_or_was_never_set_follow_the_arrival_until_it_is_set(error_ns: int) -> None:
     tag = Tag()
     assert max(map(abs, tag.errors(0, 5, error_ns))) < 100 * MS
     assert set(tag.errors(5, 10, 0)) == {0}
 
 
-def test_a_backlog_of_minutes_is_late_and_not_wrong() -> None:
+def test_a_backlog_of_minutes_is_no_clock_error() -> None:
     tag = Tag()
     assert set(tag.errors(0, 1, 0)) == {0}
     late = [tag.send(T + S + step * S // 10, 0, delay_ns=300 * S - step * 90 * MS) for step in range(3000)]
@@ -81,7 +80,7 @@ def test_a_backlog_of_minutes_is_late_and_not_wrong() -> None:
     assert tag.jumps == 0
 
 
-def test_a_step_of_a_second_is_left_alone() -> None:
+def test_a_step_of_a_second_is_not_corrected() -> None:
     tag = Tag()
     tag.errors(0, 2, 0)
     assert set(tag.errors(2, 4, -S)) == {-S}
@@ -89,14 +88,14 @@ def test_a_step_of_a_second_is_left_alone() -> None:
     assert tag.jumps == 0
 
 
-def test_a_boot_clock_that_starts_again_is_mapped_anew_at_once() -> None:
+def test_a_boot_clock_that_restarts_is_mapped_again_at_once() -> None:
     tag = Tag(boot_clock=True)
     assert max(map(abs, tag.errors(0, 5, -T))) < 50 * MS
     assert max(map(abs, tag.errors(5, 8, -T - 5 * S))) < 50 * MS
 
 
 @pytest.mark.parametrize("ppm", [50, -50])
-def test_a_boot_clock_that_drifts_is_followed_within_milliseconds_and_its_intervals_stay(ppm: int) -> None:
+def test_a_drifting_boot_clock_is_followed_within_milliseconds_and_its_intervals_stay(ppm: int) -> None:
     tag, dice = Tag(boot_clock=True), random.Random(5)
     errors, times = list[int](), list[int]()
     for step in range(36_000):
@@ -109,7 +108,7 @@ def test_a_boot_clock_that_drifts_is_followed_within_milliseconds_and_its_interv
     assert tag.jumps == 0
 
 
-def test_a_first_message_that_came_late_is_corrected_little_by_little() -> None:
+def test_a_late_first_message_is_corrected_gradually() -> None:
     tag = Tag(boot_clock=True)
     errors = [tag.send(T, -T, 200 * MS)]
     errors += [tag.send(T + step * S // 10, -T, 5 * MS) for step in range(1, 1200)]
@@ -120,7 +119,7 @@ def test_a_first_message_that_came_late_is_corrected_little_by_little() -> None:
     assert tag.jumps == 0
 
 
-def test_another_boot_clock_of_the_tag_follows_in_the_time_of_the_first() -> None:
+def test_a_second_boot_clock_of_a_tag_is_mapped_to_the_time_of_the_first() -> None:
     first = Tag(boot_clock=True)
     second = first.another(boot_id=6)
     first.send(T, -T, 100 * MS)
@@ -134,7 +133,7 @@ def test_another_boot_clock_of_the_tag_follows_in_the_time_of_the_first() -> Non
     assert abs(apart[-1]) <= 3 * MS
 
 
-def test_a_boot_clock_that_falls_silent_leaves_the_time_to_another() -> None:
+def test_another_boot_clock_becomes_the_reference_when_the_first_falls_silent() -> None:
     first = Tag(boot_clock=True)
     second = first.another(boot_id=6)
     first.send(T, -T)
@@ -147,14 +146,14 @@ def test_a_boot_clock_that_falls_silent_leaves_the_time_to_another() -> None:
     assert len(set(times)) == 1
 
 
-def test_a_first_message_that_came_very_late_is_forgotten_with_the_second() -> None:
+def test_a_very_late_first_message_is_corrected_by_the_second_at_once() -> None:
     tag = Tag(boot_clock=True)
     assert tag.send(T, -T, 10 * S) == 10 * S
     assert tag.send(T + S, -T, 5 * MS) == 5 * MS
     assert tag.jumps == 1
 
 
-def test_a_boot_clock_that_stood_still_is_mapped_anew_within_two_minutes() -> None:
+def test_a_boot_clock_that_stood_still_is_mapped_again_within_two_minutes() -> None:
     tag = Tag(boot_clock=True)
     assert set(tag.errors(0, 100, -T)) == {5 * MS}
     errors = tag.errors(120, 320, -T - 20 * S)
@@ -171,7 +170,7 @@ def test_a_backlog_that_shrinks_for_minutes_does_not_move_a_boot_clock() -> None
     assert tag.jumps == 0
 
 
-def test_steps_of_the_host_do_nothing_to_our_own_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_of_the_host_clock_do_not_change_our_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = UtcClock()
     before = clock.now_ns()
     for step_ns in (24 * HOUR, -24 * HOUR):

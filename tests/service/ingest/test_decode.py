@@ -1,4 +1,4 @@
-"""Columns of many payloads equal the frames of the contract's own decoders."""
+"""The columns of many payloads equal the frames of the decoders of the contract."""
 
 import math
 import random
@@ -23,7 +23,8 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_service.ingest.decode import Decoded, decode
+from dropanchor_service.estimation.columns import IMU
+from dropanchor_service.ingest.decode import IMU_SAMPLE, Decoded, decode
 
 T = 1_760_000_000_000_000_000
 
@@ -45,7 +46,7 @@ frames = st.builds(
 
 
 def as_text(imu: object, ranges: object, headings: object, bearings: object) -> str:
-    """Text compares NaN as equal."""
+    """Return the samples as text, in which NaN equals NaN."""
     return repr((imu, ranges, headings, bearings))
 
 
@@ -57,7 +58,7 @@ def samples_of(decoded: Decoded, index: int) -> str:
             tuple(s["gyro"].tolist()),
             None if np.isnan(s["mag"]).all() else tuple(s["mag"].tolist()),
         )
-        for s in decoded.imu[decoded.imu["row"] == index]
+        for s in decoded.imu[decoded.imu["message"] == index]
     ]
     ranges = [RangeSample(*s.tolist()[1:]) for s in decoded.ranges if s["message"] == index]
     headings = [HeadingSample(s[1], *s[3:]) for s in decoded.headings.tolist() if s[0] == index]
@@ -87,12 +88,12 @@ def assert_equal_to_the_contract(payloads: list[bytes]) -> None:
 
 
 @given(st.lists(frames, max_size=5))
-def test_packed_payloads_give_the_samples_that_the_contract_reads(some: list[Frame]) -> None:
+def test_packed_payloads_decode_to_the_samples_of_the_contract(some: list[Frame]) -> None:
     assert_equal_to_the_contract([encode_packed(frame) for frame in some])
 
 
 @given(st.lists(st.binary(max_size=200), max_size=6))
-def test_any_bytes_are_refused_for_the_reason_that_the_contract_names(payloads: list[bytes]) -> None:
+def test_any_bytes_are_rejected_for_the_reason_of_the_contract(payloads: list[bytes]) -> None:
     assert_equal_to_the_contract(payloads)
 
 
@@ -144,19 +145,25 @@ def test_json_gives_the_same_columns_as_packed() -> None:
     assert isinstance(decode_json(encode_json(frame)), Frame)
 
 
-def test_texts_that_name_anchors_are_kept() -> None:
+def test_anchor_names_are_kept() -> None:
     payload = b'{"range":[{"t_ns":1,"anchor":"gate","range_m":1.0}]}'
     decoded = decode([payload], [ENCODING_JSON])
     assert list(decoded.anchor_names.values()) == ["gate"]
     assert decoded.ranges["anchor"].tolist() == list(decoded.anchor_names)
 
 
-def test_an_unknown_encoding_is_refused_by_name() -> None:
+def test_imu_samples_have_the_memory_layout_of_the_engine() -> None:
+    assert IMU_SAMPLE.itemsize == IMU.itemsize
+    layouts = [list((dtype.fields or {}).values()) for dtype in (IMU_SAMPLE, IMU)]
+    assert layouts[0] == layouts[1]
+
+
+def test_an_unknown_encoding_is_rejected_with_that_reason() -> None:
     decoded = decode([b"x", b""], ["zenoh/bytes", "text/plain"])
     assert decoded.rejected == [(0, Reason.ENCODING_UNKNOWN), (1, Reason.ENCODING_UNKNOWN)]
 
 
-def test_nothing_gives_nothing() -> None:
+def test_no_payloads_give_empty_columns() -> None:
     decoded = decode([], [])
     assert len(decoded.forms) == len(decoded.imu) == len(decoded.ranges) == 0
 

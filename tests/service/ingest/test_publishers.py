@@ -1,4 +1,4 @@
-"""Messages in the order of their publisher, each once."""
+"""Messages pass in the order of their publisher, each once."""
 
 import random
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ def forms_of(numbers: Sequence[int], boot_id: int = BOOT) -> np.ndarray:
 
 
 def put(publishers: Publishers, numbers: Sequence[int], boot_id: int = BOOT, due: bool = False) -> Sequenced:
-    """Messages of one tag that arrive at 1 s; due: none of them waits any longer."""
+    """Put messages of one tag that arrive at 1 s. due: none of them waits any longer."""
     n = len(numbers)
     return publishers.sequence(
         forms_of(numbers, boot_id), np.full(n, ROW, np.int32), np.full(n, S), S if due else S - 1
@@ -30,6 +30,7 @@ def put(publishers: Publishers, numbers: Sequence[int], boot_id: int = BOOT, due
 
 
 def passed(publishers: Publishers, numbers: Sequence[int], due: bool = False) -> list[int]:
+    """Put messages. Return the numbers of those that pass."""
     return [numbers[index] for index in put(publishers, numbers, due=due).due.tolist()]
 
 
@@ -40,14 +41,14 @@ def test_numbers_without_a_gap_pass_at_once() -> None:
         assert passed(publishers, numbers) == numbers
 
 
-def test_what_is_behind_a_gap_waits_and_passes_in_order_when_the_gap_is_filled() -> None:
+def test_messages_behind_a_gap_wait_and_pass_in_order_once_it_is_filled() -> None:
     publishers = Publishers()
     assert passed(publishers, [0, 1, 3, 5]) == [0, 1]
     assert passed(publishers, [3, 5, 2]) == [2, 3]
     assert passed(publishers, [5, 4]) == [4, 5]
 
 
-def test_what_is_behind_a_gap_passes_when_it_is_due_and_the_missing_are_counted() -> None:
+def test_messages_behind_a_gap_pass_when_they_are_due_and_the_missing_ones_are_counted() -> None:
     publishers = Publishers()
     assert passed(publishers, [0]) == [0]
     released = put(publishers, [6, 3], due=True)
@@ -56,7 +57,7 @@ def test_what_is_behind_a_gap_passes_when_it_is_due_and_the_missing_are_counted(
     assert passed(publishers, [7]) == [7]
 
 
-def test_one_that_is_due_takes_those_before_it_along_but_not_those_behind_the_next_gap() -> None:
+def test_a_due_message_releases_those_before_it_but_not_those_behind_the_next_gap() -> None:
     publishers = Publishers()
     assert passed(publishers, [0]) == [0]
     numbers, arrivals = [8, 5, 3], np.array([S + 9, S, S + 9])
@@ -65,7 +66,7 @@ def test_one_that_is_due_takes_those_before_it_along_but_not_those_behind_the_ne
     assert [numbers[index] for index in released.pending.tolist()] == [8]
 
 
-def test_one_that_comes_after_it_was_given_up_passes_once_and_the_engine_judges_it() -> None:
+def test_a_message_that_was_given_up_passes_once_when_it_arrives() -> None:
     publishers = Publishers()
     assert passed(publishers, [0, 2], due=True) == [0, 2]
     again = put(publishers, [1, 1])
@@ -73,14 +74,14 @@ def test_one_that_comes_after_it_was_given_up_passes_once_and_the_engine_judges_
     assert again.duplicates.tolist() == [1]
 
 
-def test_a_publisher_heard_in_mid_stream_waits_once_for_older_messages() -> None:
+def test_the_first_messages_of_a_running_publisher_wait_for_older_ones() -> None:
     publishers = Publishers()
     assert passed(publishers, [1001, 1000]) == []
     assert passed(publishers, [1001, 1000, 1002], due=True) == [1000, 1001, 1002]
     assert passed(publishers, [1003]) == [1003]
 
 
-def test_shuffled_and_doubled_numbers_come_out_once_and_in_order() -> None:
+def test_shuffled_and_duplicated_numbers_pass_once_and_in_order() -> None:
     dice = random.Random(3)
     stream = [*range(2**32 - 400, 2**32), *range(600)]
     late = sorted([(position + dice.uniform(0, 40), number) for position, number in enumerate(stream * 2)])
@@ -98,13 +99,13 @@ def test_shuffled_and_doubled_numbers_come_out_once_and_in_order() -> None:
     assert not waiting
 
 
-def test_a_publisher_that_counts_from_the_start_again_is_heard() -> None:
+def test_a_publisher_that_starts_counting_again_is_accepted() -> None:
     publishers = Publishers()
     assert passed(publishers, [WINDOW + 1], due=True) == [WINDOW + 1]
     assert passed(publishers, [0, 1, 1]) == [0, 1]
 
 
-def test_nobody_waits_for_what_was_shed_here() -> None:
+def test_no_message_waits_for_one_that_was_shed() -> None:
     publishers = Publishers()
     assert passed(publishers, [0]) == [0]
     publishers.allow_gap(np.array([ROW, 99]))
@@ -114,14 +115,14 @@ def test_nobody_waits_for_what_was_shed_here() -> None:
     assert passed(publishers, [9]) == []
 
 
-def test_publishers_of_one_tag_and_tags_do_not_wait_for_each_other() -> None:
+def test_publishers_and_tags_do_not_wait_for_each_other() -> None:
     publishers = Publishers()
     assert put(publishers, [0, 2], boot_id=1).due.tolist() == [0]
     assert put(publishers, [0, 1], boot_id=2).due.tolist() == [0, 1]
     assert publishers.sequence(forms_of([0]), np.array([5], np.int32), np.array([S]), 0).due.tolist() == [0]
 
 
-def test_made_up_boot_ids_do_not_fill_the_memory_and_push_out_the_one_unheard_for_longest() -> None:
+def test_new_boot_ids_replace_the_publisher_that_was_silent_for_longest() -> None:
     publishers = Publishers()
     for boot_id in range(2, 1000):
         for number, one in ((boot_id - 2, 1), (0, boot_id)):
@@ -131,7 +132,7 @@ def test_made_up_boot_ids_do_not_fill_the_memory_and_push_out_the_one_unheard_fo
     assert len(publishers.columns) == PER_TAG
 
 
-def test_a_copy_of_the_columns_goes_on_where_the_first_stopped() -> None:
+def test_a_copy_of_the_columns_continues_where_the_original_stopped() -> None:
     first, second = Publishers(), Publishers()
     assert passed(first, list(range(50))) == list(range(50))
     second.columns = first.columns

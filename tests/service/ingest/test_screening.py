@@ -1,4 +1,4 @@
-"""Bad values: each is counted under its reason, and the good samples beside it are kept."""
+"""Every bad value is counted under its reason, and the good samples beside it are kept."""
 
 import math
 
@@ -82,12 +82,12 @@ def test_bad_angles_are_counted(value: float, std: float, reason: Reason | None)
     assert [r.reason for r in bearing] == [reason or Reason.BEARING_ABSURD]
 
 
-def test_a_sample_with_several_faults_is_counted_once() -> None:
+def test_a_sample_with_several_errors_is_counted_once() -> None:
     _, rejected = screened(Frame(ranges=[RangeSample(T, 7, -1.0, -1.0)]))
     assert [(r.reason, len(r.messages)) for r in rejected] == [(Reason.RANGE_NEGATIVE, 1)]
 
 
-def test_what_a_sensor_can_measure_passes_unchanged() -> None:
+def test_values_that_a_sensor_can_measure_pass_unchanged() -> None:
     frame = Frame(
         imu=[ImuSample(T, LEVEL, STILL), ImuSample(T, (-320.0, 0, 0), (72.0, 0, 0), (5_000.0, 0, 0))],
         ranges=[RangeSample(T, 7, 0.0), RangeSample(T, 7, 3_000.0, 0.001)],

@@ -1,4 +1,4 @@
-"""The ingest thread survives errors, gathers messages, and tells when it does not run."""
+"""The ingest thread survives errors, gathers messages, and reports when it is not running."""
 
 import threading
 
@@ -21,7 +21,7 @@ def thread_of(bench: Bench) -> IngestThread:
     return IngestThread(bench.ingest, bench.buffer, bench.metrics, period_s=0.001)
 
 
-def test_messages_become_poses_without_being_asked_for() -> None:
+def test_messages_become_poses() -> None:
     bench = Bench()
     thread = thread_of(bench)
     thread.start()
@@ -32,16 +32,16 @@ def test_messages_become_poses_without_being_asked_for() -> None:
     assert not thread.is_alive
 
 
-def test_an_error_of_ours_is_counted_and_the_thread_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unexpected_error_is_counted_and_the_thread_continues(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench()
     turn, failures = bench.ingest.turn, 3
 
-    def failing(most: int) -> int:
+    def failing(limit: int) -> int:
         nonlocal failures
         if failures:
             failures -= 1
             raise RuntimeError("a bug")
-        return turn(most)
+        return turn(limit)
 
     monkeypatch.setattr(bench.ingest, "turn", failing)
     thread = thread_of(bench)
@@ -49,13 +49,13 @@ def test_an_error_of_ours_is_counted_and_the_thread_goes_on(monkeypatch: pytest.
     bench.put("a", frame(4.0))
     wait_until(lambda: bench.x_of("a") == [4.0])
     thread.stop()
-    assert bench.metrics.faults.labels("ingest")._value.get() == 3
+    assert bench.total(bench.metrics.faults, where="ingest") == 3
 
 
-def test_a_thread_that_does_not_run_or_is_stuck_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_thread_that_is_not_running_or_stuck_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench()
     thread = thread_of(bench)
-    assert thread.problem == "the ingest thread does not run"
+    assert thread.problem == "the ingest thread is not running"
     release = threading.Event()
     monkeypatch.setattr(bench.ingest, "turn", lambda _: release.wait(5.0))
     monkeypatch.setattr(ingest_thread, "SILENT_S", 0.05)

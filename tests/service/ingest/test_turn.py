@@ -1,4 +1,4 @@
-"""From messages to poses: admission, anchors, duplicates, clocks; every loss is counted, and no fault spreads."""
+"""The way from messages to poses: admission, anchors, duplicates, clocks. Losses are counted, and no fault spreads."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +20,7 @@ from dropanchor_schemas.wire import (
 )
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import SampleBatch, State, StateReason
-from dropanchor_service.ingest import samples as prepare
+from dropanchor_service.ingest import samples as sample_reader
 from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
@@ -37,7 +37,7 @@ def ranges(*values: float, anchor: int = 7, sequence: int | None = None, boot_id
     return Frame(ranges=samples, sequence=sequence, boot_id=boot_id)
 
 
-def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_come_back_as_poses() -> None:
+def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_become_poses() -> None:
     bench = Bench()
     bench.put("a", ranges(1.0, 2.0))
     bench.put("b", Frame(ranges=[RangeSample(T, 7, 5.0)], imu=[IMU, IMU], headings=[HeadingSample(T, 1.0)]))
@@ -51,7 +51,7 @@ def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_come_back_as_
     assert bench.rejected() == {}
 
 
-def test_json_and_packed_messages_do_the_same() -> None:
+def test_json_and_packed_messages_give_the_same_poses() -> None:
     bench = Bench()
     bench.put("a", encode_json(ranges(3.0)), ENCODING_JSON)
     bench.put("b", ranges(3.0))
@@ -59,7 +59,7 @@ def test_json_and_packed_messages_do_the_same() -> None:
     assert bench.x_of("ab") == [3.0, 3.0]
 
 
-def test_the_first_anchor_that_is_heard_becomes_the_origin_and_others_are_unknown() -> None:
+def test_the_first_anchor_becomes_the_origin_and_others_are_unknown() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0, anchor=7), ranges(2.0, anchor=8), ranges(3.0, anchor=7))
     assert bench.site.site.anchors == [Anchor(id="7")]
@@ -84,7 +84,7 @@ def test_a_bad_range_does_not_bind_an_anchor() -> None:
     assert [anchor.id for anchor in bench.site.site.anchors] == ["7"]
 
 
-def test_good_samples_of_a_frame_are_kept_beside_bad_ones_which_are_counted_for_their_tag() -> None:
+def test_bad_samples_of_a_frame_are_counted_for_their_tag_and_good_ones_are_kept() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0, -1.0, float("nan"), 9000.0, 2.0))
     tag = bench.tags.find("a")
@@ -112,9 +112,7 @@ def test_good_samples_of_a_frame_are_kept_beside_bad_ones_which_are_counted_for_
         (b"x", "zenoh/bytes", "encoding_unknown"),
     ],
 )
-def test_a_bad_payload_is_counted_for_its_tag_and_its_neighbours_pass(
-    payload: bytes, encoding: str, reason: str
-) -> None:
+def test_a_bad_payload_is_counted_for_its_tag_and_others_pass(payload: bytes, encoding: str, reason: str) -> None:
     bench = Bench()
     bench.put("good", ranges(1.0))
     bench.put("bad", payload, encoding)
@@ -138,15 +136,15 @@ def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
     assert len(bench.tags) == 0
 
 
-def test_unknown_tags_are_refused_when_the_settings_say_so_and_listed_ones_are_not() -> None:
+def test_unknown_tags_are_rejected_if_the_settings_say_so_and_listed_ones_are_not() -> None:
     bench = Bench(unknown_tags="refuse", tags={"listed": {}})
     bench.send("listed", ranges(1.0))
-    bench.send("stranger", ranges(2.0))
+    bench.send("unlisted", ranges(2.0))
     assert bench.rejected() == {"tag_unknown": 1}
-    assert bench.x_of(["listed", "stranger"]) == [1.0, None]
-    bench.site.set_tag("stranger", TagSettings())
-    bench.send("stranger", ranges(3.0))
-    assert bench.x_of(["stranger"]) == [3.0]
+    assert bench.x_of(["listed", "unlisted"]) == [1.0, None]
+    bench.site.set_tag("unlisted", TagSettings())
+    bench.send("unlisted", ranges(3.0))
+    assert bench.x_of(["unlisted"]) == [3.0]
 
 
 def test_no_more_tags_than_max_tags_are_registered() -> None:
@@ -157,7 +155,7 @@ def test_no_more_tags_than_max_tags_are_registered() -> None:
     assert bench.rejected() == {"tags_full": 2}
 
 
-def test_a_message_that_comes_twice_is_fused_once() -> None:
+def test_a_message_that_arrives_twice_is_fused_once() -> None:
     bench = Bench()
     first, second = ranges(1.0, sequence=0, boot_id=5), ranges(2.0, sequence=1, boot_id=5)
     bench.send("a", first, second, first)
@@ -166,21 +164,21 @@ def test_a_message_that_comes_twice_is_fused_once() -> None:
     assert bench.rejected() == {"duplicate": 3}
 
 
-def test_a_gap_waits_for_what_came_soon_after_it_however_long_both_have_lain_in_a_backlog() -> None:
+def test_a_gap_is_filled_from_a_backlog_however_old_it_is() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=1))
     now_ns = bench.clock.now_ns()
     for sequence, ago_ns in ((2, 900_000_000), (1, 800_000_000), (4, 700_000_000)):
         bench.put("a", ranges(1.0, sequence=sequence, boot_id=1), at_ns=now_ns - ago_ns)
-    passed = []
+    fused_counts = []
     for _ in range(4):
-        bench.ingest.turn(most=1)
-        passed.append(bench.total(bench.metrics.samples))
-    assert passed == [1, 3, 3, 4]
+        bench.ingest.turn(limit=1)
+        fused_counts.append(bench.total(bench.metrics.samples))
+    assert fused_counts == [1, 3, 3, 4]
     assert bench.total(bench.metrics.given_up) == 1
 
 
-def test_two_publishers_of_one_tag_and_two_tags_count_on_their_own() -> None:
+def test_each_publisher_and_each_tag_has_its_own_sequence() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=5), ranges(1.0, sequence=0, boot_id=6))
     bench.send("b", ranges(1.0, sequence=0, boot_id=5))
@@ -199,7 +197,7 @@ def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
     assert times == [101 * second, 102 * second, 103 * second]
 
 
-def test_settings_of_a_tag_reach_the_engine_before_it_is_heard_and_when_they_change() -> None:
+def test_settings_of_a_tag_reach_the_engine_before_its_first_message_and_when_they_change() -> None:
     bench = Bench(tags={"a": {"height_m": 1.5}})
     bench.ingest.turn()
     assert list(bench.engine.configured) == [0]
@@ -211,7 +209,7 @@ def test_settings_of_a_tag_reach_the_engine_before_it_is_heard_and_when_they_cha
     assert len(bench.engine.configured[1]) == 1
 
 
-def test_a_new_anchor_starts_nothing_afresh_but_one_that_moves_does() -> None:
+def test_tracks_start_afresh_when_an_anchor_moves_but_not_when_one_is_added() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0))
     bench.site.set_anchor(Anchor(id="8", x=5.0))
@@ -231,7 +229,7 @@ def poison_row(row: int) -> Callable[[SampleBatch], bool]:
     return poisoned
 
 
-def test_a_row_that_makes_the_engine_fail_stops_nobody_else_and_is_shown_as_lost() -> None:
+def test_a_row_that_makes_the_engine_fail_is_lost_and_stops_no_other_row() -> None:
     bench = Bench(tags={"2": {"start": StartPose(x=1.0, y=1.0).model_dump()}})
     names = [str(i) for i in range(8)]
     for name in names:
@@ -253,34 +251,34 @@ def test_a_row_that_makes_the_engine_fail_stops_nobody_else_and_is_shown_as_lost
     assert not afresh["start_known"]
 
 
-def test_a_row_that_fails_again_and_again_is_left_alone_and_counted() -> None:
+def test_a_row_that_fails_repeatedly_is_quarantined_and_its_samples_are_counted() -> None:
     bench = Bench()
     bench.send("a", ranges(1.0))
     bench.engine.poisoned = poison_row(0)
     for _ in range(FAULTS_BEFORE_QUARANTINE + 4):
         bench.send("a", ranges(1.0))
     assert bench.rejected() == {"estimator_fault": 4}
-    assert bench.metrics.faults.labels("estimator")._value.get() == FAULTS_BEFORE_QUARANTINE
+    assert bench.total(bench.metrics.faults, where="estimator") == FAULTS_BEFORE_QUARANTINE
 
 
-def test_a_payload_that_the_decoder_fails_on_costs_nothing_but_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_payload_that_makes_the_decoder_fail_harms_no_other_payload(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(payloads: list[bytes], encodings: list[str]) -> Forms:
         if b"poison" in payloads:
             raise RuntimeError("a bug")
         return read_forms(payloads, encodings)
 
-    monkeypatch.setattr(prepare, "read_forms", fails)
+    monkeypatch.setattr(sample_reader, "read_forms", fails)
     bench = Bench()
     bench.send("a", ranges(1.0), b"poison", ranges(2.0))
     assert bench.x_of("a") == [2.0]
     assert bench.rejected() == {"payload_empty": 1}
 
 
-def test_a_flood_of_unknown_tags_is_bounded_and_known_tags_are_unharmed() -> None:
+def test_a_flood_of_unknown_tags_is_bounded_and_does_not_harm_registered_tags() -> None:
     bench = Bench(max_tags=10)
     bench.send("known", ranges(1.0))
     for number in range(50_000):
-        bench.put(f"stranger{number}", ranges(1.0))
+        bench.put(f"unlisted{number}", ranges(1.0))
     bench.send("known", ranges(2.0))
     assert bench.x_of(["known"]) == [2.0]
     take_turns(bench)
@@ -299,7 +297,7 @@ def fused(bench: Bench) -> list[float]:
     return [value for batch in bench.engine.batches for value in batch.ranges["range"].tolist()]
 
 
-def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses_neither() -> None:
+def test_a_tag_gets_its_row_with_its_second_message_if_many_are_new_and_loses_none() -> None:
     bench = Bench(unproven_tags=1)
     bench.send("quick", ranges(1.0))
     bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
@@ -314,7 +312,7 @@ def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses
     assert bench.rejected() == {}
 
 
-def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
+def test_a_duplicated_or_unreadable_message_does_not_confirm_a_tag() -> None:
     bench = Bench(unproven_tags=0)
     for _ in range(3):
         bench.put("doubled", ranges(1.0), at_ns=T)
@@ -326,7 +324,7 @@ def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
     assert [pending.name for pending in bench.pending_tags.all()] == ["doubled"]
 
 
-def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
+def test_confirmed_tags_make_room_for_other_unlisted_ones() -> None:
     bench = Bench(unproven_tags=1)
     bench.put("first", ranges(1.0), at_ns=T)
     bench.put("waits", ranges(2.0), at_ns=T)
@@ -338,10 +336,10 @@ def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
     assert [tag.name for tag in bench.tags.all()] == ["first", "at-once"]
 
 
-def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_counted() -> None:
+def test_tags_that_send_once_are_dropped_and_all_of_their_messages_are_counted() -> None:
     bench = Bench(max_tags=100, unproven_tags=10)
     for number in range(5_000):
-        bench.put(f"stranger{number}", ranges(1.0))
+        bench.put(f"unlisted{number}", ranges(1.0))
         if number % 200 == 0:
             bench.ingest.turn()
     take_turns(bench)
@@ -351,21 +349,21 @@ def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_co
     assert bench.rejected() == {"tag_unproven": 5_000 - 10 - 100}
 
 
-def test_a_tag_in_quarantine_is_listed_and_comes_in_once_somebody_has_put_its_settings() -> None:
+def test_a_quarantined_tag_is_pending_until_its_settings_are_put() -> None:
     bench = Bench(unknown_tags="quarantine", tags={"listed": {}})
     bench.send("listed", ranges(1.0))
     for value in (2.0, 3.0):
-        bench.send("stranger", ranges(value))
+        bench.send("unlisted", ranges(value))
     assert fused(bench) == [1.0]
-    assert [(pending.name, pending.messages) for pending in bench.pending_tags.all()] == [("stranger", 2)]
+    assert [(pending.name, pending.messages) for pending in bench.pending_tags.all()] == [("unlisted", 2)]
     assert bench.rejected() == {"tag_quarantined": 2}
-    bench.site.set_tag("stranger", TagSettings())
-    bench.send("stranger", ranges(4.0))
+    bench.site.set_tag("unlisted", TagSettings())
+    bench.send("unlisted", ranges(4.0))
     assert fused(bench) == [1.0, 4.0]
     assert len(bench.pending_tags) == 0
 
 
-def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
+def test_messages_kept_for_a_tag_are_used_when_rest_registers_it() -> None:
     bench = Bench(unproven_tags=0)
     bench.put("a", ranges(1.0), at_ns=T)
     bench.ingest.turn()
@@ -374,7 +372,7 @@ def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
     assert fused(bench) == [1.0]
 
 
-def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
+def test_messages_of_listed_tags_do_not_wait_among_those_of_unregistered_ones() -> None:
     names = [f"listed-{number}" for number in range(UNREGISTERED_PER_TURN + 500)]
     bench = Bench(tags={name: {} for name in names})
     bench.ingest.turn()
@@ -403,14 +401,14 @@ def test_shed_messages_are_counted_for_their_tag() -> None:
     assert quiet.messages == 2
 
 
-def test_a_listed_tag_has_a_row_before_it_is_heard_and_an_announced_one_too(tmp_path: Path) -> None:
+def test_listed_and_announced_tags_have_a_row_before_their_first_message(tmp_path: Path) -> None:
     bench = Bench(tmp_path, tags={"listed": {}})
     bench.ingest.announce("alive")
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]
 
 
-def test_anchors_that_the_site_lacks_are_logged_once_each_and_no_more_than_a_bounded_number(
+def test_unknown_anchors_are_logged_once_each_up_to_a_limit(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     bench = Bench(site={"anchors": [{"id": "1"}]})
@@ -425,12 +423,12 @@ def test_anchors_that_the_site_lacks_are_logged_once_each_and_no_more_than_a_bou
     assert bench.tags.unknown_anchors.of(0, bench.clock.now_ns() + FRESH_NS) is None
 
 
-def test_a_replay_is_as_old_as_its_silence_and_a_live_tag_as_its_measurement() -> None:
+def test_the_age_of_a_replay_counts_from_its_arrival_and_that_of_a_live_tag_from_its_samples() -> None:
     bench = Bench()
     answers = Answers(bench.site, bench.tags, bench.latest, bench.clock.now_ns)
 
     def state_of(name: str, later_s: float = 0.0) -> tuple[str, float]:
-        """State and age as they are so much later than the last message, however long compiling has taken."""
+        """Return state and age at a time after the last message, however long compiling has taken."""
         tag = bench.tags.find(name)
         assert tag is not None
         assert tag.last_heard_ns is not None

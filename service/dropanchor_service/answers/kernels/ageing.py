@@ -1,4 +1,4 @@
-"""What an answer derives from a pose: how far it may still be believed, and its ellipse."""
+"""Derive from poses what an answer adds: the state at their age, and the ellipse."""
 
 import math
 from typing import Any, Final
@@ -20,8 +20,8 @@ _RANGES_MISSING: Final = int(StateReason.RANGES_MISSING)
 
 
 @njit(cache=True, nogil=True)
-def grow_old(poses: Any, age_s: Any) -> None:
-    """What POSE rows may be shown as at this age, in place."""
+def age_poses(poses: Any, age_s: Any) -> None:
+    """Set the state and reason that POSE rows have at this age, in place."""
     for i in range(len(poses)):
         lost = age_s[i] > LOST_AFTER_S
         if lost or (age_s[i] > STALE_AFTER_S and poses[i].state == _TRACKING):
@@ -31,9 +31,11 @@ def grow_old(poses: Any, age_s: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def ellipses(cov: Any, axes: Any) -> None:
-    """Into `axes` (3 × n): semi-major and semi-minor axis [m] and direction [rad] of the 95 % ellipses of cov, which
-    begins with that of (x, y); NaN where that is not finite: sqrt(χ² λ) with the eigenvalues λ of a symmetric 2 × 2
-    matrix in closed form."""
+    """Fill `axes` (3 × n) with semi-major axis [m], semi-minor axis [m] and direction [rad] of 95 % ellipses.
+
+    cov: n × 2 × 2 or more, of which the first two rows and columns are those of (x, y); an ellipse that is not finite
+    becomes NaN. The axes are sqrt(χ² λ), with the eigenvalues λ of a symmetric 2 × 2 matrix in closed form.
+    """
     for i in range(len(cov)):
         a, b, c = cov[i, 0, 0], cov[i, 0, 1], cov[i, 1, 1]
         mean, half = (a + c) / 2, math.hypot((a - c) / 2, b)

@@ -1,7 +1,8 @@
-"""JSON of many like objects: forms with holes, filled with numbers and with texts that are JSON already.
+"""Write the JSON of many like objects: fill forms with numbers and with texts.
 
-A hole is one byte below a space, which no JSON holds. Indices are unsigned: numba would ask of every other one whether
-it counts from the end. Every helper is inlined: a call costs as much as the number that it is for.
+A form is JSON with placeholders, and the texts are JSON already. A placeholder is one byte below a space, which JSON
+cannot contain. Indices are unsigned, because numba checks signed ones for counting from the end. All helpers are
+inlined, because a call costs as much as writing a number.
 """
 
 from typing import Any, Final
@@ -12,11 +13,11 @@ from numba import njit
 NUMBER: Final = 1  # the next of the row's numbers
 INTEGER: Final = 2  # its integer
 TEXT: Final = 3  # the next of all texts
-PASSED_OVER: Final = 4  # the next of the row's numbers, of which nothing is to be seen here
+SKIPPED: Final = 4  # the next of the row's numbers is not written
 END: Final = 5  # of the form
 
-BEYOND: Final = 9e18  # numbers from here on are null, as NaN is: their digits do not fit into 64 bits
-LONGEST: Final = 30  # characters of a number: a sign, 19 digits, a point and 9 decimals
+BEYOND: Final = 9e18  # larger numbers become null, as NaN does: their digits do not fit into 64 bits
+LONGEST: Final = 30  # characters of the longest number: a sign, 19 digits, a point and 9 decimals
 
 _POWERS: Final = 10.0 ** np.arange(10)
 _ONE: Final = np.uint64(1)
@@ -28,8 +29,8 @@ _ZERO: Final = np.uint64(ord("0"))
 def fill(
     forms: Any,
     begins: Any,
-    holes: Any,
-    first_hole: Any,
+    placeholders: Any,
+    first_placeholder: Any,
     form_of: Any,
     numbers: Any,
     decimals: Any,
@@ -39,28 +40,30 @@ def fill(
     filled: Any,
     ends: Any,
 ) -> None:
-    """Into `filled` (bytes): of every row its form, with the holes filled; into `ends`: where each of them ends.
+    """Fill `filled` (bytes) with the form of every row, with its placeholders filled, and `ends` with the end of each.
 
-    forms: bytes; begins: where each begins; holes: where they are, with `first_hole` of each form. numbers: one row per
-    row, rounded to `decimals` of each column; integers: one per row. texts: bytes; text_ends: where each ends."""
+    forms: bytes. begins: offset of each form. placeholders: offsets of all placeholders. first_placeholder: index of
+    the first one of each form. numbers: one row per row of the output, rounded to the `decimals` of each column.
+    integers: one per row. texts: bytes. text_ends: offset of the end of each text.
+    """
     place = text = np.uint64(0)
     which = 0
     for row in range(len(form_of)):
-        at, next_hole = np.uint64(begins[form_of[row]]), first_hole[form_of[row]]
-        column, hole = 0, 0
-        while hole != END:
-            place, at = _copied(forms, at, np.uint64(holes[next_hole]), filled, place)
-            hole = forms[at]
+        at, next_placeholder = np.uint64(begins[form_of[row]]), first_placeholder[form_of[row]]
+        column, kind = 0, 0
+        while kind != END:
+            place, at = _copied(forms, at, np.uint64(placeholders[next_placeholder]), filled, place)
+            kind = forms[at]
             at += _ONE
-            next_hole += 1
-            if hole == NUMBER:
+            next_placeholder += 1
+            if kind == NUMBER:
                 place = _rounded(numbers[row, column], decimals[column], filled, place)
                 column += 1
-            elif hole == PASSED_OVER:
+            elif kind == SKIPPED:
                 column += 1
-            elif hole == INTEGER:
+            elif kind == INTEGER:
                 place = _integer(np.uint64(integers[row]), filled, place)
-            elif hole == TEXT:
+            elif kind == TEXT:
                 place, text = _copied(texts, text, np.uint64(text_ends[which]), filled, place)
                 which += 1
         ends[row] = place
@@ -68,7 +71,7 @@ def fill(
 
 @njit(nogil=True, inline="always")
 def _copied(source: Any, begin: Any, end: Any, filled: Any, place: Any) -> tuple[Any, Any]:
-    """Where both go on."""
+    """Copy bytes. Return the offsets of the next bytes of `filled` and of `source`."""
     while begin < end:
         filled[place] = source[begin]
         place += _ONE
@@ -78,7 +81,7 @@ def _copied(source: Any, begin: Any, end: Any, filled: Any, place: Any) -> tuple
 
 @njit(nogil=True, inline="always")
 def _rounded(value: float, decimals: int, filled: Any, place: Any) -> Any:
-    """Where it goes on. No more decimals than are needed, but one."""
+    """Write a rounded number with at least one decimal and no trailing zeros. Return the offset of the next byte."""
     size = abs(value)
     if not size < BEYOND:
         for byte in b"null":
@@ -103,7 +106,7 @@ def _rounded(value: float, decimals: int, filled: Any, place: Any) -> Any:
 
 @njit(nogil=True, inline="always")
 def _integer(number: Any, filled: Any, place: Any) -> Any:
-    """Where it goes on."""
+    """Write an integer. Return the offset of the next byte."""
     length, beyond = 1, _TEN
     while number >= beyond and length < 19:
         beyond *= _TEN
@@ -113,7 +116,7 @@ def _integer(number: Any, filled: Any, place: Any) -> Any:
 
 @njit(nogil=True, inline="always")
 def _digits(number: Any, length: int, filled: Any, place: Any) -> Any:
-    """Where it goes on."""
+    """Write a number with this many digits. Return the offset of the next byte."""
     end = at = place + np.uint64(length)
     for _ in range(length):
         at -= _ONE

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import Connect
-from dropanchor_service.answers.connect_command import reached_at, simulate_command, tag_command
+from dropanchor_service.answers.connect_command import reachable_endpoint, simulate_command, tag_command
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, shown
@@ -29,7 +29,7 @@ def connect_router(store: SiteStore, endpoints: tuple[str, ...], credentials: Se
     )
     async def get_connect(request: Request) -> Response:
         site, is_local = store.site, _is_local(request)
-        reached = [reached_at(endpoint, _host(request)) for endpoint in endpoints]
+        reached = [reachable_endpoint(endpoint, _host(request)) for endpoint in endpoints]
         folder = None
         if credentials is not None:
             folder = str(credentials.bundle(SIMULATED_TAG).resolve()) if is_local else SIMULATED_TAG

@@ -58,7 +58,7 @@ POSE_FRAME: dict[str, Any] = {
     "online": [True, True],
     "state": ["tracking", "initialising"],
     "reason": ["resolved", "no_heading"],
-    "hint": ["", "No heading yet: the tag has to send IMU samples or a platform heading."],
+    "hint": ["", "There is no heading yet: the tag must send IMU samples or a platform heading."],
     "anchor": ["1", "1"],
     "age_s": [0.042, 0.05],
     "x": [3.2, None],

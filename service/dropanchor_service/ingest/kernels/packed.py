@@ -1,4 +1,4 @@
-"""Packed payloads that lie end to end in one buffer of 32-bit words: their form, and their samples as columns.
+"""Read packed payloads, end to end in one buffer of 32-bit words: their forms, and their samples as columns.
 
 The format is that of `dropanchor_schemas.wire`; every valid payload is a whole number of words.
 """
@@ -31,7 +31,7 @@ FORM = np.dtype(
         ("boot_id", "u4"),
         ("t0_ns", "i8"),
         ("counts", "i8", 4),  # imu, range, heading, bearing
-        ("start", "i8"),  # word of the buffer at which its samples begin, -1: it is not packed
+        ("start", "i8"),  # word of the buffer at which its samples begin, -1: not packed
     ]
 )
 
@@ -41,7 +41,7 @@ _IMU_WORDS, _RANGE_WORDS, _HEADING_WORDS, _BEARING_WORDS = (s.size // 4 for s in
 
 @njit(cache=True, nogil=True)
 def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> int:
-    """Fill FORM at `where` for every payload; one that has not the right form throughout is left not accepted.
+    """Fill FORM at `where` for every payload. A payload with any error in its form is not accepted.
 
     words: u4. starts, sizes: words. Returns how many were accepted. The checks are those of `wire.read_header`.
     """
@@ -83,9 +83,9 @@ def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> i
 def read_samples(
     words: Any, floats: Any, forms: Any, chosen: Any, imu: Any, ranges: Any, headings: Any, bearings: Any
 ) -> None:
-    """Fill the columns, which have the room, with the samples of the payloads `chosen`, one after another.
+    """Fill the columns, which are large enough, with the samples of the payloads `chosen`, one after another.
 
-    floats: the same buffer as f4. imu: IMU, whose `row` becomes the index of the payload; the others: SCALAR.
+    floats: the same buffer as f4. imu: IMU_SAMPLE. ranges, headings, bearings: SCALAR.
     """
     filled = np.zeros(4, np.int64)
     for i in chosen:
@@ -95,7 +95,7 @@ def read_samples(
             continue
         for _ in range(form.counts[0]):
             sample = imu[filled[0]]
-            sample.row, sample.t_ns = i, form.t0_ns + 1000 * np.int64(words[at])
+            sample.message, sample.t_ns = i, form.t0_ns + 1000 * np.int64(words[at])
             for axis in range(3):
                 sample.acc[axis] = floats[at + 1 + axis]
                 sample.gyro[axis] = floats[at + 4 + axis]

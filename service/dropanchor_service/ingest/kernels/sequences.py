@@ -1,7 +1,7 @@
-"""Numbered messages into the order of their publisher: which are due, which came twice, which wait for one before.
+"""Put numbered messages into the order of their publisher: find those that are due, duplicates and pending ones.
 
-A publisher that counts without a gap waits for nothing: its messages pass as they come (`pass_in_order`). Those behind
-a gap are held until the missing one has come or the window is over (`release`).
+The messages of a publisher that counts without a gap pass as they arrive (`pass_in_order`). Those behind a gap are
+pending until the missing message arrives or the window is over (`release`).
 """
 
 from typing import Any, Final
@@ -9,33 +9,33 @@ from typing import Any, Final
 import numpy as np
 from numba import njit
 
-PER_TAG: Final = 4  # publishers that are remembered of a tag
+PER_TAG: Final = 4  # publishers of a tag whose state is kept
 WINDOW: Final = 1024  # messages behind the newest in which a duplicate is recognised
 _LANES: Final = WINDOW // 64
 
 UNUSED: Final = 0
-HEARD: Final = 1  # nothing has passed yet
+STARTING: Final = 1  # no message has passed yet
 RUNNING: Final = 2
 
 PASS: Final = 0
 PENDING: Final = 1
 DUPLICATE: Final = 2
-REFUSED: Final = 3  # has no form
+REFUSED: Final = 3  # the payload was not accepted
 
 PUBLISHER: Final = np.dtype(
     [
         ("boot_id", "u4"),
-        ("next", "u4"),  # the number that is expected; HEARD: the first that was heard
+        ("next", "u4"),  # the expected number; while STARTING: the first that arrived
         ("status", "u1"),
-        ("gap_allowed", "?"),  # what is missing next was shed here: nobody need wait for it
+        ("gap_allowed", "?"),  # the buffer has shed messages: do not wait for the missing ones
         ("used_ns", "i8"),  # last arrival
         ("least_ns", "i8"),  # least arrival minus time of this epoch, and of the one before; NONE_NS: not yet
         ("previous_least_ns", "i8"),
         ("epoch_end_ns", "i8"),
-        ("newest_ns", "i8"),  # on its own clock, of its last message, and when that one arrived; 0: none yet
-        ("heard_ns", "i8"),
-        ("shift_ns", "i8"),  # what is added to its times: to a UTC only when it has jumped
-        ("seen", "u8", _LANES),  # bit n % WINDOW: the message n has come
+        ("newest_ns", "i8"),  # newest sample of its last message, on its own clock; 0: none yet
+        ("arrival_ns", "i8"),
+        ("shift_ns", "i8"),  # added to its times; for a UTC clock 0 until it jumps
+        ("seen", "u8", _LANES),  # bit n % WINDOW: message n has arrived
     ],
     align=True,
 )
@@ -44,7 +44,7 @@ NONE_NS: Final = np.iinfo(np.int64).max
 
 @njit(nogil=True)
 def _ahead(sequence: int, expected: int) -> int:
-    """How far a number (u32, wraps) lies ahead of another."""
+    """Return how far a number (u32, wraps) is ahead of the expected one."""
     distance: int = (np.int64(sequence) - np.int64(expected)) & 0xFFFFFFFF  # type: ignore[assignment]
     return distance - 2**32 if distance >= 2**31 else distance
 
@@ -65,7 +65,7 @@ def _was_seen(publisher: Any, sequence: int) -> bool:
 
 @njit(nogil=True)
 def _begin(publisher: Any, sequence: int) -> None:
-    """Count from here."""
+    """Start counting at this number."""
     for lane in range(_LANES):
         publisher.seen[lane] = 0
     _mark(publisher, sequence, True)
@@ -75,7 +75,7 @@ def _begin(publisher: Any, sequence: int) -> None:
 
 @njit(nogil=True)
 def _advance(publisher: Any, sequence: int) -> int:
-    """Pass one that is not behind; returns how many before it are missing."""
+    """Pass a message that is not behind. Return how many before it are missing."""
     missing = _ahead(sequence, publisher.next)
     if missing >= WINDOW:
         _begin(publisher, sequence)
@@ -91,7 +91,7 @@ def _advance(publisher: Any, sequence: int) -> int:
 def _verdict(publisher: Any, sequence: int) -> int:
     if publisher.status != RUNNING:
         if sequence != 0:
-            return PENDING  # it has begun before: what else comes of it may be older
+            return PENDING  # the publisher started earlier: older messages may follow
         _begin(publisher, sequence)
         return PASS
     ahead = _ahead(sequence, publisher.next)
@@ -101,7 +101,7 @@ def _verdict(publisher: Any, sequence: int) -> int:
         _advance(publisher, sequence)
         return PASS
     if -ahead > WINDOW:
-        _begin(publisher, sequence)  # it counts from the start again
+        _begin(publisher, sequence)  # the publisher started counting again
         return PASS
     if _was_seen(publisher, sequence):
         return DUPLICATE
@@ -111,7 +111,7 @@ def _verdict(publisher: Any, sequence: int) -> int:
 
 @njit(nogil=True)
 def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: int) -> int:
-    """Where the publisher is remembered; the one unheard for longest makes room for a new one."""
+    """Return the index of the publisher's state. A new one replaces the one that was silent for longest."""
     found = row * PER_TAG
     for slot in range(row * PER_TAG, (row + 1) * PER_TAG):
         publisher = publishers[slot]
@@ -121,10 +121,10 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
         if publisher.used_ns < publishers[found].used_ns:
             found = slot
     publisher = publishers[found]
-    publisher.boot_id, publisher.next, publisher.status = boot_id, sequence, HEARD
+    publisher.boot_id, publisher.next, publisher.status = boot_id, sequence, STARTING
     publisher.gap_allowed, publisher.used_ns, publisher.epoch_end_ns = False, arrival_ns, 0
     publisher.least_ns = publisher.previous_least_ns = NONE_NS
-    publisher.newest_ns = publisher.heard_ns = publisher.shift_ns = 0
+    publisher.newest_ns = publisher.arrival_ns = publisher.shift_ns = 0
     return found
 
 
@@ -132,12 +132,12 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
 def pass_in_order(
     forms: Any, rows: Any, arrivals: Any, publishers: Any, slots: Any, distances: Any, verdicts: Any
 ) -> int:
-    """Judge each message as it comes: PASS, PENDING, DUPLICATE or REFUSED. Returns how many are held.
+    """Judge each message in order of arrival: PASS, PENDING, DUPLICATE or REFUSED. Return how many are pending.
 
-    forms: FORM. publishers: PUBLISHER, PER_TAG for each row. slots: where the publisher of each message is, -1 without
-    one. distances: how far each lies ahead of the number that is expected.
+    forms: FORM. publishers: PUBLISHER, PER_TAG for each row. slots: index of the publisher of each message, -1 for
+    none. distances: how far the number of each is ahead of the expected one.
     """
-    held = 0
+    pending = 0
     for i in range(len(rows)):
         form = forms[i]
         slots[i], distances[i], verdicts[i] = -1, 0, PASS if form.accepted else REFUSED
@@ -149,13 +149,13 @@ def pass_in_order(
         publisher = publishers[slots[i]]
         distances[i] = _ahead(form.sequence, publisher.next)
         verdicts[i] = _verdict(publisher, form.sequence)
-        held += verdicts[i] == PENDING
-    return held
+        pending += verdicts[i] == PENDING
+    return pending
 
 
 @njit(nogil=True)
 def _force(publisher: Any, sequence: int) -> int:
-    """Pass this one although some before it are missing; returns how many."""
+    """Pass a message although some before it are missing. Return how many."""
     if publisher.status != RUNNING:
         _begin(publisher, sequence)
         return 0
@@ -164,10 +164,12 @@ def _force(publisher: Any, sequence: int) -> int:
 
 @njit(cache=True, nogil=True)
 def release(ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any, due_ns: int, verdicts: Any) -> int:
-    """Judge the held messages again, now in the order of their numbers: all up to one that has waited long enough
-    pass, and so do those that follow without a gap. Returns how many are given up as missing.
+    """Judge the pending messages again, in the order of their numbers. Return how many missing ones are given up.
 
-    ordered: the held messages by publisher, then number. due_ns: what arrived until then has waited long enough.
+    All messages up to one that has waited long enough pass, and so do those that follow without a gap.
+
+    ordered: the pending messages by publisher, then number. due_ns: messages that arrived by then have waited long
+    enough.
     """
     missing = 0
     begin = 0

@@ -1,4 +1,4 @@
-"""Which samples have values that a sensor can have measured, and which have times that can be one."""
+"""Judge the values and times of samples: whether a sensor can have measured them."""
 
 import math
 from typing import Any, Final
@@ -7,7 +7,7 @@ from numba import njit
 
 from dropanchor_schemas.wire import MAX_T_NS
 
-# Beyond what such sensors can measure a value is absurd. The widest ranges of consumer IMUs are ±30 g and ±4,000 °/s
+# A value beyond what such sensors can measure is absurd. The widest ranges of consumer IMUs are ±30 g and ±4,000 °/s
 # (TDK ICM-20649, DS-000192) and ±4,912 µT (Asahi Kasei AK09916); UWB radios end far below 3 km.
 ACC_LIMIT: Final = 320.0  # m/s², each axis
 GYRO_LIMIT: Final = 72.0  # rad/s, each axis
@@ -29,8 +29,10 @@ def _fault_of(a: float, b: float, c: float, limit: float) -> int:
 
 @njit(cache=True, nogil=True)
 def judge_imu(imu: Any, verdicts: Any) -> int:
-    """GOOD, NOT_FINITE or ABSURD for each IMU sample; returns how many are not good. A magnetometer may be absent:
-    three NaN."""
+    """Judge each IMU sample: GOOD, NOT_FINITE or ABSURD. Return how many are not good.
+
+    An absent magnetometer, three NaN, is good.
+    """
     bad = 0
     for i in range(len(imu)):
         a, w, m = imu[i].acc, imu[i].gyro, imu[i].mag
@@ -46,19 +48,22 @@ def judge_imu(imu: Any, verdicts: Any) -> int:
 
 @njit(cache=True, nogil=True)
 def judge_scalars(
-    values: Any, stds: Any, least: float, most: float, std_least: float, std_most: float, verdicts: Any
+    values: Any, stds: Any, low: float, high: float, std_low: float, std_high: float, verdicts: Any
 ) -> int:
-    """The same for ranges, headings or bearings between `least` and `most`. A std may be NaN: unknown."""
+    """Judge ranges, headings or bearings, which must lie between `low` and `high`. Return how many are not good.
+
+    A value below `low` is NEGATIVE. A std may be NaN: unknown.
+    """
     bad = 0
     for i in range(len(values)):
         value, std = values[i], stds[i]
         if not math.isfinite(value):
             verdicts[i] = NOT_FINITE
-        elif value < least:
+        elif value < low:
             verdicts[i] = NEGATIVE
-        elif value > most:
+        elif value > high:
             verdicts[i] = ABSURD
-        elif std < std_least or std > std_most:
+        elif std < std_low or std > std_high:
             verdicts[i] = STD_INVALID
         else:
             verdicts[i] = GOOD
@@ -68,8 +73,10 @@ def judge_scalars(
 
 @njit(cache=True, nogil=True)
 def shift_times(t_ns: Any, messages: Any, offsets: Any) -> int:
-    """Add to each time the offset of its message (none: no offset, of anything); returns how many UTC times cannot be
-    one."""
+    """Add to each time the offset of its message. Return how many times then lie outside the range of valid UTC times.
+
+    offsets: ns, empty if all of them are 0.
+    """
     outside = 0
     for i in range(len(t_ns)):
         if len(offsets):
@@ -80,7 +87,7 @@ def shift_times(t_ns: Any, messages: Any, offsets: Any) -> int:
 
 @njit(cache=True, nogil=True)
 def newest_times(t_ns: Any, messages: Any, newest: Any) -> None:
-    """Raise `newest` of each message to the latest of its times."""
+    """Raise `newest` of each message to the latest time of its samples."""
     for i in range(len(t_ns)):
         if t_ns[i] > newest[messages[i]]:
             newest[messages[i]] = t_ns[i]
