@@ -51,7 +51,7 @@ class House:
     def keep(self) -> None:
         """Write the history now."""
         assert self.answers.tracks is not None
-        assert self.answers.tracks.writer.turn()
+        assert self.answers.tracks.writer.flush()
 
     def app(
         self,

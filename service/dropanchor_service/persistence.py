@@ -77,7 +77,7 @@ def retention_of(settings: HistorySettings) -> Retention:
         distance_m=settings.distance_m,
         still_ns=round(settings.still_s * 1e9),
         keep_ns=round(settings.keep_days * 86_400e9),
-        most_bytes=int(settings.most_mib * 2**20),
+        max_bytes=int(settings.most_mib * 2**20),
     )
 
 
@@ -88,5 +88,5 @@ def file_limits_of(settings: RecordingSettings) -> Limits:
         file_ns=round(settings.file_minutes * 60e9),
         keep_files=settings.keep_files,
         keep_ns=round(settings.keep_days * 86_400e9),
-        most_bytes=int(settings.most_mib * 2**20),
+        max_bytes=int(settings.most_mib * 2**20),
     )

@@ -10,7 +10,7 @@ from dropanchor_service.answers.columns import REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.track_file import Stored
+from dropanchor_service.history.track_file import StoredPoses
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.site import SiteStore
 
@@ -38,7 +38,7 @@ def track_page(tracks: Tracks, site: SiteStore, tag: str, from_ns: int, to_ns: i
     """Return the first `limit` poses from `from_ns` to `to_ns`, both included. Raises sqlite3.Error."""
     found = tracks.poses(tag, from_ns, to_ns, limit + 1)
     next_ns = int(found.poses["t_ns"][limit]) if len(found.poses) > limit else None
-    return TrackPage(_columns(Stored(found.poses[:limit], found.anchors[:limit]), site), next_ns)
+    return TrackPage(_columns(StoredPoses(found.poses[:limit], found.anchors[:limit]), site), next_ns)
 
 
 def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_ns: int) -> Array | None:
@@ -49,7 +49,7 @@ def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_n
     try:
         before = tracks.poses(tag, max(0, t_ns - FAR_NS), t_ns, 1, newest_first=True)
         after = tracks.poses(tag, t_ns, t_ns + FAR_NS, 1)
-        if len(memory) == len(before.poses) == len(after.poses) == 0 and not tracks.knows(tag):
+        if len(memory) == len(before.poses) == len(after.poses) == 0 and not tracks.has_tag(tag):
             return None
     except sqlite3.Error as error:
         raise NoPoseThenError(f"the history cannot be read ({error})") from error
@@ -62,14 +62,14 @@ def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_n
     )
 
 
-def _indexed(stored: Stored, site: SiteStore) -> Array:
+def _indexed(stored: StoredPoses, site: SiteStore) -> Array:
     """Return the stored POSE with the site's index of the anchor of each, -1 for none."""
     index = {anchor.id: number for number, anchor in enumerate(site.anchors_by_index())}
     stored.poses["anchor"] = [-1 if anchor is None else index.get(anchor, -1) for anchor in stored.anchors]
     return stored.poses
 
 
-def _columns(stored: Stored, site: SiteStore) -> dict[str, list[Any]]:
+def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
     """Return the columns of `TrackPose`, with the digits of a float32, as it was stored."""
     poses = stored.poses
     known = np.isfinite(poses["cov"]).all(axis=(1, 2)).tolist()

@@ -60,7 +60,7 @@ class ServiceState:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Restore a snapshot of this layout, before the first message."""
-        self._site.remember([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
+        self._site.restore_indices([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
         self._tags.restore(snapshot.document["tags"], snapshot.arrays["counts"])
         self._publishers.columns = snapshot.arrays["publishers"]
         self._publishers.times = snapshot.arrays["times"]

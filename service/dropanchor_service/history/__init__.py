@@ -1,1 +1,1 @@
-"""Tracks of the past, on disk."""
+"""The tracks of all tags, stored on disk."""

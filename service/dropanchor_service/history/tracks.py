@@ -1,4 +1,4 @@
-"""The tracks of all tags, kept on disk: thinned, written in the background, pruned by age and size."""
+"""Store the tracks of all tags on disk: decimated, written in the background, pruned by age and size."""
 
 import logging
 import sqlite3
@@ -10,35 +10,38 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array
-from dropanchor_service.history.damaged_file import is_damage, move_aside, set_aside
-from dropanchor_service.history.track_file import Stored, TrackReader, TrackWriter
+from dropanchor_service.history.damaged_file import damaged_files, is_damage, move_aside
+from dropanchor_service.history.track_file import StoredPoses, TrackReader, TrackWriter
 from dropanchor_service.runtime.background_writer import BackgroundWriter
+from dropanchor_service.store.decimation import Decimation
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
-from dropanchor_service.store.thinning import Decimation
 
 FILE_NAME = "history.sqlite"
 WRITE_S = 2.0
-PRUNE_S = 0.5  # at most so long at a time
-MOST_WAITING_BYTES = 64 * 2**20
-MOST_DAMAGED = 3  # files that are set aside; a disk that damages more of them is not filled with them
+MAX_PRUNE_S = 0.5  # per write
+MAX_QUEUED_BYTES = 64 * 2**20
+MAX_DAMAGED_FILES = 3  # that are moved aside: a disk that keeps damaging files must not fill up with them
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Retention:
-    """Which poses are kept, and for how long; the settings say what each limit means."""
+    """Which poses are kept, and for how long. HistorySettings explains each limit."""
 
     period_ns: int
     distance_m: float
     still_ns: int
     keep_ns: int
-    most_bytes: int
+    max_bytes: int
 
 
 class Tracks:
-    """`offer` is called by the ingest thread, `poses` by any; a thread of its own writes while it is open."""
+    """The stored tracks. The ingest thread calls `offer`, any thread calls `poses`.
+
+    A background thread writes while this context manager is open.
+    """
 
     def __init__(
         self, folder: Path, retention: Retention, tags: TagTable, site: SiteStore, now_ns: Callable[[], int]
@@ -48,13 +51,13 @@ class Tracks:
         self._tags = tags
         self._site = site
         self._now_ns = now_ns
-        self._thinning = Decimation(retention.period_ns, retention.distance_m, retention.still_ns)
+        self._decimation = Decimation(retention.period_ns, retention.distance_m, retention.still_ns)
         self._file: TrackWriter | None = None
         self._reader = TrackReader(self._path)
-        self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MOST_WAITING_BYTES)
+        self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MAX_QUEUED_BYTES)
         self.written = 0
         self.used_bytes = 0
-        self.damaged: list[str] = []  # names of files that were set aside
+        self.damaged: list[str] = []  # names of files that were moved aside
 
     def __enter__(self) -> "Tracks":
         self.writer.start()
@@ -66,50 +69,50 @@ class Tracks:
             self._file.close()
 
     def offer(self, poses: Array) -> None:
-        """POSE, per row in order of time."""
-        kept = self._thinning.of(poses)
+        """Queue the poses worth keeping. poses: POSE, in order of time per row. Never blocks."""
+        kept = self._decimation.select(poses)
         if len(kept):
             self.writer.put(kept, kept.nbytes, len(kept))
 
-    def poses(self, tag: str, from_ns: int, to_ns: int, most: int, newest_first: bool = False) -> Stored:
-        """Raises sqlite3.Error."""
-        return self._reader.poses(tag, from_ns, to_ns, most, newest_first)
+    def poses(self, tag: str, from_ns: int, to_ns: int, limit: int, newest_first: bool = False) -> StoredPoses:
+        """Return up to `limit` poses of the tag between the two times. Raises sqlite3.Error."""
+        return self._reader.poses(tag, from_ns, to_ns, limit, newest_first)
 
-    def knows(self, tag: str) -> bool:
-        """Whether poses of this tag were ever kept. Raises sqlite3.Error."""
-        return self._reader.knows(tag)
+    def has_tag(self, tag: str) -> bool:
+        """Return whether poses of this tag were ever stored. Raises sqlite3.Error."""
+        return self._reader.has_tag(tag)
 
     @property
     def problems(self) -> Sequence[str]:
-        """What an operator should know: that nothing can be written, that there was a damaged file."""
-        told = [f"the history was damaged and begun afresh; what there was is kept as {name}" for name in self.damaged]
-        return told if self.writer.problem is None else [self.writer.problem, *told]
+        """Problems for the operator: the history cannot be written, or a file was damaged."""
+        damaged = [f"the history was damaged and a new one was started; the old file is {name}" for name in self.damaged]
+        return damaged if self.writer.problem is None else [self.writer.problem, *damaged]
 
     def _write(self, batches: Sequence[Array]) -> None:
         try:
-            self._put(batches)
+            self._insert_and_prune(batches)
         except sqlite3.DatabaseError as error:
-            if not is_damage(error) or len(set_aside(self._path)) >= MOST_DAMAGED:
+            if not is_damage(error) or len(damaged_files(self._path)) >= MAX_DAMAGED_FILES:
                 raise
-            self._set_aside(error)
-            self._put(batches)
+            self._move_damaged_file_aside(error)
+            self._insert_and_prune(batches)
 
-    def _put(self, batches: Sequence[Array]) -> None:
+    def _insert_and_prune(self, batches: Sequence[Array]) -> None:
         if self._file is None:
             self._file = TrackWriter(self._path)
         try:
             self._insert(self._file, np.concatenate([np.empty(0, POSE), *batches]))
             self._prune(self._file)
         except sqlite3.Error:
-            self._file.close()  # opened afresh for the next attempt: what was wrong may have been repaired
+            self._file.close()  # the next attempt opens the file again, which may be repaired by then
             self._file = None
             raise
 
-    def _set_aside(self, error: sqlite3.Error) -> None:
+    def _move_damaged_file_aside(self, error: sqlite3.Error) -> None:
         when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(self._now_ns() * 1e-9))
         name = move_aside(self._path, when)
         self.damaged.append(name)
-        _log.error("%s is damaged (%s): it is kept as %s, and a new history is begun", self._path, error, name)
+        _log.error("%s is damaged (%s): it was renamed to %s and a new history was started", self._path, error, name)
 
     def _insert(self, file: TrackWriter, poses: Array) -> None:
         if len(poses):
@@ -120,8 +123,8 @@ class Tracks:
             self.written += len(poses)
 
     def _prune(self, file: TrackWriter) -> None:
-        end_s = time.monotonic() + PRUNE_S
+        end_s = time.monotonic() + MAX_PRUNE_S
         keep_from_ns = self._now_ns() - self._retention.keep_ns
-        while file.prune(keep_from_ns, self._retention.most_bytes) and time.monotonic() < end_s:
+        while file.prune(keep_from_ns, self._retention.max_bytes) and time.monotonic() < end_s:
             pass
         self.used_bytes = file.used_bytes()

@@ -8,7 +8,7 @@ from dropanchor_service.ingest.buffer import UnregisteredMessage
 from dropanchor_service.ingest.decode import read_forms
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import PendingTags, SiteStore, Tag, TagTable
-from dropanchor_service.store.pending_tags import Waiting, is_confirmed
+from dropanchor_service.store.pending_tags import BufferedMessage, is_confirmed
 
 _REFUSALS = {"refuse": Reason.TAG_UNKNOWN, "quarantine": Reason.TAG_QUARANTINED}
 
@@ -39,7 +39,7 @@ class Admission:
             return Reason.KEY_INVALID
         found = self.admit(name)
         if found is Reason.TAG_QUARANTINED:
-            self._pending_tags.hear(name, message[2])
+            self._pending_tags.on_message(name, message[2])
         return self._confirm(name, message) if found is Reason.TAG_UNPROVEN else found
 
     def admit(self, name: str) -> Tag | Reason:
@@ -59,13 +59,13 @@ class Admission:
         self._unconfirmed = np.append(self._unconfirmed, tag.row)
         return tag
 
-    def take_kept(self, tag: Tag) -> list[Waiting]:
+    def take_kept(self, tag: Tag) -> list[BufferedMessage]:
         """Take out the messages that were kept until this tag got its row, in order of arrival."""
         return self._pending_tags.take(tag.name)
 
     def take_expired(self) -> int:
         """Return how many kept messages were dropped since the last call, because no second one arrived."""
-        return self._pending_tags.take_gone()
+        return self._pending_tags.take_evicted()
 
     def review(self) -> None:
         """Stop counting tags as unconfirmed once they have sent enough, so that other unlisted tags get rows."""
@@ -79,10 +79,10 @@ class Admission:
         for name in self._site.tags:
             self._tags.register(name)
 
-    def _confirm(self, name: str, message: Waiting) -> Tag | Reason | None:
+    def _confirm(self, name: str, message: BufferedMessage) -> Tag | Reason | None:
         payload, encoding, arrival_ns = message
         for _, reason in read_forms([payload], [encoding]).rejected:
             return reason
-        if self._pending_tags.hear(name, arrival_ns):
+        if self._pending_tags.on_message(name, arrival_ns):
             return self._tags.register(name)
-        return None if self._pending_tags.keep(name, message) else Reason.TAG_UNPROVEN
+        return None if self._pending_tags.buffer(name, message) else Reason.TAG_UNPROVEN

@@ -102,7 +102,7 @@ class SampleReader:
         newest = np.full(len(of_row), -1, np.int64)
         for messages, t_ns in _times(decoded) if decoded.forms["replay"][due].any() else ():
             newest_times(t_ns, messages, newest)
-        self._tags.set_behind(of_row[due], np.where(newest[due] < 0, 0, arrived[due] - newest[due]))
+        self._tags.set_replay_lag(of_row[due], np.where(newest[due] < 0, 0, arrived[due] - newest[due]))
 
     def _batch(self, decoded: Decoded, rejected: list[Rejected], of_row: Array, arrived: Array) -> SampleBatch:
         self._bind_first_anchor(decoded)
@@ -132,7 +132,7 @@ class SampleReader:
         for message, number in zip(messages.tolist(), ranges["anchor"][first].tolist(), strict=True):
             name = decoded.anchor_names.get(number, str(number))
             tag = self._tags.at(int(of_row[message]))
-            self._tags.unknown_anchors.note(tag.row, tag.name, number, name, int(arrived[message]))
+            self._tags.unknown_anchors.record(tag.row, tag.name, number, name, int(arrived[message]))
 
     def _anchored(self, samples: Array, rejected: list[Rejected]) -> Array:
         """Return the samples of known anchors, with the engine's index of the anchor in `anchor`."""

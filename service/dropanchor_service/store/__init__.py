@@ -1,4 +1,4 @@
-"""What the service knows at this moment: the site, the tags, and the latest pose of each."""
+"""The current state of the service: the site, its tags and the latest pose of each tag."""
 
 from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.pending_tags import PendingTags

@@ -1,5 +1,7 @@
-"""The latest pose of every tag, one array with one row per tag, and what led to it; written by one thread and read by
-any."""
+"""The latest pose of every tag, its hypotheses, its short history and its innovations.
+
+One thread writes and any thread reads. Arrays have one row per tag.
+"""
 
 from threading import Lock
 
@@ -10,110 +12,112 @@ from dropanchor_service.store.pose_history import PoseHistory
 from dropanchor_service.store.records import copied, enlarged, put, take
 from dropanchor_service.store.rings import RowRings, rank_in_row
 
-MODES = 8  # hypotheses that are kept of a tag
-INNOVATIONS = 300  # of each tag: half a minute at ten ranges a second
-MOST_BYTES = 64 * 2**20  # of all of them
+MAX_HYPOTHESES = 8  # per tag
+MAX_INNOVATIONS = 300  # per tag: half a minute at ten ranges a second
+MAX_INNOVATION_BYTES = 64 * 2**20  # for all tags together
 
 
 class LatestPoses:
-    """Readers get copies; the lock is held for a copy only, so no reader sees a half-written pose."""
+    """Gives readers copies, made under a lock, so that no reader sees a half-written pose."""
 
     def __init__(self) -> None:
         self._lock = Lock()
         self._poses = np.zeros(0, POSE)
         self._changed = np.zeros(0, np.int64)
-        self._hypotheses = np.zeros((0, MODES), HYPOTHESIS)
-        self._modes = np.zeros(0, np.int64)  # how many of them each row has
+        self._hypotheses = np.zeros((0, MAX_HYPOTHESES), HYPOTHESIS)
+        self._hypothesis_counts = np.zeros(0, np.int64)
         self._history = PoseHistory()
-        self._innovations = RowRings(INNOVATION, INNOVATIONS, MOST_BYTES)
+        self._innovations = RowRings(INNOVATION, MAX_INNOVATIONS, MAX_INNOVATION_BYTES)
         self._version = 0
 
     @property
     def version(self) -> int:
-        """Grows with every write."""
+        """A number that grows with every write."""
         return self._version
 
     def write(self, poses: Array, hypotheses: Array, innovations: Array | None = None) -> None:
-        """Take the last pose of each row in `poses` (POSE, per row in order of time), the modes behind them, and the
-        innovations (INNOVATION) that led there."""
+        """Store the last pose of each row, its hypotheses, and the innovations that led to it.
+
+        poses: POSE, in order of time per row. hypotheses: HYPOTHESIS. innovations: INNOVATION.
+        """
         if len(poses) == 0:
             return
         with self._lock:
             self._grow(max(int(poses["row"].max()), int(hypotheses["row"].max(initial=-1))) + 1)
             self._version += 1
-            put(self._poses, poses["row"], poses)  # repeated: the newest pose of the row stays
+            put(self._poses, poses["row"], poses)  # with repeated rows the last pose wins
             self._changed[poses["row"]] = self._version
-            self._modes[poses["row"]] = 0
-            self._modes[hypotheses["row"]] = 0
-            self._keep_modes(hypotheses)
+            self._hypothesis_counts[poses["row"]] = 0
+            self._hypothesis_counts[hypotheses["row"]] = 0
+            self._put_hypotheses(hypotheses)
             self._history.write(poses)
             if innovations is not None:
                 self._innovations.write(innovations)
 
     def state(self) -> dict[str, Array]:
-        """Copies of the latest poses, and of the modes behind them."""
+        """Return copies of the latest poses and their hypotheses, for a checkpoint."""
         with self._lock:
-            modes = take(self._hypotheses, np.arange(MODES) < self._modes[:, None])
-            return {"poses": take(self._poses, self._changed > 0), "hypotheses": modes}
+            hypotheses = take(self._hypotheses, np.arange(MAX_HYPOTHESES) < self._hypothesis_counts[:, None])
+            return {"poses": take(self._poses, self._changed > 0), "hypotheses": hypotheses}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Take over what `state` gave. Nobody has heard those tags since: none of them counts as tracking."""
+        """Load what `state` returned. No tag is tracking yet: its ranges are missing since then."""
         poses = state["poses"]
         tracking = poses["state"] == State.TRACKING
         poses["state"][tracking], poses["reason"][tracking] = State.COASTING, StateReason.RANGES_MISSING
         self.write(poses, state["hypotheses"])
 
     def row(self, row: int) -> Array | None:
-        """POSE (0-d) of one row, None before its first pose."""
+        """Return the POSE (0-d) of one row, or None before its first pose."""
         with self._lock:
             known = row < len(self._changed) and self._changed[row] > 0
             return copied(self._poses[row : row + 1])[0] if known else None
 
     def of(self, rows: Array) -> Array:
-        """POSE of these rows, in this order, as far as they have one."""
+        """Return the POSE of these rows, in this order, without rows that have no pose."""
         with self._lock:
             known = rows[rows < len(self._changed)]
             return take(self._poses, known[self._changed[known] > 0])
 
     def since(self, version: int = 0) -> tuple[int, Array]:
-        """The version of this answer, and POSE of every row that changed after `version`."""
+        """Return the current version, and the POSE of every row that changed after `version`."""
         with self._lock:
             return self._version, take(self._poses, self._changed > version)
 
     def hypotheses(self, row: int) -> Array:
-        """HYPOTHESIS behind the latest pose of the row; empty when it is not ambiguous."""
+        """Return the HYPOTHESIS records of the row's latest pose; none when it is not ambiguous."""
         with self._lock:
-            known = row < len(self._modes)
-            return self._hypotheses[row, : self._modes[row]].copy() if known else np.empty(0, HYPOTHESIS)
+            known = row < len(self._hypothesis_counts)
+            return self._hypotheses[row, : self._hypothesis_counts[row]].copy() if known else np.empty(0, HYPOTHESIS)
 
     def hypotheses_of(self, rows: Array) -> tuple[Array, Array]:
-        """HYPOTHESIS behind the latest poses of these rows, one row after the other, and how many each has."""
+        """Return the HYPOTHESIS records of these rows, row after row, and how many each row has."""
         with self._lock:
-            counts = self._modes[rows]
-            return take(take(self._hypotheses, rows), np.arange(MODES) < counts[:, None]), counts
+            counts = self._hypothesis_counts[rows]
+            return take(take(self._hypotheses, rows), np.arange(MAX_HYPOTHESES) < counts[:, None]), counts
 
     def history(self, row: int) -> Array:
-        """POSE of the row over the last minute or less, thinned, in order of time."""
+        """Return the decimated POSE of the row over the last minute or less, in order of time."""
         with self._lock:
             return self._history.of(row)
 
     def innovations(self, row: int) -> Array:
-        """INNOVATION of the row, oldest first."""
+        """Return the latest INNOVATION records of the row, the oldest first."""
         with self._lock:
             return self._innovations.of(row)
 
-    def _keep_modes(self, hypotheses: Array) -> None:
+    def _put_hypotheses(self, hypotheses: Array) -> None:
         if not len(hypotheses):
             return
         rank = rank_in_row(hypotheses["row"])
-        kept, rank = take(hypotheses, rank < MODES), rank[rank < MODES]
+        kept, rank = take(hypotheses, rank < MAX_HYPOTHESES), rank[rank < MAX_HYPOTHESES]
         put(self._hypotheses, (kept["row"], rank), kept)
-        np.maximum.at(self._modes, kept["row"], rank + 1)
+        np.maximum.at(self._hypothesis_counts, kept["row"], rank + 1)
 
     def _grow(self, rows: int) -> None:
         if rows > len(self._poses):
-            room = max(rows, 2 * len(self._poses))
-            self._poses = enlarged(self._poses, room)
-            self._changed = enlarged(self._changed, room)
-            self._hypotheses = enlarged(self._hypotheses, room)
-            self._modes = enlarged(self._modes, room)
+            capacity = max(rows, 2 * len(self._poses))
+            self._poses = enlarged(self._poses, capacity)
+            self._changed = enlarged(self._changed, capacity)
+            self._hypotheses = enlarged(self._hypotheses, capacity)
+            self._hypothesis_counts = enlarged(self._hypothesis_counts, capacity)

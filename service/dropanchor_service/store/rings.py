@@ -1,28 +1,30 @@
-"""The last records of every row, in bounded memory."""
+"""Ring buffers with the last records of every row, in bounded memory."""
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import enlarged, put, take
 
-FEWEST = 2  # records of a row, however many rows there are
+MIN_DEPTH = 2  # records per row, however many rows there are
 
 
 class RowRings:
-    """A ring per row, the oldest record overwritten first. Not locked: its owner is.
+    """One ring buffer per row. Not thread-safe: its owner locks.
 
-    The more rows there are the fewer records each keeps, so that all together stay within `most_bytes`.
+    The more rows there are, the fewer records each row keeps, so that all rows fit into `max_bytes`.
     """
 
-    def __init__(self, dtype: "np.dtype[np.void]", depth: int, most_bytes: int) -> None:
-        """dtype: of a record, with its `row`."""
-        self._most = depth
-        self._most_bytes = most_bytes
-        self._records: Array = np.zeros((depth, 0), dtype)  # place by place: a row that has few touches little memory
+    def __init__(self, dtype: "np.dtype[np.void]", max_depth: int, max_bytes: int) -> None:
+        """Create empty rings. dtype: of a record, with a field `row`; max_depth: records per row."""
+        self._max_depth = max_depth
+        self._max_bytes = max_bytes
+        self._records: Array = np.zeros(
+            (max_depth, 0), dtype
+        )  # (place in the ring, row): a row with few records touches little memory
         self._counts = np.zeros(0, np.int64)
 
     def write(self, records: Array) -> None:
-        """Per row in order."""
+        """Append records, which are in order per row."""
         if len(records) == 0:
             return
         rows = records["row"]
@@ -32,7 +34,7 @@ class RowRings:
         self._counts[rows] = number + 1
 
     def of(self, row: int) -> Array:
-        """A copy, oldest first."""
+        """Return a copy of the row's records, the oldest first."""
         if row >= len(self._counts):
             return np.zeros(0, self._records.dtype)
         count, depth = int(self._counts[row]), len(self._records)
@@ -43,9 +45,9 @@ class RowRings:
         if rows <= len(self._counts):
             return
         capacity = max(rows, 2 * len(self._counts))
-        depth = max(FEWEST, min(self._most, self._most_bytes // (capacity * self._records.itemsize)))
+        depth = max(MIN_DEPTH, min(self._max_depth, self._max_bytes // (capacity * self._records.itemsize)))
         grown = np.zeros((depth, capacity), self._records.dtype)
-        # The newest `depth` records of each row, numbered from the first that it ever had.
+        # Copy the newest `depth` records of each row. They are numbered from the first record the row ever had.
         number = self._counts[:, None] - depth + np.arange(depth)
         row, column = np.nonzero(number >= 0)
         kept = number[row, column]
@@ -55,7 +57,7 @@ class RowRings:
 
 
 def rank_in_row(rows: Array) -> Array:
-    """How many entries of the same row stand before each entry."""
+    """Return how many entries of the same row stand before each entry."""
     if (rows[1:] >= rows[:-1]).all():
         return _rank_in_run(rows)
     order = np.argsort(rows, kind="stable")
@@ -65,7 +67,7 @@ def rank_in_row(rows: Array) -> Array:
 
 
 def _rank_in_run(rows: Array) -> Array:
-    """The same for rows in ascending order."""
+    """Return `rank_in_row` of rows in ascending order."""
     starts = np.flatnonzero(np.append(True, rows[1:] != rows[:-1]))
     ranks: Array = np.arange(len(rows)) - np.repeat(starts, np.diff(starts, append=len(rows)))
     return ranks

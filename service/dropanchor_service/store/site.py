@@ -1,4 +1,4 @@
-"""The site, its anchors and the settings of its tags: from the configuration, changed over REST, kept in a file."""
+"""The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
 
 import logging
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ _log = logging.getLogger(__name__)
 
 
 class SiteDocument(BaseModel):
-    """What the file holds."""
+    """The content of the file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -26,18 +26,20 @@ class SiteDocument(BaseModel):
 
 
 class SiteStore:
-    """Written by the API and by the ingest thread (which binds the first anchor it hears); read by all.
+    """The current site and tag settings, written by the API and the ingest thread, read by any thread.
 
-    version: grows with every change, so that the ingest thread notices one with a single comparison.
+    The ingest thread writes when it places the first anchor that a tag ranges to. `version` grows with every change,
+    so that one comparison detects a change.
     """
 
     def __init__(self, site: Site, tags: dict[str, TagSettings], folder: Path | None = None) -> None:
-        """folder: where changes are kept over a restart; None keeps them in memory. Its file wins over `site`.
+        """Load the file in `folder` if there is one, else use `site` and `tags`.
 
+        folder: where changes are saved; with None they are lost at a restart.
         Raises OSError or pydantic's ValidationError when the file cannot be read.
         """
         self._lock = Lock()
-        self._nothing_known = TagSettings()
+        self._default_settings = TagSettings()
         self._path = None if folder is None else folder / FILE_NAME
         self._document = SiteDocument(site=site, tags=tags)
         if self._path is not None and self._path.exists():
@@ -52,7 +54,7 @@ class SiteStore:
 
     @property
     def document(self) -> SiteDocument:
-        """Site and tags of one moment."""
+        """Site and tags in one consistent snapshot."""
         return self._document
 
     @property
@@ -60,52 +62,62 @@ class SiteStore:
         return self._document.tags
 
     def tag_settings(self, tag: str) -> TagSettings:
-        return self._document.tags.get(tag, self._nothing_known)
+        """Return the settings of the tag, or the defaults when it has none."""
+        return self._document.tags.get(tag, self._default_settings)
 
     def anchor_index(self, number: int) -> int | None:
-        """The engine's index of the anchor with this number, None when the site does not have it."""
+        """Return the engine's index of the anchor with this number, or None when the site does not have it."""
         entry = self._anchors.get(number)
         return None if entry is None or entry[1] not in self.site.anchors else entry[0]
 
     def lacks(self, number: int) -> bool:
-        """Whether the site has no anchor with this number."""
+        """Return whether the site has no anchor with this number."""
         return self.anchor_index(number) is None
 
     def anchors_by_index(self) -> list[Anchor]:
-        """Every anchor the site has or had: an index keeps its meaning for the life of the store."""
+        """Return every anchor that the site has or had. An index keeps its meaning for the life of the store."""
         return [anchor for _, anchor in sorted(self._anchors.values(), key=lambda entry: entry[0])]
 
-    def remember(self, anchors: Sequence[Anchor]) -> None:
-        """Give the anchors that another store had, by its index, the same index here. Before anything else is done."""
+    def restore_indices(self, anchors: Sequence[Anchor]) -> None:
+        """Give these anchors of an earlier store, in order of their index, the same index here. Call this first."""
         self._anchors = {anchor.number: (index, anchor) for index, anchor in enumerate(anchors)}
         self._index_anchors()
 
     def bind_first(self, anchor: str) -> bool:
-        """Put `anchor` at the origin if the site has none yet. True when it did."""
+        """Put `anchor` at the origin if the site has no anchor yet. Return whether it did."""
         with self._lock:
             if self.site.anchors:
                 return False
             document = self._document.model_copy(update={"site": _with_anchor(self.site, Anchor(id=anchor))})
             try:
-                self._keep(document)
-            except OSError as error:  # nobody has been told that it is kept, and the tags cannot wait for a disk
-                _log.error("anchor %s is the origin until a restart: it cannot be kept: %s", anchor, error)
-            self._take_over(document)
+                self._save(document)
+            except OSError as error:  # the tags cannot wait for a disk, and nobody relies on the file yet
+                _log.error(
+                    "anchor %s is the origin, but only until a restart: the site cannot be saved (%s). Make room or "
+                    "correct the permissions of data_dir, then set the anchor over REST",
+                    anchor,
+                    error,
+                )
+            self._apply(document)
             return True
 
     def set_site(self, site: Site) -> None:
-        """Raises ValueError when the id differs: keys are made of it, so it is fixed while the service runs."""
+        """Replace the site and save it. Raises OSError.
+
+        Raises ValueError when the id differs: Zenoh keys contain it, so it is fixed while the service runs.
+        """
         with self._lock:
             if site.id != self.site.id:
                 raise ValueError(f"the site's id is {self.site.id!r} and cannot change while the service runs")
             self._replace(self._document.model_copy(update={"site": site}))
 
     def set_anchor(self, anchor: Anchor) -> None:
+        """Add the anchor, or replace the one with its number, and save the site. Raises OSError."""
         with self._lock:
             self._replace(self._document.model_copy(update={"site": _with_anchor(self.site, anchor)}))
 
     def remove_anchor(self, anchor: str) -> None:
-        """Raises KeyError when there is none of this id."""
+        """Remove the anchor with this id and save the site. Raises KeyError when there is none, and OSError."""
         with self._lock:
             left = [other for other in self.site.anchors if other.number != anchor_number(anchor)]
             if len(left) == len(self.site.anchors):
@@ -114,19 +126,20 @@ class SiteStore:
             self._replace(self._document.model_copy(update={"site": site}))
 
     def set_tag(self, tag: str, settings: TagSettings) -> None:
+        """Replace the settings of the tag and save them. Raises OSError."""
         with self._lock:
             self._replace(self._document.model_copy(update={"tags": self.tags | {tag: settings}}))
 
     def _replace(self, document: SiteDocument) -> None:
-        """The file is written first: what was acknowledged is not lost by a restart. Raises OSError."""
-        self._keep(document)
-        self._take_over(document)
+        """Save first, then apply: a restart never loses an acknowledged change. Raises OSError."""
+        self._save(document)
+        self._apply(document)
 
-    def _keep(self, document: SiteDocument) -> None:
+    def _save(self, document: SiteDocument) -> None:
         if self._path is not None:
             write_atomically(self._path, [document.model_dump_json(indent=2).encode()])
 
-    def _take_over(self, document: SiteDocument) -> None:
+    def _apply(self, document: SiteDocument) -> None:
         self._document = document
         self._index_anchors()
         self.version += 1

@@ -1,4 +1,4 @@
-"""The tags that have been heard or configured: the row of each, and what was received from it."""
+"""The tags that have sent messages or are configured: the row of each tag and its counters."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ _COUNTS = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class Tag:
-    """One tag. Its counters live in the columns of the table."""
+    """One tag. Its counters are columns of the table."""
 
     name: str
     row: int
@@ -52,19 +52,19 @@ class Tag:
 
     @property
     def samples(self) -> Counter[str]:
-        """Samples that reached the engine, by kind."""
+        """The number of samples that reached the engine, by kind."""
         return _named(KINDS, self.table.counts(self.row)["samples"])
 
     @property
     def rejected(self) -> Counter[str]:
-        """Messages and samples that were not used, by reason."""
+        """The number of messages and samples that were rejected, by reason."""
         return _named(REASONS, self.table.counts(self.row)["rejected"])
 
 
 class TagTable:
-    """Names and rows. Rows are dense, given in order of registration, and never reused.
+    """Maps names to rows. Rows are dense, follow the order of registration and are never reused.
 
-    Counters are written by the ingest thread only; any thread may read them.
+    Only the ingest thread writes the counters; any thread may read them.
     """
 
     def __init__(self) -> None:
@@ -73,18 +73,19 @@ class TagTable:
         self._by_row: list[Tag] = []
         self._counts = np.zeros(16, _COUNTS)
         self._online: set[str] = set()
-        self._is_online = np.zeros(16, bool)  # the same, by row
-        self._behind_ns = np.zeros(16, np.int64)  # how far the recording of a replayed tag lies in the past, by row
+        self._is_online = np.zeros(16, bool)  # the same as `_online`, by row
+        self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past, by row
         self.unknown_anchors = UnknownAnchors()
 
     def __len__(self) -> int:
         return len(self._by_row)
 
     def find(self, name: str) -> Tag | None:
+        """Return the tag of this name, or None."""
         return self._by_name.get(name)
 
     def at(self, row: int) -> Tag:
-        """Raises IndexError for a row that was never given."""
+        """Return the tag of this row. Raises IndexError when no tag has it."""
         return self._by_row[row]
 
     def all(self) -> list[Tag]:
@@ -95,7 +96,7 @@ class TagTable:
         return [by_row[row].name for row in rows]
 
     def register(self, name: str) -> Tag:
-        """The tag of this name, made when it is new."""
+        """Return the tag of this name; add it when it is new."""
         with self._lock:
             tag = self._by_name.get(name)
             if tag is None:
@@ -107,7 +108,7 @@ class TagTable:
             return tag
 
     def set_online(self, name: str, online: bool) -> None:
-        """A token may be seen before the tag is registered; it is remembered."""
+        """Set whether a tag has a liveliness token. The tag may be registered later."""
         with self._lock:
             (self._online.add if online else self._online.discard)(name)
             tag = self._by_name.get(name)
@@ -121,57 +122,58 @@ class TagTable:
         online: Array = self._is_online[rows]
         return online
 
-    def set_behind(self, rows: Array, behind_ns: Array) -> None:
-        """How far what these tags replay lies in the past, ns; 0 for tags that are live."""
-        self._behind_ns[rows] = behind_ns
+    def set_replay_lag(self, rows: Array, lag_ns: Array) -> None:
+        """Set how far the samples of replayed tags lie in the past, ns; 0 for live tags."""
+        self._replay_lag_ns[rows] = lag_ns
 
     def age_s(self, poses: Array, now_ns: int) -> Array:
-        """Age of POSE of any rows, s. The present of a replayed tag is where its recording has come to."""
-        age_s: Array = (now_ns - self._behind_ns[poses["row"]] - poses["t_ns"]) * 1e-9
+        """Return the age of each POSE, s. The age of a replayed tag counts from the current time of its recording."""
+        age_s: Array = (now_ns - self._replay_lag_ns[poses["row"]] - poses["t_ns"]) * 1e-9
         return age_s
 
     @property
     def online_names(self) -> int:
-        """How many names have a liveliness token, registered or not."""
+        """The number of names with a liveliness token, registered or not."""
         return len(self._online)
 
     def copy_counts(self) -> Array:
-        """All counters, one record per row."""
+        """Return a copy of all counters, one record per row."""
         return self._counts[: len(self._by_row)].copy()
 
     def restore(self, names: Sequence[str], counts: Array) -> None:
-        """Take over the rows and counters of another table, in an empty one."""
+        """Load the names and counters of an earlier table. This table must be empty."""
         for name in names:
             self.register(name)
         self._counts[: len(names)] = counts
 
     def counts(self, row: int | Array) -> Array:
-        """Of one row, or of each of several."""
+        """Return the counters of one row, or of several."""
         return self._counts[row]
 
     def count_messages(self, rows: Array, now_ns: int) -> None:
-        """One message from each of `rows` (repeated for several)."""
+        """Count one message for each entry of `rows`, and note the time. A row may appear several times."""
         first = self._counts["first_heard_ns"]
         first[rows[first[rows] == 0]] = now_ns
         self._counts["last_heard_ns"][rows] = now_ns
         _count(self._counts["messages"], rows)
 
     def count_samples(self, kind: str, rows: Array) -> None:
-        """rows: one entry per sample, those of a message side by side."""
+        """Count one sample for each entry of `rows`. The entries of one message stand side by side."""
         _count(self._counts["samples"][:, KINDS.index(kind)], rows)
 
     def count_rejected(self, reason: Reason, rows: Array) -> None:
+        """Count one rejection for each entry of `rows`."""
         _count(self._counts["rejected"][:, REASONS.index(reason)], rows)
 
     def _grow(self, rows: int) -> None:
         if rows > len(self._counts):
             self._counts = enlarged(self._counts, 2 * len(self._counts))
             self._is_online = enlarged(self._is_online, len(self._counts))
-            self._behind_ns = enlarged(self._behind_ns, len(self._counts))
+            self._replay_lag_ns = enlarged(self._replay_lag_ns, len(self._counts))
 
 
 def _count(column: Array, rows: Array) -> None:
-    """Add one for every entry of `rows`; quick where equal entries stand side by side."""
+    """Add one for every entry of `rows`. This is fast when equal entries stand side by side."""
     if not len(rows):
         return
     ends = np.append(np.flatnonzero(rows[1:] != rows[:-1]), len(rows) - 1)

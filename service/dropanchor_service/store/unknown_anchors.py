@@ -1,4 +1,4 @@
-"""Anchors that tags hear and the site does not have."""
+"""Anchors that tags range to although the site does not have them."""
 
 import logging
 from collections.abc import Iterator
@@ -7,52 +7,57 @@ from typing import NamedTuple
 from dropanchor_schemas.keys import chunk_from_id
 
 FRESH_NS = 10_000_000_000
-MOST_LOGGED = 64
+MAX_LOGGED = 64
 
 _log = logging.getLogger(__name__)
 
 
-class _Heard(NamedTuple):
+class _Sighting(NamedTuple):
     number: int
     name: str
     t_ns: int
 
 
 class UnknownAnchors:
-    """One anchor for each row of a tag at most. Written by the ingest thread, read by any."""
+    """Keeps at most one anchor per tag. The ingest thread writes; any thread reads."""
 
     def __init__(self) -> None:
-        self._of_row: dict[int, _Heard] = {}
+        self._by_row: dict[int, _Sighting] = {}
         self._logged: set[int] = set()
 
-    def note(self, row: int, tag: str, number: int, name: str, t_ns: int) -> None:
-        """Remember that a tag was heard with a range to this anchor. Log each anchor once, and a bounded number of
-        them. A tag that hears several keeps the first, so that what is shown does not flicker."""
-        known = self._of_row.get(row)
+    def record(self, row: int, tag: str, number: int, name: str, t_ns: int) -> None:
+        """Record that a tag sent a range to this anchor. Log each anchor once, up to a limit.
+
+        A tag that ranges to several unknown anchors keeps the first, so that its hint does not flicker.
+        """
+        known = self._by_row.get(row)
         if known is None or known.number == number or t_ns - known.t_ns > FRESH_NS:
-            self._of_row[row] = _Heard(number, name, t_ns)
-        if number not in self._logged and len(self._logged) <= MOST_LOGGED:
+            self._by_row[row] = _Sighting(number, name, t_ns)
+        if number not in self._logged and len(self._logged) <= MAX_LOGGED:
             self._logged.add(number)
             self._log_first(tag, name)
 
     def of(self, row: int, now_ns: int) -> tuple[int, str] | None:
-        """Number and id of the anchor that this tag has heard of late."""
-        heard = self._of_row.get(row)
-        return None if heard is None or now_ns - heard.t_ns > FRESH_NS else (heard.number, heard.name)
+        """Return the number and id of the unknown anchor that this tag ranged to recently, or None."""
+        last = self._by_row.get(row)
+        return None if last is None or now_ns - last.t_ns > FRESH_NS else (last.number, last.name)
 
     def fresh(self, now_ns: int) -> Iterator[tuple[int, int, str]]:
-        """Row, and number and id of the anchor, of every tag that has heard one of late."""
-        for row, heard in list(self._of_row.items()):
-            if now_ns - heard.t_ns <= FRESH_NS:
-                yield row, heard.number, heard.name
+        """Yield row, anchor number and anchor id for every tag that recently ranged to an unknown anchor."""
+        for row, last in list(self._by_row.items()):
+            if now_ns - last.t_ns <= FRESH_NS:
+                yield row, last.number, last.name
 
     def _log_first(self, tag: str, name: str) -> None:
-        if len(self._logged) > MOST_LOGGED:
-            _log.warning("more than %d unknown anchors were heard: no more of them are named here", MOST_LOGGED)
+        if len(self._logged) > MAX_LOGGED:
+            _log.warning(
+                "tags range to more than %d unknown anchors: further ones are not logged. Check the anchor ids",
+                MAX_LOGGED,
+            )
             return
         _log.warning(
-            "tag %s hears anchor %s, which this site does not have: its ranges are not used. If the anchor belongs to "
-            "the site, add it: PUT /api/v1/anchors/%s; else set the right anchor in the tag",
+            "tag %s hears anchor %s, which this site does not have: these ranges are not used. If the anchor belongs "
+            "to the site, add it with PUT /api/v1/anchors/%s. Otherwise set the right anchor in the tag",
             tag,
             name,
             chunk_from_id(name),
@@ -60,5 +65,5 @@ class UnknownAnchors:
 
 
 def hint_about(name: str) -> str:
-    """What a person can do about an anchor that a tag hears and the site does not have."""
+    """Return what an operator can do about an unknown anchor that a tag ranges to."""
     return f"Hears anchor {name}, which this site does not have: check its id, or add the anchor to the site."

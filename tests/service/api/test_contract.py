@@ -51,7 +51,7 @@ def operations() -> Iterator[Operation]:
     house.move("tag-1", "a")
     house.keep()
     house.recorder.messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
-    house.recorder.writer.turn()
+    house.recorder.writer.flush()
     house.stopping.set()  # a stream ends after its first event
     load_all_checks()
     document = schemathesis.openapi.from_asgi("/api/v1/openapi.json", house.app())

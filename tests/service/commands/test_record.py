@@ -44,9 +44,9 @@ def test_a_recording_is_started_stopped_listed_and_fetched(
     assert recorder is not None
     assert main(["record", "start", "a", "b", "--url", url]) == 0
     recorder.messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
-    recorder.writer.turn()
+    recorder.writer.flush()
     assert main(["record", "stop", "--url", url]) == 0
-    recorder.writer.turn()
+    recorder.writer.flush()
     (file,) = recorder.files()
     assert main(["record", "list", "--url", url]) == 0
     assert main(["record", "fetch", file.name, "--url", url, "--out", str(tmp_path / "copy")]) == 0

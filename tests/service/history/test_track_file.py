@@ -1,4 +1,4 @@
-"""The file of the history."""
+"""The history's file stores poses, prunes them and survives failed writes and kills."""
 
 import sqlite3
 from pathlib import Path
@@ -25,17 +25,17 @@ def poses(*offsets_s: float, x: float = 0.0) -> Array:
 
 def times(reader: TrackReader, tag: str, from_s: float = -LONG, to_s: float = LONG, **options: object) -> list[float]:
     window = max(0, T_NS + round(from_s * SECOND)), min(2**62, T_NS + round(to_s * SECOND))
-    found = reader.poses(tag, *window, **{"most": 1000, **options})  # type: ignore[arg-type]
+    found = reader.poses(tag, *window, **{"limit": 1000, **options})  # type: ignore[arg-type]
     return [(t_ns - T_NS) / SECOND for t_ns in found.poses["t_ns"].tolist()]
 
 
-def test_what_was_written_is_read_in_order_of_time_with_its_anchor(tmp_path: Path) -> None:
+def test_poses_are_read_in_order_of_time_with_their_anchors(tmp_path: Path) -> None:
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
     writer.insert(poses(25, 0, 3, 1), ["a", "a", "b", "a"], ["7", None, "7", "Süd"])
     assert times(reader, "a") == [0, 1, 25]
     assert times(reader, "b") == [3]
     assert times(reader, "c") == []
-    assert (reader.knows("b"), reader.knows("c")) == (True, False)
+    assert (reader.has_tag("b"), reader.has_tag("c")) == (True, False)
     found = reader.poses("a", T_NS, T_NS + 60 * SECOND, 10)
     assert found.anchors == [None, "Süd", "7"]
     np.testing.assert_array_equal(found.poses["cov"][1], poses(0)["cov"][0])
@@ -47,30 +47,30 @@ def test_a_window_includes_its_ends_and_can_be_read_from_either(tmp_path: Path) 
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
     writer.insert(poses(*range(100)), ["a"] * 100, [None] * 100)
     assert times(reader, "a", 9, 12) == [9, 10, 11, 12]
-    assert times(reader, "a", 9, 40, most=3) == [9, 10, 11]
-    assert times(reader, "a", 9, 40, most=2, newest_first=True) == [40, 39]
+    assert times(reader, "a", 9, 40, limit=3) == [9, 10, 11]
+    assert times(reader, "a", 9, 40, limit=2, newest_first=True) == [40, 39]
     writer.close()
 
 
-def test_however_many_poses_come_at_a_time_few_different_statements_are_kept_in_memory(
+def test_inserts_of_any_size_use_few_different_statements(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     statements: set[str] = set()
 
-    class Noting(sqlite3.Connection):
+    class RecordingConnection(sqlite3.Connection):
         def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
             statements.add(sql)
             return super().execute(sql, *values)
 
     connect = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda *given, **named: connect(*given, **named, factory=Noting))
+    monkeypatch.setattr(sqlite3, "connect", lambda *args, **kwargs: connect(*args, **kwargs, factory=RecordingConnection))
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
     counts = [*range(1, 150), 1023, 1024, 1025]
     for number, count in enumerate(counts):
         writer.insert(poses(*range(count)), [str(number)] * count, [None] * count)
     writer.close()
     assert len([sql for sql in statements if "INTO poses" in sql]) <= 10
-    assert [len(times(reader, str(number), most=2000)) for number in range(len(counts))] == counts
+    assert [len(times(reader, str(number), limit=2000)) for number in range(len(counts))] == counts
 
 
 def test_a_pose_of_the_same_time_is_replaced(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_a_pose_of_the_same_time_is_replaced(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_the_oldest_go_first_by_age_and_by_size(tmp_path: Path) -> None:
+def test_the_oldest_poses_are_pruned_first_by_age_and_by_size(tmp_path: Path) -> None:
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
     writer.insert(poses(*range(5000)), ["a"] * 5000, [None] * 5000)
     while writer.prune(T_NS + 1005 * SECOND, 2**40):
@@ -95,22 +95,23 @@ def test_the_oldest_go_first_by_age_and_by_size(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_a_failed_insert_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_a_failed_insert_leaves_nothing_behind(tmp_path: Path, connections: list[sqlite3.Connection]) -> None:
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+    (writing,) = connections
     writer.insert(poses(0), ["a"], [None])
-    writer._connection.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
+    writing.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
     many = poses(*range(1, 5001))
     with pytest.raises(sqlite3.OperationalError, match="full"):
         writer.insert(many, ["new"] * 5000, ["7"] * 5000)
-    assert not reader.knows("new")
-    writer._connection.execute("PRAGMA max_page_count = 1000000")
+    assert not reader.has_tag("new")
+    writing.execute("PRAGMA max_page_count = 1000000")
     writer.insert(many, ["new"] * 5000, ["7"] * 5000)
-    assert len(times(reader, "new", most=9999)) == 5000
+    assert len(times(reader, "new", limit=9999)) == 5000
     writer.close()
 
 
 @pytest.mark.parametrize("content", [b"this is not a database, " * 100, None])
-def test_a_file_that_is_not_ours_is_left_alone(tmp_path: Path, content: bytes | None) -> None:
+def test_a_file_of_another_kind_or_version_is_not_changed(tmp_path: Path, content: bytes | None) -> None:
     path = tmp_path / "h.sqlite"
     if content is None:
         connection = sqlite3.connect(path)
@@ -124,22 +125,25 @@ def test_a_file_that_is_not_ours_is_left_alone(tmp_path: Path, content: bytes | 
     assert path.read_bytes() == before
 
 
-def test_a_writer_that_was_killed_in_the_middle_loses_only_what_was_not_committed(tmp_path: Path) -> None:
+def test_a_writer_that_is_killed_in_a_transaction_loses_only_that_transaction(
+    tmp_path: Path, connections: list[sqlite3.Connection]
+) -> None:
     path = tmp_path / "h.sqlite"
     writer = TrackWriter(path)
+    (writing,) = connections
     writer.insert(poses(*range(100)), ["a"] * 100, [None] * 100)
-    writer._connection.execute("BEGIN")
-    writer._connection.execute("DELETE FROM poses")
+    writing.execute("BEGIN")
+    writing.execute("DELETE FROM poses")
     torn = tmp_path / "copy"
     torn.mkdir()
-    for file in tmp_path.glob("h.sqlite*"):  # as a kill would leave them
+    for file in tmp_path.glob("h.sqlite*"):  # as a kill leaves them
         (torn / file.name).write_bytes(file.read_bytes())
     assert len(times(TrackReader(torn / "h.sqlite"), "a")) == 100
-    writer._connection.execute("ROLLBACK")
+    writing.execute("ROLLBACK")
     writer.close()
 
 
-def test_a_reader_that_takes_its_time_blocks_no_writer(tmp_path: Path) -> None:
+def test_a_slow_reader_does_not_block_the_writer(tmp_path: Path) -> None:
     path = tmp_path / "h.sqlite"
     writer = TrackWriter(path)
     writer.insert(poses(*range(100)), ["a"] * 100, [None] * 100)
@@ -148,7 +152,7 @@ def test_a_reader_that_takes_its_time_blocks_no_writer(tmp_path: Path) -> None:
     assert rows.fetchone() is not None
     writer.insert(poses(*range(100, 200)), ["a"] * 100, [None] * 100)
     assert writer.prune(T_NS + 50 * SECOND, LONG) == 1
-    assert len(rows.fetchall()) == 99  # what there was when it began
+    assert len(rows.fetchall()) == 99  # the rows at the time it began
     slow.close()
     assert len(times(TrackReader(path), "a")) == 190
     writer.close()

@@ -24,7 +24,7 @@ from dropanchor_service.ingest import samples as sample_reader
 from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
-from dropanchor_service.store.unknown_anchors import FRESH_NS, MOST_LOGGED
+from dropanchor_service.store.unknown_anchors import FRESH_NS, MAX_LOGGED
 from support.ingest import Bench
 
 T = 1_760_000_000_000_000_000
@@ -415,10 +415,10 @@ def test_unknown_anchors_are_logged_once_each_up_to_a_limit(
     for anchor in range(2, 1000):
         bench.send("a", ranges(1.0, anchor=anchor), ranges(1.0, anchor=anchor))
     lines = [record.message for record in caplog.records if "unknown_anchors" in record.name]
-    assert len(lines) == MOST_LOGGED + 1
+    assert len(lines) == MAX_LOGGED + 1
     assert lines[0].startswith("tag a hears anchor 2, which this site does not have")
     assert "PUT /api/v1/anchors/2" in lines[0]
-    assert "no more of them" in lines[-1]
+    assert "further ones are not logged" in lines[-1]
     assert len(list(bench.tags.unknown_anchors.fresh(bench.clock.now_ns()))) == 1
     assert bench.tags.unknown_anchors.of(0, bench.clock.now_ns() + FRESH_NS) is None
 

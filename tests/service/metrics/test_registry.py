@@ -42,7 +42,7 @@ def test_tags_are_counted_by_the_state_that_is_shown_not_by_the_one_that_was_sto
         tags.register(name)
     tags.set_online("a", True)
     pending_tags = PendingTags(10)
-    pending_tags.hear("e", 100 * S)
+    pending_tags.on_message("e", 100 * S)
     metrics.watch(FleetGauges(tags, pending_tags, latest, lambda: 100 * S, lambda: 5))
     found = lines(metrics)
     states = {state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("tracking", "coasting", "lost")}

@@ -55,7 +55,7 @@ class Desk:
         self.recorder.poses(pose)
 
     def write(self) -> bool:
-        return self.recorder.writer.turn()
+        return self.recorder.writer.flush()
 
     def paths(self) -> list[Path]:
         return [self.recorder.folder / file.name for file in self.recorder.files()]

@@ -1,4 +1,4 @@
-"""The last records of every row, in bounded memory; and poses thinned to a history."""
+"""Ring buffers keep the last records of every row; the pose history decimates poses."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ def records(*pairs: tuple[int, int]) -> np.ndarray:
     return np.array(list(pairs), RECORD)
 
 
-def test_a_row_keeps_its_last_records_in_order_whatever_the_others_do() -> None:
+def test_a_row_keeps_its_last_records_in_order_whatever_other_rows_do() -> None:
     rings = RowRings(RECORD, 3, 10_000)
     rings.write(records((0, 1), (2, 10), (0, 2), (2, 11)))
     rings.write(records((0, 3), (0, 4), (2, 12)))
@@ -22,13 +22,13 @@ def test_a_row_keeps_its_last_records_in_order_whatever_the_others_do() -> None:
     assert rings.of(1)["value"].tolist() == rings.of(99)["value"].tolist() == []
 
 
-def test_one_batch_may_hold_more_than_a_ring() -> None:
+def test_one_batch_may_hold_more_records_than_a_ring() -> None:
     rings = RowRings(RECORD, 4, 10_000)
     rings.write(records(*((0, value) for value in range(11))))
     assert rings.of(0)["value"].tolist() == [7, 8, 9, 10]
 
 
-def test_more_rows_keep_fewer_records_each_and_lose_only_the_oldest() -> None:
+def test_with_more_rows_each_row_keeps_fewer_records_and_loses_only_the_oldest() -> None:
     rings = RowRings(RECORD, 8, 8 * 8 * RECORD.itemsize)
     rings.write(records(*((0, value) for value in range(10)), (1, 5)))
     assert len(rings.of(0)) == 8
@@ -46,7 +46,7 @@ def poses(*times_ns: int, row: int = 0) -> np.ndarray:
     return made
 
 
-def test_a_history_keeps_one_pose_of_each_quarter_of_a_second_however_they_arrive() -> None:
+def test_a_history_keeps_one_pose_per_quarter_of_a_second_however_they_arrive() -> None:
     times = [100_000_000 * i for i in range(11)]
     at_once, one_by_one = PoseHistory(), PoseHistory()
     at_once.write(np.concatenate([poses(*times), poses(*times, row=3)]))
@@ -57,7 +57,7 @@ def test_a_history_keeps_one_pose_of_each_quarter_of_a_second_however_they_arriv
     assert one_by_one.of(0)["t_ns"].tolist() == expected
 
 
-def test_after_a_clock_was_set_back_only_what_came_since_is_history() -> None:
+def test_after_a_clock_was_set_back_the_history_holds_only_newer_poses() -> None:
     history = PoseHistory()
     history.write(poses(*(SPACING_NS * i for i in (10, 11, 12, 2, 3))))
     assert history.of(0)["t_ns"].tolist() == [SPACING_NS * 2, SPACING_NS * 3]

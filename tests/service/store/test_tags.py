@@ -1,4 +1,4 @@
-"""The table of tags: rows, counters, liveliness."""
+"""The tag table holds rows, counters and liveliness."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def test_repeated_rows_are_counted_each_time() -> None:
     assert tags.at(0).rejected == {"range_negative": 2}
 
 
-def test_a_tag_that_was_never_heard_has_no_times_and_empty_counters() -> None:
+def test_a_tag_that_never_sent_has_no_times_and_empty_counters() -> None:
     tag = TagTable().register("a")
     assert tag.first_heard_ns is None
     assert tag.last_heard_ns is None

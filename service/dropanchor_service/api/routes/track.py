@@ -102,7 +102,7 @@ def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> T
 
 def _require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
     """A tag that has not been heard since the start may have been heard before."""
-    if answers.tags.find(tag) is None and not tracks.knows(tag):
+    if answers.tags.find(tag) is None and not tracks.has_tag(tag):
         raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {tag!r} has been heard or configured.")
 
 

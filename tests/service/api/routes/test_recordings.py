@@ -30,12 +30,12 @@ def test_a_recording_is_started_stopped_listed_and_fetched(house: House) -> None
     assert RecordingState.model_validate(started.json()) == RecordingState(recording=True, since_ns=T_NS, tags=["a"])
     assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "records-already"
     recorder.messages([(0, b"payload", ENCODING_PACKED, T_NS)])
-    recorder.writer.turn()
+    recorder.writer.flush()
     listed = RecordingList.model_validate(ask(app, "GET", "/api/v1/recordings").json())
     assert listed.file == listed.files[0].name
     assert not listed.files[0].finished
     assert ask(app, "POST", "/api/v1/recordings/stop").json()["recording"] is False
-    recorder.writer.turn()
+    recorder.writer.flush()
     assert kind_of(ask(app, "POST", "/api/v1/recordings/stop")) == "records-nothing"
     file = RecordingList.model_validate(ask(app, "GET", "/api/v1/recordings").json()).files[0]
     fetched = ask(app, "GET", f"/api/v1/recordings/{file.name}")

@@ -36,7 +36,7 @@ def test_the_list_of_tags_holds_those_that_were_never_heard_too() -> None:
 def test_newcomers_are_listed_by_when_they_were_heard_last() -> None:
     house = make_house()
     for name, t_ns in (("a", 10), ("b", 20), ("a", 30)):
-        house.answers.pending_tags.hear(name, t_ns)
+        house.answers.pending_tags.on_message(name, t_ns)
     listed = NewcomerList.model_validate(ask(house.app(), "GET", "/api/v1/newcomers").json()).newcomers
     assert [(n.tag, n.first_heard_ns, n.last_heard_ns, n.messages) for n in listed] == [
         ("a", 10, 30, 2),

@@ -1,4 +1,4 @@
-"""Which poses are worth keeping: one per slot of time, and fewer of a tag that stands still."""
+"""Decimate poses: keep one per time slot, and fewer of a tag that stands still."""
 
 import numpy as np
 
@@ -6,15 +6,18 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import take
 
 
-class SlotFirsts:
-    """The first pose of every row and slot of time. Not locked: its owner is."""
+class FirstOfSlot:
+    """Selects the first pose of every row and time slot. Not thread-safe: its owner locks."""
 
     def __init__(self, slot_ns: int) -> None:
         self._slot_ns = slot_ns
-        self._slot = np.zeros(0, np.int64)  # of the newest pose of each row
+        self._slot = np.zeros(0, np.int64)  # slot of the newest pose of each row
 
-    def of(self, poses: Array) -> Array:
-        """poses: POSE, not empty, per row in order of time; the answer is ordered by row."""
+    def select(self, poses: Array) -> Array:
+        """Return the first pose of each row and slot, ordered by row.
+
+        poses: POSE, not empty, in order of time per row.
+        """
         missing = int(poses["row"].max()) + 1 - len(self._slot)
         if missing > 0:
             self._slot = np.concatenate([self._slot, np.full(max(missing, len(self._slot)), -1)])
@@ -29,26 +32,29 @@ class SlotFirsts:
 
 
 class Decimation:
-    """Of the first poses of the slots those are kept that are `distance_m` away from the one kept before, or have
-    another state, or come `still_ns` after it. Owned by one thread."""
+    """Keeps at most one pose per row and period, and drops poses that add little.
+
+    A pose is kept when it is `distance_m` away from the last kept pose of its row, has another state, or comes
+    `still_ns` after it. Not thread-safe.
+    """
 
     def __init__(self, period_ns: int, distance_m: float = 0.0, still_ns: int = 0) -> None:
-        self._firsts = SlotFirsts(period_ns)
+        self._first_of_slot = FirstOfSlot(period_ns)
         self._distance_m = distance_m
         self._still_ns = still_ns
         self._kept = np.zeros(0, np.dtype([("t_ns", "i8"), ("x", "f8"), ("y", "f8"), ("state", "i2")]))
 
-    def of(self, poses: Array) -> Array:
-        """Those of the poses (POSE, per row in order of time) that are kept."""
+    def select(self, poses: Array) -> Array:
+        """Return the poses to keep. poses: POSE, in order of time per row."""
         if len(poses) == 0:
             return poses
-        firsts = self._firsts.of(poses)
+        firsts = self._first_of_slot.select(poses)
         if len(firsts) == 0:
             return firsts
         self._grow(int(firsts["row"].max()) + 1)
         chosen = np.zeros(len(firsts), bool)
         left = np.arange(len(firsts))
-        while len(left):  # a turn for each pose of the row that has most
+        while len(left):  # one pass takes the next pose of every row
             _, first = np.unique(firsts["row"][left], return_index=True)
             turn = left[first]
             kept = turn[~self._adds_nothing(firsts[turn])]
@@ -59,7 +65,7 @@ class Decimation:
 
     def _adds_nothing(self, poses: Array) -> Array:
         before = self._kept[poses["row"]]
-        with np.errstate(invalid="ignore"):  # an unknown place is not near
+        with np.errstate(invalid="ignore"):  # an unknown position is not near
             near = np.hypot(poses["x"] - before["x"], poses["y"] - before["y"]) < self._distance_m
         both_unknown = np.isnan(poses["x"]) & np.isnan(before["x"])
         soon = np.abs(poses["t_ns"] - before["t_ns"]) < self._still_ns
