@@ -1,4 +1,4 @@
-"""What is kept on disk for long: the history of poses and the recordings, as far as the settings want them."""
+"""The pose history and the recordings, as the settings enable them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -16,7 +16,7 @@ from dropanchor_service.store import SiteStore, TagTable
 
 
 class Persistence:
-    """They write while this is open. tracks, recorder: None where there is none."""
+    """The history (`tracks`) and the recorder, each None when disabled. They write while this context is open."""
 
     def __init__(
         self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics
@@ -30,20 +30,20 @@ class Persistence:
             return
         if settings.history.enabled:
             self.tracks = Tracks(folder, retention_of(settings.history), tags, site, now_ns)
-            metrics.watch(HistoryMetrics(self.tracks))
-        about = {
+            metrics.register(HistoryMetrics(self.tracks))
+        metadata = {
             "engine": settings.engine,
             "paper": settings.paper.model_dump_json(),
             "ingest": settings.ingest.model_dump_json(),
         }
         period_ns = round(settings.recording.pose_period_s * 1e9)
-        self.recorder = Recorder(folder, file_limits_of(settings.recording), period_ns, tags, site, now_ns, about)
-        metrics.watch(RecordingMetrics(self.recorder))
+        self.recorder = Recorder(folder, file_limits_of(settings.recording), period_ns, tags, site, now_ns, metadata)
+        metrics.register(RecordingMetrics(self.recorder))
 
     def __enter__(self) -> Self:
-        for part in (self.tracks, self.recorder):
-            if part is not None:
-                self._opened.enter_context(part)
+        for writer in (self.tracks, self.recorder):
+            if writer is not None:
+                self._opened.enter_context(writer)
         if self.recorder is not None and self._settings.recording.enabled:
             self.recorder.start(self._settings.recording.tags or None)
         return self
@@ -53,25 +53,26 @@ class Persistence:
 
     @property
     def observers(self) -> Observers:
+        """The observers that pass messages and poses of the ingest to the history and the recorder."""
         tracks, recorder = self.tracks, self.recorder
 
-        def take(poses: Array) -> None:
+        def on_poses(poses: Array) -> None:
             if tracks is not None:
                 tracks.offer(poses)
             if recorder is not None:
-                recorder.poses(poses)
+                recorder.record_poses(poses)
 
-        return NO_OBSERVERS if recorder is None else Observers(recorder.messages, take)
+        return NO_OBSERVERS if recorder is None else Observers(recorder.record_messages, on_poses)
 
     def problems(self) -> Sequence[str]:
-        """Why one of them does not write, or has lost what it had."""
+        """Return the problems of the history and the recorder: failing writes and damaged files."""
         of_tracks = [] if self.tracks is None else self.tracks.problems
-        recorder = None if self.recorder is None else self.recorder.writer.problem
-        return [*of_tracks, *([] if recorder is None else [recorder])]
+        of_recorder = None if self.recorder is None else self.recorder.writer.problem
+        return [*of_tracks, *([] if of_recorder is None else [of_recorder])]
 
 
 def retention_of(settings: HistorySettings) -> Retention:
-    """Return what the history keeps, in its own units."""
+    """Return which poses the history keeps, in its units."""
     return Retention(
         period_ns=round(settings.period_s * 1e9),
         distance_m=settings.distance_m,
@@ -82,7 +83,7 @@ def retention_of(settings: HistorySettings) -> Retention:
 
 
 def file_limits_of(settings: RecordingSettings) -> Limits:
-    """Return when a recording's file is full and which files are kept, in the recorder's units."""
+    """Return when a file of a recording is full and which files are kept, in the recorder's units."""
     return Limits(
         file_bytes=int(settings.file_mib * 2**20),
         file_ns=round(settings.file_minutes * 60e9),

@@ -103,7 +103,7 @@ class Service:
             self._checkpoints.between_turns if self._checkpoints else lambda: None,
         )
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
-        self.metrics.watch(
+        self.metrics.register(
             FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )
 
@@ -173,7 +173,7 @@ class Service:
         threads = {"http": self._http.is_alive, "ingest": self._thread.is_alive}
         if self._checkpoints is not None:
             threads["checkpoints"] = self._checkpoints.is_alive
-        return sorted({*self._supervision.dead, *(name for name, lives in threads.items() if not lives)})
+        return sorted({*self._supervision.dead_threads, *(name for name, lives in threads.items() if not lives)})
 
     def _checkpointer(self, engine: GuardedEngine) -> CheckpointThread | None:
         """None where nothing is kept."""
@@ -185,7 +185,7 @@ class Service:
         return CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
-        if self._thread.is_alive or "ingest" in self._supervision.dead:
+        if self._thread.is_alive or "ingest" in self._supervision.dead_threads:
             _log.error("the ingest thread has not come to a proper end: there is no last checkpoint")
         else:
             checkpoints.stop()

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from dropanchor_service.commands import serve
-from dropanchor_service.runtime.memory import SpareMemory
+from dropanchor_service.runtime.memory import HeapTrimmer
 from dropanchor_service.runtime.systemd import Systemd
 from support.service import environment
 from support.zenoh_router import free_endpoint
@@ -86,6 +86,6 @@ def test_systemd_hears_of_no_progress_while_samples_are_not_fused(tmp_path: Path
         manager.bind(str(tmp_path / "notify"))
         manager.setblocking(False)
         systemd = Systemd({"NOTIFY_SOCKET": str(tmp_path / "notify")})
-        assert serve.goes_on(Stuck(), systemd, SpareMemory())
+        assert serve.goes_on(Stuck(), systemd, HeapTrimmer())
         with pytest.raises(BlockingIOError):
             manager.recv(100)

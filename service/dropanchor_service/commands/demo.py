@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
     try:
         with interrupts() as interrupt, _cast(arguments) as cast:
-            with interrupt.at_once():  # it may have to compile the estimator
+            with interrupt.raising():  # it may have to compile the estimator
                 made = Service(cast.settings)
             with made as service, _tags(cast) as tags:
                 sys.stdout.write(_where_to_look(service.url))

@@ -59,7 +59,7 @@ def _session(file: Path) -> str:
     """Of the recording that the file is a part of: another one begins with estimators of its own."""
     reader = RecordingReader(file)
     next(reader.turns(), None)
-    return reader.about.get(SESSION, file.name)
+    return reader.metadata.get(SESSION, file.name)
 
 
 def _replay_session(
@@ -69,7 +69,7 @@ def _replay_session(
     first = next(turns, None)
     if first is None or first.site is None:
         raise RecordingError(f"{readers[0].path} holds nothing")
-    settings = settings_of(readers[0].about, load_settings(arguments.config), arguments.engine)
+    settings = settings_of(readers[0].metadata, load_settings(arguments.config), arguments.engine)
     service, outcome = OfflineService(settings, first.site), Outcome()
     print(f"recorded {_utc(first.t_ns)}, {len(readers)} file(s), engine {settings.engine}")
     for turn, poses in service.poses_of(tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc=session)):
@@ -157,5 +157,5 @@ def _rejections(service: OfflineService, readers: Sequence[RecordingReader]) -> 
     if refused:
         yield f"not used: {refused}"
     for reader in readers:
-        if reader.torn is not None:
-            print(f"{reader.path} ends before its end ({reader.torn}): the rest of it is lost", file=sys.stderr)
+        if reader.read_error is not None:
+            print(f"{reader.path} ends before its end ({reader.read_error}): the rest of it is lost", file=sys.stderr)

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 2 when it could not start."""
     logs.configure(arguments.log_level)
-    open_files.allow_all()
+    open_files.raise_limit()
     try:
         settings = router_settings(arguments)
         credentials = credentials_of(settings)

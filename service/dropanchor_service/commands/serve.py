@@ -8,7 +8,7 @@ from typing import Protocol
 from dropanchor_service.api.http.server import ListenError
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.runtime import logs, open_files
-from dropanchor_service.runtime.memory import SpareMemory
+from dropanchor_service.runtime.memory import HeapTrimmer
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.runtime.systemd import Systemd
 from dropanchor_service.service import Service
@@ -48,18 +48,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """0 when it was stopped, 1 when it died, 2 when it could not start."""
     logs.configure(arguments.log_level)
-    open_files.allow_all()
+    open_files.raise_limit()
     gc.set_threshold(*GARBAGE)
     sys.setswitchinterval(SWITCH_S)
     systemd = Systemd()
     try:
         with interrupts() as interrupt:
-            with interrupt.at_once():  # it may have to compile the estimator
+            with interrupt.raising():  # it may have to compile the estimator
                 made = Service(settings_of(arguments))
             with made as service:
                 systemd.ready()
-                spare = SpareMemory()
-                stopped = interrupt.wait(lambda: goes_on(service, systemd, spare))
+                heap = HeapTrimmer()
+                stopped = interrupt.wait(lambda: goes_on(service, systemd, heap))
                 systemd.stopping()
     except KeyboardInterrupt:
         return 0
@@ -77,9 +77,9 @@ class Supervised(Protocol):
     def has_died(self) -> bool: ...
 
 
-def goes_on(service: Supervised, systemd: Systemd, spare: SpareMemory) -> bool:
+def goes_on(service: Supervised, systemd: Systemd, heap: HeapTrimmer) -> bool:
     """Asked twice a second. A service that is stuck says nothing to systemd, which starts it again."""
     if service.makes_progress:
         systemd.progress()
-    spare.give_back()
+    heap.trim()
     return not service.has_died

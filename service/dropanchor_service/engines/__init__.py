@@ -1,1 +1,1 @@
-"""Choosing an engine and compiling it before it is needed."""
+"""Choose an engine and compile it before it is needed."""

@@ -1,4 +1,4 @@
-"""Build the engine that the settings choose."""
+"""Create the engine that the settings choose."""
 
 from dropanchor_service.engines.warm_up import warm_up
 from dropanchor_service.estimation.columns import Engine
@@ -7,7 +7,7 @@ from dropanchor_service.settings.model import Settings
 
 
 def create_engine(settings: Settings) -> Engine:
-    """Each engine is imported when it is chosen: filterpy alone costs seconds, compiling the kernels a minute, once."""
+    """Return a compiled engine. Only the chosen one is imported: filterpy takes seconds, the first compile a minute."""
     match settings.engine:
         case "paper":
             from dropanchor_service.estimation.paper.engine import PaperEngine

@@ -1,4 +1,4 @@
-"""Compiling what is compiled before it is needed."""
+"""Compile the kernels before they are needed."""
 
 import logging
 import os
@@ -41,69 +41,74 @@ from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
-SAY_EVERY_S = 5.0
-NOT_TO_BE_FOUND: Final[Any] = None  # in the place of a module
+PROGRESS_S = 5.0
+IMPORT_BLOCKED: Final[Any] = None  # in sys.modules it makes an import fail
 
 _log = logging.getLogger(__name__)
 
 
 @contextmanager
-def _said_while_compiling(what: str) -> Iterator[None]:
-    """A minute of silence looks like a fault, so it is said; at warning level, which nobody turns off."""
+def _log_compilation(what: str) -> Iterator[None]:
+    """Log the progress of compiling, because a minute of silence looks like a fault.
+
+    The level is WARNING, so that the lines appear at any usual log level.
+    """
     from numba.core.event import Event, Listener, install_listener
 
     class Progress(Listener):
-        """Told of every function, of which there are hundreds."""
+        """Receives an event for each of hundreds of functions."""
 
-        began: float | None = None
-        said = 0.0
+        started: float | None = None
+        logged = 0.0
 
         def on_start(self, event: Event) -> None:  # noqa: ARG002
             now = time.monotonic()
-            if self.began is None:
-                self.began = self.said = now
-                _log.warning("compiling %s, once after an update", what)
-            elif now - self.said >= SAY_EVERY_S:
-                self.said = now
-                _log.warning("compiling: %.0f s so far", now - self.began)
+            if self.started is None:
+                self.started = self.logged = now
+                _log.warning("compiling %s; please wait. This happens once after an update", what)
+            elif now - self.logged >= PROGRESS_S:
+                self.logged = now
+                _log.warning("compiling: %.0f s so far", now - self.started)
 
         def on_end(self, event: Event) -> None: ...
 
     progress = Progress()
     with install_listener("numba:compile", progress):
         yield
-    if progress.began is not None:
-        elapsed = time.monotonic() - progress.began
-        _log.warning("compiled in %.0f s; it is kept in %s", elapsed, os.environ.get(VARIABLE))
+    if progress.started is not None:
+        elapsed = time.monotonic() - progress.started
+        _log.warning("compiled in %.0f s; the result is cached in %s", elapsed, os.environ.get(VARIABLE))
 
 
 @contextmanager
 def _without_blas() -> Iterator[None]:
-    """Keep numba from importing scipy.linalg where scipy is installed, which it does to look for BLAS.
+    """Keep numba from importing scipy.linalg, where it looks for BLAS.
 
-    No kernel of ours calls BLAS. The import would cost every start 0.2 s of processor time and 14 MB of memory.
+    No kernel here calls BLAS. The import would cost every start 0.2 s of processor time and 14 MB of memory.
     """
-    found = sys.modules.setdefault("scipy.linalg", NOT_TO_BE_FOUND)
+    found = sys.modules.setdefault("scipy.linalg", IMPORT_BLOCKED)
     try:
         yield
     finally:
-        if found is NOT_TO_BE_FOUND:
+        if found is IMPORT_BLOCKED:
             del sys.modules["scipy.linalg"]
 
 
 @_without_blas()
-@_said_while_compiling("the estimator, in about a minute")
+@_log_compilation("the estimator, which takes about a minute")
 def warm_up(engine: Engine) -> None:
-    """Compile what `engine`, which is thrown away, runs: a second of a tag that moves off, seen by every sensor."""
+    """Compile the kernels of `engine` with two seconds of a tag that moves off. Discard `engine` afterwards."""
     engine.set_anchors(np.zeros(1, ANCHOR))
-    unknown, known = default_settings(), default_settings()
-    known["start_known"], known["start_x"], known["start_y"], known["start_heading"] = True, 10.0, 0.0, 0.0
-    for row, settings in enumerate((unknown, known)):
+    unknown_start, known_start = default_settings(), default_settings()
+    known_start["start_known"] = True
+    known_start["start_x"], known_start["start_y"], known_start["start_heading"] = 10.0, 0.0, 0.0
+    for row, settings in enumerate((unknown_start, known_start)):
         engine.configure(row, settings)
     engine.process(_moving_off(2))
 
 
 def _moving_off(rows: int) -> SampleBatch:
+    """Return two seconds of samples of every kind for each row."""
     n = 200
     row = np.repeat(np.arange(rows), n)
     t_ns = np.tile(np.arange(n) * 10_000_000, rows)
@@ -116,10 +121,12 @@ def _moving_off(rows: int) -> SampleBatch:
 
 
 @_without_blas()
-@_said_while_compiling("the reader of messages")
+@_log_compilation("the decoder of messages")
 def warm_up_ingest() -> None:
-    """Compile what every message goes through: two of a publisher, with a gap between, and one alone, whose columns
-    are another type to the compiler, for they have no strides."""
+    """Compile the kernels of the ingest with two messages around a gap, and with one message.
+
+    The columns of a single message have no strides, which makes them another type to the compiler.
+    """
     frame = Frame(
         [ImuSample(1, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0))],
         [RangeSample(1, 7, 1.0)],
@@ -129,11 +136,11 @@ def warm_up_ingest() -> None:
         boot_clock=True,
     )
     payloads = [encode_packed(replace(frame, sequence=number)) for number in (0, 2)]
-    for some in (payloads, payloads[:1]):
-        _pass(some)
+    for batch in (payloads, payloads[:1]):
+        _ingest(batch)
 
 
-def _pass(payloads: list[bytes]) -> None:
+def _ingest(payloads: list[bytes]) -> None:
     read = read_forms(payloads, [ENCODING_PACKED] * len(payloads))
     publishers, arrivals = Publishers(), np.zeros(len(payloads), np.int64)
     sequenced = publishers.sequence(read.forms, np.zeros(len(payloads), np.int32), arrivals, 0)
@@ -145,15 +152,15 @@ def _pass(payloads: list[bytes]) -> None:
 
 
 @_without_blas()
-@_said_while_compiling("the writer of answers")
+@_log_compilation("the encoder of answers")
 def warm_up_answers() -> None:
-    """Compile what every answer goes through: an old pose, and one of a tag that may be in two places."""
+    """Compile the kernels of the answers with an old pose and an ambiguous one."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
-    poses, modes = np.zeros(2, POSE), np.zeros(2, HYPOTHESIS)
+    poses, hypotheses = np.zeros(2, POSE), np.zeros(2, HYPOTHESIS)
     for row in range(len(poses)):
         answers.tags.register(f"tag-{row}")
         poses["row"][row] = row
     poses["t_ns"] = [0, answers.now_ns()]
-    poses["state"], modes["row"] = State.AMBIGUOUS, 1
-    answers.latest.write(poses, modes)
+    poses["state"], hypotheses["row"] = State.AMBIGUOUS, 1
+    answers.latest.write(poses, hypotheses)
     b"".join(answers.pose_list_json())

@@ -28,7 +28,19 @@ RECORD = np.dtype(
         *((name, "<f4") for name in ("p_mode", "sigma_pos", "sigma_obs")),
     ]
 )
-_SAME_IN_POSE = ("state", "reason", "range", "x", "y", "heading", "speed", "yaw_rate", "p_mode", "sigma_pos", "sigma_obs")
+_SAME_IN_POSE = (
+    "state",
+    "reason",
+    "range",
+    "x",
+    "y",
+    "heading",
+    "speed",
+    "yaw_rate",
+    "p_mode",
+    "sigma_pos",
+    "sigma_obs",
+)
 _UPPER_TRIANGLE = np.triu_indices(3)
 
 _SCHEMA = f"""
@@ -132,7 +144,9 @@ class TrackWriter:
         version = self._connection.execute("PRAGMA user_version").fetchone()[0]
         tables = self._connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
         if version not in (0, VERSION) or (version == 0 and tables):
-            raise TrackFileError(f"the file has schema version {version}, but this service needs {VERSION}: move the file away")
+            raise TrackFileError(
+                f"the file has schema version {version}, but this service needs {VERSION}: move the file away"
+            )
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = NORMAL")
         self._connection.execute("PRAGMA journal_size_limit = 67108864")

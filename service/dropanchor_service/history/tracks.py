@@ -85,7 +85,9 @@ class Tracks:
     @property
     def problems(self) -> Sequence[str]:
         """Problems for the operator: the history cannot be written, or a file was damaged."""
-        damaged = [f"the history was damaged and a new one was started; the old file is {name}" for name in self.damaged]
+        damaged = [
+            f"the history was damaged and a new one was started; the old file is {name}" for name in self.damaged
+        ]
         return damaged if self.writer.problem is None else [self.writer.problem, *damaged]
 
     def _write(self, batches: Sequence[Array]) -> None:

@@ -1,1 +1,1 @@
-"""What the service counts, for Prometheus."""
+"""Metrics of the service for Prometheus."""

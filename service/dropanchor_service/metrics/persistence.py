@@ -1,4 +1,4 @@
-"""What is kept on disk, for Prometheus."""
+"""Metrics of the history and the recording."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -12,7 +12,7 @@ from dropanchor_service.runtime.background_writer import BackgroundWriter
 
 
 class HistoryMetrics(Collector):
-    """Read from the history when they are asked for."""
+    """Metrics that are read from the history at every scrape."""
 
     def __init__(self, tracks: Tracks) -> None:
         self._tracks = tracks
@@ -22,13 +22,13 @@ class HistoryMetrics(Collector):
         yield CounterMetricFamily("dropanchor_history_poses", "Poses written to the history.", tracks.written)
         yield GaugeMetricFamily("dropanchor_history_bytes", "Bytes that the history uses.", tracks.used_bytes)
         yield CounterMetricFamily(
-            "dropanchor_history_damaged", "Damaged files of the history that were set aside.", len(tracks.damaged)
+            "dropanchor_history_damaged", "Damaged history files that were moved aside.", len(tracks.damaged)
         )
-        yield from _of_writer("history", tracks.writer)
+        yield from _writer_metrics("history", tracks.writer)
 
 
 class RecordingMetrics(Collector):
-    """Read from the recorder when they are asked for."""
+    """Metrics that are read from the recorder at every scrape."""
 
     def __init__(self, recorder: Recorder) -> None:
         self._recorder = recorder
@@ -37,14 +37,16 @@ class RecordingMetrics(Collector):
         recorder = self._recorder
         yield CounterMetricFamily("dropanchor_recording_messages", "Messages and poses recorded.", recorder.written)
         yield GaugeMetricFamily(
-            "dropanchor_recording_running", "1 while samples are recorded.", recorder.running is not None
+            "dropanchor_recording_running", "1 while a recording is running.", recorder.running is not None
         )
-        yield from _of_writer("recording", recorder.writer)
+        yield from _writer_metrics("recording", recorder.writer)
 
 
-def _of_writer(name: str, writer: BackgroundWriter[Any]) -> Iterable[Metric]:
-    yield CounterMetricFamily(f"dropanchor_{name}_dropped", f"What the {name} could not take and lost.", writer.dropped)
-    yield CounterMetricFamily(f"dropanchor_{name}_errors", f"Attempts to write the {name} that failed.", writer.errors)
+def _writer_metrics(name: str, writer: BackgroundWriter[Any]) -> Iterable[Metric]:
+    yield CounterMetricFamily(
+        f"dropanchor_{name}_dropped", f"Items that the {name} dropped because its queue was full.", writer.dropped
+    )
+    yield CounterMetricFamily(f"dropanchor_{name}_errors", f"Failed attempts to write the {name}.", writer.errors)
     yield GaugeMetricFamily(
         f"dropanchor_{name}_failing", f"1 while the {name} cannot be written.", writer.problem is not None
     )

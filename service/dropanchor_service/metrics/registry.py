@@ -1,4 +1,4 @@
-"""What the service counts, for Prometheus."""
+"""The counters and gauges of the service for Prometheus."""
 
 from collections.abc import Callable, Iterable
 
@@ -17,54 +17,61 @@ _SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0
 
 
 class Metrics:
-    """A registry of its own, so that several services fit into one process."""
+    """All metrics, in a registry of their own, so that several services fit into one process."""
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
-        self.messages = Counter("dropanchor_messages", "Messages of tags.", registry=self.registry)
+        self.messages = Counter("dropanchor_messages", "Messages received from tags.", registry=self.registry)
         self.samples = Counter(
-            "dropanchor_samples", "Samples handed to the estimators.", ["kind"], registry=self.registry
+            "dropanchor_samples", "Samples passed to the estimators.", ["kind"], registry=self.registry
         )
         self.rejected = Counter(
-            "dropanchor_rejected", "Messages and samples that were not used.", ["reason"], registry=self.registry
+            "dropanchor_rejected", "Messages and samples that were rejected.", ["reason"], registry=self.registry
         )
         self.shed_samples = Counter(
-            "dropanchor_shed_samples", "Samples of packed messages that were shed.", registry=self.registry
+            "dropanchor_shed_samples",
+            "Samples of packed messages that were shed under overload.",
+            registry=self.registry,
         )
-        self.poses = Counter("dropanchor_poses", "Poses that the estimators gave.", registry=self.registry)
+        self.poses = Counter("dropanchor_poses", "Poses that the estimators produced.", registry=self.registry)
         self.misses = Counter(
             "dropanchor_missed_messages",
-            "Messages that a publisher numbered and nobody has any more.",
+            "Messages that a publisher numbered but that can no longer be retrieved.",
             registry=self.registry,
         )
         self.given_up = Counter(
             "dropanchor_given_up_messages",
-            "Messages that were waited for behind a gap in their publisher's numbers, and did not come in time.",
+            "Messages missing from a publisher's sequence that did not arrive in time.",
             registry=self.registry,
         )
-        self.faults = Counter("dropanchor_faults", "Errors of our own, by place.", ["where"], registry=self.registry)
+        self.faults = Counter("dropanchor_faults", "Internal errors, by place.", ["where"], registry=self.registry)
         self.estimator_seconds = Histogram(
-            "dropanchor_estimator_seconds", "Time to fuse one batch.", buckets=_SECONDS, registry=self.registry
+            "dropanchor_estimator_seconds",
+            "Time to fuse one batch of samples.",
+            buckets=_SECONDS,
+            registry=self.registry,
         )
         self.delay_seconds = Histogram(
             "dropanchor_pose_delay_seconds",
-            "From the arrival of the oldest message of a batch to the poses in the store.",
+            "Time from the arrival of the oldest message of a batch until its poses are in the store.",
             buckets=_SECONDS,
             registry=self.registry,
         )
         self.clock_jumps = Counter(
-            "dropanchor_clock_jumps", "Clocks of tags that were set while they ran.", registry=self.registry
+            "dropanchor_clock_jumps", "Tag clocks that were set while they ran.", registry=self.registry
         )
         self.caught_up = Counter(
             "dropanchor_caught_up_messages",
-            "Messages that went on after the caches of their tag had been asked.",
+            "Messages that were suspended while the caches of their tag were queried, and then processed.",
             registry=self.registry,
         )
-        self.checkpoints = Counter("dropanchor_checkpoints", "Checkpoints.", ["outcome"], registry=self.registry)
+        self.checkpoints = Counter(
+            "dropanchor_checkpoints", "Attempts to write a checkpoint, by outcome.", ["outcome"], registry=self.registry
+        )
         self.checkpoint_age = Gauge(
             "dropanchor_checkpoint_age_seconds",
-            "How much of the past a killed service would have to make up for.",
+            "Age of the newest checkpoint: the time that a service must catch up on after a kill.",
             registry=self.registry,
         )
         self.checkpoint_bytes = Gauge(
@@ -77,13 +84,13 @@ class Metrics:
         for reason in Reason:
             self.rejected.labels(reason)
 
-    def watch(self, collector: Collector) -> None:
-        """Ask this one too, at every scrape."""
+    def register(self, collector: Collector) -> None:
+        """Include the metrics of this collector in every scrape."""
         self.registry.register(collector)
 
 
 class FleetGauges(Collector):
-    """Gauges that are read from the store when they are asked for."""
+    """Gauges that are read from the store at every scrape."""
 
     def __init__(
         self,
@@ -101,15 +108,19 @@ class FleetGauges(Collector):
 
     def collect(self) -> Iterable[Metric]:
         poses = self._latest.since()[1]
-        shown = aged_poses(poses, self._tags.age_s(poses, self._now_ns()))
-        by_state = np.bincount(shown["state"], minlength=len(STATES))
+        aged = aged_poses(poses, self._tags.age_s(poses, self._now_ns()))
+        by_state = np.bincount(aged["state"], minlength=len(STATES))
         tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
         for state, count in zip(STATES, by_state, strict=True):
             tags.add_metric([state], count)
         yield tags
-        yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that have a row.", len(self._tags))
+        yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that are registered.", len(self._tags))
         yield GaugeMetricFamily(
-            "dropanchor_newcomers", "Tags that were heard and have no row.", len(self._pending_tags)
+            "dropanchor_newcomers",
+            "Pending tags: they have sent messages but are not registered.",
+            len(self._pending_tags),
         )
-        yield GaugeMetricFamily("dropanchor_tags_online", "Tags whose token is present.", self._tags.online_names)
-        yield GaugeMetricFamily("dropanchor_queue_messages", "Messages that wait to be fused.", self._queue_depth())
+        yield GaugeMetricFamily(
+            "dropanchor_tags_online", "Tags whose liveliness token is present.", self._tags.online_names
+        )
+        yield GaugeMetricFamily("dropanchor_queue_messages", "Messages queued for the estimators.", self._queue_depth())

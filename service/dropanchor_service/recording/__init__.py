@@ -1,1 +1,1 @@
-"""Recordings: raw samples and poses in MCAP files, which Foxglove and Lichtblick open and `dropanchor replay` reads."""
+"""Recordings of raw samples and poses: MCAP files for Foxglove, Lichtblick and `dropanchor replay`."""

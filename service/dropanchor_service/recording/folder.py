@@ -1,4 +1,4 @@
-"""The folder with the recordings: what is in it, and what has to go."""
+"""The folder of the recordings: list its files and delete the oldest."""
 
 import os
 import re
@@ -16,18 +16,21 @@ _NAME = re.compile(r"[A-Za-z0-9._%-]{1,250}\.mcap")
 
 @dataclass(frozen=True)
 class Limits:
-    """When a file is full, and what is kept: every limit holds."""
+    """When a file is full and which files are kept. All limits apply together."""
 
     file_bytes: int
     file_ns: int
     keep_files: int
     keep_ns: int
-    most_bytes: int
+    max_bytes: int
 
 
 @dataclass(frozen=True)
 class RecordedFile:
-    """finished: it has its index; one that is being written, or was when the service was killed, has none."""
+    """A file in the folder. `finished` says whether it has its index.
+
+    A file has no index while it is written, or when the service was killed meanwhile.
+    """
 
     name: str
     size: int
@@ -36,33 +39,33 @@ class RecordedFile:
 
 
 def new_name(prefix: str, t_ns: int) -> str:
-    """Names sort by time."""
+    """Return a file name for a recording that starts at `t_ns`. Names sort by time."""
     return f"{prefix}-{datetime.fromtimestamp(t_ns // 10**9, UTC):%Y%m%dT%H%M%S}-{t_ns % 10**9 // 10**3:06d}Z{SUFFIX}"
 
 
 def path_of(folder: Path, name: str) -> Path | None:
-    """The file of this name, None when there is none; no name leads out of the folder."""
+    """Return the path of the recording of this name, or None. No name leads out of the folder."""
     path = folder / name
     return path if _NAME.fullmatch(name) and path.is_file() else None
 
 
 def files_in(folder: Path) -> list[RecordedFile]:
-    """The oldest first."""
+    """Return the recordings in the folder, the oldest first."""
     found = [file for path in folder.glob(f"*{SUFFIX}") if (file := _file(path)) is not None]
     return sorted(found, key=lambda file: (file.changed_ns, file.name))
 
 
 def prune(folder: Path, limits: Limits, open_name: str | None) -> None:
-    """Delete the oldest until the limits hold, but not the one that is open. Raises OSError."""
-    for name in _superfluous(files_in(folder), limits, open_name):
+    """Delete the oldest files until the limits hold, but never the open one. Raises OSError."""
+    for name in _excess_files(files_in(folder), limits, open_name):
         (folder / name).unlink(missing_ok=True)
 
 
-def _superfluous(files: list[RecordedFile], limits: Limits, open_name: str | None) -> Iterator[str]:
+def _excess_files(files: list[RecordedFile], limits: Limits, open_name: str | None) -> Iterator[str]:
     total, oldest_ns = sum(file.size for file in files), time.time_ns() - limits.keep_ns
-    for place, file in enumerate(files):
-        too_many = len(files) - place > limits.keep_files
-        if file.name != open_name and (too_many or total > limits.most_bytes or file.changed_ns < oldest_ns):
+    for index, file in enumerate(files):
+        too_many = len(files) - index > limits.keep_files
+        if file.name != open_name and (too_many or total > limits.max_bytes or file.changed_ns < oldest_ns):
             total -= file.size
             yield file.name
 
@@ -74,5 +77,5 @@ def _file(path: Path) -> RecordedFile | None:
             file.seek(-min(size, len(MCAP0_MAGIC)), os.SEEK_END)
             finished = size > 2 * len(MCAP0_MAGIC) and file.read() == MCAP0_MAGIC
             return RecordedFile(path.name, size, os.fstat(file.fileno()).st_mtime_ns, finished)
-    except FileNotFoundError:  # pruned meanwhile
+    except FileNotFoundError:  # deleted meanwhile
         return None

@@ -1,4 +1,4 @@
-"""Poses and anchors as messages that viewers draw."""
+"""Build the messages of a recording from poses and anchors, in schemas that viewers draw."""
 
 import math
 from collections.abc import Iterator
@@ -17,19 +17,20 @@ from dropanchor_service.store.site import SiteDocument
 FRAME = "site"
 SITE_TOPIC = "/site"
 ESTIMATE = "estimate"  # the last part of a topic
-NO_TURN = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-KNOWN_COVARIANCE = 3  # foxglove.LocationFix.position_covariance_type
+IDENTITY_ROTATION = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+COVARIANCE_KNOWN = 3  # foxglove.LocationFix.position_covariance_type
 
 Message = tuple[str, str, bytes]
-"""Topic, name of the schema, JSON."""
+"""Topic, schema name, JSON."""
 
 
 def topic_of(tag: str, leaf: str) -> str:
+    """Return the topic of a tag. leaf: its last part."""
     return f"/tag/{chunk_from_id(tag)}/{leaf}"
 
 
 def site_messages(document: SiteDocument, t_ns: int) -> Iterator[Message]:
-    """The document, which a replay needs, and where the anchors are, for the eye."""
+    """Yield the site document, which a replay needs, and the anchor positions, which viewers draw."""
     yield SITE_TOPIC, schemas.SITE, document.model_dump_json().encode()
     for anchor in document.site.anchors:
         transform = {
@@ -37,60 +38,60 @@ def site_messages(document: SiteDocument, t_ns: int) -> Iterator[Message]:
             "parent_frame_id": FRAME,
             "child_frame_id": f"anchor/{anchor.id}",
             "translation": {"x": anchor.x, "y": anchor.y, "z": anchor.z},
-            "rotation": NO_TURN,
+            "rotation": IDENTITY_ROTATION,
         }
         yield "/tf", schemas.TRANSFORM, to_json(transform)
 
 
 def pose_messages(pose: Array, tag: str, anchor: str | None, document: SiteDocument) -> Iterator[Message]:
-    """pose: POSE (0-d). What is not known is not drawn."""
+    """Yield the messages of a pose. pose: POSE (0-d). An unknown position gives an estimate only."""
     stamp = _stamp(int(pose["t_ns"]))
     yield topic_of(tag, ESTIMATE), schemas.ESTIMATE, to_json(_estimate(pose, anchor))
     x, y, heading = (float(pose[name]) for name in ("x", "y", "heading"))
     if not math.isfinite(x + y):
         return
-    turn = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
+    rotation = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
     settings = document.tags.get(tag)
-    placed = {
+    placement = {
         "position": {"x": x, "y": y, "z": 0.0 if settings is None else settings.height_m},
-        "orientation": turn if math.isfinite(heading) else NO_TURN,
+        "orientation": rotation if math.isfinite(heading) else IDENTITY_ROTATION,
     }
-    in_frame = {"timestamp": stamp, "frame_id": FRAME, "pose": placed}
+    in_frame = {"timestamp": stamp, "frame_id": FRAME, "pose": placement}
     yield topic_of(tag, "pose"), schemas.POSE, to_json(in_frame)
     if document.site.georeference is not None:
         yield topic_of(tag, "location"), schemas.LOCATION, to_json({"timestamp": stamp} | _location(pose, document))
 
 
 def _estimate(pose: Array, anchor: str | None) -> dict[str, object]:
-    """What is not known is left out."""
-    said: dict[str, object] = {
+    """Return the fields of an estimate, without those that are unknown."""
+    fields: dict[str, object] = {
         "t_ns": int(pose["t_ns"]),
         "state": STATES[pose["state"]],
         "reason": REASONS[pose["reason"]],
     }
     numbers = {name: float(pose[field]) for name, field in ESTIMATED.items()}
-    said |= {name: value for name, value in numbers.items() if math.isfinite(value)}
+    fields |= {name: value for name, value in numbers.items() if math.isfinite(value)}
     if np.isfinite(pose["cov"]).all():
-        said["covariance"] = pose["cov"].reshape(-1).tolist()
-    return said if anchor is None else said | {"anchor": anchor}
+        fields["covariance"] = pose["cov"].reshape(-1).tolist()
+    return fields if anchor is None else fields | {"anchor": anchor}
 
 
 def _location(pose: Array, document: SiteDocument) -> dict[str, object]:
-    """The covariance is of east, north and up; up is not estimated."""
+    """Return a foxglove.LocationFix. Its covariance is in east, north and up; up is not estimated."""
     assert document.site.georeference is not None
     lat, lon = lat_lon(document.site.georeference, pose["x"], pose["y"])
-    turn = document.site.georeference.rotation_rad
-    east_from_x = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    spread = np.zeros((3, 3))
-    spread[:2, :2] = east_from_x @ pose["cov"][:2, :2] @ east_from_x.T
-    known = bool(np.isfinite(spread).all())
+    angle = document.site.georeference.rotation_rad
+    enu_from_site = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = enu_from_site @ pose["cov"][:2, :2] @ enu_from_site.T
+    known = bool(np.isfinite(covariance).all())
     return {
         "frame_id": FRAME,
         "latitude": float(lat),
         "longitude": float(lon),
         "altitude": 0.0,
-        "position_covariance": spread.reshape(-1).tolist() if known else [0.0] * 9,
-        "position_covariance_type": KNOWN_COVARIANCE if known else 0,
+        "position_covariance": covariance.reshape(-1).tolist() if known else [0.0] * 9,
+        "position_covariance_type": COVARIANCE_KNOWN if known else 0,
     }
 
 

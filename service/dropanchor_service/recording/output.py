@@ -1,4 +1,4 @@
-"""The side of the recorder that writes: what was put down goes into files, one after the other."""
+"""The writing side of the recorder: write queued items to one file after the other."""
 
 import time
 from base64 import b64encode
@@ -15,10 +15,10 @@ from dropanchor_service.store.site import SiteDocument, SiteStore
 from dropanchor_service.store.tags import TagTable
 
 PRUNE_S = 10.0
-PACKED, JSON = "samples_packed", "samples"  # the last part of a topic of samples, by their encoding
+PACKED, JSON = "samples_packed", "samples"  # the last part of a topic, by the encoding of its samples
 
 Messages = Sequence[tuple[int, bytes, str, int]]
-"""Row, payload, encoding, arrival."""
+"""Row, payload, encoding, UTC of arrival in ns."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Poses:
-    """What came out of it."""
+    """The poses that a turn of the ingest produced."""
 
     turn_ns: int
     poses: Array
@@ -39,7 +39,7 @@ class Poses:
 
 @dataclass(frozen=True)
 class SiteChange:
-    """The site from this turn on."""
+    """The site document from this turn on."""
 
     turn_ns: int
     document: SiteDocument
@@ -54,7 +54,7 @@ Item = Samples | Poses | SiteChange | End
 
 
 class Output:
-    """Owned by the thread that writes."""
+    """Writes items to files. Only the writing thread uses it."""
 
     def __init__(
         self,
@@ -64,7 +64,10 @@ class Output:
         tags: TagTable,
         site: SiteStore,
     ) -> None:
-        """prune: deletes old files, but not the one of that name."""
+        """Create an output without a file.
+
+        new_file: creates the file for a turn. prune: deletes old files, but not the file of the given name.
+        """
         self._new_file = new_file
         self._prune = prune
         self._limits = limits
@@ -73,10 +76,10 @@ class Output:
         self._file: McapFile | None = None
         self._document = SiteDocument(site=site.site, tags=site.tags)
         self._topics: dict[tuple[int, str], str] = {}
-        self._taken = 0
+        self._items_added = 0
         self._pruned_s = 0.0
         self.written = 0
-        self.left_out = 0  # messages beyond what a file can name
+        self.omitted = 0  # messages of topics beyond what a file can hold
 
     @property
     def open_name(self) -> str | None:
@@ -84,26 +87,29 @@ class Output:
         return None if file is None else file.path.name
 
     def write(self, items: Sequence[Item]) -> None:
-        """Raises OSError, and may then be called again with the same items and more: none is written twice."""
+        """Write the items.
+
+        Raises OSError, and may then be called again with the same items and more: no item is written twice.
+        """
         if self._file is not None and self._is_full(self._file):
             self._finish()
         try:
-            for item in items[self._taken :]:
-                self._take(item)
-                self._taken += 1
+            for item in items[self._items_added :]:
+                self._add(item)
+                self._items_added += 1
             if self._file is not None:
-                self._file.drain()
+                self._file.flush()
         except OSError:
             raise
-        except Exception:  # a mistake of ours: these items do not come again
-            self._taken = 0
+        except Exception:  # a bug: the caller does not repeat these items
+            self._items_added = 0
             raise
-        self._taken = 0
+        self._items_added = 0
         if time.monotonic() - self._pruned_s > PRUNE_S:
             self._pruned_s = time.monotonic()
             self._prune(self.open_name)
 
-    def _take(self, item: Item) -> None:
+    def _add(self, item: Item) -> None:
         match item:
             case End():
                 self._finish()
@@ -140,11 +146,11 @@ class Output:
                 if encoding.startswith(ENCODING_PACKED):
                     message = b'{"data":"' + b64encode(payload) + b'"}'
                     file.add(self._topic(row, PACKED), PACKED_SAMPLES, turn_ns, arrival_ns, message)
-                elif encoding.startswith(ENCODING_JSON):  # any other was refused by the decoder
+                elif encoding.startswith(ENCODING_JSON):  # the decoder rejected any other encoding
                     file.add(self._topic(row, JSON), SAMPLES, turn_ns, arrival_ns, payload)
                 self.written += 1
             except TooManyChannelsError:
-                self.left_out += 1
+                self.omitted += 1
 
     def _topic(self, row: int, leaf: str) -> str:
         topic = self._topics.get((row, leaf))
@@ -164,4 +170,4 @@ class Output:
                     file.add(topic, schema, turn_ns, int(pose["t_ns"]), message)
                 self.written += 1
             except TooManyChannelsError:
-                self.left_out += 1
+                self.omitted += 1

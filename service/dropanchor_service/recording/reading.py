@@ -1,4 +1,4 @@
-"""Reads recordings: turn by turn what came in, and the poses that came out; a torn file as far as it goes."""
+"""Read recordings turn by turn: the messages and the poses. Read a torn file up to the tear."""
 
 import struct
 from base64 import b64decode
@@ -21,14 +21,17 @@ from dropanchor_service.recording.output import JSON, PACKED
 from dropanchor_service.store.site import SiteDocument
 from dropanchor_tag_client.recording import RecordingError
 
-_TORN = (McapError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, EOFError)
+_READ_ERRORS = (McapError, struct.error, zstandard.ZstdError, RuntimeError, ValueError, EOFError)
 _RECORD_LIMIT = 2**30
 
 
 @dataclass
 class Turn:
-    """One turn of the ingest. site: where it has changed. messages: tag, payload, encoding, arrival.
-    estimates: of the poses recorded, by tag; what was not known is not in them."""
+    """One turn of the ingest.
+
+    site: the site document if it changed. messages: tag, payload, encoding, UTC of arrival in ns.
+    estimates: tag and fields of each recorded pose, without unknown values.
+    """
 
     t_ns: int
     site: SiteDocument | None = None
@@ -37,21 +40,24 @@ class Turn:
 
 
 class RecordingReader:
-    """about: what the recorder wrote of itself; torn: why the file ends before its end, None when it does not. Both
-    hold once `turns` has begun, or ended."""
+    """Reads one file.
+
+    metadata: what the recorder noted in the file, known once `turns` has begun. read_error: why reading stopped
+    before the end of the file, else None; known once `turns` has ended.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.about: Mapping[str, str] = {}
-        self.torn: str | None = None
+        self.metadata: Mapping[str, str] = {}
+        self.read_error: str | None = None
 
     def turns(self) -> Iterator[Turn]:
-        """Raises RecordingError for a file that is no recording of ours."""
+        """Yield the turns in order. Raises RecordingError when the file is not a recording of this service."""
         topics: dict[int, str] = {}
         turn: Turn | None = None
         for record in self._records():
             if isinstance(record, Metadata) and record.name == METADATA:
-                self.about = record.metadata
+                self.metadata = record.metadata
             elif isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
@@ -60,7 +66,7 @@ class RecordingReader:
                         yield turn
                     turn = Turn(record.log_time)
                 try:
-                    _into(turn, topics.get(record.channel_id, ""), record)
+                    _add_to(turn, topics.get(record.channel_id, ""), record)
                 except ValueError as error:
                     raise RecordingError(f"{self.path}: a message cannot be read: {error}") from error
         if turn is not None:
@@ -69,23 +75,23 @@ class RecordingReader:
     def _records(self) -> Iterator[Any]:
         with self.path.open("rb") as file:
             records = StreamReader(file, validate_crcs=True, record_size_limit=_RECORD_LIMIT).records
-            is_ours = False
+            is_recording = False
             while True:
                 try:
                     record = next(records, None)
-                except _TORN as error:
-                    self.torn = str(error) or type(error).__name__
+                except _READ_ERRORS as error:
+                    self.read_error = str(error) or type(error).__name__
                     record = None
                 if isinstance(record, Header):
-                    is_ours = record.profile == PROFILE
-                if not is_ours:
+                    is_recording = record.profile == PROFILE
+                if not is_recording:
                     raise RecordingError(f"{self.path} is not a recording of this service")
                 if record is None:
                     return
                 yield record
 
 
-def _into(turn: Turn, topic: str, message: Message) -> None:
+def _add_to(turn: Turn, topic: str, message: Message) -> None:
     if topic == SITE_TOPIC:
         turn.site = SiteDocument.model_validate_json(message.data)
     elif topic.startswith("/tag/"):

@@ -1,4 +1,4 @@
-"""Records what comes in and what comes out, while it is asked to, in files that follow each other."""
+"""Record incoming messages and outgoing poses in a series of files."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,29 +13,30 @@ from dropanchor_service.recording.folder import Limits, RecordedFile
 from dropanchor_service.recording.mcap_file import SESSION, McapFile
 from dropanchor_service.recording.output import End, Item, Messages, Output, Poses, Samples, SiteChange
 from dropanchor_service.runtime.background_writer import BackgroundWriter
+from dropanchor_service.store.decimation import Decimation
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
-from dropanchor_service.store.thinning import Decimation
 
 FOLDER = "recordings"
-WRITE_S = 1.0  # what a kill can cost
-MOST_WAITING_BYTES = 64 * 2**20
-MESSAGE_BYTES = 150  # that a waiting message takes beside its payload
+WRITE_S = 1.0  # so much of a recording a kill can lose
+MAX_QUEUED_BYTES = 64 * 2**20
+MESSAGE_OVERHEAD = 150  # bytes of a queued message beside its payload
 
 
 @dataclass(frozen=True)
-class Running:
-    """tags: those that are recorded, None for all."""
+class RunningRecording:
+    """A recording in progress. tags: the recorded tags, None for all."""
 
     since_ns: int
     tags: tuple[str, ...] | None
 
 
 class Recorder:
-    """`messages` and `poses` are called by the ingest thread, `start` and `stop` by any; a thread of its own writes.
+    """Records while it is started. A background thread writes the files.
 
-    All messages of one turn of the ingest carry its time as `log_time`, and the time of their arrival as
-    `publish_time`: so a replay can repeat the turns.
+    The ingest thread calls `record_messages` and `record_poses`; any thread calls `start` and `stop`.
+    All messages of one turn of the ingest carry its time as `log_time` and their arrival as `publish_time`, so that a
+    replay can repeat the turns.
     """
 
     def __init__(
@@ -46,23 +47,23 @@ class Recorder:
         tags: TagTable,
         site: SiteStore,
         now_ns: Callable[[], int],
-        about: Mapping[str, str],
+        metadata: Mapping[str, str],
     ) -> None:
-        """about: what a replay has to know, kept in every file."""
+        """Create a recorder that does not record yet. metadata: what a replay needs, stored in every file."""
         self.folder = data_dir / FOLDER
         self._limits = limits
         self._pose_period_ns = pose_period_ns
         self._tags = tags
         self._site = site
         self._now_ns = now_ns
-        self._about = about
-        self._running: Running | None = None
+        self._metadata = metadata
+        self._running: RunningRecording | None = None
         self._site_version = 0
         self._session = ""
-        self._thinning = Decimation(pose_period_ns)
+        self._decimation = Decimation(pose_period_ns)
         self._output = Output(self._new_file, self._prune, limits, tags, site)
         self.writer: BackgroundWriter[Item] = BackgroundWriter(
-            "recording", self._output.write, WRITE_S, MOST_WAITING_BYTES
+            "recording", self._output.write, WRITE_S, MAX_QUEUED_BYTES
         )
 
     def __enter__(self) -> "Recorder":
@@ -74,68 +75,71 @@ class Recorder:
         self.writer.stop()
 
     @property
-    def running(self) -> Running | None:
+    def running(self) -> RunningRecording | None:
+        """The recording in progress, or None."""
         return self._running
 
     @property
     def written(self) -> int:
-        """Messages so far."""
+        """The number of messages written so far."""
         return self._output.written
 
     @property
     def open_name(self) -> str | None:
+        """The name of the file that is being written, or None."""
         return self._output.open_name
 
     def files(self) -> list[RecordedFile]:
-        """The oldest first."""
+        """Return the recorded files, the oldest first."""
         return files.files_in(self.folder)
 
     def path_of(self, name: str) -> Path | None:
+        """Return the path of the file of this name, or None."""
         return files.path_of(self.folder, name)
 
     def prepare(self) -> None:
-        """Make the folder, which otherwise is made with the first file. Raises OSError."""
+        """Create the folder now rather than with the first file. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
 
     def start(self, tags: Sequence[str] | None = None) -> bool:
-        """False when it records already."""
+        """Start recording these tags, or all. Return False when a recording is already running."""
         if self._running is not None:
             return False
         self._site_version = 0
-        self._thinning = Decimation(self._pose_period_ns)
+        self._decimation = Decimation(self._pose_period_ns)
         since_ns = self._now_ns()
         self._session = str(since_ns)
-        self._running = Running(since_ns, None if tags is None else tuple(tags))
+        self._running = RunningRecording(since_ns, None if tags is None else tuple(tags))
         return True
 
     def stop(self) -> bool:
-        """False when it does not record. The file is finished a moment later."""
+        """Stop recording; the file is finished shortly after. Return False when nothing is being recorded."""
         if self._running is None:
             return False
         self._running = None
         self.writer.put(End(), 0)
         return True
 
-    def messages(self, messages: Messages) -> None:
-        """Of one turn of the ingest."""
+    def record_messages(self, messages: Messages) -> None:
+        """Queue the messages of one turn of the ingest, if a recording is running."""
         running = self._running
         if running is None:
             return
         now_ns = self._now_ns()
-        self._follow_site(now_ns)
+        self._queue_site_change(now_ns)
         if running.tags is not None:
             rows = self._rows(running.tags)
             messages = [message for message in messages if message[0] in rows]
         if messages:
-            size = sum(len(message[1]) for message in messages) + MESSAGE_BYTES * len(messages)
+            size = sum(len(message[1]) for message in messages) + MESSAGE_OVERHEAD * len(messages)
             self.writer.put(Samples(now_ns, messages), size, len(messages))
 
-    def poses(self, poses: Array) -> None:
-        """POSE, per row in order of time."""
+    def record_poses(self, poses: Array) -> None:
+        """Queue decimated poses, if a recording is running. poses: POSE, in order of time per row."""
         running = self._running
         if running is None:
             return
-        kept = self._thinning.of(poses)
+        kept = self._decimation.select(poses)
         if running.tags is not None:
             kept = kept[np.isin(kept["row"], list(self._rows(running.tags)))]
         if len(kept):
@@ -144,12 +148,12 @@ class Recorder:
     def _new_file(self, t_ns: int) -> McapFile:
         self.folder.mkdir(parents=True, exist_ok=True)
         name = files.new_name(chunk_from_id(self._site.site.id), t_ns)
-        return McapFile(self.folder / name, {**self._about, SESSION: self._session})
+        return McapFile(self.folder / name, {**self._metadata, SESSION: self._session})
 
     def _prune(self, open_name: str | None) -> None:
         files.prune(self.folder, self._limits, open_name)
 
-    def _follow_site(self, now_ns: int) -> None:
+    def _queue_site_change(self, now_ns: int) -> None:
         version = self._site.version
         if version != self._site_version:
             self._site_version = version

@@ -1,8 +1,8 @@
-"""Schemas of the messages in a recording: well-known ones where there are any, by the names that viewers look for.
+"""JSON Schemas of the messages in a recording, under the names that viewers look for.
 
-Names and fields of `foxglove.*`: the JSON Schemas of Foxglove's package @foxglove/schemas. Viewers take a part of JSON
-Schema only: every property has one `type`, an object has `properties`, the items of an array are no arrays; a property
-that has no place in that is left out of the schema, not of the message.
+The names and fields of `foxglove.*` follow the JSON Schemas of Foxglove's package @foxglove/schemas. Viewers support
+only a part of JSON Schema: every property has one `type`, an object has `properties`, and the items of an array are
+not arrays. Properties that do not fit are left out of the schema, but not of the message.
 """
 
 from collections.abc import Mapping
@@ -27,10 +27,10 @@ _BASE64: Schema = {"type": "string", "contentEncoding": "base64"}
 
 
 def all_schemas() -> dict[str, Schema]:
-    """JSON Schemas by name."""
+    """Return all JSON Schemas by name."""
     return {
-        POSE: _record(timestamp=_TIME, frame_id=_TEXT, pose=_record(position=_VECTOR, orientation=_QUATERNION)),
-        LOCATION: _record(
+        POSE: _object(timestamp=_TIME, frame_id=_TEXT, pose=_object(position=_VECTOR, orientation=_QUATERNION)),
+        LOCATION: _object(
             timestamp=_TIME,
             frame_id=_TEXT,
             latitude=_NUMBER,
@@ -39,10 +39,10 @@ def all_schemas() -> dict[str, Schema]:
             position_covariance=_NINE,
             position_covariance_type=_INTEGER,
         ),
-        TRANSFORM: _record(
+        TRANSFORM: _object(
             timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_QUATERNION
         ),
-        ESTIMATE: _record(
+        ESTIMATE: _object(
             t_ns=_INTEGER,
             state=_TEXT,
             reason=_TEXT,
@@ -50,31 +50,31 @@ def all_schemas() -> dict[str, Schema]:
             covariance=_NINE,
             **dict.fromkeys(ESTIMATED, _NUMBER),
         ),
-        SAMPLES: _record(
+        SAMPLES: _object(
             sequence=_INTEGER,
-            imu=_listed(t_ns=_INTEGER, acc=_numbers(3), gyro=_numbers(3)),
-            range=_listed(t_ns=_INTEGER, range_m=_NUMBER),
-            heading=_listed(t_ns=_INTEGER, heading_rad=_NUMBER),
-            bearing=_listed(t_ns=_INTEGER, bearing_rad=_NUMBER),
+            imu=_array_of(t_ns=_INTEGER, acc=_numbers(3), gyro=_numbers(3)),
+            range=_array_of(t_ns=_INTEGER, range_m=_NUMBER),
+            heading=_array_of(t_ns=_INTEGER, heading_rad=_NUMBER),
+            bearing=_array_of(t_ns=_INTEGER, bearing_rad=_NUMBER),
         ),
-        PACKED_SAMPLES: _record(data=_BASE64),
-        SITE: _record(site=_record(id=_TEXT, name=_TEXT, anchors=_listed(id=_TEXT, x=_NUMBER, y=_NUMBER, z=_NUMBER))),
+        PACKED_SAMPLES: _object(data=_BASE64),
+        SITE: _object(site=_object(id=_TEXT, name=_TEXT, anchors=_array_of(id=_TEXT, x=_NUMBER, y=_NUMBER, z=_NUMBER))),
     }
 
 
-def _record(**properties: Schema) -> Schema:
+def _object(**properties: Schema) -> Schema:
     return {"type": "object", "properties": properties}
 
 
-def _listed(**properties: Schema) -> Schema:
-    return {"type": "array", "items": _record(**properties)}
+def _array_of(**properties: Schema) -> Schema:
+    return {"type": "array", "items": _object(**properties)}
 
 
 def _numbers(count: int) -> Schema:
     return {"type": "array", "items": _NUMBER, "minItems": count, "maxItems": count}
 
 
-_TIME = _record(sec={"type": "integer", "minimum": 0}, nsec={"type": "integer", "minimum": 0, "maximum": 999_999_999})
-_VECTOR = _record(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_QUATERNION = _record(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_TIME = _object(sec={"type": "integer", "minimum": 0}, nsec={"type": "integer", "minimum": 0, "maximum": 999_999_999})
+_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_QUATERNION = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
 _NINE = _numbers(9)

@@ -55,7 +55,7 @@ def _registry(folder: Path) -> CollectorRegistry:
     metrics, tags, latest = Metrics(), TagTable(), LatestPoses()
     settings = Settings(data_dir=folder)
     Persistence(settings, tags, SiteStore(settings.site, {}), lambda: 0, metrics)
-    metrics.watch(FleetGauges(tags, PendingTags(0), latest, lambda: 0, lambda: 0))
+    metrics.register(FleetGauges(tags, PendingTags(0), latest, lambda: 0, lambda: 0))
     return metrics.registry
 
 

@@ -1,1 +1,1 @@
-"""What every process needs: clock, logs, threads that are watched, files, signals, the cache of compiled kernels."""
+"""Services for every process: clock, logs, supervised threads, files, signals, the kernel cache."""

@@ -1,4 +1,4 @@
-"""Files that are whole or not there, whenever the power goes."""
+"""Write files that are complete or absent even after a power failure."""
 
 import os
 from collections.abc import Iterable
@@ -9,14 +9,15 @@ _UP_TO_UMASK = 0o666
 
 
 def write_atomically(path: Path, parts: Iterable[bytes | memoryview], mode: int = _UP_TO_UMASK) -> None:
-    """Write the file so that it is the old one or the new one, never half of one.
+    """Replace the file, so that readers find the old or the new content, never a mixture.
 
-    mode: its permissions, less the umask; it never had wider ones. Raises OSError, and then the old file is untouched.
+    mode: the permissions, less the umask; the file never has wider ones. Raises OSError, and then the old file is
+    unchanged.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f"{path.name}.part")
     try:
-        part.unlink(missing_ok=True)  # a killed writer may have left it, with other permissions
+        part.unlink(missing_ok=True)  # a killed writer may have left one with other permissions
         _write(part, parts, mode)
         os.replace(part, path)
     except OSError:
@@ -27,7 +28,7 @@ def write_atomically(path: Path, parts: Iterable[bytes | memoryview], mode: int 
 
 
 def sync_folder(folder: Path) -> None:
-    """Put the folder's names on the disk: the content of a file is of no use without its name. Raises OSError."""
+    """Write the names in the folder to the disk, so that new files survive a power failure. Raises OSError."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -39,9 +40,9 @@ def _write(path: Path, parts: Iterable[bytes | memoryview], mode: int) -> None:
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
     try:
         for part in parts:
-            left = memoryview(part)
-            while left:
-                left = left[os.write(descriptor, left) :]
+            remaining = memoryview(part)
+            while remaining:
+                remaining = remaining[os.write(descriptor, remaining) :]
         os.fsync(descriptor)
     finally:
         os.close(descriptor)

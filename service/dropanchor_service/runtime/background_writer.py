@@ -1,4 +1,4 @@
-"""Writes what others put down, in a thread of its own: whoever puts never waits, and a full disk stops nobody."""
+"""Write queued items in a background thread, so that neither a slow nor a full disk blocks the caller."""
 
 import logging
 import sqlite3
@@ -16,24 +16,24 @@ Write = Callable[[Sequence[Item]], None]
 
 
 class BackgroundWriter(Generic[Item]):
-    """A bounded queue in front of `write`, which is called every `period_s` with all that waits, or with nothing.
+    """A bounded queue that passes its items to `write` every `period_s`, even when it is empty.
 
-    When `write` cannot (OSError, sqlite3.Error), the same items are offered to it again after a second, as often as
-    it takes; meanwhile the queue fills, and what does not fit is dropped and counted. Any other error is one of ours:
-    it costs the items that were to be written.
+    When `write` raises OSError or sqlite3.Error, the same items are tried again every second until it succeeds.
+    Meanwhile the queue fills; items that do not fit are dropped and counted. Any other error is a bug, and its items
+    are dropped.
     """
 
-    def __init__(self, name: str, write: Write[Item], period_s: float, most_bytes: int) -> None:
+    def __init__(self, name: str, write: Write[Item], period_s: float, max_bytes: int) -> None:
         self._log = RareLog(logging.getLogger(f"{__name__}.{name}"))
         self._name = name
         self._write = write
         self._period_s = period_s
-        self._most_bytes = most_bytes
+        self._max_bytes = max_bytes
         self._lock = threading.Lock()
-        self._waiting: deque[tuple[Item, int, int]] = deque()
+        self._queue: deque[tuple[Item, int, int]] = deque()  # item, size, count
         self._bytes = 0
         self._stop = threading.Event()
-        self._wake = threading.Event()
+        self._flush_now = threading.Event()
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self.dropped = 0
         self.errors = 0
@@ -43,9 +43,9 @@ class BackgroundWriter(Generic[Item]):
         self._thread.start()
 
     def stop(self, timeout_s: float = 2.0) -> None:
-        """What waits is written once more."""
+        """Write the queued items once more and end the thread."""
         self._stop.set()
-        self._wake.set()
+        self._flush_now.set()
         self._thread.join(timeout_s)
 
     @property
@@ -53,49 +53,55 @@ class BackgroundWriter(Generic[Item]):
         return self._thread.is_alive()
 
     @property
-    def waiting_bytes(self) -> int:
+    def queued_bytes(self) -> int:
         return self._bytes
 
     def put(self, item: Item, size: int, count: int = 1) -> None:
-        """From any thread. size: in bytes; count: of the things in it that are counted when it is dropped."""
+        """Queue an item; any thread may call this.
+
+        size: in bytes. count: by how much `dropped` grows when the item does not fit.
+        """
         with self._lock:
-            if self._bytes + size > self._most_bytes:
+            if self._bytes + size > self._max_bytes:
                 self.dropped += count
                 return
-            self._waiting.append((item, size, count))
+            self._queue.append((item, size, count))
             self._bytes += size
-        if self._bytes > self._most_bytes // 2:
-            self._wake.set()
+        if self._bytes > self._max_bytes // 2:
+            self._flush_now.set()
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            self._wake.wait(self._period_s)
-            self._wake.clear()
-            if not self.turn():
+            self._flush_now.wait(self._period_s)
+            self._flush_now.clear()
+            if not self.flush():
                 self._stop.wait(RETRY_S)
-        self.turn()
+        self.flush()
 
-    def turn(self) -> bool:
-        """Write all that waits; False when it has to be tried again. Called by the thread, or instead of it."""
-        count = len(self._waiting)
-        taken = [self._waiting[index] for index in range(count)]
+    def flush(self) -> bool:
+        """Write all queued items. Return False when that must be tried again.
+
+        The thread calls this; without the thread, its owner may.
+        """
+        count = len(self._queue)
+        taken = [self._queue[index] for index in range(count)]
         try:
             self._write([item for item, _, _ in taken])
         except (OSError, sqlite3.Error) as error:
-            self._fail(error)
-            self._log.warning(self._name, f"cannot be written: {error}")
+            self._record_error(error)
+            self._log.warning(self._name, f"cannot be written: {error}. The items are queued and tried again")
             return False
         except Exception as error:
-            self._fail(error)
+            self._record_error(error)
             self._log.exception(self._name, error)
             self.dropped += sum(entry[2] for entry in taken)
         else:
             self.problem = None
         with self._lock:
             for _ in range(count):
-                self._bytes -= self._waiting.popleft()[1]
+                self._bytes -= self._queue.popleft()[1]
         return True
 
-    def _fail(self, error: Exception) -> None:
+    def _record_error(self, error: Exception) -> None:
         self.errors += 1
         self.problem = f"{self._name} cannot be written: {error}"

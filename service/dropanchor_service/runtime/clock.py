@@ -1,13 +1,14 @@
-"""Our own UTC."""
+"""The service's clock."""
 
 import time
 
 
 class UtcClock:
-    """UTC as the host had it at the start, carried on by its monotonic clock: steps of the host's clock do nothing."""
+    """UTC of the host at the start, advanced by the monotonic clock. Later steps of the host's clock have no effect."""
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def now_ns(self) -> int:
+        """Return the current UTC in ns."""
         return time.monotonic_ns() + self._offset_ns

@@ -1,7 +1,7 @@
-"""Where compiled kernels are kept.
+"""Choose the folder in which numba caches compiled kernels.
 
-numba judges its cache by the file of the outermost kernel alone: after an update of a file which that kernel calls
-into, it would go on running the old code. So the cache's folder is named after all the sources.
+numba checks only the source file of the outermost kernel. After an update of another file that the kernel calls into,
+it would run the old code. Therefore the folder's name contains a digest of all sources.
 """
 
 import hashlib
@@ -17,13 +17,13 @@ _log = logging.getLogger(__name__)
 
 
 def sources_digest() -> str:
-    """Of all that the kernels, and the meaning of their rows, are made of."""
+    """Return a digest of all sources that define the kernels and the meaning of their rows."""
     sources = sorted(source for name in _PACKAGES for source in (Path(__file__).parents[1] / name).rglob("*.py"))
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
 
 
 def use_kernel_cache() -> None:
-    """Choose the cache's folder, unless the environment has. It takes effect if numba is not imported yet."""
+    """Set the folder of the cache, unless the environment does. Call this before numba is imported."""
     if VARIABLE in os.environ:
         return
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
@@ -34,7 +34,11 @@ def use_kernel_cache() -> None:
     except OSError:
         writable = False
     if not writable:
-        # Only a folder that nobody else can have filled: what is read from a cache is run.
+        # Use a fresh private folder: the code in a cache is executed, so nobody else may have written it.
         folder = Path(tempfile.mkdtemp(prefix="dropanchor-kernels-"))
-        _log.warning("%s is not writable: the estimator is compiled at every start; set %s", home, VARIABLE)
+        _log.warning(
+            "%s is not writable, so the estimator is compiled at every start: set %s to a writable folder",
+            home,
+            VARIABLE,
+        )
     os.environ[VARIABLE] = str(folder)

@@ -1,7 +1,7 @@
-"""Memory that was needed for a moment goes back to the system.
+"""Return unused heap memory to the system.
 
-The allocator of glibc gives back only the end of each of its arenas: after a burst of messages the rest would stay with
-the process for good, and the next burst, in another arena, would come on top of it.
+The allocator of glibc returns only the end of each arena. After a burst of messages the process would keep the rest,
+and the next burst in another arena would add to it.
 """
 
 import ctypes
@@ -11,18 +11,18 @@ from collections.abc import Callable
 PERIOD_S = 60.0
 
 
-class SpareMemory:
-    """Owned by one thread. Does nothing where the C library has no malloc_trim(3)."""
+class HeapTrimmer:
+    """Calls malloc_trim(3) now and then; does nothing where the C library lacks it. Not thread-safe."""
 
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
         self._now_s = now_s
-        self._given_back_s = now_s()
-        self._trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        self._trimmed_s = now_s()
+        self._malloc_trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
 
-    def give_back(self) -> bool:
-        """Once in PERIOD_S, however often it is called; True when it did. Other threads run meanwhile."""
-        if self._trim is None or self._now_s() - self._given_back_s < PERIOD_S:
+    def trim(self) -> bool:
+        """Trim the heap if the last time was PERIOD_S ago. Return whether it did. Other threads run meanwhile."""
+        if self._malloc_trim is None or self._now_s() - self._trimmed_s < PERIOD_S:
             return False
-        self._given_back_s = self._now_s()
-        self._trim(ctypes.c_size_t(0))
+        self._trimmed_s = self._now_s()
+        self._malloc_trim(ctypes.c_size_t(0))
         return True

@@ -1,9 +1,9 @@
-"""How many sockets and files the process may open: as many as the system allows, not the 1,024 of a login shell."""
+"""Raise the limit on open sockets and files, which is only 1,024 in a login shell."""
 
 import resource
 
 
-def allow_all() -> None:
-    """Clients that connect and say nothing hold a socket each until they are cut."""
+def raise_limit() -> None:
+    """Raise the limit to what the system allows. Idle clients hold a socket each until they are disconnected."""
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))

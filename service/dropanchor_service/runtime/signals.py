@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as an event that the main thread waits for."""
+"""Turn Ctrl-C and SIGTERM into an event that the main thread waits for."""
 
 import os
 import signal
@@ -11,29 +11,30 @@ CHECK_S = 0.5
 
 
 class Interrupt:
-    """Set by the first signal; the second ends the process at once."""
+    """An event that the first signal sets. A second signal ends the process immediately."""
 
     def __init__(self) -> None:
         self._event = threading.Event()
         self._raises = False
 
     @contextmanager
-    def at_once(self) -> Iterator[None]:
-        """While it is open a signal raises KeyboardInterrupt: for long work that leaves nothing behind."""
+    def raising(self) -> Iterator[None]:
+        """Let a signal raise KeyboardInterrupt in this context: for long work that needs no cleanup."""
         self._raises = True
         try:
             yield
         finally:
             self._raises = False
 
-    def wait(self, goes_on: Callable[[], bool]) -> bool:
-        """Until a signal comes; False when `goes_on` has become false before."""
+    def wait(self, keep_waiting: Callable[[], bool]) -> bool:
+        """Wait for a signal and return True. Return False when `keep_waiting` returns False first."""
         while not self._event.wait(CHECK_S):
-            if not goes_on():
+            if not keep_waiting():
                 return self._event.is_set()
         return True
 
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
+        """Handle a signal."""
         if self._event.is_set():
             os._exit(128 + number)
         self._event.set()
@@ -43,7 +44,7 @@ class Interrupt:
 
 @contextmanager
 def interrupts() -> Iterator[Interrupt]:
-    """Signals are ours while it is open."""
+    """Handle SIGINT and SIGTERM in this context; restore the former handlers after it."""
     interrupt = Interrupt()
     before = {number: signal.signal(number, interrupt.on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -1,4 +1,4 @@
-"""No thread of ours dies silently."""
+"""Report threads that die of an error."""
 
 import logging
 import threading
@@ -9,12 +9,14 @@ _log = logging.getLogger(__name__)
 
 
 class Supervision:
-    """While it is open it learns of every thread that ends with an error. (Those that Zenoh makes are not threads of
-    Python's.)"""
+    """Records every Python thread that ends with an error while this context manager is open.
+
+    Zenoh's threads are not Python threads and are not covered.
+    """
 
     def __init__(self) -> None:
-        self.dead: list[str] = []
-        """Names of threads that have ended with an error."""
+        self.dead_threads: list[str] = []
+        """Names of the threads that have ended with an error."""
 
     def __enter__(self) -> Self:
         self._before = threading.excepthook
@@ -28,5 +30,5 @@ class Supervision:
 
     def _on_error(self, died: threading.ExceptHookArgs) -> None:
         name = "unknown" if died.thread is None else died.thread.name
-        self.dead.append(name)
-        _log.critical("the thread %s has died", name, exc_info=died.exc_value)
+        self.dead_threads.append(name)
+        _log.critical("the thread %s has died of an unexpected error: please report it", name, exc_info=died.exc_value)

@@ -1,6 +1,7 @@
-"""What systemd is told of a service of Type=notify: that it is ready, that it makes progress, that it stops.
+"""Notify systemd that a service of Type=notify is ready, makes progress or stops.
 
-One datagram per message to the socket in NOTIFY_SOCKET (sd_notify(3)); without that variable nothing is sent.
+Each notification is one datagram to the socket in NOTIFY_SOCKET, see sd_notify(3). Without that variable nothing is
+sent.
 """
 
 import os
@@ -9,28 +10,30 @@ from collections.abc import Mapping
 
 
 class Systemd:
-    """The service manager that started this process, if it was one."""
+    """Sends notifications to the service manager, if one started this process."""
 
     def __init__(self, environment: Mapping[str, str] = os.environ) -> None:
         path = environment.get("NOTIFY_SOCKET")
         self._address = None if path is None else path.replace("@", "\0", 1) if path.startswith("@") else path
 
     def ready(self) -> None:
-        self._tell("READY=1")
+        """Notify that the service is ready."""
+        self._notify("READY=1")
 
     def progress(self) -> None:
-        """To be told well within WatchdogSec=, else the process is taken for stuck, killed and started again."""
-        self._tell("WATCHDOG=1")
+        """Notify the watchdog. Call this well within WatchdogSec=, or systemd kills and restarts the process."""
+        self._notify("WATCHDOG=1")
 
     def stopping(self) -> None:
-        self._tell("STOPPING=1")
+        """Notify that the service is stopping."""
+        self._notify("STOPPING=1")
 
-    def _tell(self, what: str) -> None:
+    def _notify(self, state: str) -> None:
         if self._address is None:
             return
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as to_manager:
             to_manager.setblocking(False)
             try:
-                to_manager.sendto(what.encode(), self._address)
+                to_manager.sendto(state.encode(), self._address)
             except OSError:
-                return  # nobody listens, or its queue is full: the next one will do
+                return  # no listener or a full queue: the next notification will do

@@ -1,4 +1,4 @@
-"""Turn what an operator knows of tags and anchors into the columns of an engine."""
+"""Convert the settings of tags and anchors into the columns of an engine."""
 
 import math
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, 
 
 
 def anchor_columns(anchors: Sequence[Anchor]) -> Array:
-    """ANCHOR, one per anchor."""
+    """Return one ANCHOR per anchor, in order."""
     return np.array([(anchor.x, anchor.y, anchor.z) for anchor in anchors], ANCHOR)
 
 
 def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
-    """TAG_SETTINGS (0-d)."""
+    """Return TAG_SETTINGS (0-d). Settings that are not given are NaN. declination_rad: of the site."""
     columns = default_settings()
     columns["height"] = tag.height_m
     columns["range_std"] = _or_nan(tag.range_std_m)

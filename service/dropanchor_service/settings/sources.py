@@ -1,4 +1,4 @@
-"""Reads the settings: one TOML file, environment variables over it, command-line options over both."""
+"""Read the settings from a TOML file, the environment and the command line. Each overrides the one before."""
 
 import difflib
 import json
@@ -18,7 +18,7 @@ ENVIRONMENT_DELIMITER = "__"
 
 
 class SettingsError(ValueError):
-    """Settings that cannot be used. The message names the place, the key, and what is expected."""
+    """The settings are invalid. The message names the source, the key and the expected value."""
 
 
 def load_settings(
@@ -26,7 +26,7 @@ def load_settings(
     options: Mapping[str, Any] | None = None,
     environment: Mapping[str, str] = os.environ,
 ) -> Settings:
-    """The settings of this file, these environment variables and these (nested) options; the later wins.
+    """Return the settings from the file, the environment and the nested options, in ascending priority.
 
     Raises SettingsError.
     """
@@ -41,7 +41,7 @@ def load_settings(
     try:
         return Settings.model_validate(merged)
     except ValidationError as error:
-        raise SettingsError("\n".join(_sentence(entry, layers) for entry in error.errors())) from error
+        raise SettingsError("\n".join(_message(entry, layers) for entry in error.errors())) from error
 
 
 def _from_file(file: Path | None) -> dict[str, Any]:
@@ -52,15 +52,15 @@ def _from_file(file: Path | None) -> dict[str, Any]:
     except OSError as error:
         raise SettingsError(f"{file}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise SettingsError(f"{file}: is not a text file in UTF-8") from error
+        raise SettingsError(f"{file}: is not a UTF-8 text file") from error
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(f"{file}: is not TOML: {error}") from error
 
 
 def _from_environment(environment: Mapping[str, str]) -> dict[str, Any]:
-    """`DROPANCHOR_HTTP__PORT=8081` is `port` in `[http]`; lists and tables are given as JSON.
+    """Return the settings in the environment: `DROPANCHOR_HTTP__PORT=8081` sets `port` in `[http]`.
 
-    Other variables with the prefix are left alone, unless they look like one section's key and are not.
+    Lists and tables are JSON. Other variables with the prefix are ignored, unless they contain the delimiter.
     """
     found: dict[str, Any] = {}
     for variable, text in environment.items():
@@ -78,7 +78,7 @@ def _value(variable: str, text: str) -> Any:
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:
-        raise SettingsError(f"environment variable {variable}: is not JSON: {error}") from error
+        raise SettingsError(f"environment variable {variable}: is not valid JSON: {error}") from error
 
 
 def _nested(path: list[str], value: Any) -> dict[str, Any]:
@@ -93,24 +93,25 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-def _sentence(error: Any, layers: list[tuple[str, dict[str, Any]]]) -> str:
-    """Where it stands, which key, what is expected; the value is left out, it may be a secret."""
-    path = [str(part) for part in error["loc"] if part != "[key]"]  # pydantic's word for a key that is wrong itself
-    place, _ = max(reversed([entry for entry in layers if entry[1]]), key=lambda entry: _depth(entry[1], path))
-    key = ".".join(path) or "all together"
+def _message(error: Any, layers: list[tuple[str, dict[str, Any]]]) -> str:
+    """Return one line with the source, the key and what is expected, without the value, which may be a secret."""
+    path = [str(part) for part in error["loc"] if part != "[key]"]  # pydantic adds this when the key itself is wrong
+    source, _ = max(reversed([entry for entry in layers if entry[1]]), key=lambda entry: _depth(entry[1], path))
+    key = ".".join(path) or "the settings together"
     if error["type"] == "extra_forbidden":
-        return f"{place}: {key} is not a setting{_suggestion(path)}"
-    return f"{place}: {key}: {error['msg'].removeprefix('Value error, ')}"
+        return f"{source}: {key} is not a setting{_suggestion(path)}"
+    return f"{source}: {key}: {error['msg'].removeprefix('Value error, ')}"
 
 
 def _depth(layer: Any, path: list[str]) -> int:
-    """How far the layer goes along the path."""
+    """Return how many parts of the path the layer contains."""
     if not path or not isinstance(layer, Mapping) or path[0] not in layer:
         return 0
     return 1 + _depth(layer[path[0]], path[1:])
 
 
 def _suggestion(path: list[str]) -> str:
+    """Return "; did you mean ...?" when a setting has a similar name, else nothing."""
     model: Any = Settings
     for part in path[:-1]:
         field = getattr(model, "model_fields", {}).get(part)

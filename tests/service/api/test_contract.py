@@ -50,7 +50,7 @@ def operations() -> Iterator[Operation]:
     house.recorder.start()
     house.move("tag-1", "a")
     house.keep()
-    house.recorder.messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
+    house.recorder.record_messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
     house.recorder.writer.flush()
     house.stopping.set()  # a stream ends after its first event
     load_all_checks()

@@ -43,7 +43,7 @@ def test_a_recording_is_started_stopped_listed_and_fetched(
     recorder = house.recorder
     assert recorder is not None
     assert main(["record", "start", "a", "b", "--url", url]) == 0
-    recorder.messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
+    recorder.record_messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
     recorder.writer.flush()
     assert main(["record", "stop", "--url", url]) == 0
     recorder.writer.flush()

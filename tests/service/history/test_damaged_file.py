@@ -51,7 +51,9 @@ def cut_end_off(file: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [damage_first_page, damage_table_pages, cut_end_off])
-def test_a_damaged_history_is_moved_aside_and_a_new_one_is_written(tmp_path: Path, damage: Callable[[Path], None]) -> None:
+def test_a_damaged_history_is_moved_aside_and_a_new_one_is_written(
+    tmp_path: Path, damage: Callable[[Path], None]
+) -> None:
     before = tracks_in(tmp_path)
     with before:
         assert write(before, *range(100))
@@ -67,9 +69,7 @@ def test_a_damaged_history_is_moved_aside_and_a_new_one_is_written(tmp_path: Pat
     assert [name in problem for problem in tracks.problems] == [True]
 
 
-def test_damage_while_the_file_is_open_costs_no_new_pose(
-    tmp_path: Path, connections: list[sqlite3.Connection]
-) -> None:
+def test_damage_while_the_file_is_open_costs_no_new_pose(tmp_path: Path, connections: list[sqlite3.Connection]) -> None:
     tracks = tracks_in(tmp_path)
     assert write(tracks, *range(100))
     (writing,) = connections

@@ -52,9 +52,7 @@ def test_a_window_includes_its_ends_and_can_be_read_from_either(tmp_path: Path) 
     writer.close()
 
 
-def test_inserts_of_any_size_use_few_different_statements(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_inserts_of_any_size_use_few_different_statements(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     statements: set[str] = set()
 
     class RecordingConnection(sqlite3.Connection):
@@ -63,7 +61,9 @@ def test_inserts_of_any_size_use_few_different_statements(
             return super().execute(sql, *values)
 
     connect = sqlite3.connect
-    monkeypatch.setattr(sqlite3, "connect", lambda *args, **kwargs: connect(*args, **kwargs, factory=RecordingConnection))
+    monkeypatch.setattr(
+        sqlite3, "connect", lambda *args, **kwargs: connect(*args, **kwargs, factory=RecordingConnection)
+    )
     writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
     counts = [*range(1, 150), 1023, 1024, 1025]
     for number, count in enumerate(counts):

@@ -1,4 +1,4 @@
-"""What Prometheus sees."""
+"""Prometheus can scrape the metrics of the ingest and the store."""
 
 import numpy as np
 from prometheus_client import generate_latest
@@ -27,12 +27,12 @@ def test_samples_rejections_and_times_are_counted() -> None:
     assert found["dropanchor_estimator_seconds_count"] == found["dropanchor_pose_delay_seconds_count"] == 1
 
 
-def test_every_reason_is_there_from_the_start_so_that_a_rate_can_be_taken() -> None:
+def test_every_rejection_reason_is_exported_from_the_start_so_that_rates_work() -> None:
     found = lines(Metrics())
     assert all(found[f'dropanchor_rejected_total{{reason="{reason}"}}'] == 0 for reason in Reason)
 
 
-def test_tags_are_counted_by_the_state_that_is_shown_not_by_the_one_that_was_stored() -> None:
+def test_tags_are_counted_by_their_aged_state_rather_than_the_stored_one() -> None:
     tags, latest, metrics = TagTable(), LatestPoses(), Metrics()
     poses = np.zeros(3, POSE)
     poses["row"], poses["state"] = [0, 1, 2], State.TRACKING
@@ -43,7 +43,7 @@ def test_tags_are_counted_by_the_state_that_is_shown_not_by_the_one_that_was_sto
     tags.set_online("a", True)
     pending_tags = PendingTags(10)
     pending_tags.on_message("e", 100 * S)
-    metrics.watch(FleetGauges(tags, pending_tags, latest, lambda: 100 * S, lambda: 5))
+    metrics.register(FleetGauges(tags, pending_tags, latest, lambda: 100 * S, lambda: 5))
     found = lines(metrics)
     states = {state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("tracking", "coasting", "lost")}
     assert states == {"tracking": 1, "coasting": 1, "lost": 1}

@@ -1,4 +1,4 @@
-"""Recordings: what comes in and out goes into files that viewers open, a kill cannot harm and a replay repeats."""
+"""Recordings are files that viewers open and replays repeat, and that survive kills and full disks."""
 
 import json
 import os
@@ -25,14 +25,14 @@ from dropanchor_tag_client.recording import RecordingError
 
 S = 1_000_000_000
 T_NS = 1_800_000_000 * S
-LARGE = Limits(2**30, 3600 * S, 1000, 10**18, 2**40)
+UNLIMITED = Limits(2**30, 3600 * S, 1000, 10**18, 2**40)
 SITE = Site(anchors=[Anchor(id="7", x=1.0, z=2.5)], georeference=Georeference(lat=52.5, lon=13.4))
 
 
-class Desk:
-    """A recorder whose thread does not run: `write` does its work."""
+class RecorderBench:
+    """A recorder without its thread: `write` does the thread's work."""
 
-    def __init__(self, folder: Path, limits: Limits = LARGE) -> None:
+    def __init__(self, folder: Path, limits: Limits = UNLIMITED) -> None:
         self.now_ns = T_NS
         self.tags = TagTable()
         self.site = SiteStore(SITE, {"a": TagSettings(height_m=1.5)})
@@ -40,19 +40,19 @@ class Desk:
         for name in ("a", "b/ü"):
             self.tags.register(name)
 
-    def hear(self, count: int = 1, row: int = 0, size: int = 40) -> None:
+    def receive(self, count: int = 1, row: int = 0, size: int = 40) -> None:
         for _ in range(count):
             self.now_ns += S // 10
             payload = b"%d" % self.now_ns + b"x" * size
-            self.recorder.messages([(row, payload, ENCODING_PACKED, self.now_ns - 7)])
+            self.recorder.record_messages([(row, payload, ENCODING_PACKED, self.now_ns - 7)])
 
-    def move(self, **fields: Any) -> None:
+    def estimate(self, **fields: Any) -> None:
         pose = np.zeros(1, POSE)
         pose["t_ns"], pose["state"] = self.now_ns, State.TRACKING
         pose["cov"] = np.diag([0.04, 0.01, 0.001])
         for name, value in fields.items():
             pose[name] = value
-        self.recorder.poses(pose)
+        self.recorder.record_poses(pose)
 
     def write(self) -> bool:
         return self.recorder.writer.flush()
@@ -67,50 +67,50 @@ class Desk:
         return [message[1] for turn in self.turns() for message in turn.messages]
 
 
-def test_what_comes_in_is_read_back_with_its_turn_its_arrival_and_the_site(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    assert desk.recorder.start()
-    assert not desk.recorder.start()
-    desk.now_ns += 1
-    desk.recorder.messages(
+def test_messages_are_read_back_with_their_turn_their_arrival_and_the_site(tmp_path: Path) -> None:
+    bench = RecorderBench(tmp_path)
+    assert bench.recorder.start()
+    assert not bench.recorder.start()
+    bench.now_ns += 1
+    bench.recorder.record_messages(
         [(1, b"packed", ENCODING_PACKED, T_NS), (0, b"{}", ENCODING_JSON + ";v1", T_NS - 5), (0, b"?", "text/plain", 1)]
     )
-    desk.site.set_anchor(Anchor(id="8"))
-    desk.hear()
-    assert desk.recorder.stop()
-    assert desk.write()
-    first, second = desk.turns()
-    assert first.site == desk.site.document.model_copy(update={"site": SITE})
+    bench.site.set_anchor(Anchor(id="8"))
+    bench.receive()
+    assert bench.recorder.stop()
+    assert bench.write()
+    first, second = bench.turns()
+    assert first.site == bench.site.document.model_copy(update={"site": SITE})
     assert first.messages == [("b/ü", b"packed", ENCODING_PACKED, T_NS), ("a", b"{}", ENCODING_JSON, T_NS - 5)]
-    assert second.site == desk.site.document
-    assert (first.t_ns, second.t_ns) == (T_NS + 1, desk.now_ns)
+    assert second.site == bench.site.document
+    assert (first.t_ns, second.t_ns) == (T_NS + 1, bench.now_ns)
 
 
-def test_only_the_chosen_tags_and_only_while_it_runs(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    desk.hear()
-    desk.recorder.start(["b/ü", "nobody"])
-    desk.hear(row=0)
-    desk.hear(row=1)
-    desk.move(row=0)
-    desk.recorder.stop()
-    desk.hear(row=1)
-    desk.write()
-    assert [message[0] for turn in desk.turns() for message in turn.messages] == ["b/ü"]
-    assert not any(turn.estimates for turn in desk.turns())
+def test_only_chosen_tags_are_recorded_and_only_while_a_recording_runs(tmp_path: Path) -> None:
+    bench = RecorderBench(tmp_path)
+    bench.receive()
+    bench.recorder.start(["b/ü", "nobody"])
+    bench.receive(row=0)
+    bench.receive(row=1)
+    bench.estimate(row=0)
+    bench.recorder.stop()
+    bench.receive(row=1)
+    bench.write()
+    assert [message[0] for turn in bench.turns() for message in turn.messages] == ["b/ü"]
+    assert not any(turn.estimates for turn in bench.turns())
 
 
-def test_poses_are_messages_that_viewers_know_valid_by_their_schemas(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    desk.recorder.start()
-    desk.hear()
-    desk.move(x=3.0, y=4.0, heading=np.pi / 2, anchor=0, range=5.0)
-    desk.now_ns += S
-    desk.move(x=np.nan, y=np.nan, cov=np.nan, state=State.AMBIGUOUS, anchor=-1)
-    desk.recorder.stop()
-    desk.write()
+def test_poses_are_recorded_in_schemas_that_viewers_know_and_are_valid(tmp_path: Path) -> None:
+    bench = RecorderBench(tmp_path)
+    bench.recorder.start()
+    bench.receive()
+    bench.estimate(x=3.0, y=4.0, heading=np.pi / 2, anchor=0, range=5.0)
+    bench.now_ns += S
+    bench.estimate(x=np.nan, y=np.nan, cov=np.nan, state=State.AMBIGUOUS, anchor=-1)
+    bench.recorder.stop()
+    bench.write()
     found: dict[str, list[Any]] = {}
-    with desk.paths()[0].open("rb") as file:
+    with bench.paths()[0].open("rb") as file:
         reader = make_reader(file)
         assert reader.get_header().profile == "dropanchor"
         for schema, channel, message in reader.iter_messages():
@@ -129,30 +129,30 @@ def test_poses_are_messages_that_viewers_know_valid_by_their_schemas(tmp_path: P
     assert len(found["dropanchor.PackedSamples"]) == 1
 
 
-def is_plain(schema: Any) -> bool:
-    """What Foxglove's and Lichtblick's readers of JSON Schema understand; for anything else they refuse the topic."""
+def is_supported(schema: Any) -> bool:
+    """Return whether Foxglove and Lichtblick support the schema. They refuse topics with any other."""
     if schema["type"] == "object":
-        return all(map(is_plain, schema["properties"].values()))
+        return all(map(is_supported, schema["properties"].values()))
     if schema["type"] == "array":
-        return schema["items"]["type"] != "array" and is_plain(schema["items"])
+        return schema["items"]["type"] != "array" and is_supported(schema["items"])
     return schema["type"] in ("boolean", "string", "number", "integer")
 
 
-def test_viewers_understand_every_schema() -> None:
-    assert all(map(is_plain, all_schemas().values()))
+def test_viewers_support_every_schema() -> None:
+    assert all(map(is_supported, all_schemas().values()))
 
 
-def test_a_file_that_ends_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    desk.recorder.start()
+def test_a_file_that_is_cut_off_anywhere_is_read_up_to_the_cut(tmp_path: Path) -> None:
+    bench = RecorderBench(tmp_path)
+    bench.recorder.start()
     ends = []
     for _ in range(4):
-        desk.hear(5)
-        desk.write()
-        ends.append(desk.paths()[0].stat().st_size)
-    everything = desk.payloads()
+        bench.receive(5)
+        bench.write()
+        ends.append(bench.paths()[0].stat().st_size)
+    everything = bench.payloads()
     assert len(everything) == 20
-    whole = desk.paths()[0].read_bytes()
+    whole = bench.paths()[0].read_bytes()
     torn = tmp_path / "torn.mcap"
     for length in range(len(whole)):
         torn.write_bytes(whole[:length])
@@ -160,34 +160,34 @@ def test_a_file_that_ends_anywhere_is_read_as_far_as_it_goes(tmp_path: Path) -> 
         try:
             read = [message[1] for turn in reader.turns() for message in turn.messages]
         except RecordingError:
-            assert length < 100  # not even the header
+            assert length < 100  # the header is incomplete
             continue
         at_least = 5 * sum(end <= length for end in ends)
         assert read == everything[: len(read)]
         assert len(read) >= at_least
-        assert reader.torn is not None
+        assert reader.read_error is not None
 
 
-def test_files_follow_each_other_and_each_can_be_replayed_alone(tmp_path: Path) -> None:
-    desk = Desk(tmp_path, Limits(2000, 3600 * S, 1000, 10**18, 2**40))
-    desk.recorder.start()
+def test_a_full_file_is_followed_by_another_and_each_can_be_replayed_alone(tmp_path: Path) -> None:
+    bench = RecorderBench(tmp_path, Limits(2000, 3600 * S, 1000, 10**18, 2**40))
+    bench.recorder.start()
     for _ in range(6):
-        desk.hear(40, size=200)
-        desk.write()
-    desk.recorder.stop()
-    desk.write()
-    assert len(desk.paths()) >= 3
-    assert all(file.finished for file in desk.recorder.files())
-    assert len(desk.payloads()) == 240
-    for path in desk.paths():
-        assert next(RecordingReader(path).turns()).site == desk.site.document
+        bench.receive(40, size=200)
+        bench.write()
+    bench.recorder.stop()
+    bench.write()
+    assert len(bench.paths()) >= 3
+    assert all(file.finished for file in bench.recorder.files())
+    assert len(bench.payloads()) == 240
+    for path in bench.paths():
+        assert next(RecordingReader(path).turns()).site == bench.site.document
 
 
 @pytest.mark.parametrize(
     ("limits", "left"),
     [(Limits(1, 1, 2, 10**18, 2**40), "de"), (Limits(1, 1, 99, 10**18, 2500), "de"), (Limits(1, 1, 99, 0, 2**40), "")],
 )
-def test_the_oldest_files_go_by_count_size_and_age_but_never_the_open_one(
+def test_the_oldest_files_are_deleted_by_count_size_and_age_but_never_the_open_one(
     tmp_path: Path, limits: Limits, left: str
 ) -> None:
     for name in "abcde":
@@ -199,38 +199,38 @@ def test_the_oldest_files_go_by_count_size_and_age_but_never_the_open_one(
 
 
 @pytest.fixture
-def no_room() -> Iterator[Any]:
-    """Files of this process cannot grow beyond so many bytes."""
+def file_size_limit() -> Iterator[Any]:
+    """A function that limits the size of the files of this process, in bytes."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_full_disk_loses_nothing_that_still_waits_and_leaves_a_whole_file(tmp_path: Path, no_room: Any) -> None:
-    desk = Desk(tmp_path)
-    desk.recorder.start()
-    desk.hear(10)
-    assert desk.write()
-    size = desk.paths()[0].stat().st_size
-    no_room(size + 100)
+def test_a_full_disk_loses_no_queued_message_and_leaves_a_valid_file(tmp_path: Path, file_size_limit: Any) -> None:
+    bench = RecorderBench(tmp_path)
+    bench.recorder.start()
+    bench.receive(10)
+    assert bench.write()
+    size = bench.paths()[0].stat().st_size
+    file_size_limit(size + 100)
     for _ in range(3):
-        desk.hear(10, size=500)
-        assert not desk.write()
-    assert "recording cannot be written" in (desk.recorder.writer.problem or "")
-    assert desk.paths()[0].stat().st_size == size
-    no_room(resource.RLIM_INFINITY)
-    desk.recorder.stop()
-    assert desk.write()
-    assert desk.recorder.writer.problem is None
-    assert len(desk.payloads()) == len(set(desk.payloads())) == 40
-    assert desk.recorder.files()[0].finished
+        bench.receive(10, size=500)
+        assert not bench.write()
+    assert "recording cannot be written" in (bench.recorder.writer.problem or "")
+    assert bench.paths()[0].stat().st_size == size
+    file_size_limit(resource.RLIM_INFINITY)
+    bench.recorder.stop()
+    assert bench.write()
+    assert bench.recorder.writer.problem is None
+    assert len(bench.payloads()) == len(set(bench.payloads())) == 40
+    assert bench.recorder.files()[0].finished
 
 
 @pytest.mark.parametrize("nth", range(1, 6))
-def test_a_write_that_fails_halfway_leaves_nothing_and_is_repeated(
+def test_a_write_that_fails_halfway_is_undone_and_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nth: int
 ) -> None:
-    desk, calls, write = Desk(tmp_path), count(1), os.write
+    bench, calls, write = RecorderBench(tmp_path), count(1), os.write
 
     def failing(fd: int, data: Any) -> int:
         if next(calls) != nth:
@@ -238,24 +238,24 @@ def test_a_write_that_fails_halfway_leaves_nothing_and_is_repeated(
         write(fd, data[: len(data) // 2])
         raise OSError(5, "Input/output error")
 
-    desk.recorder.start()
+    bench.recorder.start()
     with monkeypatch.context() as patched:
         patched.setattr(os, "write", failing)
         outcomes = []
         for _ in range(6):
-            desk.hear(5)
-            outcomes.append(desk.write())
+            bench.receive(5)
+            outcomes.append(bench.write())
     assert outcomes.count(False) == 1
-    desk.recorder.stop()
-    assert desk.write()
-    (path,) = desk.paths()
+    bench.recorder.stop()
+    assert bench.write()
+    (path,) = bench.paths()
     reader = RecordingReader(path)
     payloads = [message[1] for turn in reader.turns() for message in turn.messages]
     assert len(payloads) == len(set(payloads)) == 30
-    assert reader.torn is None
+    assert reader.read_error is None
 
 
-def test_what_is_no_recording_of_ours_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_recording_is_refused(tmp_path: Path) -> None:
     for content in (b"", b"RIFF", b"\x89MCAP0\r\n" + b"\0" * 100):
         (tmp_path / "x.mcap").write_bytes(content)
         with pytest.raises(RecordingError, match="not a recording"):

@@ -1,4 +1,4 @@
-"""Files that are there whole, with their names, before anyone is told so."""
+"""Files are complete and on the disk, with their names, before a write returns."""
 
 import os
 import stat
@@ -40,17 +40,17 @@ def write_recording(folder: Path) -> None:
 @pytest.mark.parametrize(
     "write", [write_api_key, write_credentials, write_site, write_checkpoint, write_recording], ids=lambda f: f.__name__
 )
-def test_what_was_written_is_on_the_disk_with_its_name(
+def test_a_written_file_and_its_name_are_synced_to_the_disk(
     write: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[Path] = []
     fsync = os.fsync
 
-    def noted(descriptor: int) -> None:
+    def recorded(descriptor: int) -> None:
         synced.append(Path(os.readlink(f"/proc/self/fd/{descriptor}")))
         fsync(descriptor)
 
-    monkeypatch.setattr(os, "fsync", noted)
+    monkeypatch.setattr(os, "fsync", recorded)
     write(tmp_path)
     kept = [path for path in tmp_path.iterdir() if not path.name.startswith(".")]
     assert {path.name for path in kept} == {path.name.removesuffix(".part") for path in synced} - {tmp_path.name}

@@ -1,4 +1,4 @@
-"""The thread that writes what others put down."""
+"""The background writer writes queued items and survives full disks and bugs."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from support.zenoh_router import wait_until
 
 
 class Disk:
-    """Where the items go, unless the disk is full."""
+    """Collects the items, or raises `error`."""
 
     def __init__(self) -> None:
         self.items: list[int] = []
@@ -19,7 +19,7 @@ class Disk:
         self.items.extend(items)
 
 
-def test_what_is_put_is_written_in_order_and_the_rest_at_the_stop() -> None:
+def test_items_are_written_in_order_and_the_rest_when_it_stops() -> None:
     disk = Disk()
     writer = BackgroundWriter("test", disk.write, 0.01, 1000)
     writer.start()
@@ -35,25 +35,25 @@ def test_what_is_put_is_written_in_order_and_the_rest_at_the_stop() -> None:
     assert disk.items == [0, 1, 2, 3, 4, 5]
 
 
-def test_a_full_disk_costs_only_what_does_not_fit_into_the_queue() -> None:
+def test_on_a_full_disk_only_items_beyond_the_queue_are_dropped() -> None:
     disk = Disk()
     disk.error = OSError(28, "No space left on device")
     writer = BackgroundWriter("test", disk.write, 0.01, 100)
     writer.put(0, 50, count=7)
-    assert not writer.turn()
+    assert not writer.flush()
     assert "No space left" in (writer.problem or "")
     writer.put(1, 50, count=7)
     writer.put(2, 50, count=7)
-    assert (writer.dropped, writer.waiting_bytes) == (7, 100)
+    assert (writer.dropped, writer.queued_bytes) == (7, 100)
     disk.error = None
-    assert writer.turn()
+    assert writer.flush()
     assert disk.items == [0, 1]
-    assert (writer.problem, writer.errors, writer.waiting_bytes) == (None, 1, 0)
+    assert (writer.problem, writer.errors, writer.queued_bytes) == (None, 1, 0)
 
 
-def test_a_mistake_of_ours_costs_what_was_to_be_written_and_not_the_thread() -> None:
+def test_a_bug_in_write_drops_its_items_but_does_not_end_the_thread() -> None:
     disk = Disk()
-    disk.error = ZeroDivisionError("ours")
+    disk.error = ZeroDivisionError("a bug")
     writer = BackgroundWriter("test", disk.write, 0.01, 1000)
     writer.start()
     writer.put(0, 1, count=3)

@@ -1,4 +1,4 @@
-"""One kind of event does not flood the log."""
+"""Repeated events do not flood the log."""
 
 import logging
 
@@ -7,7 +7,7 @@ import pytest
 from dropanchor_service.runtime.logs import REPEAT_S, RareLog
 
 
-def test_repeated_events_are_logged_rarely_and_their_number_is_told(caplog: pytest.LogCaptureFixture) -> None:
+def test_repeated_events_are_logged_rarely_and_counted(caplog: pytest.LogCaptureFixture) -> None:
     now = 0.0
     log = RareLog(logging.getLogger("test"), clock=lambda: now)
     for _ in range(100):
@@ -22,7 +22,7 @@ def test_repeated_events_are_logged_rarely_and_their_number_is_told(caplog: pyte
     ]
 
 
-def test_a_traceback_is_shown_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_traceback_is_logged_only_once(caplog: pytest.LogCaptureFixture) -> None:
     now = 0.0
     log = RareLog(logging.getLogger("test"), clock=lambda: now)
     for now in (0.0, 2 * REPEAT_S):  # noqa: B007

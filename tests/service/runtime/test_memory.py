@@ -1,4 +1,4 @@
-"""What was needed for a moment does not stay with the process."""
+"""Heap memory that is no longer used is returned to the system."""
 
 import ctypes
 import os
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_service.runtime.memory import PERIOD_S, SpareMemory
+from dropanchor_service.runtime.memory import PERIOD_S, HeapTrimmer
 
 
 def resident_bytes() -> int:
@@ -14,16 +14,16 @@ def resident_bytes() -> int:
 
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="this C library has no malloc_trim")
-def test_memory_between_what_is_still_used_is_given_back_once_in_a_while() -> None:
+def test_free_memory_between_used_blocks_is_returned_once_per_period() -> None:
     now_s = [0.0]
-    spare = SpareMemory(lambda: now_s[0])
+    heap = HeapTrimmer(lambda: now_s[0])
     burst = [bytes(10_000) for _ in range(10_000)]
     kept = burst[::100]
     del burst
     before = resident_bytes()
-    assert not spare.give_back()
+    assert not heap.trim()
     now_s[0] = PERIOD_S
-    assert spare.give_back()
-    assert not spare.give_back()
+    assert heap.trim()
+    assert not heap.trim()
     assert before - resident_bytes() > 50 * 2**20
     assert len(kept) == 100

@@ -1,4 +1,4 @@
-"""What systemd hears."""
+"""systemd receives the notifications."""
 
 import socket
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ def manager(tmp_path: Path) -> Iterator[socket.socket]:
         yield listening
 
 
-def test_each_message_is_one_datagram(manager: socket.socket) -> None:
+def test_each_notification_is_one_datagram(manager: socket.socket) -> None:
     systemd = Systemd({"NOTIFY_SOCKET": manager.getsockname()})
     systemd.ready()
     systemd.progress()
@@ -25,7 +25,7 @@ def test_each_message_is_one_datagram(manager: socket.socket) -> None:
     assert [manager.recv(100) for _ in range(3)] == [b"READY=1", b"WATCHDOG=1", b"STOPPING=1"]
 
 
-def test_an_abstract_socket_is_written_with_an_at_sign() -> None:
+def test_an_at_sign_marks_an_abstract_socket() -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
         listening.bind("")  # the kernel chooses an abstract name
         name = listening.getsockname()
@@ -34,7 +34,7 @@ def test_an_abstract_socket_is_written_with_an_at_sign() -> None:
         assert listening.recv(100) == b"READY=1"
 
 
-def test_without_a_manager_or_one_that_listens_nothing_happens(manager: socket.socket) -> None:
+def test_without_a_listening_manager_notifications_do_nothing(manager: socket.socket) -> None:
     Systemd({}).ready()
     Systemd({"NOTIFY_SOCKET": manager.getsockname() + "-gone"}).ready()
     full = Systemd({"NOTIFY_SOCKET": manager.getsockname()})

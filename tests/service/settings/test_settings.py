@@ -1,4 +1,4 @@
-"""Settings from a file, the environment and options; a bad one is named with its place."""
+"""Settings come from a file, the environment and options. Errors name the source and the key."""
 
 from pathlib import Path
 
@@ -39,7 +39,7 @@ attitude = { yaw_time = 4.0 }
 """
 
 
-def test_nothing_configured_gives_defaults_on_the_loopback() -> None:
+def test_without_configuration_the_defaults_listen_on_the_loopback() -> None:
     settings = load_settings(environment={})
     assert (settings.http.host, settings.http.port) == ("127.0.0.1", 8080)
     assert settings.zenoh.listen == ("tcp/127.0.0.1:7447",)
@@ -47,7 +47,7 @@ def test_nothing_configured_gives_defaults_on_the_loopback() -> None:
     assert settings.paper.values() == PaperParameters()
 
 
-def test_a_file_is_read_whole(tmp_path: Path) -> None:
+def test_all_sections_of_a_file_are_read(tmp_path: Path) -> None:
     settings = load_settings(write(tmp_path, FULL), environment={})
     assert settings.site.anchors[0].x == 1.5
     assert settings.tags["forklift-1"].start is not None
@@ -56,20 +56,20 @@ def test_a_file_is_read_whole(tmp_path: Path) -> None:
     assert parameters.attitude.yaw_time == 4.0
 
 
-def test_options_win_over_the_environment_and_that_over_the_file(tmp_path: Path) -> None:
+def test_options_override_the_environment_which_overrides_the_file(tmp_path: Path) -> None:
     environment = {"DROPANCHOR_HTTP__PORT": "8082", "DROPANCHOR_MAX_TAGS": "7", "DROPANCHOR_HTTP__HOST": "::1"}
     settings = load_settings(write(tmp_path, FULL), {"http": {"port": 8083}}, environment)
     assert (settings.http.port, settings.http.host, settings.max_tags) == (8083, "::1", 7)
     assert settings.unknown_tags == "refuse"
 
 
-def test_lists_in_the_environment_are_json_or_have_commas() -> None:
+def test_lists_in_the_environment_are_json_or_separated_by_commas() -> None:
     for text in ('["tcp/a:1", "tcp/b:2"]', "tcp/a:1, tcp/b:2"):
         settings = load_settings(environment={"DROPANCHOR_ZENOH__CONNECT": text})
         assert settings.zenoh.connect == ("tcp/a:1", "tcp/b:2")
 
 
-def test_a_text_is_a_number_in_the_environment_alone(tmp_path: Path) -> None:
+def test_a_string_is_accepted_as_a_number_only_in_the_environment(tmp_path: Path) -> None:
     environment = {"DROPANCHOR_SITE__DECLINATION_RAD": "0.05", "DROPANCHOR_SITE__ID": "7", "DROPANCHOR_INSECURE": "1"}
     settings = load_settings(environment=environment)
     assert (settings.site.declination_rad, settings.site.id, settings.insecure) == (0.05, "7", True)
@@ -77,7 +77,7 @@ def test_a_text_is_a_number_in_the_environment_alone(tmp_path: Path) -> None:
         load_settings(write(tmp_path, '[site]\ndeclination_rad = "0.05"'), environment={})
 
 
-def test_variables_of_others_with_our_prefix_are_left_alone() -> None:
+def test_unrelated_variables_with_the_prefix_are_ignored() -> None:
     assert load_settings(environment={"DROPANCHOR_DATA": "/somewhere"}) == load_settings(environment={})
 
 
@@ -103,9 +103,7 @@ def test_variables_of_others_with_our_prefix_are_left_alone() -> None:
         ("port = ", ["is not TOML", "Invalid value"]),
     ],
 )
-def test_a_bad_setting_is_named_with_its_file_key_and_what_is_expected(
-    tmp_path: Path, text: str, words: list[str]
-) -> None:
+def test_an_error_names_the_file_the_key_and_what_is_expected(tmp_path: Path, text: str, words: list[str]) -> None:
     file = write(tmp_path, text)
     with pytest.raises(SettingsError) as caught:
         load_settings(file, environment={})
@@ -113,7 +111,7 @@ def test_a_bad_setting_is_named_with_its_file_key_and_what_is_expected(
         assert word in str(caught.value)
 
 
-def test_all_bad_settings_are_told_at_once_and_each_with_its_own_place(tmp_path: Path) -> None:
+def test_all_errors_are_reported_together_each_with_its_source(tmp_path: Path) -> None:
     with pytest.raises(SettingsError) as caught:
         load_settings(write(tmp_path, "max_tags = 0"), {"http": {"port": -1}}, {"DROPANCHOR_ENGINE": "magic"})
     lines = str(caught.value).splitlines()
@@ -124,17 +122,17 @@ def test_all_bad_settings_are_told_at_once_and_each_with_its_own_place(tmp_path:
     ]
 
 
-def test_a_value_is_not_repeated_in_the_message_it_may_be_a_secret() -> None:
+def test_an_error_does_not_repeat_the_value_which_may_be_a_secret() -> None:
     with pytest.raises(SettingsError) as caught:
         load_settings(environment={"DROPANCHOR_HTTP__PORT": "hunter2"})
     assert "hunter2" not in str(caught.value)
 
 
-def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+def test_an_unreadable_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match=r"missing\.toml: cannot be read: No such file"):
         load_settings(tmp_path / "missing.toml", environment={})
 
 
-def test_settings_cannot_change_after_they_are_built() -> None:
+def test_settings_are_immutable() -> None:
     with pytest.raises(ValidationError):
         load_settings(environment={}).max_tags = 3

@@ -29,7 +29,7 @@ def test_a_recording_is_started_stopped_listed_and_fetched(house: House) -> None
     assert started.status_code == 201
     assert RecordingState.model_validate(started.json()) == RecordingState(recording=True, since_ns=T_NS, tags=["a"])
     assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "records-already"
-    recorder.messages([(0, b"payload", ENCODING_PACKED, T_NS)])
+    recorder.record_messages([(0, b"payload", ENCODING_PACKED, T_NS)])
     recorder.writer.flush()
     listed = RecordingList.model_validate(ask(app, "GET", "/api/v1/recordings").json())
     assert listed.file == listed.files[0].name
