@@ -44,7 +44,9 @@ class RecordingMetrics(Collector):
 
 def _writer_metrics(name: str, writer: BackgroundWriter[Any]) -> Iterable[Metric]:
     yield CounterMetricFamily(
-        f"dropanchor_{name}_dropped", f"Items that the {name} dropped because its queue was full.", writer.dropped
+        f"dropanchor_{name}_dropped",
+        f"Items that the {name} dropped because its queue was full or a write failed for good.",
+        writer.dropped,
     )
     yield CounterMetricFamily(f"dropanchor_{name}_errors", f"Failed attempts to write the {name}.", writer.errors)
     yield GaugeMetricFamily(
