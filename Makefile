@@ -1,4 +1,4 @@
-# make demo · make test · make check · make bench          (make help explains)
+# make demo · make test · make check · make bench · make results          (make help explains)
 
 PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
@@ -10,14 +10,17 @@ PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/
 PARALLEL := -n 2 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
 
-.PHONY: help demo test check bench install chromium clean
+RESULTS := service/docs/results
+
+.PHONY: help demo test check bench results install chromium clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo 'make demo     start the service and simulated tags around one anchor, print the page address'
 	@echo 'make test     install what the tests need and run them all'
-	@echo 'make check    format, lint, types, import rules, schema drift'
-	@echo 'make bench    measure, print and record'
+	@echo 'make check    format, lint, types, import rules, generated files, age of the results'
+	@echo 'make bench    measure what the service costs, print it and write it into $(RESULTS)/performance.md'
+	@echo 'make results  measure everything in $(RESULTS) again: hours, on a machine that does nothing else'
 	@echo 'make install  the set-up alone: a virtual environment in $(VENV)'
 
 install: $(STAMP)
@@ -53,9 +56,15 @@ check: install
 	@$(BIN)/python -m dropanchor_schemas.export --check
 	@$(BIN)/python -m dropanchor_service.api.export --check
 	@$(BIN)/python -m dropanchor_service.reference.export --check
+	@$(BIN)/python -m dropanchor_service.evaluation.results --check
 
 bench: install chromium
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
+
+results: bench
+	@$(BIN)/dropanchor evaluate recordings --into $(RESULTS)/recordings.md $(EVALUATE)
+	@$(BIN)/dropanchor evaluate paper --into $(RESULTS)/paper.md $(EVALUATE)
+	@$(BIN)/dropanchor evaluate product --into $(RESULTS)/scenarios.md $(EVALUATE)
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -13,6 +13,7 @@ MESSAGE_S = 0.2
 IMU_PER_MESSAGE, RANGES_PER_MESSAGE = 20, 2
 SAMPLES_PER_MESSAGE = IMU_PER_MESSAGE + RANGES_PER_MESSAGE
 STEP_NS = int(MESSAGE_S * 1e9)
+ANCHOR = 1  # number of the one anchor, as in the settings of the measured service
 TRACKS = 48  # distinct motions; tag i moves like track i % TRACKS, at its own phase
 
 _PACKED_IMU = np.dtype([("dt_us", "<u4"), ("values", "<f4", 9)])
@@ -54,5 +55,6 @@ def _body(run: Simulation, index: int) -> bytes:
     ranges = np.zeros(RANGES_PER_MESSAGE, _PACKED_RANGE)
     chosen = slice(index * RANGES_PER_MESSAGE + 1, (index + 1) * RANGES_PER_MESSAGE + 1)
     ranges["dt_us"] = np.arange(1, RANGES_PER_MESSAGE + 1) * 100_000
+    ranges["anchor"] = ANCHOR
     ranges["value"], ranges["std"] = run.ranges.range_m[chosen], run.ranges.std_m[chosen]
     return imu.tobytes() + ranges.tobytes()

@@ -1,13 +1,21 @@
-"""The measurements as tables, and their place in the README beside this."""
-
-import os
-import platform
-from datetime import UTC, datetime
-from pathlib import Path
+"""The measurements as tables, and their place in the documents."""
 
 from benchmarks.step import Figures
+from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
 
-README = Path(__file__).with_name("README.md")
+PAGE = PAGES / "performance.md"
+_WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
+SOURCES = {
+    "capacity": _WHOLE,
+    "engines": ("estimation",),
+    "idle": _WHOLE,
+    "overload": _WHOLE,
+    "page": ("dashboard",),
+    "pose-json": ("answers",),
+    "rest": ("answers", "api"),
+    "sessions": _WHOLE,
+}
+"""What each table measures, below the package of the service."""
 HEAD = (
     "| tags | samples/s | service CPU | CPU-s per 10⁶ samples | query p50 / p99 ms | store p50 / p99 ms ≤ "
     "| kB per tag | lost | router CPU | generator late p99 ms | load |\n" + "|---" * 11 + "|"
@@ -39,19 +47,6 @@ def ratios(end_to_end: float, costs: dict[str, float]) -> str:
 
 
 def record(name: str, text: str) -> None:
-    """Print it, and put it between the marks of this name in the README."""
-    when = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    cores = f"{os.cpu_count()} cores of {_processor()}"
-    block = f"{text}\n\nMeasured {when}, Python {platform.python_version()}, {cores}.\n"
-    print(f"\n== {name}\n{block}", flush=True)
-    begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
-    before, _, rest = README.read_text(encoding="utf-8").partition(begin)
-    _, found, after = rest.partition(end)
-    assert found, f"{README.name} has no place for {name}"
-    README.write_text(f"{before}{begin}\n{block}\n{end}{after}", encoding="utf-8")
-
-
-def _processor() -> str:
-    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.machine()
+    """Print the table, and write it between the markers of this name in the page of results."""
+    print(f"\n== {name}\n{text}", flush=True)
+    write(ROOT, PAGE, name, text, Measured([f"service/dropanchor_service/{source}" for source in SOURCES[name]]))

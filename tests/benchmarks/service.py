@@ -6,7 +6,7 @@ from pathlib import Path
 import httpx
 
 from benchmarks import proc
-from benchmarks.motion import SAMPLES_PER_MESSAGE, tracks
+from benchmarks.motion import ANCHOR, SAMPLES_PER_MESSAGE, tracks
 from support.service import Running
 
 MAX_TAGS = 200_000
@@ -61,5 +61,5 @@ def settings_file(tags: int, folder: Path) -> Path:
         for i, (x, y, heading) in ((i, starts[i % len(starts)]) for i in range(tags))
     ]
     file = folder / f"fleet-{tags}.toml"
-    file.write_text(f'max_tags = {MAX_TAGS}\n[[site.anchors]]\nid = "1"\n' + "\n".join(tables))
+    file.write_text(f'max_tags = {MAX_TAGS}\n[[site.anchors]]\nid = "{ANCHOR}"\n' + "\n".join(tables))
     return file

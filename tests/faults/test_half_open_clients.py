@@ -19,7 +19,7 @@ from support.zenoh_router import connected_session
 
 HTTP_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_HTTP", "200"))
 ZENOH_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_ZENOH", "100"))
-"""1,000 and 300 in the figures of the README, which `pytest -s` prints."""
+"""1,000 and 300 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
 
 PATIENCE_S = 60.0
 

@@ -25,7 +25,7 @@ from support.zenoh_router import connected_session, free_port, wait_until
 
 GONE = [f"gone-{number}" for number in range(int(os.environ.get("DROPANCHOR_VANISHING_TAGS", "12")))]
 HERE = [f"here-{number}" for number in range(int(os.environ.get("DROPANCHOR_STAYING_TAGS", "12")))]
-"""60 and 40 in the larger case of the README, whose figures `pytest -s` prints."""
+"""60 and 40 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
 
 HZ = 10
 MOST_S = 1.0

@@ -15,7 +15,7 @@ from support.service import Running, running_service, settings_file, straight_no
 from support.zenoh_router import connected_session, wait_until
 
 UNKNOWN = int(os.environ.get("DROPANCHOR_UNKNOWN_TAGS_SENT", "5000"))
-"""100,000 in the figures of the README, which `pytest -s` prints."""
+"""100,000 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
 
 NOTHING_LOST: dict[str, Any] = {
     "encoding": ENCODING_PACKED,

@@ -14,8 +14,8 @@ from dropanchor_service.evaluation.paper.whole import FULL, QUICK, TITLE, Experi
 from dropanchor_service.evaluation.parallel import Workers
 from dropanchor_service.evaluation.plaza import FILES, read_plaza
 from dropanchor_service.evaluation.product.rows import NoRowError
-from dropanchor_service.evaluation.report import Section, markdown_table, write_report
-from dropanchor_service.evaluation.results import NoPlaceError
+from dropanchor_service.evaluation.report import Section, markdown_section, markdown_table, write_report
+from dropanchor_service.evaluation.results import ROOT, Measured, NoPlaceError, require_place, write
 from dropanchor_tag_client.recording import RecordingError
 
 DESCRIPTION = """\
@@ -35,6 +35,7 @@ examples:
   dropanchor evaluate product --rows 'S5/*' 'walk-*/9-axis/*' --seeds 5000-5019
 """
 DATA = Path("../shared/data")
+SOURCES = ("service/dropanchor_service/estimation", "service/dropanchor_service/evaluation/paper")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,13 +43,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     paper = what.add_parser("paper", help="the experiments of the paper")
     paper.add_argument("--out", type=Path, default=Path("report"), metavar="DIR", help="where to write (report)")
     paper.add_argument("--quick", action="store_true", help="few seeds: shows that it runs, not how good it is")
+    _add_into(paper)
     _add_common(paper)
     real = what.add_parser("recordings", help="real recordings with ground truth")
     real.add_argument("--plaza", action="store_true", help="the Plaza sets of the package gtsam")
     real.add_argument("--out", type=Path, metavar="DIR", help="write a report there, too")
+    _add_into(real)
     _add_common(real)
     product.add_arguments(what.add_parser("product", help="the whole engine on what tags send"))
     _add_common(what.choices["product"])
+
+
+def _add_into(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--into", type=Path, metavar="PAGE", help="put the tables between their markers in a page")
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
@@ -78,15 +85,26 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _paper(arguments: argparse.Namespace) -> int:
     plan = QUICK if arguments.quick else FULL
+    _require_place(arguments)
     arguments.out.mkdir(parents=True, exist_ok=True)  # before the minutes of work, not after them
     with Workers(arguments.processes) as workers:
         sections = _run_all(experiments(plan, workers, arguments.data))
     write_report(arguments.out, TITLE, preface(plan), sections)
     print(f"report: {arguments.out / 'report.html'}")
+    if arguments.into:
+        own = [section for section in sections if section.key != "recordings"]  # they have a page of their own
+        text = "\n\n".join([*preface(plan), *(f"### {one.title}\n\n{markdown_section(one)}" for one in own)])
+        write(ROOT, arguments.into, "paper", text, Measured(SOURCES, f"0-{plan.families - 1}"))
     return 0
 
 
+def _require_place(arguments: argparse.Namespace) -> None:
+    if arguments.into:
+        require_place(arguments.into, arguments.what)
+
+
 def _recordings(arguments: argparse.Namespace) -> int:
+    _require_place(arguments)
     with Workers(arguments.processes) as workers:
         if arguments.plaza:
             plaza = [read_plaza(name) for name in FILES]
@@ -102,6 +120,9 @@ def _recordings(arguments: argparse.Namespace) -> int:
     if arguments.out:
         write_report(arguments.out, "Real recordings", [], sections)
         print(f"report: {arguments.out / 'report.html'}")
+    if arguments.into:
+        text = "\n\n".join(markdown_section(section) for section in sections)
+        write(ROOT, arguments.into, "recordings", text, Measured(SOURCES[:1]))
     return 0
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from dropanchor_service.evaluation.parallel import Workers
-from dropanchor_service.evaluation.product.report import markdown, write_into, write_json
+from dropanchor_service.evaluation.product.report import NAME, markdown, write_into, write_json
 from dropanchor_service.evaluation.product.rows import (
     DEVELOPMENT_SEEDS,
     FIRST_REPORTED_SEED,
@@ -17,6 +17,7 @@ from dropanchor_service.evaluation.product.rows import (
     simulated_rows,
 )
 from dropanchor_service.evaluation.product.work import Result, prepare, tasks, work
+from dropanchor_service.evaluation.results import require_place
 
 SEEDS = range(FIRST_REPORTED_SEED, FIRST_REPORTED_SEED + 100)
 QUICK_SEEDS = range(DEVELOPMENT_SEEDS[0], DEVELOPMENT_SEEDS[0] + 3)
@@ -58,6 +59,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if arguments.out:
         arguments.out.mkdir(parents=True, exist_ok=True)
+    if arguments.into:
+        require_place(arguments.into, NAME)
     seeds = arguments.seeds or (QUICK_SEEDS if arguments.quick else SEEDS)
     prepare()  # once, before two processes would compile the same
     results: list[Result] = []

@@ -82,12 +82,16 @@ def markdown_table(table: Table) -> str:
     return "\n".join([f"*{table.caption}*", "", *lines])
 
 
+def markdown_section(section: Section) -> str:
+    """Return the section's sentences and tables, without its heading and figures."""
+    said = [f"**The paper:** {section.paper}", f"**Here:** {section.finding}", *section.text]
+    return "\n\n".join([*said, *(markdown_table(table) for table in section.tables)])
+
+
 def _markdown(title: str, preface: Sequence[str], sections: Sequence[Section]) -> str:
     parts = [f"# {title}", *preface]
     for section in sections:
-        parts += [f"## {section.title}", f"**The paper:** {section.paper}", f"**Here:** {section.finding}"]
-        parts += section.text
-        parts += [markdown_table(table) for table in section.tables]
+        parts += [f"## {section.title}", markdown_section(section)]
         parts += [f"![{name}]({name}.png)" for name in section.figures]
     return "\n\n".join(parts) + "\n"
 

@@ -1,8 +1,12 @@
 """Tables of measured figures in the documents: a command writes them, and a check says when they are no longer true.
 
-A table stands between two markers in a Markdown file. The first marker says when, where and of which commit it was
-measured. It also holds two digests: of the table, so that an edit by hand is noticed, and of the sources that the table
-measures, so that a table older than they are is noticed. Comments, docstrings and formatting do not count as a change.
+A table stands between two markers in a Markdown file. Its last line says when, where and at which commit it was
+measured. The first marker holds two digests. That of the table shows an edit by hand. That of the sources which the
+table measures shows that the table is older than they are. Comments, docstrings and formatting do not count.
+
+The line `<!-- place for NAME -->` is where a table goes that nobody has measured yet.
+
+`python -m dropanchor_service.evaluation.results --check` checks every page in `service/docs/results`.
 """
 
 import ast
@@ -11,6 +15,7 @@ import os
 import platform
 import re
 import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -19,28 +24,39 @@ from pathlib import Path
 _BLOCK = re.compile(
     r"<!-- results (?P<name>[\w-]+)(?P<facts>[^>]*) -->\n(?P<text>.*?)<!-- end (?P=name) -->\n", re.DOTALL
 )
+_PLACE = re.compile(r"<!-- place for (?P<name>[\w-]+) -->\n")
 _FACT = re.compile(r'(\w+)="([^"]*)"')
 _DIGITS = 16
+_CODE = (".py", ".js", ".css", ".html")
+
+ROOT = Path(__file__).parents[3]
+PAGES = ROOT / "service" / "docs" / "results"
 
 
 class NoPlaceError(LookupError):
-    """The page has no markers of this name."""
+    """The page has no place for a table of this name."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a table measures. sources: files or folders of Python code, relative to the root of the project."""
+    """What a table measures. sources: files or folders of code, relative to the root of the project."""
 
     sources: Sequence[str]
     seeds: str = ""
 
 
+def require_place(page: Path, name: str) -> re.Match[str]:
+    """Return where the table of this name is or goes. Raises NoPlaceError, OSError."""
+    text = page.read_text(encoding="utf-8")
+    for found in (*_BLOCK.finditer(text), *_PLACE.finditer(text)):
+        if found["name"] == name:
+            return found
+    raise NoPlaceError(f"{page.name} has no place for {name}: add the line <!-- place for {name} -->")
+
+
 def write(root: Path, page: Path, name: str, text: str, measured: Measured) -> None:
-    """Put `text` between the markers of `name` in the page. Raises NoPlaceError where there are none."""
-    old = page.read_text(encoding="utf-8")
-    found = next((block for block in _BLOCK.finditer(old) if block["name"] == name), None)
-    if found is None:
-        raise NoPlaceError(f"{page.name} has no place for {name}: add <!-- results {name} --> and <!-- end {name} -->")
+    """Put `text` between the markers of `name` in the page. Raises NoPlaceError, OSError."""
+    found = require_place(page, name)
     body = f"\n{text.strip()}\n\n{_sentence(root, measured)}\n\n"
     facts = {
         "seeds": measured.seeds,
@@ -50,7 +66,7 @@ def write(root: Path, page: Path, name: str, text: str, measured: Measured) -> N
     }
     head = " ".join(f'{key}="{value}"' for key, value in facts.items())
     block = f"<!-- results {name} {head} -->\n{body}<!-- end {name} -->\n"
-    page.write_text(old[: found.start()] + block + old[found.end() :], encoding="utf-8")
+    page.write_text(found.string[: found.start()] + block + found.string[found.end() :], encoding="utf-8")
 
 
 def problems(root: Path, pages: Sequence[Path]) -> Iterator[str]:
@@ -68,14 +84,20 @@ def problems(root: Path, pages: Sequence[Path]) -> Iterator[str]:
 
 
 def sources_digest(root: Path, sources: Sequence[str]) -> str:
-    """Return a digest of the code in these files and folders, without comments and docstrings."""
+    """Return a digest of the code in these files and folders, without comments and docstrings of Python."""
     digest = hashlib.sha256()
     for source in sources:
         path = root / source
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
-            digest.update(file.relative_to(root).as_posix().encode())
-            digest.update(ast.dump(_without_docstrings(ast.parse(file.read_text(encoding="utf-8")))).encode())
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if file.suffix in _CODE and file.is_file():
+                digest.update(file.relative_to(root).as_posix().encode())
+                digest.update(_code(file).encode())
     return digest.hexdigest()[:_DIGITS]
+
+
+def _code(file: Path) -> str:
+    text = file.read_text(encoding="utf-8")
+    return ast.dump(_without_docstrings(ast.parse(text))) if file.suffix == ".py" else text
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:
@@ -123,3 +145,17 @@ def _processor() -> str:
         return platform.machine()
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.machine()
+
+
+def main(arguments: list[str]) -> int:
+    """Return 1 and print a sentence for each table that is not current, 2 for other arguments than --check."""
+    if arguments != ["--check"]:
+        sys.stderr.write("usage: python -m dropanchor_service.evaluation.results --check\n")
+        return 2
+    found = list(problems(ROOT, sorted(PAGES.glob("*.md"))))
+    sys.stderr.writelines(f"{problem}\n" for problem in found)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

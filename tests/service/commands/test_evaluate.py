@@ -60,8 +60,20 @@ def test_the_report_has_every_experiment_and_the_same_seeds_give_the_same_number
     (tmp_path / "data" / "square").mkdir(parents=True)
     write_square(tmp_path / "data" / "square", range_std_m=0.05)
     out = {processes: tmp_path / str(processes) for processes in (1, 2)}
+    page = tmp_path / "paper.md"
+    page.write_text("# The paper\n\n<!-- place for paper -->\n")
     for processes, folder in out.items():
-        options = ["--quick", "--out", str(folder), "--data", str(tmp_path / "data"), "--processes", str(processes)]
+        options = [
+            "--into",
+            str(page),
+            "--quick",
+            "--out",
+            str(folder),
+            "--data",
+            str(tmp_path / "data"),
+            "--processes",
+            str(processes),
+        ]
         assert main(["evaluate", "paper", *options]) == 0
     assert "100%" in capsys.readouterr().err
     one, two = (results(folder) for folder in out.values())
@@ -72,6 +84,8 @@ def test_the_report_has_every_experiment_and_the_same_seeds_give_the_same_number
     }
     assert one["families"]["rows"]["L1-paper"]["vanilla EKF, tuned"]["median"] > 0
     assert one["recordings"]["square"]["A"]["Algorithm 1, tuned"]["rmse"] < 2.0
+    assert "### Table I" in page.read_text()
+    assert "Real recordings" not in page.read_text()
     report = (out[1] / "report.html").read_text()
     assert "seeds 1000 to 1007" in report
     assert "2.81" in report
@@ -83,10 +97,26 @@ def test_the_report_has_every_experiment_and_the_same_seeds_give_the_same_number
 def test_recordings_are_compared_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "square").mkdir()
     write_square(tmp_path / "square", range_std_m=0.05)
-    assert main(["evaluate", "recordings", "--data", str(tmp_path), "--processes", "1"]) == 0
+    page = tmp_path / "recordings.md"
+    page.write_text("# Recordings\n\n<!-- place for recordings -->\n")
+    options = ["--data", str(tmp_path), "--processes", "1", "--into", str(page)]
+    assert main(["evaluate", "recordings", *options]) == 0
     printed = capsys.readouterr().out
     assert "| square | A |" in printed
     assert "development set" in printed
+    assert "| square | A |" in page.read_text()
+
+
+@pytest.mark.parametrize("what", ["paper", "recordings", "product"])
+def test_a_page_without_a_place_is_said_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("text\n")
+    assert main(["evaluate", what, "--data", str(tmp_path), "--into", str(page)]) == 2
+    printed = capsys.readouterr().err
+    assert f"page.md has no place for {what}" in printed
+    assert "%" not in printed
 
 
 def test_a_folder_without_recordings_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

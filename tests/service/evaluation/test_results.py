@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_service.evaluation.results import Measured, NoPlaceError, problems, write
+from dropanchor_service.evaluation.results import Measured, NoPlaceError, main, problems, write
 
 PAGE = "# Results\n\n<!-- results speed -->\n<!-- end speed -->\n\nWhat it means.\n"
 CODE = '"""Doc."""\n\n\ndef twice(x):\n    """Double."""\n    return 2 * x  # why\n'
@@ -47,6 +47,16 @@ def test_writing_again_replaces_the_table(root: Path) -> None:
     assert found(root) == []
 
 
+def test_a_place_becomes_a_table_and_is_no_problem_before(root: Path) -> None:
+    (root / "page.md").write_text("Before.\n\n<!-- place for speed -->\n\nAfter.\n")
+    assert found(root) == []
+    measure(root)
+    text = (root / "page.md").read_text()
+    assert text.startswith("Before.\n\n<!-- results speed ")
+    assert text.endswith("<!-- end speed -->\n\nAfter.\n")
+    assert "place for" not in text
+
+
 def test_an_edit_by_hand_is_noticed(root: Path) -> None:
     measure(root)
     page = root / "page.md"
@@ -60,6 +70,23 @@ def test_a_change_of_the_code_makes_a_table_old_and_a_change_of_comments_does_no
     assert found(root) == []
     (root / "code.py").write_text(CODE.replace("2 * x", "3 * x"))
     assert found(root) == ["page.md, speed: code.py changed since; measure it again"]
+
+
+def test_the_code_of_the_page_counts_and_so_does_its_removal(root: Path) -> None:
+    (root / "map").mkdir()
+    script = root / "map" / "draw.js"
+    script.write_text("draw();\n")
+    write(root, root / "page.md", "speed", "| 1 |", Measured(["map"]))
+    assert found(root) == []
+    script.write_text("drawTwice();\n")
+    assert found(root) == ["page.md, speed: map changed since; measure it again"]
+    script.unlink()
+    assert found(root) == ["page.md, speed: map changed since; measure it again"]
+
+
+def test_the_command_checks_and_does_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    assert "--check" in capsys.readouterr().err
 
 
 def test_a_page_without_a_place_is_an_error(root: Path) -> None:

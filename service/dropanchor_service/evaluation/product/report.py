@@ -9,10 +9,9 @@ from typing import Any
 
 from dropanchor_service.evaluation.product.rows import purpose
 from dropanchor_service.evaluation.product.work import BATCH_S, Result
-from dropanchor_service.evaluation.results import Measured, commit, write
+from dropanchor_service.evaluation.results import ROOT, Measured, commit, write
 
 NAME = "product"
-ROOT = Path(__file__).parents[4]
 SOURCES = ("service/dropanchor_service/estimation", "tag_client/dropanchor_tag_client/simulator")
 COLUMNS = (
     *("motion / sensors / told / start", "RMSE", "2nd half", "up to rotation", "lost", "tracking after", "never"),
