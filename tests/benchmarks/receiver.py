@@ -9,7 +9,7 @@ from typing import Any
 import zenoh
 
 from dropanchor_schemas.keys import all_tags
-from dropanchor_service.zenoh_io.channel import received
+from dropanchor_service.zenoh_io.channel import drain
 from dropanchor_service.zenoh_io.intake import GATHER_S, WAITING
 from support.zenoh_router import connected_session
 
@@ -18,7 +18,7 @@ def main(endpoint: str) -> None:
     count = [0]
 
     def take_all(channel: Any) -> None:
-        for sample in received(channel, GATHER_S):
+        for sample in drain(channel, GATHER_S):
             count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
     with connected_session(endpoint) as session:
