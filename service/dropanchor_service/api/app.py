@@ -104,7 +104,11 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
 def _add_access(document: dict[str, Any]) -> None:
     """Add the bearer scheme and the responses of refused requests to every protected operation."""
     document["components"]["securitySchemes"] = {
-        "bearer": {"type": "http", "scheme": "bearer", "description": "An API key, or a token of the site's OpenID Connect provider."}
+        "bearer": {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "An API key, or a token of the site's OpenID Connect provider.",
+        }
     }
     refusals = {str(status): response for status, response in problems(*_REFUSALS).items()}
     for path, operations in document["paths"].items():

@@ -73,7 +73,9 @@ def _tag(site: str, tag: str) -> list[Section]:
         _rule(f"{tag}: puts its samples", "ingress", ["put"], own),
         _rule(f"{tag}: declares its liveliness", "ingress", ["liveliness_token"], [alive, f"{samples}/@adv/**"]),
         _rule(f"{tag}: answers from its cache", "ingress", ["declare_queryable", "reply"], own),
-        _rule(f"{tag}: receives queries to its cache", "egress", _RECOVERY, [all_samples, f"{all_samples}/@adv/**", *own]),
+        _rule(
+            f"{tag}: receives queries to its cache", "egress", _RECOVERY, [all_samples, f"{all_samples}/@adv/**", *own]
+        ),
         _rule(f"{tag}: requests its pose", "ingress", ["query", "declare_subscriber"], [pose, keys.all_anchors(site)]),
         _rule(f"{tag}: receives its pose", "egress", ["put", "reply"], [pose, keys.all_anchors(site)]),
     ]

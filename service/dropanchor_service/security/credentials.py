@@ -29,7 +29,9 @@ def credentials_of(settings: Settings) -> SecurityFolder | None:
     except SecurityError as error:
         raise SettingsError(f"security.folder: {error}") from error
     for sentence in folder.expiring(EXPIRY_WARNING):
-        _log.warning("%s; renew it with `dropanchor security renew`, or with `dropanchor tag add --renew` for a tag", sentence)
+        _log.warning(
+            "%s; renew it with `dropanchor security renew`, or with `dropanchor tag add --renew` for a tag", sentence
+        )
     return folder
 
 

@@ -110,7 +110,9 @@ class SecurityFolder:
         limit = datetime.now(UTC) + within
         expiries = {f"the certificate {self.certificate(name)}": self._expires(name) for name in ("ca", *ROLES)}
         expiries |= {f"the certificate of tag {name!r}": self.table.tags[name].expires for name in self.table.admitted}
-        return [f"{what} expires on {end:%Y-%m-%d}" for what, end in expiries.items() if end is not None and end < limit]
+        return [
+            f"{what} expires on {end:%Y-%m-%d}" for what, end in expiries.items() if end is not None and end < limit
+        ]
 
     def add_tag(self, name: str, days: int, renew: bool = False) -> Path:
         """Issue a certificate to a tag, and return the folder to copy onto it.
@@ -172,7 +174,9 @@ class SecurityFolder:
     def _refuse_tag(self, name: str, renew: bool) -> None:
         chunk_from_id(name)
         if len(name.encode()) > MAX_COMMON_NAME_BYTES:
-            raise SecurityError(f"{name!r} is too long for a certificate: a name may have {MAX_COMMON_NAME_BYTES} bytes")
+            raise SecurityError(
+                f"{name!r} is too long for a certificate: a name may have {MAX_COMMON_NAME_BYTES} bytes"
+            )
         if name in ROLES:
             raise SecurityError(f"{name!r} is a reserved name; choose another name for the tag")
         existing = self.table.tags.get(name)
@@ -198,7 +202,9 @@ class SecurityFolder:
         try:
             return Authority(Issued((self.path / "ca.pem").read_bytes(), (self.path / "ca.key").read_bytes()))
         except OSError as error:
-            raise SecurityError(f"the authority's certificate and key are needed: {error.filename}: {error.strerror}") from error
+            raise SecurityError(
+                f"the authority's certificate and key are needed: {error.filename}: {error.strerror}"
+            ) from error
         except ValueError as error:
             raise SecurityError(f"the authority in {self.path} is damaged: {error}") from error
 

@@ -73,7 +73,9 @@ def _exposed_by_file(settings: ZenohSettings) -> Iterator[str]:
         return  # the error is reported when the session is opened
     mode = json.loads(config.get_json("mode")) or "peer"
     listen = json.loads(config.get_json("listen/endpoints")) if mode != "client" else []
-    authenticates = _has(config, "transport/link/tls/enable_mtls") or _has(config, "transport/auth/usrpwd/dictionary_file")
+    authenticates = _has(config, "transport/link/tls/enable_mtls") or _has(
+        config, "transport/auth/usrpwd/dictionary_file"
+    )
     for endpoint in _endpoints(listen.get(mode, []) if isinstance(listen, dict) else listen):
         if _is_reachable(endpoint) and not (authenticates and endpoint.startswith(_ENCRYPTED_LINKS)):
             yield f"Zenoh at {endpoint} (set in {settings.config_file})"

@@ -131,7 +131,9 @@ async def _on_invalid_request(request: Request, error: Exception) -> Response:
 
 
 async def _on_exception(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs it
-    return problem_response(request, Kind.INTERNAL, "An unexpected error occurred. The log of the service has the details.")
+    return problem_response(
+        request, Kind.INTERNAL, "An unexpected error occurred. The log of the service has the details."
+    )
 
 
 def _path(request: Request) -> str:
