@@ -10,7 +10,7 @@ import zenoh
 
 from dropanchor_schemas.keys import all_tags
 from dropanchor_service.zenoh_io.channel import drain
-from dropanchor_service.zenoh_io.intake import GATHER_S, WAITING
+from dropanchor_service.zenoh_io.intake import GATHER_S, CHANNEL_LENGTH
 from support.zenoh_router import connected_session
 
 
@@ -22,7 +22,9 @@ def main(endpoint: str) -> None:
             count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
     with connected_session(endpoint) as session:
-        subscriber = session.declare_subscriber(all_tags("default", "samples"), zenoh.handlers.FifoChannel(WAITING))
+        subscriber = session.declare_subscriber(
+            all_tags("default", "samples"), zenoh.handlers.FifoChannel(CHANNEL_LENGTH)
+        )
         thread = threading.Thread(target=take_all, args=(subscriber.handler,))
         thread.start()
         print("ready", flush=True)

@@ -90,8 +90,8 @@ def _explain(settings: ZenohSettings, text: str) -> str:
     endpoints = ", ".join(settings.connect or settings.listen)
     if settings.connect:
         return (
-            f"Zenoh cannot connect to {endpoints}: check the address, that a router runs there, and whether it requires "
-            f"a certificate (--security). ({text})"
+            f"Zenoh cannot connect to {endpoints}: check the address, that a router runs there, and whether it "
+            f"requires a certificate (--security). ({text})"
         )
     if "address already in use" in text.lower() or "os error 98" in text.lower():
         return f"Zenoh cannot listen on {endpoints}: the port is in use. Choose another one with --zenoh-listen."

@@ -9,7 +9,7 @@ from dropanchor_schemas.answers import Connect
 from dropanchor_service.answers.connect_command import reachable_endpoint, simulate_command, tag_command
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, example_response
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.store.site import SiteStore
 

@@ -22,9 +22,9 @@ from dropanchor_service.api.routes.parameters import (
     LastInnovations,
     TagFilter,
     TagId,
+    example_response,
     id_of,
     json_response,
-    example_response,
 )
 from dropanchor_service.store.tags import Tag
 

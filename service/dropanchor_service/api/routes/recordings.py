@@ -10,7 +10,7 @@ from starlette.responses import Response, StreamingResponse
 from dropanchor_schemas.recordings import RecordingList, RecordingRequest, RecordingState
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, saving, example_response
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.recording.recorder import Recorder
 
 MEDIA_TYPE = "application/octet-stream"

@@ -10,7 +10,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, AnchorId, json_response, saving, example_response
+from dropanchor_service.api.routes.parameters import NO_QUERY, AnchorId, example_response, json_response, saving
 from dropanchor_service.store.site import SiteStore
 
 _BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)

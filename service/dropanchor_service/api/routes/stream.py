@@ -30,7 +30,8 @@ _NAP_S = 0.2
 _DESCRIPTION = """\
 Server-sent events. The first event, `snapshot`, holds every tag that has a pose. Each `poses` event then holds the tags
 that have changed since. The data of both is a `PoseFrame`. A client that reads slowly gets the newest poses when it is
-ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every 5 s."""
+ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every
+5 s."""
 
 
 class StreamQuery(TagFilter):

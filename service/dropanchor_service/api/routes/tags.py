@@ -12,7 +12,7 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, json_response, saving, example_response
+from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
 
 _REASON_NAMES = [reason.value for reason in REASONS]
@@ -77,8 +77,8 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         "/tags/{tag}/settings",
         operation_id="put_tag_settings",
         summary="Replace the settings of a tag",
-        description="An unknown tag is registered. The estimator of the tag restarts with the new settings, from `start` "
-        "if it is given.",
+        description="An unknown tag is registered. The estimator of the tag restarts with the new settings, from "
+        "`start` if it is given.",
         response_model=TagSettings,
         responses=example_response(examples.TAG_SETTINGS)
         | problems(Kind.TAGS_FULL, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
