@@ -10,7 +10,7 @@ import zenoh
 
 from dropanchor_schemas.keys import all_tags
 from dropanchor_service.zenoh_io.channel import drain
-from dropanchor_service.zenoh_io.intake import GATHER_S, CHANNEL_LENGTH
+from dropanchor_service.zenoh_io.intake import CHANNEL_LENGTH, GATHER_S
 from support.zenoh_router import connected_session
 
 
