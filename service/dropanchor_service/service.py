@@ -1,4 +1,4 @@
-"""The service put together: what it consists of, in the order in which it starts and, backwards, stops."""
+"""The wiring of the service: its parts, in the order in which they start. They stop in reverse order."""
 
 import logging
 import os
@@ -52,9 +52,9 @@ _log = logging.getLogger(__name__)
 
 
 class Service:
-    """Runs while it is open: `with Service(settings) as service`.
+    """The running service: `with Service(settings) as service`.
 
-    Raises, when it is made or opened, SettingsError, ListenError or ZenohError, each with a sentence for its user.
+    Creating or entering it raises SettingsError, ListenError or ZenohError, each with a message for the user.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -123,15 +123,17 @@ class Service:
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._link)
             self._http.start()
-            # Asked first, joined last: what is stuck there keeps nobody else from stopping.
+            # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
         if self._checkpoints is None:
-            lacking = (
-                "without data_dir" if self._settings.data_dir is None else f"by the engine {self._settings.engine}"
+            reason = (
+                "data_dir is not set"
+                if self._settings.data_dir is None
+                else f"the engine {self._settings.engine} does not support them"
             )
-            _log.info("%s no checkpoints are kept: after a restart all tags start afresh", lacking)
+            _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
 
     def __exit__(
@@ -143,40 +145,40 @@ class Service:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
+        """The address of the dashboard."""
         host, port = self._address[:2]
         scheme = "http" if self._certificate is None else "https"
         return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
     def problems(self) -> Sequence[str]:
-        """Why the service cannot do its work at this moment; empty when it can."""
+        """Return why the service cannot do its work now; empty when it can."""
         found = (self._thread.problem, self._link.problem)
         dead = [f"the thread {name} has died" for name in self._dead_threads()]
         return [*dead, *(problem for problem in found if problem is not None)]
 
     def impairments(self) -> Sequence[str]:
-        """What does not work although the service does its work."""
+        """Return what does not work although the service can do its main work."""
         found = [*self._persistence.problems(), self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property
     def has_died(self) -> bool:
-        """Whether a thread that must run does not: only a new process can be trusted then."""
+        """Whether a thread that must run has died. The process has to be restarted then."""
         return bool(self._dead_threads())
 
     @property
     def makes_progress(self) -> bool:
-        """Whether samples are fused as they come in."""
+        """Whether samples are processed as they arrive."""
         return self._thread.problem is None
 
     def _dead_threads(self) -> list[str]:
         threads = {"http": self._http.is_alive, "ingest": self._thread.is_alive}
         if self._checkpoints is not None:
             threads["checkpoints"] = self._checkpoints.is_alive
-        return sorted({*self._supervision.dead_threads, *(name for name, lives in threads.items() if not lives)})
+        return sorted({*self._supervision.dead_threads, *(name for name, is_alive in threads.items() if not is_alive)})
 
     def _checkpointer(self, engine: GuardedEngine) -> CheckpointThread | None:
-        """None where nothing is kept."""
+        """Return the thread that writes checkpoints; None without a folder or with an engine that keeps no state."""
         folder = self._settings.data_dir
         if folder is None or not engine.keeps_state:
             return None
@@ -186,7 +188,9 @@ class Service:
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
         if self._thread.is_alive or "ingest" in self._supervision.dead_threads:
-            _log.error("the ingest thread has not come to a proper end: there is no last checkpoint")
+            _log.error(
+                "the ingest thread did not stop cleanly, so no last checkpoint is written; the previous one stays"
+            )
         else:
             checkpoints.stop()
 
@@ -242,4 +246,4 @@ def _site_store(settings: Settings) -> SiteStore:
     try:
         return SiteStore(settings.site, dict(settings.tags), settings.data_dir)
     except (OSError, ValidationError) as error:
-        raise SettingsError(f"data_dir: the site kept in {settings.data_dir} cannot be read: {error}") from error
+        raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error

@@ -9,8 +9,8 @@ from typing import Any
 import zenoh
 
 from dropanchor_schemas.keys import all_tags
-from dropanchor_service.zenoh_io.channel import received
-from dropanchor_service.zenoh_io.intake import GATHER_S, WAITING
+from dropanchor_service.zenoh_io.channel import drain
+from dropanchor_service.zenoh_io.intake import CHANNEL_LENGTH, GATHER_S
 from support.zenoh_router import connected_session
 
 
@@ -18,11 +18,13 @@ def main(endpoint: str) -> None:
     count = [0]
 
     def take_all(channel: Any) -> None:
-        for sample in received(channel, GATHER_S):
+        for sample in drain(channel, GATHER_S):
             count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
     with connected_session(endpoint) as session:
-        subscriber = session.declare_subscriber(all_tags("default", "samples"), zenoh.handlers.FifoChannel(WAITING))
+        subscriber = session.declare_subscriber(
+            all_tags("default", "samples"), zenoh.handlers.FifoChannel(CHANNEL_LENGTH)
+        )
         thread = threading.Thread(target=take_all, args=(subscriber.handler,))
         thread.start()
         print("ready", flush=True)

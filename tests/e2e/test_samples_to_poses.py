@@ -117,7 +117,7 @@ def test_samples_in_the_encoding_that_zenoh_pico_sends_are_used(service: Running
 
 
 def test_a_query_that_has_no_answer_says_why(session: zenoh.Session) -> None:
-    assert ask(session, keys.pose_key("default", "nobody")) == {"error": {"error": "no tag 'nobody' is known"}}
+    assert ask(session, keys.pose_key("default", "nobody")) == {"error": {"error": "tag 'nobody' is unknown"}}
     assert "anchor '99'" in str(ask(session, keys.anchor_key("default", "99"))["error"])
     assert "parameter 'when'" in str(ask(session, keys.pose_key("default", "a") + "?when=5")["error"])
     assert "takes one time" in str(ask(session, keys.pose_key("default", "a") + "?at=noon")["error"])

@@ -69,7 +69,7 @@ def test_a_kept_site_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     (tmp_path / "site.json").write_text("{")
     result = run("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(tmp_path))
     assert result.returncode == 2
-    assert f"the site kept in {tmp_path} cannot be read" in result.stderr
+    assert f"the site stored in {tmp_path} cannot be read" in result.stderr
 
 
 def test_what_was_set_over_rest_is_there_after_a_restart(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The REST interface, the stream and the page: reads the store, changes the site; knows no engine and no Zenoh."""
+"""The REST interface, the pose stream and the dashboard. They depend on the store, not on an engine or on Zenoh."""
 
 from dropanchor_service.api.app import create_app
 

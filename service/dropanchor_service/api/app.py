@@ -1,4 +1,4 @@
-"""Puts the interface together. Everything it uses is passed in."""
+"""Build the FastAPI application. Everything it uses is passed in."""
 
 from pathlib import Path
 from threading import Event
@@ -10,7 +10,7 @@ from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.answers import PoseFrame, Problem
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api.http.access import OPEN, Access
+from dropanchor_service.api.http.access import OPEN_PATHS, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
@@ -48,15 +48,19 @@ def create_app(
     authenticator: Authenticator | None = None,
     rate_limiter: RateLimiter | None = None,
 ) -> FastAPI:
-    """ready: whether the service can do its work, and why not. impaired: what else does not work. stopping: when set,
-    streams end. recorder: None where nothing can be recorded. dashboard: the folder of the page, None for no page.
-    endpoints: of the Zenoh router, as they are set. credentials: what tags need, None where they need none.
-    authenticator: who knows who asks; None: everybody may do everything. rate_limiter: how often one client may ask."""
+    """Return the application with all routes and middleware.
+
+    ready: returns whether the service can do its work, and the reasons when it cannot. impaired: returns what else does
+    not work. stopping: ends the streams when set. recorder: None when there is no folder for recordings. dashboard: the
+    folder of the page; None for no page. endpoints: those of the Zenoh router, as configured. credentials: those of the
+    tags; None when they need none. authenticator: None when every client may do everything. rate_limiter: limits the
+    requests of each client; None for no limit.
+    """
     app = FastAPI(
         title="Dropanchor",
         version="1",
         openapi_url=f"{PREFIX}/openapi.json",
-        docs_url=None,  # its scripts come from elsewhere; the page works without any other network
+        docs_url=None,  # its scripts come from a CDN, but the service must work without internet access
         redoc_url=None,
         redirect_slashes=False,
     )
@@ -84,11 +88,12 @@ def create_app(
 
 
 def openapi_of(app: FastAPI) -> dict[str, Any]:
+    """Return the OpenAPI document, built once."""
     if app.openapi_schema is None:
         document = get_openapi(
             title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
         )
-        for model in (PoseFrame, Problem):  # neither is the one model of a route
+        for model in (PoseFrame, Problem):  # no route has one of these as its only model
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
             document["components"]["schemas"] |= schema.pop("$defs") | {model.__name__: schema}
         _add_access(document)
@@ -97,13 +102,17 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
 
 
 def _add_access(document: dict[str, Any]) -> None:
-    """How somebody is known, and what is answered otherwise, at every operation that asks."""
+    """Add the bearer scheme and the responses of refused requests to every protected operation."""
     document["components"]["securitySchemes"] = {
-        "bearer": {"type": "http", "scheme": "bearer", "description": "An API key, or a token of the site's provider."}
+        "bearer": {
+            "type": "http",
+            "scheme": "bearer",
+            "description": "An API key, or a token of the site's OpenID Connect provider.",
+        }
     }
-    refusals = {str(status): told for status, told in problems(*_REFUSALS).items()}
+    refusals = {str(status): response for status, response in problems(*_REFUSALS).items()}
     for path, operations in document["paths"].items():
-        for operation in operations.values() if path not in OPEN else ():
+        for operation in operations.values() if path not in OPEN_PATHS else ():
             operation["responses"] = dict(sorted((operation["responses"] | refusals).items()))
             operation["security"] = [{"bearer": []}, {}]
 
@@ -111,17 +120,18 @@ def _add_access(document: dict[str, Any]) -> None:
 _REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
 _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
-    {"name": "tags", "description": "What was heard from the tags, and what an operator knows about them."},
-    {"name": "site", "description": "The frame, its place on the Earth, and the anchors."},
-    {"name": "recordings", "description": "Raw samples and poses in MCAP files."},
-    {"name": "health", "description": "For supervisors and Prometheus."},
+    {"name": "tags", "description": "What the tags have sent, and their settings."},
+    {"name": "site", "description": "The site frame, its georeference, and the anchors."},
+    {"name": "recordings", "description": "MCAP files with raw samples and poses."},
+    {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},
 ]
 
 
 def _description() -> str:
     rows = "\n".join(f"| `{kind.type}` | {kind.status} | {kind.title} |" for kind in Kind)
     return (
-        "Live positions of a fleet of tags around one dropped UWB anchor. SI units; the site frame is ENU with x east; "
-        "times are UTC in ns.\n\nErrors are problems (RFC 9457) of these types:\n\n"
+        "Live positions of a fleet of tags around one UWB anchor. All values are in SI units. The site frame is ENU "
+        "with x pointing east. Times are UTC in nanoseconds.\n\n"
+        "Every error is a problem document (RFC 9457) of one of these types:\n\n"
         f"| type | status | title |\n|---|---|---|\n{rows}\n"
     )

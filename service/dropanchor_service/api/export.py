@@ -1,4 +1,4 @@
-"""Writes the OpenAPI document into the schemas' folder, or with --check says whether it is current."""
+"""Write the OpenAPI document into the folder of the schemas, or check with --check whether it is current."""
 
 import json
 import sys
@@ -17,6 +17,7 @@ FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
 
 
 def text() -> str:
+    """Return the document as JSON."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
     app = create_app(answers, ready=lambda: (True, []), registry=CollectorRegistry(), stopping=Event(), dashboard=None)
     return json.dumps(app.openapi(), indent=2, ensure_ascii=False) + "\n"
@@ -28,7 +29,7 @@ def main(arguments: list[str]) -> int:
         return 0
     if FILE.exists() and FILE.read_text(encoding="utf-8") == text():
         return 0
-    sys.stderr.write(f"not current: {FILE.name}; run python -m dropanchor_service.api.export\n")
+    sys.stderr.write(f"{FILE.name} is out of date; run python -m dropanchor_service.api.export\n")
     return 1
 
 

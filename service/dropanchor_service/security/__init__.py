@@ -1,1 +1,1 @@
-"""Who may do what: certificates and access control of the Zenoh network, keys and tokens of the REST interface."""
+"""Authentication and access control: certificates on the Zenoh network, API keys and tokens on the REST interface."""

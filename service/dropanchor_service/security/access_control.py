@@ -1,7 +1,7 @@
-"""Zenoh's access control for one site: who may send what on which keys. Whatever is not allowed here is denied.
+"""Zenoh's access control for one site. It lists who may send what on which keys, and denies everything else.
 
-Zenoh knows no template for "its own name", so every tag has rules of its own. `**` does not cover the verbatim chunk
-`@adv`, under which publishers that recover lost messages keep their caches, so that it stands beside its key.
+Zenoh rules have no placeholder for the name of the client, so every tag gets its own rules. Publishers that recover
+lost messages keep their caches under the verbatim chunk `@adv`. `**` does not match it, so it is listed separately.
 """
 
 from collections.abc import Iterable
@@ -11,9 +11,9 @@ from dropanchor_schemas import keys
 
 SERVICE, READER, ROUTER = "service", "reader", "router"
 ROLES = (SERVICE, READER, ROUTER)
-"""Common names that no tag can have."""
+"""Common names that are reserved: no tag may use them."""
 
-MAX_SAMPLES_BYTES = 16_384  # 50 samples in JSON are some 8 kB
+MAX_SAMPLES_BYTES = 16_384  # 50 samples take about 8 kB as JSON
 
 _RECOVERY = ["query", "declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _EVERYTHING = [
@@ -32,23 +32,27 @@ Section = dict[str, Any]
 
 
 def access_control(site: str, tags: Iterable[str]) -> Section:
-    """The section `access_control` of a router's configuration. tags: their ids, which are their common names."""
+    """Return the section `access_control` of a router's configuration.
+
+    tags: the ids of the tags, which are also the common names of their certificates.
+    """
     by_name = {SERVICE: _service(site), READER: _reader(site)}
     by_name |= {tag: _tag(site, tag) for tag in tags}
-    rules = [rule for of_one in by_name.values() for rule in of_one]
+    rules = [rule for subject_rules in by_name.values() for rule in subject_rules]
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
         "subjects": [{"id": name, "cert_common_names": [name]} for name in by_name],
         "policies": [
-            {"rules": [rule["id"] for rule in of_one], "subjects": [name]} for name, of_one in by_name.items()
+            {"rules": [rule["id"] for rule in subject_rules], "subjects": [name]}
+            for name, subject_rules in by_name.items()
         ],
     }
 
 
 def low_pass_filter(site: str) -> list[Section]:
-    """The section `low_pass_filter`: messages of samples have a size."""
+    """Return the section `low_pass_filter`, which limits the size of sample messages."""
     samples = keys.all_tags(site, "samples")
     return [
         {
@@ -63,15 +67,17 @@ def low_pass_filter(site: str) -> list[Section]:
 
 def _tag(site: str, tag: str) -> list[Section]:
     samples, alive, pose = keys.samples_key(site, tag), keys.tag_alive_key(site, tag), keys.pose_key(site, tag)
-    everyone = keys.all_tags(site, "samples")
+    all_samples = keys.all_tags(site, "samples")
     own = [samples, f"{samples}/@adv/**"]
     return [
-        _rule(f"{tag}: its samples", "ingress", ["put"], own),
-        _rule(f"{tag}: its liveliness", "ingress", ["liveliness_token"], [alive, f"{samples}/@adv/**"]),
-        _rule(f"{tag}: its cache answers", "ingress", ["declare_queryable", "reply"], own),
-        _rule(f"{tag}: its cache is asked", "egress", _RECOVERY, [everyone, f"{everyone}/@adv/**", *own]),
-        _rule(f"{tag}: asks for its pose", "ingress", ["query", "declare_subscriber"], [pose, keys.all_anchors(site)]),
-        _rule(f"{tag}: is told its pose", "egress", ["put", "reply"], [pose, keys.all_anchors(site)]),
+        _rule(f"{tag}: puts its samples", "ingress", ["put"], own),
+        _rule(f"{tag}: declares its liveliness", "ingress", ["liveliness_token"], [alive, f"{samples}/@adv/**"]),
+        _rule(f"{tag}: answers from its cache", "ingress", ["declare_queryable", "reply"], own),
+        _rule(
+            f"{tag}: receives queries to its cache", "egress", _RECOVERY, [all_samples, f"{all_samples}/@adv/**", *own]
+        ),
+        _rule(f"{tag}: requests its pose", "ingress", ["query", "declare_subscriber"], [pose, keys.all_anchors(site)]),
+        _rule(f"{tag}: receives its pose", "egress", ["put", "reply"], [pose, keys.all_anchors(site)]),
     ]
 
 
@@ -81,14 +87,14 @@ def _service(site: str) -> list[Section]:
 
 
 def _reader(site: str) -> list[Section]:
-    shown = [keys.all_tags(site, "pose"), keys.poses_key(site), keys.all_anchors(site)]
+    poses = [keys.all_tags(site, "pose"), keys.poses_key(site), keys.all_anchors(site)]
     alive = [keys.all_tags(site, "alive"), keys.all_services_alive(site)]
-    asks = ["liveliness_query", "declare_liveliness_subscriber"]
+    liveliness = ["liveliness_query", "declare_liveliness_subscriber"]
     return [
-        _rule("readers ask for poses", "ingress", ["query", "declare_subscriber"], shown),
-        _rule("readers are told poses", "egress", ["put", "reply", "declare_queryable"], shown),
-        _rule("readers ask who is there", "ingress", asks, alive),
-        _rule("readers are told who is there", "egress", ["liveliness_token", "reply"], alive),
+        _rule("readers request poses", "ingress", ["query", "declare_subscriber"], poses),
+        _rule("readers receive poses", "egress", ["put", "reply", "declare_queryable"], poses),
+        _rule("readers request liveliness", "ingress", liveliness, alive),
+        _rule("readers receive liveliness", "egress", ["liveliness_token", "reply"], alive),
     ]
 
 

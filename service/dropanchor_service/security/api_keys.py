@@ -1,6 +1,7 @@
-"""API keys: random secrets, of which only the SHA-256 is kept.
+"""API keys: random secrets, of which the service stores only the SHA-256.
 
-A secret has 256 random bits, so that a slow password hash would add nothing but a way to keep the service busy.
+A secret has 256 random bits, so a slow password hash would not make it safer. It would only help to overload the
+service.
 """
 
 import hashlib
@@ -16,23 +17,23 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from dropanchor_service.runtime.atomic_file import write_atomically
-from dropanchor_service.security.files import PRIVATE, one_at_a_time
+from dropanchor_service.security.files import PRIVATE, exclusive_lock
 from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
 
 FILE = "api_keys.json"
 SOURCE = "key"
 PREFIX = "dropanchor_"
-CHECK_S = 1.0  # a change of the file counts after so long
+CHECK_S = 1.0  # how often to look for changes of the file
 
 _log = logging.getLogger(__name__)
 
 
 class ApiKeyError(ValueError):
-    """A key that cannot be made or revoked; the message says why."""
+    """A key cannot be created or revoked; the message says why."""
 
 
 class ApiKey(BaseModel):
-    """What is kept of a key."""
+    """The stored record of a key, without its secret."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -47,31 +48,34 @@ class ApiKey(BaseModel):
         return self.expires is not None and self.expires <= datetime.now(UTC)
 
 
-_KEYS = TypeAdapter(dict[str, ApiKey])  # by the id in the key
+_KEYS = TypeAdapter(dict[str, ApiKey])  # by the id that is part of the key
 
 
 class ApiKeys:
-    """The keys in a file, which other processes may change: a key works, or works no more, within a second."""
+    """The API keys in a file. Other processes may change it; a new or revoked key takes effect within a second."""
 
-    takes_time = False
+    may_block = False
 
     def __init__(self, folder: Path, clock: Callable[[], float] = time.monotonic) -> None:
-        """Raises ApiKeyError when the file is damaged."""
+        """Read the keys in `folder`. Raises ApiKeyError when the file is damaged."""
         self._file = folder / FILE
         self._clock = clock
         self._checked_s = clock()
-        self._version = self._version_now()
+        self._version = self._file_version()
         self._keys = self._read()
 
     def all(self) -> Mapping[str, ApiKey]:
         return self._keys
 
     def add(self, name: str, scope: Scope, days: int | None = None) -> str:
-        """The key, which nobody can read again. Raises ApiKeyError."""
-        with one_at_a_time(self._file.parent):
+        """Create a key and return its secret, which cannot be read again later.
+
+        days: the lifetime; None for a key that never expires. Raises ApiKeyError when the name is taken.
+        """
+        with exclusive_lock(self._file.parent):
             keys = self._read()
             if any(key.name == name for key in keys.values()):
-                raise ApiKeyError(f"there is a key {name!r}; revoke it first, or choose another name")
+                raise ApiKeyError(f"a key named {name!r} exists already; revoke it first, or choose another name")
             identifier, made = secrets.token_hex(4), datetime.now(UTC)
             secret = f"{PREFIX}{identifier}_{secrets.token_urlsafe(32)}"
             expires = None if days is None else made + timedelta(days=days)
@@ -80,45 +84,45 @@ class ApiKeys:
         return secret
 
     def revoke(self, name: str) -> None:
-        """Raises ApiKeyError."""
-        with one_at_a_time(self._file.parent):
+        """Remove the key with this name. Raises ApiKeyError when there is none."""
+        with exclusive_lock(self._file.parent):
             keys = self._read()
-            left = {identifier: key for identifier, key in keys.items() if key.name != name}
-            if len(left) == len(keys):
-                raise ApiKeyError(f"there is no key {name!r}")
-            self._write(left)
+            remaining = {identifier: key for identifier, key in keys.items() if key.name != name}
+            if len(remaining) == len(keys):
+                raise ApiKeyError(f"there is no key named {name!r}")
+            self._write(remaining)
 
-    def knows(self, secret: str) -> bool:
+    def recognises(self, secret: str) -> bool:
         return secret.startswith(PREFIX)
 
     def identify(self, secret: str) -> Identity:
-        """Raises UnauthenticatedError."""
-        self._follow_file()
+        """Return the identity of a key. Raises UnauthenticatedError when it is unknown, revoked or expired."""
+        self._reload_if_changed()
         key = self._keys.get(secret.removeprefix(PREFIX).partition("_")[0])
         if key is None or not hmac.compare_digest(key.sha256, _hash(secret)):
-            raise UnauthenticatedError("the API key is not known, or was revoked")
+            raise UnauthenticatedError("the API key is unknown or was revoked")
         if key.is_expired:
             raise UnauthenticatedError("the API key has expired")
         return Identity(SOURCE, key.name, key.scope)
 
-    def is_still_good(self, identity: Identity) -> bool:
-        self._follow_file()
+    def is_still_valid(self, identity: Identity) -> bool:
+        self._reload_if_changed()
         return any(key.name == identity.name and not key.is_expired for key in self._keys.values())
 
-    def _follow_file(self) -> None:
+    def _reload_if_changed(self) -> None:
         if self._clock() - self._checked_s < CHECK_S:
             return
         self._checked_s = self._clock()
-        version = self._version_now()
+        version = self._file_version()
         if version == self._version:
             return
         self._version = version
         try:
             self._keys = self._read()
         except ApiKeyError as error:
-            _log.error("%s; the keys that were known before still count", error)
+            _log.error("%s; the keys read before stay valid until the file is repaired", error)
 
-    def _version_now(self) -> tuple[int, int] | None:
+    def _file_version(self) -> tuple[int, int] | None:
         try:
             status = self._file.stat()
         except FileNotFoundError:
@@ -138,7 +142,7 @@ class ApiKeys:
     def _write(self, keys: Mapping[str, ApiKey]) -> None:
         content = json.dumps(_KEYS.dump_python(dict(keys), mode="json"), indent=2, ensure_ascii=False)
         write_atomically(self._file, [content.encode(), b"\n"], PRIVATE)
-        self._keys, self._version = dict(keys), self._version_now()
+        self._keys, self._version = dict(keys), self._file_version()
 
 
 def _hash(secret: str) -> str:

@@ -1,4 +1,4 @@
-"""A certificate authority of our own: one site, one authority, certificates told apart by their common name."""
+"""The certificate authority of a site. It issues the certificates; the common name identifies each holder."""
 
 import ipaddress
 from collections.abc import Sequence
@@ -18,14 +18,14 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 AUTHORITY_DAYS = 3650
-SKEW = timedelta(days=1)  # clocks of tags are not always right
+SKEW = timedelta(days=1)  # the clocks of tags may be wrong
 _BOTH_ENDS = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
 _CLIENT = [ExtendedKeyUsageOID.CLIENT_AUTH]
 
 
 @dataclass(frozen=True)
 class Issued:
-    """A certificate and its private key, PEM."""
+    """A certificate and its private key, both in PEM."""
 
     certificate: bytes
     key: bytes
@@ -40,15 +40,15 @@ class Issued:
 
 
 def expiry(certificate: bytes) -> datetime:
-    """Of a certificate in PEM. Raises ValueError."""
+    """Return when a PEM certificate expires. Raises ValueError when it cannot be read."""
     return x509.load_pem_x509_certificate(certificate).not_valid_after_utc
 
 
 class Authority:
-    """Signs certificates with the key of the site."""
+    """Signs certificates with the private key of the site."""
 
     def __init__(self, issued: Issued) -> None:
-        """Raises ValueError when these are no certificate and key."""
+        """Load the authority. Raises ValueError when the certificate or the key cannot be read."""
         key = load_pem_private_key(issued.key, None)
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise ValueError("the authority's key is not an elliptic curve key")
@@ -58,6 +58,7 @@ class Authority:
 
     @classmethod
     def make(cls, name: str) -> Self:
+        """Create a new key and a self-signed certificate with this common name."""
         key = ec.generate_private_key(ec.SECP256R1())
         subject = _name(name)
         builder = (
@@ -69,12 +70,12 @@ class Authority:
         return cls(_pem(builder.sign(key, SHA256()), key))
 
     def server(self, name: str, hosts: Sequence[str], days: int) -> Issued:
-        """For one who listens at these hosts (names or addresses), and connects too."""
+        """Issue a certificate to a process that listens at these hosts (names or addresses) and also connects."""
         names = x509.SubjectAlternativeName([_host(host) for host in hosts])
         return self._issue(name, days, _BOTH_ENDS, names)
 
     def client(self, name: str, days: int) -> Issued:
-        """For one who only connects."""
+        """Issue a certificate to a process that only connects."""
         return self._issue(name, days, _CLIENT, None)
 
     def _issue(

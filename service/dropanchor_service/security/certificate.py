@@ -1,4 +1,4 @@
-"""The certificate that the HTTP server shows."""
+"""The TLS certificate of the HTTP server."""
 
 from dataclasses import dataclass
 from pathlib import Path

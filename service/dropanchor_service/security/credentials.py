@@ -1,4 +1,4 @@
-"""What the settings say about credentials, as objects."""
+"""Load the credentials that the settings name."""
 
 import logging
 from datetime import timedelta
@@ -12,26 +12,31 @@ from dropanchor_service.security.identity import Authenticator, IdentityProvider
 from dropanchor_service.settings.model import HttpSettings, SecuritySettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 
-SOON = timedelta(days=30)
+EXPIRY_WARNING = timedelta(days=30)
 
 _log = logging.getLogger(__name__)
 
 
 def credentials_of(settings: Settings) -> SecurityFolder | None:
-    """Raises SettingsError when there is a folder that cannot be used."""
+    """Open the folder of credentials, and warn about certificates that expire soon.
+
+    Return None when no folder is set. Raises SettingsError when the folder cannot be used.
+    """
     if settings.security.folder is None:
         return None
     try:
         folder = SecurityFolder.open(settings.security.folder)
     except SecurityError as error:
         raise SettingsError(f"security.folder: {error}") from error
-    for sentence in folder.expiring(SOON):
-        _log.warning("%s; dropanchor security renew and dropanchor tag add --renew make new ones", sentence)
+    for sentence in folder.expiring(EXPIRY_WARNING):
+        _log.warning(
+            "%s; renew it with `dropanchor security renew`, or with `dropanchor tag add --renew` for a tag", sentence
+        )
     return folder
 
 
 def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -> Certificate | None:
-    """None for plain HTTP."""
+    """Return the certificate of the HTTP server; None for plain HTTP."""
     if not settings.tls:
         return None
     if settings.certificate is not None and settings.key is not None:
@@ -40,7 +45,7 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
 
 
 def authenticator_of(settings: SecuritySettings) -> Authenticator | None:
-    """None when nobody is asked. Raises SettingsError."""
+    """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError."""
     providers: dict[str, IdentityProvider] = {}
     try:
         if settings.folder is not None:

@@ -1,4 +1,4 @@
-"""Files of credentials: their permissions, and a lock so that one process at a time changes them."""
+"""Permissions of credential files, and a lock that lets only one process change them at a time."""
 
 import fcntl
 from collections.abc import Iterator
@@ -9,7 +9,8 @@ PRIVATE, PUBLIC = 0o600, 0o644
 
 
 @contextmanager
-def one_at_a_time(folder: Path) -> Iterator[None]:
+def exclusive_lock(folder: Path) -> Iterator[None]:
+    """Hold the lock of this folder; wait while another process has it."""
     with (folder / ".lock").open("ab") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield

@@ -1,4 +1,4 @@
-"""The folder that `dropanchor security init` makes: certificates, the table of tags, the router's configuration."""
+"""The folder that `dropanchor security init` creates: certificates, issued tags, and the router's configuration."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE
 from dropanchor_service.security.authority import Authority, Issued, expiry
-from dropanchor_service.security.files import PRIVATE, PUBLIC, one_at_a_time
+from dropanchor_service.security.files import PRIVATE, PUBLIC, exclusive_lock
 from dropanchor_service.security.router import router_configuration
 
 TABLE = "issued.json"
@@ -22,11 +22,11 @@ MAX_COMMON_NAME_BYTES = 64  # RFC 5280, ub-common-name
 
 
 class SecurityError(ValueError):
-    """Credentials that cannot be made or used; the message says what to do."""
+    """Credentials cannot be created or used; the message says what to do."""
 
 
 class IssuedTag(BaseModel):
-    """A tag's certificate."""
+    """The record of a certificate that was issued to a tag."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -36,7 +36,7 @@ class IssuedTag(BaseModel):
 
 
 class Table(BaseModel):
-    """Who has a certificate."""
+    """The issued certificates and the addresses of the router."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -47,11 +47,12 @@ class Table(BaseModel):
 
     @property
     def admitted(self) -> list[str]:
+        """The ids of the tags whose certificates are not revoked."""
         return [name for name, tag in self.tags.items() if tag.revoked is None]
 
 
 class SecurityFolder:
-    """Reads and changes the folder. Whatever is written appears whole or not at all; private keys are for the owner."""
+    """Reads and changes the folder. Files are written atomically; only the owner can read private keys."""
 
     def __init__(self, path: Path, table: Table) -> None:
         self.path = path
@@ -59,12 +60,12 @@ class SecurityFolder:
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Raises SecurityError."""
+        """Read the folder. Raises SecurityError when it is missing or damaged."""
         try:
             return cls(path, Table.model_validate_json((path / TABLE).read_bytes()))
         except FileNotFoundError as error:
             raise SecurityError(
-                f"there are no credentials in {path}; make them with: dropanchor security init --security {path}"
+                f"there are no credentials in {path}; create them with: dropanchor security init --security {path}"
             ) from error
         except OSError as error:
             raise SecurityError(f"the credentials in {path} cannot be read: {error.strerror}") from error
@@ -73,14 +74,17 @@ class SecurityFolder:
 
     @classmethod
     def make(cls, path: Path, table: Table, days: int) -> Self:
-        """A new authority and the certificates of router, service and reader. Raises SecurityError."""
+        """Create a new authority, and certificates for router, service and reader.
+
+        days: the lifetime of the certificates. Raises SecurityError when the folder is not empty or not writable.
+        """
         if path.exists() and any(path.iterdir()):
-            raise SecurityError(f"{path} is not empty, and credentials are never overwritten; choose another folder")
+            raise SecurityError(f"{path} is not empty, and existing files are never overwritten; choose another folder")
         try:
             path.mkdir(parents=True, exist_ok=True, mode=0o700)
             authority = Authority.make("Dropanchor site authority")
             folder = cls(path, table)
-            folder._keep("ca", authority.issued)
+            folder._write_pair("ca", authority.issued)
             folder._issue_roles(authority, days)
             folder._save(table)
         except OSError as error:
@@ -88,22 +92,33 @@ class SecurityFolder:
         return folder
 
     def renew(self, hosts: Sequence[str], days: int) -> None:
-        """New certificates of router, service and reader, for these hosts too. Raises SecurityError."""
+        """Issue new certificates to router, service and reader. Raises SecurityError.
+
+        hosts: additional names or addresses of the router. days: the lifetime of the certificates.
+        """
         with self._changing():
             authority = self._authority()
-            every_host = tuple(dict.fromkeys([*self.table.hosts, *hosts]))
-            self._save(self.table.model_copy(update={"hosts": every_host}))
+            all_hosts = tuple(dict.fromkeys([*self.table.hosts, *hosts]))
+            self._save(self.table.model_copy(update={"hosts": all_hosts}))
             self._issue_roles(authority, days)
 
     def expiring(self, within: timedelta) -> list[str]:
-        """What expires soon, of the folder's own certificates and those of admitted tags, in words."""
-        soon = datetime.now(UTC) + within
-        ends = {f"the certificate {self.certificate(name)}": self._expires(name) for name in ("ca", *ROLES)}
-        ends |= {f"the certificate of tag {name!r}": self.table.tags[name].expires for name in self.table.admitted}
-        return [f"{what} expires on {end:%Y-%m-%d}" for what, end in ends.items() if end is not None and end < soon]
+        """Return a sentence for each certificate that expires `within` this time.
+
+        It checks the certificates in the folder and those of admitted tags.
+        """
+        limit = datetime.now(UTC) + within
+        expiries = {f"the certificate {self.certificate(name)}": self._expires(name) for name in ("ca", *ROLES)}
+        expiries |= {f"the certificate of tag {name!r}": self.table.tags[name].expires for name in self.table.admitted}
+        return [
+            f"{what} expires on {end:%Y-%m-%d}" for what, end in expiries.items() if end is not None and end < limit
+        ]
 
     def add_tag(self, name: str, days: int, renew: bool = False) -> Path:
-        """The folder that goes to the tag. Raises SecurityError or InvalidKeyError."""
+        """Issue a certificate to a tag, and return the folder to copy onto it.
+
+        renew: replace the certificate that the tag has. Raises SecurityError or InvalidKeyError.
+        """
         with self._changing():
             self._refuse_tag(name, renew)
             issued = self._authority().client(name, days)
@@ -112,21 +127,22 @@ class SecurityFolder:
             write_atomically(bundle / "ca.pem", [(self.path / "ca.pem").read_bytes()], PUBLIC)
             write_atomically(bundle / "tag.pem", [issued.certificate], PUBLIC)
             write_atomically(bundle / "tag.key", [issued.key], PRIVATE)
-            write_atomically(bundle / "tag.json", [_json(self._about(name))], PUBLIC)
+            write_atomically(bundle / "tag.json", [_json(self._connection(name))], PUBLIC)
             entry = IssuedTag(serial=issued.serial, expires=issued.expires)
             self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: entry}}))
         return bundle
 
     def revoke_tag(self, name: str) -> None:
-        """Raises SecurityError."""
+        """Mark the certificate of a tag as revoked. Raises SecurityError when the tag has none."""
         with self._changing():
             tag = self.table.tags.get(name)
             if tag is None or tag.revoked is not None:
-                raise SecurityError(f"tag {name!r} has no certificate" + (" any more" if tag else ""))
+                raise SecurityError(f"tag {name!r} " + ("is revoked already" if tag else "has no certificate"))
             revoked = tag.model_copy(update={"revoked": datetime.now(UTC)})
             self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: revoked}}))
 
     def bundle(self, name: str) -> Path:
+        """Return the folder with the credentials of a tag."""
         return self.path / "tags" / chunk_from_id(name)
 
     def certificate(self, role: str) -> Path:
@@ -136,17 +152,17 @@ class SecurityFolder:
         return self.path / f"{role}.key"
 
     def router_configuration(self, listen: Sequence[str] | None = None) -> dict[str, Any]:
-        """Zenoh's, with the access control of the tags that are in the table now."""
+        """Return the Zenoh configuration of the router, with access control for the tags admitted now."""
         files = {name: str(path.resolve()) for name, path in self._tls_files().items()}
         return router_configuration(self.table.site, self.table.admitted, listen or self.table.listen, files)
 
     def _issue_roles(self, authority: Authority, days: int) -> None:
         for role in (ROUTER, SERVICE):
-            self._keep(role, authority.server(role, self.table.hosts, days))
-        self._keep(READER, authority.client(READER, days))
+            self._write_pair(role, authority.server(role, self.table.hosts, days))
+        self._write_pair(READER, authority.client(READER, days))
 
     def _expires(self, name: str) -> datetime | None:
-        """None where there is none: not every host needs all of them."""
+        """Return when a certificate expires; None when it is missing, since not every host needs all of them."""
         try:
             return expiry(self.certificate(name).read_bytes())
         except (OSError, ValueError):
@@ -158,22 +174,25 @@ class SecurityFolder:
     def _refuse_tag(self, name: str, renew: bool) -> None:
         chunk_from_id(name)
         if len(name.encode()) > MAX_COMMON_NAME_BYTES:
-            raise SecurityError(f"a certificate holds names of {MAX_COMMON_NAME_BYTES} bytes, {name!r} has more")
+            raise SecurityError(
+                f"{name!r} is too long for a certificate: a name may have {MAX_COMMON_NAME_BYTES} bytes"
+            )
         if name in ROLES:
-            raise SecurityError(f"{name!r} is the name of a part of the system; a tag needs another")
-        known = self.table.tags.get(name)
-        if known is None:
+            raise SecurityError(f"{name!r} is a reserved name; choose another name for the tag")
+        existing = self.table.tags.get(name)
+        if existing is None:
             if renew:
                 raise SecurityError(f"tag {name!r} has no certificate to renew")
-        elif known.revoked is not None and known.expires > datetime.now(UTC):
+        elif existing.revoked is not None and existing.expires > datetime.now(UTC):
             raise SecurityError(
-                f"tag {name!r} was revoked, and its old certificate would be let in again with the name, until it "
-                f"expires on {known.expires:%Y-%m-%d}; choose another name"
+                f"tag {name!r} was revoked; adding it again would also admit its old certificate, which expires on "
+                f"{existing.expires:%Y-%m-%d}; choose another name"
             )
-        elif known.revoked is None and not renew:
-            raise SecurityError(f"tag {name!r} has a certificate; --renew makes a new one")
+        elif existing.revoked is None and not renew:
+            raise SecurityError(f"tag {name!r} has a certificate already; replace it with --renew")
 
-    def _about(self, name: str) -> dict[str, str]:
+    def _connection(self, name: str) -> dict[str, str]:
+        """Return the contents of `tag.json`: who the tag is and where it connects."""
         port = self.table.listen[0].rpartition(":")[2]
         host = self.table.hosts[0]
         host = f"[{host}]" if ":" in host else host
@@ -183,11 +202,13 @@ class SecurityFolder:
         try:
             return Authority(Issued((self.path / "ca.pem").read_bytes(), (self.path / "ca.key").read_bytes()))
         except OSError as error:
-            raise SecurityError(f"the authority's key is needed: {error.filename}: {error.strerror}") from error
+            raise SecurityError(
+                f"the authority's certificate and key are needed: {error.filename}: {error.strerror}"
+            ) from error
         except ValueError as error:
             raise SecurityError(f"the authority in {self.path} is damaged: {error}") from error
 
-    def _keep(self, name: str, issued: Issued) -> None:
+    def _write_pair(self, name: str, issued: Issued) -> None:
         write_atomically(self.path / f"{name}.pem", [issued.certificate], PUBLIC)
         write_atomically(self.path / f"{name}.key", [issued.key], PRIVATE)
 
@@ -198,8 +219,8 @@ class SecurityFolder:
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
-        """One process at a time, on the table as it is now."""
-        with one_at_a_time(self.path):
+        """Lock the folder and read its table again, so that concurrent changes are not lost."""
+        with exclusive_lock(self.path):
             self.table = type(self).open(self.path).table
             yield
 

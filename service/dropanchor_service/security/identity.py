@@ -1,4 +1,4 @@
-"""Who asks over REST, and what they may do."""
+"""The identity and scope of REST clients."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Protocol, Self
 
 
 class Scope(IntEnum):
-    """What somebody may do; each includes those before it."""
+    """A permission level; each includes the lower ones."""
 
     READ = 1
     WRITE = 2
@@ -15,7 +15,7 @@ class Scope(IntEnum):
 
     @classmethod
     def named(cls, name: str) -> Self:
-        """Raises KeyError."""
+        """Return the scope with this lower-case name. Raises KeyError."""
         return cls[name.upper()]
 
     @property
@@ -28,7 +28,10 @@ SCOPES = tuple(scope.word for scope in Scope)
 
 @dataclass(frozen=True)
 class Identity:
-    """source: where it is known from. expires_s: seconds since 1970, None: never."""
+    """An authenticated client.
+
+    source: the identity provider. scope: None when the client may do nothing. expires_s: Unix time; None: never.
+    """
 
     source: str
     name: str
@@ -37,37 +40,37 @@ class Identity:
 
 
 class UnauthenticatedError(Exception):
-    """Nobody is known by what was shown; the message may be told to whoever asks."""
+    """The credentials are not valid. The message is safe to return to the client."""
 
 
 class IdentityProvider(Protocol):
-    """One place where somebody may be known."""
+    """A source of identities, such as API keys or an OpenID Connect provider."""
 
-    takes_time: bool
-    """Whether `identify` may ask somebody else, so that it has no place on an event loop."""
+    may_block: bool
+    """Whether `identify` may wait for the network, so that it must not run on an event loop."""
 
-    def knows(self, secret: str) -> bool:
-        """Whether it looks like one of ours."""
+    def recognises(self, secret: str) -> bool:
+        """Return whether the secret has the form that this provider issues."""
 
     def identify(self, secret: str) -> Identity:
-        """Raises UnauthenticatedError."""
+        """Return the identity that the secret belongs to. Raises UnauthenticatedError."""
 
-    def is_still_good(self, identity: Identity) -> bool:
-        """Whether the identity it once gave still holds. At once."""
+    def is_still_valid(self, identity: Identity) -> bool:
+        """Return whether an identity of this provider is neither revoked nor expired. Never blocks."""
 
 
 class Authenticator:
-    """Knows which register to ask. providers: by the source that their identities name."""
+    """Selects the identity provider for a secret. providers: by the `source` of their identities."""
 
     def __init__(self, providers: Mapping[str, IdentityProvider]) -> None:
         self._providers = dict(providers)
 
     def provider_of(self, secret: str) -> IdentityProvider:
-        """Raises UnauthenticatedError."""
-        for register in self._providers.values():
-            if register.knows(secret):
-                return register
-        raise UnauthenticatedError("what was sent is neither an API key nor a token that this service takes")
+        """Return the provider that recognises the secret. Raises UnauthenticatedError when none does."""
+        for provider in self._providers.values():
+            if provider.recognises(secret):
+                return provider
+        raise UnauthenticatedError("the credential is neither an API key nor a token that this service accepts")
 
-    def is_still_good(self, identity: Identity) -> bool:
-        return self._providers[identity.source].is_still_good(identity)
+    def is_still_valid(self, identity: Identity) -> bool:
+        return self._providers[identity.source].is_still_valid(identity)

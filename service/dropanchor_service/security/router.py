@@ -1,4 +1,4 @@
-"""The configuration of a Zenoh router that lets in certificates of one authority, each to its own keys."""
+"""The configuration of a Zenoh router that accepts the certificates of one authority, each for its own keys."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -8,19 +8,19 @@ from dropanchor_service.security.access_control import access_control, low_pass_
 LINK: dict[str, Any] = {"tx": {"lease": 4000, "keep_alive": 4}, "rx": {"max_message_size": 2**20}}
 
 QUIET: dict[str, Any] = {
-    # A router waits for what it might find for half a second, even where it does not look.
+    # Without this, a router waits half a second for scouting even when scouting is off.
     "scouting": {"delay": 0, "multicast": {"enabled": False}, "gossip": {"enabled": False}},
-    # Routers stamp messages by default, one after another for each session. A subscriber with recovery takes those of
-    # plain publishers whose stamps are out of order for repeated ones, and drops them without a word.
+    # By default a router adds timestamps to messages, and across sessions these can be out of order. A subscriber with
+    # recovery treats out-of-order messages of plain publishers as duplicates, and drops them silently.
     "timestamping": {"enabled": False},
 }
 
 
 def router_transport(tls: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """What not to leave at its default, for every router of ours."""
+    """Return the transport settings that every Dropanchor router changes from Zenoh's defaults."""
     return {
         "shared_memory": {"enabled": False},
-        # Silent sockets, which send nothing after they connect, must not keep tags out.
+        # Sockets that connect and then send nothing must not keep tags out.
         "unicast": {"max_sessions": 20_000, "accept_pending": 2000, "accept_timeout": 2000},
         "link": LINK | ({} if tls is None else {"tls": dict(tls)}),
     }
@@ -29,7 +29,10 @@ def router_transport(tls: Mapping[str, Any] | None = None) -> dict[str, Any]:
 def router_configuration(
     site: str, tags: Iterable[str], listen: Sequence[str], files: Mapping[str, str]
 ) -> dict[str, Any]:
-    """files: `ca`, `certificate` and `key` of the router, PEM."""
+    """Return the configuration of a router with mutual TLS and access control.
+
+    files: the paths of `ca`, `certificate` and `key` of the router, all PEM.
+    """
     tls = {
         "root_ca_certificate": files["ca"],
         "listen_certificate": files["certificate"],

@@ -1,1 +1,1 @@
-"""All that speaks Zenoh: the session, samples in, caches asked, queries answered, poses published."""
+"""The Zenoh side of the service: session, intake of samples, queries to tag caches, queryables and publishers."""

@@ -1,7 +1,7 @@
-"""Asks the caches of the tags' publishers for what was published while nobody listened.
+"""Queries the caches of the tags' publishers for messages that were published while the service was not subscribed.
 
-Not with the history of Zenoh's own advanced subscriber: together with recovery, and many publishers that are live, that
-loses thousands of samples.
+The history option of Zenoh's advanced subscriber could do this too. Combined with recovery and many live publishers it
+loses thousands of samples, so it is not used.
 """
 
 import logging
@@ -23,22 +23,24 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import TagTable
-from dropanchor_service.zenoh_io.channel import received
+from dropanchor_service.zenoh_io.channel import drain
 
 ANSWER_S = 2.0
-FEWEST = 100  # messages that a cache is asked for
-PER_SECOND = 200  # and more, for every second that the tag was not heard: no publisher sends as many
-NINE_OF_TEN = 0.9  # tags have sent all that they are asked for in the first round; the others are asked again
-SPARE = 1.2
-PAUSE_S = 0.1  # before the same tag is asked again
-REPLIES = 2**16  # that may wait for us: a receive thread that waited for the interpreter would hold up what is live
+MIN_MESSAGES = 100  # that a cache is asked for
+MESSAGES_PER_S = 200  # asked for in addition, per second of silence; no publisher sends as many
+RATE_QUANTILE = 0.9  # of the tags' rates; the first round covers these tags, the others are asked again
+MARGIN = 1.2  # on the number of messages that a rate predicts
+RETRY_S = 0.1  # pause before the same tag is asked again
+REPLIES = 2**16  # queue length; a full queue would block the receive thread and delay live messages
 
 _log = logging.getLogger(__name__)
 
 
 class ZenohCaches:
-    """Asks on a thread of its own, since callbacks of Zenoh must not call it. Start it once samples are subscribed to:
-    what is published from then on arrives live."""
+    """Queries the caches from its own thread, because Zenoh callbacks must not call Zenoh.
+
+    Start it after subscribing to the samples, so that no message falls between the two.
+    """
 
     def __init__(
         self,
@@ -54,15 +56,15 @@ class ZenohCaches:
         self._tags = tags
         self._metrics = metrics
         self._clock = clock
-        self._later: deque[tuple[float, str, int]] = deque()  # to be asked again, and when
+        self._later: deque[tuple[float, str, int]] = deque()  # queries to repeat: when, key, missing
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # by the last process
+        self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # before this process started
         self._thread = threading.Thread(target=self._run, name="caches", daemon=True)
 
     @property
     def new_publisher_limit(self) -> int:
         """Number of messages to ask for from a publisher that the last process did not know."""
-        return self._most(self._newest_ns)
+        return self._limit(self._newest_ns)
 
     def start(self, catch_up: CatchUp) -> None:
         """Ask all caches, and pass their replies to `catch_up`."""
@@ -77,13 +79,13 @@ class ZenohCaches:
     def ask(self, key: str, missing: int, retries: int) -> None:
         """Ask the caches of a tag for `missing` messages (0: unknown), on the thread; a retry waits for a moment."""
         if retries:
-            self._later.append((time.monotonic() + PAUSE_S, key, missing))
+            self._later.append((time.monotonic() + RETRY_S, key, missing))
         self._tasks.put(self._ask_later if retries else partial(self._ask, key, missing))
 
     def _run(self) -> None:
         while True:
             try:
-                task = self._tasks.get(timeout=PAUSE_S if self._later else None)
+                task = self._tasks.get(timeout=RETRY_S if self._later else None)
             except Empty:
                 task = self._ask_later
             if task is None:
@@ -95,36 +97,36 @@ class ZenohCaches:
                 self._rare.exception("caches", error)
 
     def _ask_later(self) -> None:
-        """Those whose time has come."""
+        """Repeat the queries that are due."""
         while self._later and self._later[0][0] <= time.monotonic():
             _, key, missing = self._later.popleft()
             self._ask(key, missing)
 
     def _ask_all(self) -> None:
-        most, asked_s = min(self._usual(), self._most(self._newest_ns)), time.monotonic()
+        limit, asked_s = min(self._typical_limit(), self._limit(self._newest_ns)), time.monotonic()
         try:
-            replies = self._asked(keys.all_tags(self._site, "samples"), most, zenoh.handlers.FifoChannel(REPLIES))
-            for reply in received(replies):
+            replies = self._get(keys.all_tags(self._site, "samples"), limit, zenoh.handlers.FifoChannel(REPLIES))
+            for reply in drain(replies):
                 self._on_reply(reply)
         finally:
-            self._finish(partial(self._catch_up.on_first_round_answer, most), asked_s)
+            self._finish(partial(self._catch_up.on_first_round_answer, limit), asked_s)
 
     def _ask(self, key: str, missing: int) -> None:
         tag = self._tags.find(keys.tag_from_key(key))
-        heard_ns = None if tag is None else tag.last_heard_ns
-        most = FEWEST + missing if missing else self._most(heard_ns or 0)
-        answered = partial(self._catch_up.on_answer, key, most)
+        last_heard_ns = None if tag is None else tag.last_heard_ns
+        limit = MIN_MESSAGES + missing if missing else self._limit(last_heard_ns or 0)
+        answered = partial(self._catch_up.on_answer, key, limit)
         done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
         try:
-            self._asked(key, most, zenoh.handlers.Callback(self._on_reply, done))
+            self._get(key, limit, zenoh.handlers.Callback(self._on_reply, done))
         except zenoh.ZError:
             answered()
             raise
 
-    def _asked(self, samples: str, most: int, handler: Any) -> Any:
-        """Ask for the newest `most`."""
+    def _get(self, samples: str, limit: int, handler: Any) -> Any:
+        """Query the caches of these keys for their newest `limit` messages."""
         return self._session.get(
-            f"{samples}/@adv/**?_max={most}",
+            f"{samples}/@adv/**?_max={limit}",
             handler,
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
@@ -132,21 +134,22 @@ class ZenohCaches:
             timeout=ANSWER_S,
         )
 
-    def _usual(self) -> int:
-        """How many messages most tags have sent since the last process heard them, if they went on as before."""
+    def _typical_limit(self) -> int:
+        """Return how many messages most tags have sent since the last process stopped, at their former rates."""
         counts = self._tags.copy_counts()
         heard = counts[counts["messages"] > 0]
         if not len(heard):
-            return FEWEST
+            return MIN_MESSAGES
         heard_s = np.maximum((heard["last_heard_ns"] - heard["first_heard_ns"]) * 1e-9, 1.0)
-        rate = float(np.quantile(heard["messages"] / heard_s, NINE_OF_TEN))
-        return FEWEST // 5 + round(SPARE * rate * self._silent_s(self._newest_ns))
+        rate = float(np.quantile(heard["messages"] / heard_s, RATE_QUANTILE))
+        return MIN_MESSAGES // 5 + round(MARGIN * rate * self._silent_s(self._newest_ns))
 
-    def _most(self, heard_ns: int) -> int:
-        return FEWEST + round(PER_SECOND * self._silent_s(heard_ns))
+    def _limit(self, last_heard_ns: int) -> int:
+        """Return how many messages a tag can have sent since it was last heard, at most."""
+        return MIN_MESSAGES + round(MESSAGES_PER_S * self._silent_s(last_heard_ns))
 
-    def _silent_s(self, heard_ns: int) -> float:
-        return max((self._clock.now_ns() - heard_ns) * 1e-9, 0.0) if heard_ns else 0.0
+    def _silent_s(self, last_heard_ns: int) -> float:
+        return max((self._clock.now_ns() - last_heard_ns) * 1e-9, 0.0) if last_heard_ns else 0.0
 
     def _on_reply(self, reply: Any) -> None:
         message = reply.ok
@@ -159,4 +162,4 @@ class ZenohCaches:
         messages = answered()
         self._metrics.caught_up.inc(messages)
         if messages:
-            _log.debug("caches answered in %.2f s; %d messages go on", time.monotonic() - asked_s, messages)
+            _log.debug("the caches answered in %.2f s and added %d messages", time.monotonic() - asked_s, messages)

@@ -1,4 +1,7 @@
-"""What a Zenoh channel holds, taken in one go: waiting gives up the interpreter, which has to be won back."""
+"""Drain a Zenoh channel in batches.
+
+Each wait releases the interpreter lock, and getting it back takes time. A batch pays that once for many entries.
+"""
 
 import time
 from collections.abc import Iterator
@@ -7,8 +10,11 @@ from typing import Any
 import zenoh
 
 
-def received(channel: Any, gather_s: float = 0.0) -> Iterator[Any]:
-    """Until it is closed. gather_s: how long the first entry waits for others, so that one waking takes many."""
+def drain(channel: Any, gather_s: float = 0.0) -> Iterator[Any]:
+    """Yield the entries of a channel until it is closed.
+
+    gather_s: how long to wait for more entries after the first one of a batch.
+    """
     while True:
         try:
             entry = channel.recv()

@@ -1,4 +1,4 @@
-"""The endpoints of the Zenoh router that tags connect to."""
+"""The endpoints that tags connect to."""
 
 import json
 from pathlib import Path
@@ -11,16 +11,16 @@ from dropanchor_service.zenoh_io.session import listening_at
 
 
 def endpoints_of(settings: ZenohSettings, credentials: SecurityFolder | None) -> tuple[str, ...]:
-    """The endpoints as they are set: of a router elsewhere, or those where ours listens."""
+    """Return the endpoints of the router as configured: an external one, or the one inside the service."""
     if settings.config_file is not None:
-        return _in_file(settings.config_file)
+        return _endpoints_in(settings.config_file)
     return settings.connect or listening_at(settings, credentials)
 
 
-def _in_file(file: Path) -> tuple[str, ...]:
-    """Of a Zenoh configuration of the operator's own; it was read once before, so it can be."""
+def _endpoints_in(file: Path) -> tuple[str, ...]:
+    """Return the endpoints in a Zenoh configuration file, which was already read once without an error."""
     config = zenoh.Config.from_file(str(file))
     mode = json.loads(config.get_json("mode")) or "peer"
-    given = json.loads(config.get_json("connect/endpoints" if mode == "client" else "listen/endpoints"))
-    found = given.get(mode, []) if isinstance(given, dict) else given
+    configured = json.loads(config.get_json("connect/endpoints" if mode == "client" else "listen/endpoints"))
+    found = configured.get(mode, []) if isinstance(configured, dict) else configured
     return (found,) if isinstance(found, str) else tuple(found or ())

@@ -1,4 +1,4 @@
-"""Beyond the loopback the service listens only where it knows who connects, unless it is told that anybody may."""
+"""Refuse to listen beyond the loopback without credentials, unless the settings allow it."""
 
 import ipaddress
 import json
@@ -17,33 +17,36 @@ _LOCAL_LINKS = ("unixsock-stream", "unixpipe", "serial", "vsock")
 _ENCRYPTED_LINKS = ("tls", "quic")
 
 _WHAT_TO_DO = """\
-Either make credentials, and give the folder to the router and to the service:
+Either create credentials, and pass the folder to the router and to the service:
   dropanchor security init --security security --host NAME_OR_ADDRESS_OF_THIS_MACHINE
   and add: --security security
-or, on a network where everybody is trusted, let anybody in:
+or, on a trusted network, allow connections without credentials:
   add: --insecure      (settings: insecure = true, environment: DROPANCHOR_INSECURE=true)"""
 
 
 def refuse_exposure(settings: Settings, credentials: SecurityFolder | None) -> None:
-    """Raises SettingsError, which says what to do, when anybody beyond this machine could connect."""
+    """Raise SettingsError, with advice, when other machines could connect without credentials."""
     if settings.insecure:
         return
-    doors = list(_open_zenoh(settings.zenoh, credentials))
+    exposed = list(_exposed_zenoh(settings.zenoh, credentials))
     if not is_loopback(settings.http.host) and not _is_guarded(settings, credentials):
-        doors.insert(0, f"HTTP at {settings.http.host}")
-    if doors:
-        them = " and ".join(doors)
-        raise SettingsError(f"{them} could be reached by anybody on the network without credentials.\n{_WHAT_TO_DO}")
+        exposed.insert(0, f"HTTP at {settings.http.host}")
+    if exposed:
+        listeners = " and ".join(exposed)
+        raise SettingsError(f"{listeners} would be open to the network without credentials.\n{_WHAT_TO_DO}")
 
 
 def _is_guarded(settings: Settings, credentials: SecurityFolder | None) -> bool:
-    """Whether REST asks who it is, and nobody else hears the answer."""
-    asks = credentials is not None or settings.security.oidc is not None
-    return asks and certificate_of(settings.http, credentials) is not None
+    """Return whether REST authenticates its clients and encrypts the traffic."""
+    authenticates = credentials is not None or settings.security.oidc is not None
+    return authenticates and certificate_of(settings.http, credentials) is not None
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches it. A name that means nothing is let pass: nobody can listen there."""
+    """Return whether only this machine can reach the host.
+
+    A name that cannot be resolved counts as loopback: nothing can listen there.
+    """
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -55,25 +58,27 @@ def is_loopback(host: str) -> bool:
     return all(ipaddress.ip_address(str(address[0]).partition("%")[0]).is_loopback for *_, address in found)
 
 
-def _open_zenoh(settings: ZenohSettings, credentials: SecurityFolder | None) -> Iterator[str]:
+def _exposed_zenoh(settings: ZenohSettings, credentials: SecurityFolder | None) -> Iterator[str]:
     if settings.config_file is not None:
-        yield from _open_by_file(settings)
+        yield from _exposed_by_file(settings)
     elif credentials is None and not settings.connect:
         yield from (f"Zenoh at {endpoint}" for endpoint in settings.listen if _is_reachable(endpoint))
 
 
-def _open_by_file(settings: ZenohSettings) -> Iterator[str]:
-    """A configuration of the operator's own has to ask for certificates, or for passwords over TLS."""
+def _exposed_by_file(settings: ZenohSettings) -> Iterator[str]:
+    """Yield the listeners of a Zenoh configuration file that require neither certificates nor passwords over TLS."""
     try:
         config = zenoh.Config.from_file(str(settings.config_file))
     except zenoh.ZError:
-        return  # opening the session says what is wrong with it
+        return  # the error is reported when the session is opened
     mode = json.loads(config.get_json("mode")) or "peer"
     listen = json.loads(config.get_json("listen/endpoints")) if mode != "client" else []
-    asks = _has(config, "transport/link/tls/enable_mtls") or _has(config, "transport/auth/usrpwd/dictionary_file")
+    authenticates = _has(config, "transport/link/tls/enable_mtls") or _has(
+        config, "transport/auth/usrpwd/dictionary_file"
+    )
     for endpoint in _endpoints(listen.get(mode, []) if isinstance(listen, dict) else listen):
-        if _is_reachable(endpoint) and not (asks and endpoint.startswith(_ENCRYPTED_LINKS)):
-            yield f"Zenoh at {endpoint} (by {settings.config_file})"
+        if _is_reachable(endpoint) and not (authenticates and endpoint.startswith(_ENCRYPTED_LINKS)):
+            yield f"Zenoh at {endpoint} (set in {settings.config_file})"
 
 
 def _has(config: zenoh.Config, key: str) -> bool:

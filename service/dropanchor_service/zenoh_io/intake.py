@@ -1,7 +1,7 @@
-"""What comes in over Zenoh: samples and liveliness. Callbacks put things down and return; they never call Zenoh.
+"""Receives samples and liveliness over Zenoh. Callbacks store what they get and return; they never call Zenoh.
 
-Samples have no callback: a receive thread that had to win the interpreter for each of them would wait up to 5 ms each
-time another thread computes, and what is live would pile up in the router and be dropped there.
+Samples are read from a channel and not by a callback. A callback needs the interpreter lock for every message, and can
+wait 5 ms for it while another thread computes. Live messages would then queue in the router, which drops them.
 """
 
 import logging
@@ -21,14 +21,14 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import TagTable
 from dropanchor_service.zenoh_io.caches import ZenohCaches
-from dropanchor_service.zenoh_io.channel import received
+from dropanchor_service.zenoh_io.channel import drain
 
-WAITING = 2**14  # messages between the receive thread and ours
-GATHER_S = 0.005  # of messages that are taken together
+CHANNEL_LENGTH = 2**14  # messages between Zenoh's receive thread and ours
+GATHER_S = 0.005  # how long to collect messages before processing them together
 
 
 class ZenohIntake:
-    """Subscribed while it is open. Messages that a tag's publisher still has are asked for when they were missed."""
+    """Subscribes to the samples while it is open. Missed messages are fetched from the publishers' caches."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class ZenohIntake:
         samples = zenoh.ext.declare_advanced_subscriber(
             self._session,
             keys.all_tags(self._site, "samples"),
-            zenoh.handlers.FifoChannel(WAITING),
+            zenoh.handlers.FifoChannel(CHANNEL_LENGTH),
             recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
         )
         misses = samples.sample_miss_listener(zenoh.handlers.Callback(self._on_miss, indirect=False))
@@ -68,7 +68,7 @@ class ZenohIntake:
             history=True,
         )
         self._declared = [misses, samples, tokens]
-        self._thread = threading.Thread(target=self._take_all, args=(samples.handler,), name="samples", daemon=True)
+        self._thread = threading.Thread(target=self._receive_all, args=(samples.handler,), name="samples", daemon=True)
         self._thread.start()
         self._caches.start(self._catch_up)
         return self
@@ -81,19 +81,19 @@ class ZenohIntake:
             declared.undeclare()
         self._thread.join(1.0)
 
-    def _take_all(self, samples: Any) -> None:
-        """Until the subscriber is undeclared."""
-        for message in received(samples, GATHER_S):
-            self._hear(message)
+    def _receive_all(self, samples: Any) -> None:
+        """Pass on messages until the subscriber is undeclared."""
+        for message in drain(samples, GATHER_S):
+            self._receive(message)
 
-    def _hear(self, message: zenoh.Sample) -> None:
+    def _receive(self, message: zenoh.Sample) -> None:
         now_ns = self._clock.now_ns()
         encoding = payload_encoding(str(message.encoding))
         self._catch_up.on_live(str(message.key_expr), bytes(message.payload), encoding, now_ns)
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)
-        self._log.warning("messages are lost for good", f"{miss.nb} of one publisher, which no longer has them")
+        self._log.warning("messages are lost", f"{miss.nb} messages of one publisher are no longer in its cache")
 
     def _on_token(self, message: zenoh.Sample) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The Zenoh side of the service: opened at once with a router of its own, else as soon as the router is there."""
+"""Keeps the Zenoh session of the service: opens its own router at once, or retries until an external one answers."""
 
 import logging
 import threading
@@ -13,15 +13,15 @@ from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.zenoh_io.session import ATTEMPT_S, ZenohError, open_session
 
-PAUSE_S = 0.2
+RETRY_S = 0.2
 
 _log = logging.getLogger(__name__)
 
 
 class ZenohLink:
-    """While it is open there is a session, or one is being tried for; the parts are opened with it.
+    """Opens a session, and then the parts that use it. Retries in the background while the router does not answer.
 
-    Raises ZenohError, when it is opened, where trying again would not help.
+    Entering raises ZenohError where a retry would not help.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class ZenohLink:
         self._opened = ExitStack()
         self._session: zenoh.Session | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._try, name="zenoh link", daemon=True)
+        self._thread = threading.Thread(target=self._connect, name="zenoh link", daemon=True)
 
     def __enter__(self) -> Self:
         if self._settings.connect:
@@ -55,7 +55,7 @@ class ZenohLink:
 
     @property
     def problem(self) -> str | None:
-        """Why nothing can come in over Zenoh at this moment; None when it can."""
+        """Why Zenoh cannot be used now; None when it can."""
         if self._session is None or (self._settings.connect and not self._session.info.routers_zid()):
             return "there is no connection to the Zenoh router"
         return None
@@ -68,16 +68,16 @@ class ZenohLink:
             self._opened = opening.pop_all()
         self._session = session
 
-    def _try(self) -> None:
-        told = False
+    def _connect(self) -> None:
+        has_warned = False
         while not self._stop.is_set():
             try:
                 self._open()
             except ZenohError as error:
-                if not told:
-                    _log.warning("%s Still trying.", error)
-                told = True
-                self._stop.wait(PAUSE_S)
+                if not has_warned:
+                    _log.warning("%s The service keeps trying.", error)
+                has_warned = True
+                self._stop.wait(RETRY_S)
             else:
                 _log.info("connected to the Zenoh router at %s", ", ".join(self._settings.connect))
                 return

@@ -1,4 +1,4 @@
-"""Poses put on Zenoh, per tag on change and as one frame of all, as long as somebody subscribes."""
+"""Publishes poses over Zenoh while somebody subscribes: each tag's pose on change, and one frame of all poses."""
 
 import logging
 import threading
@@ -13,15 +13,15 @@ from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 
-PERIOD_S = 0.05  # a tag's pose is put at most so often
+PERIOD_S = 0.05  # the shortest time between two poses of a tag
 FRAME_PERIOD_S = 0.1
 
 
 class ZenohPoses:
-    """A thread of its own while it is open: putting may take time, and the ingest thread has none.
+    """Publishes from its own thread while it is open, because a put may take longer than the ingest thread can wait.
 
-    One publisher on `…/tag/*/pose` tells whether anybody listens to any tag; the puts themselves name their tag, and
-    Zenoh drops those that nobody has subscribed to. A declared publisher per tag would stall the routing of a fleet.
+    One publisher on `…/tag/*/pose` shows whether anybody subscribes to any tag. Each put then uses the key of its tag,
+    and Zenoh drops those without a subscriber. One declared publisher per tag would stall the routing of a fleet.
     """
 
     def __init__(self, session: zenoh.Session, answers: Answers, metrics: Metrics) -> None:
@@ -37,10 +37,10 @@ class ZenohPoses:
         self._frame_due_s = 0.0
 
     def __enter__(self) -> Self:
-        self._of_tags = self._session.declare_publisher(
+        self._tag_publisher = self._session.declare_publisher(
             keys.all_tags(self._site, "pose"), congestion_control=zenoh.CongestionControl.DROP
         )
-        self._of_all = self._session.declare_publisher(
+        self._frame_publisher = self._session.declare_publisher(
             keys.poses_key(self._site),
             encoding=zenoh.Encoding.APPLICATION_JSON,
             congestion_control=zenoh.CongestionControl.DROP,
@@ -53,8 +53,8 @@ class ZenohPoses:
     ) -> None:
         self._stop.set()
         self._thread.join(1.0)
-        self._of_tags.undeclare()
-        self._of_all.undeclare()
+        self._tag_publisher.undeclare()
+        self._frame_publisher.undeclare()
 
     def _run(self) -> None:
         while not self._stop.wait(PERIOD_S):
@@ -66,7 +66,7 @@ class ZenohPoses:
                 self._log.exception("publication", error)
 
     def _put_tags(self) -> None:
-        if not _is_wanted(self._of_tags):
+        if not _has_subscribers(self._tag_publisher):
             self._tag_version = self._answers.latest.version
             return
         self._tag_version, poses = self._answers.latest.since(self._tag_version)
@@ -79,16 +79,16 @@ class ZenohPoses:
             )
 
     def _put_frame(self) -> None:
-        if time.monotonic() < self._frame_due_s or not _is_wanted(self._of_all):
+        if time.monotonic() < self._frame_due_s or not _has_subscribers(self._frame_publisher):
             return
         if self._answers.latest.version == self._frame_version:
             return
         self._frame_due_s = time.monotonic() + FRAME_PERIOD_S
         self._frame_version, poses = self._answers.latest.since()
-        self._of_all.put(to_json(self._answers.frame_of(poses, self._answers.now_ns())))
+        self._frame_publisher.put(to_json(self._answers.frame_of(poses, self._answers.now_ns())))
 
 
-def _is_wanted(publisher: zenoh.Publisher) -> bool:
-    """Whether anybody subscribes. The type stub says bool; what comes is an object that has one."""
+def _has_subscribers(publisher: zenoh.Publisher) -> bool:
+    """Return whether anybody subscribes. The type stub says bool, but Zenoh returns an object that holds one."""
     status = publisher.matching_status
     return bool(getattr(status, "matching", status))

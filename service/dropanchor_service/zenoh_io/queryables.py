@@ -1,6 +1,6 @@
 """Answers to Zenoh queries: `…/tag/*/pose` and `…/anchor/*`, also with wildcards over many.
 
-A queryable that raises leaves the asker without reply or error, so everything unforeseen is answered as an error.
+A queryable that raises leaves its client without any reply, so every unexpected error becomes an error reply.
 """
 
 import logging
@@ -18,18 +18,18 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store.tags import Tag
 
-FROM_DISK = 100  # tags of one query
+MAX_TAGS_FROM_DISK = 100  # in one query
 
 Reply = tuple[str, bytes]
 """Key and JSON."""
 
 
 class QueryError(Exception):
-    """A query that has no answer; the message says why."""
+    """A query cannot be answered; the message says why."""
 
 
 class ZenohAnswers:
-    """Answers while it is open. Queries are answered one after another in a thread of Zenoh's own."""
+    """Answers queries while it is open, one after another, in a thread of Zenoh."""
 
     def __init__(self, session: zenoh.Session, answers: Answers, service_id: str, metrics: Metrics) -> None:
         self._log = RareLog(logging.getLogger(__name__))
@@ -56,24 +56,27 @@ class ZenohAnswers:
         for declared in self._declared:
             declared.undeclare()
 
-    def poses(self, asked: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
-        """Raises QueryError when one tag is asked for and has no pose, at that time if one is given."""
+    def poses(self, key_expr: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
+        """Yield the poses of all tags that match, the latest ones or those at the time in `parameters`.
+
+        Raises QueryError when the key names one tag and that tag has no such pose.
+        """
         at_ns = _time_of(parameters)
-        name = _one_tag(str(asked))
+        name = _single_tag(str(key_expr))
         tags = self._answers.tags
         if name is not None:
             tag = tags.find(name)
             pose = self._pose(name, at_ns)
             if pose is None:
-                raise QueryError(f"no tag {name!r} is known" if tag is None else f"tag {name!r} has no pose yet")
+                raise QueryError(f"tag {name!r} is unknown" if tag is None else f"tag {name!r} has no pose yet")
             yield keys.pose_key(self._site, name), to_json(pose)
             return
-        wanted = [tag for tag in tags.all() if asked.includes(keys.pose_key(self._site, tag.name))]
+        matching = [tag for tag in tags.all() if key_expr.includes(keys.pose_key(self._site, tag.name))]
         if at_ns is None:
-            found = self._answers.pose_jsons(self._answers.rows(wanted), self._answers.now_ns())
+            found = self._answers.pose_jsons(self._answers.rows(matching), self._answers.now_ns())
         else:
-            found = ((pose["tag"], to_json(pose)) for pose in self._poses_at(wanted, at_ns))
-        yield from ((keys.pose_key(self._site, of), text) for of, text in found)
+            found = ((pose["tag"], to_json(pose)) for pose in self._poses_at(matching, at_ns))
+        yield from ((keys.pose_key(self._site, tag_name), text) for tag_name, text in found)
 
     def _pose(self, name: str, at_ns: int | None) -> Answer | None:
         try:
@@ -85,25 +88,27 @@ class ZenohAnswers:
         return None if tag is None else self._answers.pose_of(tag)
 
     def _poses_at(self, tags: Sequence[Tag], at_ns: int) -> Iterator[Answer]:
-        """Of those tags that have a pose for that time; the history on disk is asked for a few tags only, because other
-        queries wait meanwhile."""
+        """Yield the poses at that time, of the tags that have one.
+
+        The history on disk is read only for a few tags, because other queries wait meanwhile.
+        """
         for tag in tags:
             with suppress(NoPoseThenError):
-                pose = self._answers.pose_at(tag.name, at_ns, from_disk=len(tags) <= FROM_DISK)
+                pose = self._answers.pose_at(tag.name, at_ns, from_disk=len(tags) <= MAX_TAGS_FROM_DISK)
                 if pose is not None:
                     yield pose
 
-    def anchors(self, asked: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
-        """Raises QueryError when one anchor is asked for and is not there."""
-        _refuse(parameters)
+    def anchors(self, key_expr: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
+        """Yield the anchors that match. Raises QueryError when the key names one anchor that the site lacks."""
+        _refuse_parameters(parameters)
         site = self._answers.site.site
         found = [
             (key, to_json(anchor.model_dump() | {"site": site.model_dump(exclude={"anchors"})}))
             for key, anchor in ((keys.anchor_key(site.id, anchor.id), anchor) for anchor in site.anchors)
-            if asked.includes(key)
+            if key_expr.includes(key)
         ]
-        if not found and "*" not in str(asked):
-            raise QueryError(f"no anchor {str(asked).rpartition('/')[2]!r} is known")
+        if not found and "*" not in str(key_expr):
+            raise QueryError(f"anchor {str(key_expr).rpartition('/')[2]!r} is unknown")
         yield from found
 
     def _answering(self, find: Callable[[zenoh.KeyExpr, str], Iterator[Reply]]) -> Callable[[zenoh.Query], None]:
@@ -122,8 +127,8 @@ class ZenohAnswers:
         return answer
 
 
-def _one_tag(key: str) -> str | None:
-    """The tag that a key without wildcards names. Raises QueryError when it does not follow the contract."""
+def _single_tag(key: str) -> str | None:
+    """Return the tag that the key names; None for wildcards. Raises QueryError when the key is malformed."""
     if "*" in key or "$" in key:
         return None
     try:
@@ -133,19 +138,19 @@ def _one_tag(key: str) -> str | None:
 
 
 def _time_of(parameters: str) -> int | None:
-    """The time in `at=<t_ns>`, None without it. Raises QueryError for anything else."""
-    given = [part for part in parameters.split(";") if part.startswith("at=")]
-    _refuse(";".join(part for part in parameters.split(";") if part not in given))
-    if not given:
+    """Return the time in `at=<t_ns>`; None without it. Raises QueryError for any other parameter."""
+    times = [part for part in parameters.split(";") if part.startswith("at=")]
+    _refuse_parameters(";".join(part for part in parameters.split(";") if part not in times))
+    if not times:
         return None
-    digits = given[0].removeprefix("at=")
-    if len(given) > 1 or not (digits.isascii() and digits.isdigit()) or int(digits) >= 2**63:
-        raise QueryError("parameter 'at' takes one time, UTC in ns")
+    digits = times[0].removeprefix("at=")
+    if len(times) > 1 or not (digits.isascii() and digits.isdigit()) or int(digits) >= 2**63:
+        raise QueryError("parameter 'at' takes one time: UTC, integer nanoseconds")
     return int(digits)
 
 
-def _refuse(parameters: str) -> None:
-    """Parameters that are not understood must not be ignored: the answer would be to another question."""
+def _refuse_parameters(parameters: str) -> None:
+    """Raise QueryError for any parameter, since ignoring one would answer a different question."""
     unknown = [part.partition("=")[0] for part in parameters.split(";") if part and not part.startswith("_")]
     if unknown:
-        raise QueryError(f"parameter {unknown[0]!r} is not known")
+        raise QueryError(f"parameter {unknown[0]!r} is unknown")

@@ -1,18 +1,20 @@
-"""Enough threads for a router to close dead connections without keeping living ones waiting.
+"""Give a router enough receive threads to close dead connections without delaying live ones.
 
-A tag that vanishes without closing its connection (no power, no Wi-Fi) leaves data that it never acknowledges. When
-Zenoh closes such a TCP or TLS connection, `close` blocks a receive thread for up to 10 s (`SO_LINGER`), and Zenoh
-starts two of them: a handful of such tags would silence all others for tens of seconds.
+A tag that vanishes (no power, no Wi-Fi) leaves data unacknowledged. When Zenoh closes such a TCP or TLS connection,
+`close` blocks a receive thread for up to 10 s (`SO_LINGER`). Zenoh starts only two receive threads by default, so a few
+such tags would block all others for tens of seconds.
 """
 
 import os
 
 VARIABLE = "ZENOH_RUNTIME"
 COUNT = 256
-"""As many tags can vanish at once. Together the threads cost a router 3.7 MB, and 0.3 % of a core or less at rest."""
+"""How many tags can vanish at once. At rest the threads cost 3.7 MB and at most 0.3 % of a core."""
 
 
-def have_enough() -> None:
-    """Tell Zenoh how many receive threads to start, unless the environment does. It must not be in use yet: Zenoh
-    reads the variable once, when it first runs anything."""
+def set_receive_threads() -> None:
+    """Set how many receive threads Zenoh starts, unless the environment does.
+
+    Call this before anything uses Zenoh, which reads the variable only once.
+    """
     os.environ.setdefault(VARIABLE, f"(rx: (worker_threads: {COUNT}, max_blocking_threads: {COUNT}))")

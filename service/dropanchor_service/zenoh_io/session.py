@@ -1,4 +1,4 @@
-"""The Zenoh session of the service: a router of its own, or a client of one; with what not to leave at its default."""
+"""Open the Zenoh session of the service: its own router, or a client of an external one."""
 
 import json
 from pathlib import Path
@@ -16,28 +16,28 @@ ATTEMPT_S = 1.0
 
 
 class ZenohError(Exception):
-    """The session could not be opened; the message says what to check."""
+    """The session cannot be opened; the message says what to check."""
 
 
 def open_session(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> zenoh.Session:
-    """Raises ZenohError."""
+    """Open a session with these settings. Raises ZenohError."""
     if not settings.connect:
-        receive_threads.have_enough()
+        receive_threads.set_receive_threads()
     try:
         return zenoh.open(_config(settings, credentials))
     except zenoh.ZError as error:
-        raise ZenohError(_sentence(settings, str(error))) from error
+        raise ZenohError(_explain(settings, str(error))) from error
 
 
 def listening_at(settings: ZenohSettings, credentials: SecurityFolder | None) -> tuple[str, ...]:
-    """The endpoints of a router of ours."""
+    """Return the endpoints where the router of the service listens."""
     if credentials is None or "listen" in settings.model_fields_set:
         return settings.listen
     return credentials.table.listen
 
 
 def configuration(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> dict[str, Any]:
-    """The Zenoh configuration of these endpoints, unless a file gives one."""
+    """Return the Zenoh configuration for these settings, when no file provides one."""
     if settings.connect:
         return _client(settings, credentials) | QUIET
     listen = listening_at(settings, credentials)
@@ -51,7 +51,7 @@ def _client(settings: ZenohSettings, credentials: SecurityFolder | None) -> dict
         "mode": "client",
         "connect": {
             "endpoints": list(settings.connect),
-            # An endless attempt inside Zenoh could not be interrupted; a finite one still reconnects for ever.
+            # An endless attempt inside Zenoh cannot be interrupted. A finite one still reconnects forever.
             "timeout_ms": round(ATTEMPT_S * 1000),
             "exit_on_failure": True,
             "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
@@ -84,15 +84,15 @@ def _config(settings: ZenohSettings, credentials: SecurityFolder | None) -> zeno
         raise ZenohError(f"zenoh.config_file: {settings.config_file} cannot be read: {error.strerror}") from error
 
 
-def _sentence(settings: ZenohSettings, text: str) -> str:
+def _explain(settings: ZenohSettings, text: str) -> str:
     if settings.config_file is not None:
-        return f"Zenoh does not start with {settings.config_file}: {text}"
+        return f"Zenoh cannot start with {settings.config_file}: {text}"
     endpoints = ", ".join(settings.connect or settings.listen)
     if settings.connect:
         return (
-            f"Zenoh cannot connect to {endpoints}: check the address, that a router runs there, and whether it wants "
-            f"a certificate (--security). ({text})"
+            f"Zenoh cannot connect to {endpoints}: check the address, that a router runs there, and whether it "
+            f"requires a certificate (--security). ({text})"
         )
     if "address already in use" in text.lower() or "os error 98" in text.lower():
-        return f"Zenoh cannot listen on {endpoints}: the port is taken. Choose another one with --zenoh-listen."
+        return f"Zenoh cannot listen on {endpoints}: the port is in use. Choose another one with --zenoh-listen."
     return f"Zenoh cannot listen on {endpoints}: {text}"

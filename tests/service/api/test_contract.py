@@ -1,4 +1,4 @@
-"""The interface does what its OpenAPI document says, whatever is sent: schemathesis asks."""
+"""Check with schemathesis that the interface follows its OpenAPI document, for valid and invalid requests."""
 
 import os
 from collections.abc import Iterator
@@ -26,10 +26,10 @@ from dropanchor_service.recording.recorder import Recorder
 Operation = APIOperation[Any, Any, Any, Any]
 
 EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
-"""Good requests per operation, and as many bad ones; the seed is fixed, so that every run asks the same."""
+"""Valid requests per operation, and as many invalid ones. The seed is fixed, so that every run sends the same."""
 
 BEYOND_THE_SCHEMA = {"get_track": [positive_data_acceptance], "put_site": [positive_data_acceptance]}
-"""What no schema can say, and words do: `from` and `to` are at most 31 days apart, each anchor stands there once."""
+"""Rules that a schema cannot express: `from` and `to` are at most 31 days apart; each anchor is listed once."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(str.isprintable)
@@ -39,7 +39,7 @@ schemathesis.openapi.format(
 )
 
 
-FOLDER = TemporaryDirectory(prefix="dropanchor-contract-")  # for as long as the module is there
+FOLDER = TemporaryDirectory(prefix="dropanchor-contract-")  # deleted together with the module
 
 
 def operations() -> Iterator[Operation]:
@@ -64,14 +64,14 @@ OPERATIONS = {operation.definition.raw["operationId"]: operation for operation i
 
 
 @pytest.mark.parametrize("name", OPERATIONS)
-def test_every_answer_is_one_that_the_document_promises(name: str) -> None:
+def test_every_response_follows_the_document(name: str) -> None:
     excluded = BEYOND_THE_SCHEMA.get(name, [])
     asked = sum(_asked(OPERATIONS[name], mode, excluded) for mode in schemathesis.GenerationMode)
     assert asked > 0
 
 
 def _asked(operation: Operation, mode: schemathesis.GenerationMode, excluded: list[Any]) -> int:
-    """How many requests of this kind there were: where nothing is sent, nothing can be bad."""
+    """Send requests of this kind and return how many. An operation without input has no invalid requests."""
     count = 0
 
     @seed(20)

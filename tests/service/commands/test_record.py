@@ -63,6 +63,6 @@ def test_what_cannot_be_done_is_said_in_a_sentence(url: str, capsys: pytest.Capt
     assert main(["record", "list", "--url", nobody]) == 2
     assert main(["record", "list", "--url", "nonsense"]) == 2
     errors = capsys.readouterr().err.splitlines()
-    assert errors[0] == "dropanchor record: Nothing is being recorded."
+    assert errors[0] == "dropanchor record: No recording is running, so there is nothing to stop."
     assert "does not answer" in errors[2]
     assert len(errors) == 4

@@ -1,4 +1,4 @@
-"""A real router with certificates: what one tag can do to another, with access control and, as a control, without."""
+"""What one tag can do to another on a real router with certificates: with access control, and without as a control."""
 
 import time
 from collections.abc import Callable
@@ -25,29 +25,29 @@ ALL_REPLIES: dict[str, Any] = {
 }
 
 
-class Ears:
-    """What a session hears: (kind, key, payload)."""
+class Received:
+    """The messages that a session receives: (kind, key, payload)."""
 
     def __init__(self) -> None:
-        self.heard: list[tuple[str, str, bytes]] = []
+        self.messages: list[tuple[str, str, bytes]] = []
 
     def __call__(self, message: zenoh.Sample) -> None:
-        self.heard.append(
+        self.messages.append(
             (str(message.kind).removeprefix("SampleKind."), str(message.key_expr), bytes(message.payload))
         )
 
     def has(self, key: str, payload: bytes | None = None, kind: str = "PUT") -> bool:
-        return any(k == kind and at == key and payload in (None, p) for k, at, p in self.heard)
+        return any(k == kind and at == key and payload in (None, p) for k, at, p in self.messages)
 
 
 class World:
-    """The service and a reader, tag b at work with its cache, and tag a with a session that does as it likes."""
+    """The service, a reader, tag b with a normal client and its cache, and tag a with an attacker's session."""
 
     def __init__(self, site: SecuredSite, stack: ExitStack) -> None:
         enter = stack.enter_context
         self.service, self.reader = enter(site.session("service")), enter(site.session("reader"))
         self.a = enter(site.session("a"))
-        self.samples, self.alive, self.poses, self.stolen = Ears(), Ears(), Ears(), Ears()
+        self.samples, self.alive, self.poses, self.stolen = Received(), Received(), Received(), Received()
         recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
         self._kept: list[object] = [
             zenoh.ext.declare_advanced_subscriber(
@@ -64,8 +64,8 @@ class World:
     def keep(self, *declared: object) -> None:
         self._kept.extend(declared)
 
-    def work(self) -> None:
-        """Honest traffic, which must pass in any case and after what was done before it."""
+    def exchange(self) -> None:
+        """Send permitted messages and wait until they arrive, and with them whatever was sent before."""
         self.b.publish_range(1, 1.0)
         self.b.flush()
         own = keys.samples_key(SITE, "a")
@@ -88,18 +88,18 @@ def _answers(payload: bytes) -> Callable[[zenoh.Query], None]:
     return answer
 
 
-def asked(session: zenoh.Session, selector: str, **how: Any) -> list[bytes]:
+def query_payloads(session: zenoh.Session, selector: str, **how: Any) -> list[bytes]:
     replies = session.get(selector, timeout=2.0, **how)
     return [bytes(reply.ok.payload) for reply in replies if reply.ok is not None]
 
 
-def alive_as_told_to(session: zenoh.Session) -> list[str]:
+def live_tags(session: zenoh.Session) -> list[str]:
     replies = session.liveliness().get(keys.all_tags(SITE, "alive"), timeout=2.0)
     return [key for reply in replies if reply.ok is not None and "ghost" not in (key := str(reply.ok.key_expr))]
 
 
-def attempts(world: World) -> dict[str, Callable[[], bool]]:
-    """What a does, at once, and whether it has succeeded, by name."""
+def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
+    """Start every attack of a. Return, by name, functions that say whether it succeeded."""
     a, samples, alive, poses, stolen = world.a, world.samples, world.alive, world.poses, world.stolen
     a.put(OF_B, b"spoofed")
     a.delete(OF_B)
@@ -110,17 +110,17 @@ def attempts(world: World) -> dict[str, Callable[[], bool]]:
         a.liveliness().declare_token(key)
         for key in (keys.tag_alive_key(SITE, "ghost"), keys.service_alive_key(SITE, "ghost"))
     ]
-    spies = [
+    subscribers = [
         a.declare_subscriber(OF_B, stolen),
         a.declare_subscriber(keys.all_tags(SITE, "pose"), stolen),
         a.liveliness().declare_subscriber(keys.all_tags(SITE, "alive"), stolen, history=True),
     ]
-    liars = [
+    queryables = [
         a.declare_queryable(POSE_OF_B, _answers(b"a lie")),
         a.declare_queryable(f"{OF_B}/@adv/pub/liar", _answers(b"a lie")),
     ]
-    world.keep(tokens, spies, liars)
-    every: dict[str, Any] = {"target": zenoh.QueryTarget.ALL}
+    world.keep(tokens, subscribers, queryables)
+    all_targets: dict[str, Any] = {"target": zenoh.QueryTarget.ALL}
     return {
         "puts samples of b": lambda: samples.has(OF_B, b"spoofed"),
         "deletes samples of b": lambda: samples.has(OF_B, kind="DELETE"),
@@ -129,38 +129,40 @@ def attempts(world: World) -> dict[str, Callable[[], bool]]:
         "puts the frame of all poses": lambda: poses.has(keys.poses_key(SITE), b"forged"),
         "pretends that another tag is alive": lambda: alive.has(keys.tag_alive_key(SITE, "ghost")),
         "pretends to be a service": lambda: alive.has(keys.service_alive_key(SITE, "ghost")),
-        "hears samples of b": lambda: stolen.has(OF_B),
-        "hears poses of b": lambda: stolen.has(POSE_OF_B),
-        "hears that b is alive": lambda: stolen.has(keys.tag_alive_key(SITE, "b")),
-        "asks who is alive": lambda: alive_as_told_to(a) != [],
-        "asks for the pose of b": lambda: b"from the service" in asked(a, POSE_OF_B, **every),
-        "asks for all poses": lambda: b"from the service" in asked(a, keys.all_tags(SITE, "pose"), **every),
-        "asks for the cache of b": lambda: set(asked(a, CACHES, **ALL_REPLIES)) - {b"a lie"} != set(),
-        "answers for the pose of b": lambda: b"a lie" in asked(world.reader, POSE_OF_B, **every),
-        "answers for the cache of b": lambda: b"a lie" in asked(world.service, CACHES, **ALL_REPLIES),
+        "receives samples of b": lambda: stolen.has(OF_B),
+        "receives poses of b": lambda: stolen.has(POSE_OF_B),
+        "receives that b is alive": lambda: stolen.has(keys.tag_alive_key(SITE, "b")),
+        "queries who is alive": lambda: live_tags(a) != [],
+        "queries the pose of b": lambda: b"from the service" in query_payloads(a, POSE_OF_B, **all_targets),
+        "queries all poses": lambda: (
+            b"from the service" in query_payloads(a, keys.all_tags(SITE, "pose"), **all_targets)
+        ),
+        "queries the cache of b": lambda: set(query_payloads(a, CACHES, **ALL_REPLIES)) - {b"a lie"} != set(),
+        "answers for the pose of b": lambda: b"a lie" in query_payloads(world.reader, POSE_OF_B, **all_targets),
+        "answers for the cache of b": lambda: b"a lie" in query_payloads(world.service, CACHES, **ALL_REPLIES),
     }
 
 
 @pytest.mark.parametrize("access_control", [True, False], ids=["guarded", "control"])
-def test_a_tag_speaks_only_for_itself_and_without_access_control_every_attempt_succeeds(
+def test_a_tag_speaks_only_for_itself_and_without_access_control_every_attack_succeeds(
     tmp_path: Path, access_control: bool
 ) -> None:
     site = secured_site(tmp_path / "security", "a", "b")
     with ExitStack() as stack:
         stack.enter_context(site.router(access_control))
         world = World(site, stack)
-        world.work()
-        done = attempts(world)
+        world.exchange()
+        done = start_attacks(world)
         for _ in range(3):
-            world.work()
+            world.exchange()
         if access_control:
             assert [name for name, succeeded in done.items() if succeeded()] == []
         else:
             for name, succeeded in done.items():
                 end_s = time.monotonic() + 10.0
                 while not (ok := succeeded()) and time.monotonic() < end_s:
-                    world.work()
-                assert ok, f"the check cannot fail: {name}"
+                    world.exchange()
+                assert ok, f"this attack never succeeds, so the guarded test proves nothing: {name}"
 
 
 def test_a_tag_reads_its_own_pose_and_its_cache_answers_the_service(tmp_path: Path) -> None:
@@ -168,27 +170,27 @@ def test_a_tag_reads_its_own_pose_and_its_cache_answers_the_service(tmp_path: Pa
     with ExitStack() as stack:
         stack.enter_context(site.router())
         world = World(site, stack)
-        world.work()
-        assert asked(world.a, POSE_OF_A) == [b"from the service"]
-        assert len(asked(world.service, f"{CACHES}?_max=10", **ALL_REPLIES)) == 1
+        world.exchange()
+        assert query_payloads(world.a, POSE_OF_A) == [b"from the service"]
+        assert len(query_payloads(world.service, f"{CACHES}?_max=10", **ALL_REPLIES)) == 1
 
 
-def test_a_revoked_tag_and_one_without_certificate_are_shut_out(tmp_path: Path) -> None:
+def test_a_revoked_tag_and_one_without_a_certificate_are_refused(tmp_path: Path) -> None:
     site = secured_site(tmp_path / "security", "a", "b")
     site.folder.revoke_tag("a")
     plain = SessionSettings(connect=site.endpoint, ca=tmp_path / "security" / "ca.pem")
-    ears = Ears()
+    received = Received()
     with site.router(), site.session("service") as service, site.session("a") as a, site.session("b") as b:
-        with service.declare_subscriber(keys.all_tags(SITE, "samples"), ears):
+        with service.declare_subscriber(keys.all_tags(SITE, "samples"), received):
 
             def passed() -> bool:
                 a.put(keys.samples_key(SITE, "a"), b"revoked")
                 b.put(OF_B, b"admitted")
-                return ears.has(OF_B)
+                return received.has(OF_B)
 
             wait_until(passed)
             passed()
-            wait_until(lambda: len(ears.heard) >= 2)
-            assert {key for _, key, _ in ears.heard} == {OF_B}
+            wait_until(lambda: len(received.messages) >= 2)
+            assert {key for _, key, _ in received.messages} == {OF_B}
         with pytest.raises(ConnectError, match="the certificates"):
             TagClient("c", connect=plain, connect_timeout_s=0.7).open()

@@ -1,4 +1,4 @@
-"""API keys: shown once, kept as hashes, followed while the service runs."""
+"""API keys: shown once, stored as hashes, and reloaded while the service runs."""
 
 import stat
 from pathlib import Path
@@ -11,40 +11,40 @@ from dropanchor_service.security.identity import Scope, UnauthenticatedError
 from support.secured import secured_site
 
 
-def test_a_key_is_known_with_its_scope_and_only_its_hash_is_kept(tmp_path: Path) -> None:
+def test_a_key_has_a_scope_and_only_its_hash_is_stored(tmp_path: Path) -> None:
     keys = ApiKeys(tmp_path)
     secret = keys.add("dashboard", Scope.WRITE)
     identity = keys.identify(secret)
     assert (identity.name, identity.scope) == ("dashboard", Scope.WRITE)
-    kept = (tmp_path / FILE).read_text()
-    assert secret not in kept
-    assert secret.rpartition("_")[2] not in kept
+    stored = (tmp_path / FILE).read_text()
+    assert secret not in stored
+    assert secret.rpartition("_")[2] not in stored
     assert stat.S_IMODE((tmp_path / FILE).stat().st_mode) == 0o600
 
 
-def test_a_running_service_follows_within_a_second(tmp_path: Path) -> None:
+def test_a_running_service_follows_changes_of_the_file_within_a_second(tmp_path: Path) -> None:
     now_s = 0.0
     running = ApiKeys(tmp_path, lambda: now_s)
     secret = ApiKeys(tmp_path).add("late", Scope.READ)
     now_s = 1.1
     assert running.identify(secret).name == "late"
-    assert running.is_still_good(running.identify(secret))
+    assert running.is_still_valid(running.identify(secret))
     identity = running.identify(secret)
     ApiKeys(tmp_path).revoke("late")
     now_s = 2.2
-    assert not running.is_still_good(identity)
+    assert not running.is_still_valid(identity)
     with pytest.raises(UnauthenticatedError, match="was revoked"):
         running.identify(secret)
 
 
-def test_an_expired_key_is_told_so(tmp_path: Path) -> None:
+def test_an_expired_key_is_refused_as_expired(tmp_path: Path) -> None:
     keys = ApiKeys(tmp_path)
     secret = keys.add("short", Scope.READ, days=-1)
     with pytest.raises(UnauthenticatedError, match="has expired"):
         keys.identify(secret)
 
 
-def test_a_file_that_is_damaged_while_the_service_runs_changes_nothing_and_one_at_the_start_is_told(
+def test_a_damaged_file_stops_the_start_but_does_not_affect_a_running_service(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     now_s = 0.0
@@ -58,18 +58,18 @@ def test_a_file_that_is_damaged_while_the_service_runs_changes_nothing_and_one_a
         ApiKeys(tmp_path)
 
 
-def test_keys_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_adds_lists_and_revokes_keys(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = secured_site(tmp_path / "security").folder.path
     folder = ["--security", str(path)]
     assert main(["key", "add", "dash", "--scope", "read", *folder]) == 0
     secret = capsys.readouterr().out.strip()
     assert ApiKeys(path).identify(secret).scope is Scope.READ
     assert main(["key", "add", "dash", *folder]) == 2
-    assert "there is a key 'dash'" in capsys.readouterr().err
+    assert "a key named 'dash' exists already" in capsys.readouterr().err
     assert main(["key", "list", *folder]) == 0
     listed = capsys.readouterr().out
     assert listed.startswith("dash\tread\tnever expires")
     assert secret not in listed
     assert main(["key", "revoke", "dash", *folder]) == 0
     assert main(["key", "revoke", "dash", *folder]) == 2
-    assert "there is no key 'dash'" in capsys.readouterr().err
+    assert "there is no key named 'dash'" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The folder of credentials: who gets what, and what is never done."""
+"""The folder of credentials: what it issues, and what it refuses."""
 
 import json
 import stat
@@ -25,13 +25,13 @@ def modes(folder: Path) -> dict[str, int]:
     return {file.name: stat.S_IMODE(file.stat().st_mode) for file in folder.rglob("*") if file.is_file()}
 
 
-def test_init_says_what_comes_next_and_never_overwrites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_init_prints_the_next_steps_and_never_overwrites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "security"
     init = ["security", "init", "--security", str(folder), "--host", "yard.example", "--host", "192.0.2.7"]
     assert main(init) == 0
-    said = capsys.readouterr().out
-    assert "dropanchor tag add NAME" in said
-    assert "dropanchor router --security" in said
+    output = capsys.readouterr().out
+    assert "dropanchor tag add NAME" in output
+    assert "dropanchor router --security" in output
     before = {file.name: file.read_bytes() for file in folder.iterdir()}
     assert main(init) == 2
     assert "never overwritten" in capsys.readouterr().err
@@ -39,19 +39,19 @@ def test_init_says_what_comes_next_and_never_overwrites(tmp_path: Path, capsys: 
 
 
 @pytest.mark.parametrize(
-    ("listen", "reached"),
+    ("listen", "connect"),
     [("tls/0.0.0.0:19747", "tls/localhost:19747"), ("tls/192.0.2.7:19748", "tls/192.0.2.7:19748")],
 )
-def test_the_next_steps_name_the_endpoint_that_was_asked_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], listen: str, reached: str
+def test_the_next_steps_name_the_requested_endpoint(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], listen: str, connect: str
 ) -> None:
     assert main(["security", "init", "--security", str(tmp_path / "s"), "--host", "192.0.2.7", "--listen", listen]) == 0
-    said = capsys.readouterr().out
-    assert f"--zenoh-connect {reached}" in said
-    assert "7447" not in said
+    output = capsys.readouterr().out
+    assert f"--zenoh-connect {connect}" in output
+    assert "7447" not in output
 
 
-def test_private_keys_are_for_the_owner_alone(tmp_path: Path) -> None:
+def test_only_the_owner_can_read_private_keys(tmp_path: Path) -> None:
     site = secured_site(tmp_path / "security", "a")
     found = modes(site.folder.path)
     assert {name for name, mode in found.items() if mode == 0o600} >= {name for name in found if name.endswith(".key")}
@@ -59,7 +59,7 @@ def test_private_keys_are_for_the_owner_alone(tmp_path: Path) -> None:
     assert stat.S_IMODE(site.folder.path.stat().st_mode) == 0o700
 
 
-def test_certificates_are_signed_for_their_hosts_and_their_purpose(tmp_path: Path) -> None:
+def test_certificates_name_their_hosts_and_their_purpose(tmp_path: Path) -> None:
     site = secured_site(tmp_path / "security", "a")
     authority = x509.load_pem_x509_certificate(site.folder.certificate("ca").read_bytes())
     router = x509.load_pem_x509_certificate(site.folder.certificate("router").read_bytes())
@@ -98,17 +98,17 @@ def test_tags_are_added_listed_and_revoked(tmp_path: Path, capsys: pytest.Captur
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["tag", "add", "service"], "a tag needs another"),
+        (["tag", "add", "service"], "is a reserved name"),
         (["tag", "add", "x" * 65], "1 to 64 characters"),
-        (["tag", "add", "ü" * 33], "names of 64 bytes"),
-        (["tag", "add", "known"], "--renew makes a new one"),
+        (["tag", "add", "ü" * 33], "a name may have 64 bytes"),
+        (["tag", "add", "known"], "replace it with --renew"),
         (["tag", "add", "new", "--renew"], "no certificate to renew"),
-        (["tag", "add", "gone"], "its old certificate would be let in again"),
+        (["tag", "add", "gone"], "would also admit its old certificate"),
         (["tag", "revoke", "nobody"], "'nobody' has no certificate"),
-        (["tag", "revoke", "gone"], "no certificate any more"),
+        (["tag", "revoke", "gone"], "is revoked already"),
     ],
 )
-def test_what_cannot_be_is_a_sentence(
+def test_a_request_that_cannot_be_met_is_refused_with_a_reason(
     tmp_path: Path, arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = secured_site(tmp_path / "security", "known", "gone").folder
@@ -117,7 +117,7 @@ def test_what_cannot_be_is_a_sentence(
     assert words in capsys.readouterr().err
 
 
-def test_a_folder_that_is_not_there_or_damaged_is_named(tmp_path: Path) -> None:
+def test_a_missing_or_damaged_folder_is_named_in_the_error(tmp_path: Path) -> None:
     with pytest.raises(SecurityError, match="dropanchor security init"):
         SecurityFolder.open(tmp_path)
     (tmp_path / "issued.json").write_text("{")
@@ -129,11 +129,11 @@ def test_the_key_of_the_authority_may_be_kept_elsewhere_until_it_is_needed(tmp_p
     folder = secured_site(tmp_path / "security", "a").folder
     folder.key("ca").unlink()
     folder.revoke_tag("a")
-    with pytest.raises(SecurityError, match="the authority's key is needed"):
+    with pytest.raises(SecurityError, match="the authority's certificate and key are needed"):
         folder.add_tag("b", 30)
 
 
-def test_tags_that_are_added_at_the_same_time_are_all_there(tmp_path: Path) -> None:
+def test_tags_added_by_concurrent_processes_are_all_kept(tmp_path: Path) -> None:
     path = secured_site(tmp_path / "security").folder.path
     commands = [
         [sys.executable, "-m", "dropanchor_service", "tag", "add", f"t{n}", "--security", str(path)] for n in range(4)
@@ -144,14 +144,12 @@ def test_tags_that_are_added_at_the_same_time_are_all_there(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("host", ["", "a b", "yard.example:7447", "tls/yard"])
-def test_a_host_that_is_none_is_refused(tmp_path: Path, host: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_invalid_host_is_refused(tmp_path: Path, host: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["security", "init", "--security", str(tmp_path / "s"), "--host", host]) == 2
     assert "neither the name nor the address" in capsys.readouterr().err
 
 
-def test_certificates_are_renewed_by_the_same_authority_and_for_one_more_host(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_renewal_keeps_the_authority_and_adds_the_new_host(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = secured_site(tmp_path / "security", "a").folder
     before = folder.certificate("router").read_bytes()
     assert folder.expiring(timedelta(days=29)) == []
@@ -172,7 +170,9 @@ def test_certificates_are_renewed_by_the_same_authority_and_for_one_more_host(
     assert len(SecurityFolder.open(folder.path).expiring(timedelta(days=31))) == 1
 
 
-def test_the_service_says_at_its_start_what_expires_soon(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_service_warns_at_its_start_about_certificates_that_expire_soon(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     folder = secured_site(tmp_path / "security", "a").folder
     folder.renew([], days=3)
     credentials_of(Settings(security=SecuritySettings(folder=folder.path)))

@@ -1,4 +1,4 @@
-"""Tokens of a provider that the tests run themselves, on the loopback."""
+"""OpenID Connect tokens, with a real provider on loopback."""
 
 import json
 import time
@@ -22,27 +22,33 @@ AUDIENCE = "dropanchor-yard"
 
 @dataclass
 class Provider:
-    """Publishes the keys that it signs with. asked: the paths that were asked for; moved_to: a redirect of all."""
+    """Signs tokens and publishes its keys. requested: the requested paths; moved_to: redirects every request there."""
 
     url: str = ""
     keys: dict[str, Any] = field(default_factory=dict)
-    asked: list[str] = field(default_factory=list)
+    requested: list[str] = field(default_factory=list)
     moved_to: str = ""
 
     def new_key(self, kid: str) -> None:
         self.keys[kid] = rsa.generate_private_key(65537, 2048)
 
     def answer(self, path: str) -> dict[str, Any]:
-        self.asked.append(path)
+        self.requested.append(path)
         if path == "/.well-known/openid-configuration":
             return {"issuer": self.url, "jwks_uri": f"{self.url}/keys"}
         to_jwk = jwt.algorithms.RSAAlgorithm.to_jwk
         return {"keys": [to_jwk(key.public_key(), as_dict=True) | {"kid": kid} for kid, key in self.keys.items()]}
 
     def token(self, kid: str = "one", key: Any = None, algorithm: str = "RS256", **claims: Any) -> str:
-        told = {"iss": self.url, "aud": AUDIENCE, "sub": "ann", "exp": time.time() + 60, "scope": "dropanchor:read"}
-        told = {name: value for name, value in (told | claims).items() if value is not None}
-        return jwt.encode(told, key or self.keys[kid], algorithm=algorithm, headers={"kid": kid})
+        all_claims = {
+            "iss": self.url,
+            "aud": AUDIENCE,
+            "sub": "ann",
+            "exp": time.time() + 60,
+            "scope": "dropanchor:read",
+        }
+        all_claims = {name: value for name, value in (all_claims | claims).items() if value is not None}
+        return jwt.encode(all_claims, key or self.keys[kid], algorithm=algorithm, headers={"kid": kid})
 
     def settings(self, **more: Any) -> OidcSettings:
         return OidcSettings.model_validate({"issuer": self.url, "audience": AUDIENCE} | more)
@@ -75,13 +81,13 @@ def provider() -> Iterator[Provider]:
         thread.join()
 
 
-def test_a_token_of_the_provider_is_known_with_its_subject_and_scope(provider: Provider) -> None:
+def test_a_token_of_the_provider_yields_its_subject_and_scope(provider: Provider) -> None:
     tokens = OidcTokens(provider.settings())
     identity = tokens.identify(provider.token(scope="openid dropanchor:read dropanchor:write"))
     assert (identity.source, identity.name, identity.scope) == ("token", "ann", Scope.WRITE)
-    assert tokens.is_still_good(identity)
+    assert tokens.is_still_valid(identity)
     tokens.identify(provider.token())
-    assert provider.asked == ["/.well-known/openid-configuration", "/keys"]
+    assert provider.requested == ["/.well-known/openid-configuration", "/keys"]
 
 
 @pytest.mark.parametrize(
@@ -113,12 +119,14 @@ def test_scopes_are_mapped_as_the_settings_say(
         ({"aud": None}, "aud"),
     ],
 )
-def test_claims_that_are_not_for_us_are_refused(provider: Provider, claims: dict[str, Any], words: str) -> None:
+def test_tokens_with_wrong_or_missing_claims_are_refused(
+    provider: Provider, claims: dict[str, Any], words: str
+) -> None:
     with pytest.raises(UnauthenticatedError, match=words):
         OidcTokens(provider.settings()).identify(provider.token(**claims))
 
 
-def test_signatures_of_others_are_refused(provider: Provider) -> None:
+def test_forged_signatures_are_refused(provider: Provider) -> None:
     tokens = OidcTokens(provider.settings())
     foreign = rsa.generate_private_key(65537, 2048)
     public = provider.keys["one"].public_key()
@@ -136,7 +144,7 @@ def test_signatures_of_others_are_refused(provider: Provider) -> None:
     assert public is not None
 
 
-def test_a_new_key_of_the_provider_is_found_and_made_up_ones_cost_it_one_question(provider: Provider) -> None:
+def test_a_new_key_is_found_and_unknown_key_ids_cost_the_provider_one_request(provider: Provider) -> None:
     now_s = 0.0
     keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
     assert keys.find("one")
@@ -144,17 +152,17 @@ def test_a_new_key_of_the_provider_is_found_and_made_up_ones_cost_it_one_questio
     for _ in range(50):
         with pytest.raises(UnauthenticatedError, match="does not publish"):
             keys.find("two")
-    assert provider.asked == ["/keys"]
+    assert provider.requested == ["/keys"]
     now_s = RETRY_S + 0.1
     assert keys.find("two")
-    assert provider.asked == ["/keys", "/keys"]
+    assert provider.requested == ["/keys", "/keys"]
 
 
-def test_a_provider_that_is_away_is_told_and_its_known_keys_still_count(provider: Provider) -> None:
+def test_an_unreachable_provider_is_named_and_its_fetched_keys_stay_valid(provider: Provider) -> None:
     now_s = 0.0
-    nobody = SigningKeys("http://127.0.0.1:9", None, lambda: now_s)
+    unreachable = SigningKeys("http://127.0.0.1:9", None, lambda: now_s)
     with pytest.raises(UnauthenticatedError, match="does not answer"):
-        nobody.find("one")
+        unreachable.find("one")
     keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
     assert keys.find("one")
     provider.keys.clear()
@@ -163,14 +171,14 @@ def test_a_provider_that_is_away_is_told_and_its_known_keys_still_count(provider
     assert keys.find("one")
 
 
-def test_no_token_waits_for_a_provider_that_hangs_while_its_keys_are_known(provider: Provider) -> None:
+def test_no_token_waits_for_a_hanging_provider_whose_keys_were_fetched(provider: Provider) -> None:
     now_s = 0.0
     keys = SigningKeys(provider.url, f"{provider.url}/keys", lambda: now_s)
     keys.find("one")
-    asked, release, answer = Event(), Event(), provider.answer
+    requested, release, answer = Event(), Event(), provider.answer
 
     def hang(path: str) -> dict[str, Any]:
-        asked.set()
+        requested.set()
         release.wait()
         return answer(path)
 
@@ -178,22 +186,22 @@ def test_no_token_waits_for_a_provider_that_hangs_while_its_keys_are_known(provi
     now_s = 1e6
     first = Thread(target=keys.find, args=["one"])
     first.start()
-    assert asked.wait(10)
+    assert requested.wait(10)
     assert keys.find("one")
     assert first.is_alive()
     release.set()
     first.join()
 
 
-def test_keys_come_from_the_address_that_was_set_and_from_no_other(provider: Provider) -> None:
+def test_keys_come_only_from_the_configured_address(provider: Provider) -> None:
     provider.moved_to = f"{provider.url}/other"
     with pytest.raises(UnauthenticatedError, match="does not answer"):
         SigningKeys(provider.url, f"{provider.url}/keys").find("one")
-    assert provider.asked == ["/keys"]
+    assert provider.requested == ["/keys"]
 
 
 @pytest.mark.parametrize("jwks_uri", ["http://idp.example/keys", "file:///etc/passwd", None])
-def test_a_provider_whose_keys_others_could_replace_is_not_asked_for_them(
+def test_keys_are_not_fetched_from_an_address_where_others_could_replace_them(
     provider: Provider, jwks_uri: str | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     provider.answer = lambda _path: {"jwks_uri": jwks_uri}  # type: ignore[method-assign, assignment]
@@ -203,6 +211,6 @@ def test_a_provider_whose_keys_others_could_replace_is_not_asked_for_them(
 
 
 @pytest.mark.parametrize("url", ["http://idp.example", "file:///etc/passwd", "idp.example"])
-def test_a_provider_that_others_could_speak_for_is_refused(url: str) -> None:
+def test_a_provider_without_https_is_refused(url: str) -> None:
     with pytest.raises(ValidationError, match="https://"):
         OidcSettings.model_validate({"issuer": url, "audience": AUDIENCE})

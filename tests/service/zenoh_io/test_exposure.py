@@ -1,4 +1,4 @@
-"""Where the service listens without knowing who connects: on the loopback, and nowhere else unless it is told to."""
+"""Without credentials the service listens only on loopback, unless the settings allow more."""
 
 import subprocess
 from pathlib import Path
@@ -15,7 +15,7 @@ from support.service import command, environment
 from support.zenoh_router import free_endpoint
 
 
-def checked(**settings: Any) -> None:
+def check(**settings: Any) -> None:
     model = Settings.model_validate(settings)
     refuse_exposure(model, credentials_of(model))
 
@@ -24,40 +24,40 @@ def checked(**settings: Any) -> None:
 def test_the_loopback_needs_no_credentials(host: str) -> None:
     assert is_loopback(host)
     bracketed = f"[{host}]" if ":" in host else host
-    checked(http={"host": host}, zenoh={"listen": f"tcp/{bracketed}:7447"})
+    check(http={"host": host}, zenoh={"listen": f"tcp/{bracketed}:7447"})
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "2001:db8::1"])
-def test_other_addresses_are_refused_and_both_ways_out_are_told(host: str) -> None:
+def test_other_addresses_are_refused_with_both_remedies(host: str) -> None:
     bracketed = f"[{host}]" if ":" in host else host
-    for door in ({"http": {"host": host}}, {"zenoh": {"listen": f"tcp/{bracketed}:7447"}}):
+    for listener in ({"http": {"host": host}}, {"zenoh": {"listen": f"tcp/{bracketed}:7447"}}):
         with pytest.raises(SettingsError) as caught:
-            checked(**door)
+            check(**listener)
         assert "dropanchor security init" in str(caught.value)
         assert "--insecure" in str(caught.value)
         assert host in str(caught.value)
-        checked(**door, insecure=True)
+        check(**listener, insecure=True)
 
 
-def test_all_open_doors_are_told_at_once() -> None:
-    with pytest.raises(SettingsError, match=r"HTTP at 0\.0\.0\.0 and Zenoh at tcp/0\.0\.0\.0:7447 could be"):
-        checked(http={"host": "0.0.0.0"}, zenoh={"listen": "tcp/0.0.0.0:7447, tcp/127.0.0.1:7448"})
+def test_all_exposed_listeners_are_named_at_once() -> None:
+    with pytest.raises(SettingsError, match=r"HTTP at 0\.0\.0\.0 and Zenoh at tcp/0\.0\.0\.0:7447 would be"):
+        check(http={"host": "0.0.0.0"}, zenoh={"listen": "tcp/0.0.0.0:7447, tcp/127.0.0.1:7448"})
 
 
-def test_one_who_only_connects_needs_no_credentials() -> None:
-    checked(zenoh={"connect": "tcp/192.0.2.1:7447", "listen": "tcp/0.0.0.0:7447"})
+def test_a_service_that_only_connects_needs_no_credentials() -> None:
+    check(zenoh={"connect": "tcp/192.0.2.1:7447", "listen": "tcp/0.0.0.0:7447"})
 
 
 def test_with_credentials_zenoh_may_listen_anywhere(tmp_path: Path) -> None:
     folder = secured_site(tmp_path / "security").folder.path
-    checked(zenoh={"listen": "tls/0.0.0.0:7447"}, security={"folder": folder})
+    check(zenoh={"listen": "tls/0.0.0.0:7447"}, security={"folder": folder})
 
 
-def test_credentials_that_are_not_there_are_named(tmp_path: Path) -> None:
+def test_missing_credentials_are_named(tmp_path: Path) -> None:
     with pytest.raises(
         SettingsError, match=r"security\.folder: there are no credentials in .*: dropanchor security init"
     ):
-        checked(security={"folder": tmp_path})
+        check(security={"folder": tmp_path})
 
 
 @pytest.mark.parametrize(
@@ -79,14 +79,14 @@ def test_credentials_that_are_not_there_are_named(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_configuration_of_the_operators_own_is_judged_too(tmp_path: Path, text: str, refused: bool) -> None:
+def test_a_zenoh_configuration_file_is_checked_too(tmp_path: Path, text: str, refused: bool) -> None:
     file = tmp_path / "router.json5"
     file.write_text(text)
     if refused:
-        with pytest.raises(SettingsError, match=r"Zenoh at .* could be reached by anybody"):
-            checked(zenoh={"config_file": file})
+        with pytest.raises(SettingsError, match=r"Zenoh at .* would be open to the network"):
+            check(zenoh={"config_file": file})
     else:
-        checked(zenoh={"config_file": file})
+        check(zenoh={"config_file": file})
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_a_configuration_of_the_operators_own_is_judged_too(tmp_path: Path, text
     [["serve", "--port", "0", "--host", "0.0.0.0"], ["router", "--zenoh-listen", "tcp/0.0.0.0:0"]],
     ids=["serve", "router"],
 )
-def test_the_program_ends_before_it_listens(arguments: list[str]) -> None:
+def test_the_program_exits_before_it_listens(arguments: list[str]) -> None:
     listen = [] if "--zenoh-listen" in arguments else ["--zenoh-listen", free_endpoint()]
     result = subprocess.run(
         command(*arguments, *listen), capture_output=True, text=True, env=environment(), timeout=60, check=False

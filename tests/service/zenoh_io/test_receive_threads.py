@@ -1,4 +1,4 @@
-"""How many receive threads a router of ours has, once somebody has connected to it."""
+"""The number of receive threads of a router after a client has connected."""
 
 import sys
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ def receive_threads(pid: int) -> int:
 
 @contextmanager
 def router(endpoint: str, **more: str) -> Iterator[int]:
-    """Its process id."""
+    """Run a router; yield its process id."""
     clean = {name: value for name, value in environment().items() if name != VARIABLE}
     words = command("router", "--zenoh-listen", endpoint)
     with Popen(words, stderr=PIPE, text=True, env=clean | more) as process:
@@ -40,7 +40,7 @@ def test_a_router_has_enough_receive_threads() -> None:
         wait_until(lambda: receive_threads(pid) == COUNT)
 
 
-def test_the_environment_decides_where_it_says_how_many() -> None:
+def test_the_environment_variable_overrides_the_number() -> None:
     endpoint = free_endpoint()
     with router(endpoint, **{VARIABLE: "(rx: (worker_threads: 3))"}) as pid, connected_session(endpoint):
         wait_until(lambda: receive_threads(pid) == 3)
@@ -55,4 +55,4 @@ def test_a_service_with_the_router_inside_has_enough_receive_threads(
         try:
             wait_until(lambda: receive_threads(service.process.pid) == COUNT)
         finally:
-            service.stop()  # the demo ends its simulated tags
+            service.stop()  # the demo also stops its simulated tags

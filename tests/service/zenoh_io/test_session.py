@@ -1,4 +1,4 @@
-"""What our router must not do to the messages of publishers that know nothing of recovery."""
+"""The router of the service must deliver all messages of publishers without recovery."""
 
 from threading import Lock, Thread
 
@@ -12,7 +12,7 @@ from support.zenoh_router import connected_session, free_endpoint, wait_until
 SESSIONS, MESSAGES = 16, 500
 
 
-def test_no_message_of_plain_publishers_in_many_sessions_is_lost_to_a_subscriber_with_recovery() -> None:
+def test_a_subscriber_with_recovery_receives_every_message_of_many_plain_publishers() -> None:
     endpoint = free_endpoint()
     received, lock = [0], Lock()
 

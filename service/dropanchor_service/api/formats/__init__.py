@@ -1,1 +1,1 @@
-"""Formats other than JSON."""
+"""Response formats other than JSON."""

@@ -1,4 +1,4 @@
-"""Poses as GeoJSON (RFC 7946, WGS 84), and the choice between it and plain JSON."""
+"""Poses as GeoJSON (RFC 7946, WGS 84), and content negotiation between GeoJSON and JSON."""
 
 import re
 from typing import Any
@@ -14,14 +14,17 @@ JSON = "application/json"
 _WEIGHT = re.compile(r"0(\.[0-9]{0,3})?|1(\.0{0,3})?")
 
 
-def wanted(request: Request, answers: Answers) -> bool:
-    """Whether the client would rather have GeoJSON than JSON. Raises ProblemError when neither can be given."""
+def is_preferred(request: Request, answers: Answers) -> bool:
+    """Return whether the client prefers GeoJSON to JSON.
+
+    Raises ProblemError when it accepts neither, or prefers GeoJSON and the site has no georeference.
+    """
     accept = request.headers.get("accept", "*/*")
     if accept in ("*/*", JSON):
         return False
     as_json, as_geojson = quality(accept, JSON), quality(accept, MEDIA_TYPE)
     if as_json == as_geojson == 0:
-        raise ProblemError(Kind.NOT_ACCEPTABLE, f"{JSON} and {MEDIA_TYPE} are offered.")
+        raise ProblemError(Kind.NOT_ACCEPTABLE, f"The service offers {JSON} and {MEDIA_TYPE}.")
     if as_geojson <= as_json:
         return False
     require_georeference(answers, "GeoJSON")
@@ -29,16 +32,17 @@ def wanted(request: Request, answers: Answers) -> bool:
 
 
 def require_georeference(answers: Answers, form: str) -> None:
-    """Raises ProblemError where the site has none."""
+    """Raise ProblemError when the site has no georeference. form: the format that needs one."""
     if answers.site.site.georeference is None:
         raise ProblemError(
             Kind.NOT_GEOREFERENCED,
-            f"{form} holds WGS 84 coordinates only: set `georeference` with PUT /api/v1/site, or accept "
+            f"{form} holds only WGS 84 coordinates. Set `georeference` with PUT /api/v1/site, or request "
             "application/json for poses in the site frame.",
         )
 
 
 def feature_of(pose: Answer) -> Answer:
+    """Return a pose as a Feature; `geometry` is null while the position is unknown."""
     geometry: Any = None
     if pose["lat"] is not None and pose["lat"] == pose["lat"]:  # NaN: the position is unknown
         geometry = {"type": "Point", "coordinates": [pose["lon"], pose["lat"]]}
@@ -47,20 +51,24 @@ def feature_of(pose: Answer) -> Answer:
 
 
 def collection_of(pose_list: Answer) -> Answer:
+    """Return a list of poses as a FeatureCollection."""
     features = [feature_of(pose) for pose in pose_list["poses"]]
     return {"type": "FeatureCollection", "t_ns": pose_list["t_ns"], "features": features}
 
 
 def quality(accept: str, media_type: str) -> float:
-    """The q of RFC 9110, section 12.5.1: the most specific range that matches counts; 0: not wanted."""
-    ranges = {_first(part): _q(part) for part in accept.split(",")}
+    """Return the q value of a media type in an `Accept` header; 0 when it is not acceptable.
+
+    The most specific range that matches counts (RFC 9110, section 12.5.1).
+    """
+    ranges = {_media_range(part): _q(part) for part in accept.split(",")}
     for candidate in (media_type, f"{media_type.partition('/')[0]}/*", "*/*"):
         if candidate in ranges:
             return ranges[candidate]
     return 0.0
 
 
-def _first(part: str) -> str:
+def _media_range(part: str) -> str:
     return part.split(";")[0].strip().lower()
 
 

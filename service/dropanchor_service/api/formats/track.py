@@ -18,27 +18,28 @@ from dropanchor_service.api.http.errors import Kind, ProblemError
 JSON, GEOJSON, CSV, GPX = "json", "geojson", "csv", "gpx"
 MEDIA_TYPES = {JSON: "application/json", GEOJSON: "application/geo+json", CSV: "text/csv", GPX: "application/gpx+xml"}
 GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX"}
-GAP_NS = 10_000_000_000  # a longer one begins a new segment of a GPX track
+GAP_NS = 10_000_000_000  # a longer gap starts a new segment of a GPX track
 
 _PLACED = ("tracking", "coasting", "degraded")
 _COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
 
 Head = Mapping[str, Any]
-"""The members of `Track` beside its poses."""
+"""The members of `Track` except its poses."""
 
 
-def chosen(request: Request, asked: str | None) -> str:
-    """The format that was asked for by name, else the one that the client would rather have. Raises ProblemError."""
-    if asked is not None:
-        return asked
+def negotiate(request: Request, requested: str | None) -> str:
+    """Return the requested format, or else the one that the `Accept` header prefers. Raises ProblemError."""
+    if requested is not None:
+        return requested
     accept = request.headers.get("accept", "*/*")
-    best = max(MEDIA_TYPES, key=lambda name: geojson.quality(accept, MEDIA_TYPES[name]))  # the first of equals
+    best = max(MEDIA_TYPES, key=lambda name: geojson.quality(accept, MEDIA_TYPES[name]))  # the first one on a tie
     if geojson.quality(accept, MEDIA_TYPES[best]) == 0:
-        raise ProblemError(Kind.NOT_ACCEPTABLE, f"{', '.join(MEDIA_TYPES.values())} are offered.")
+        raise ProblemError(Kind.NOT_ACCEPTABLE, f"The service offers {', '.join(MEDIA_TYPES.values())}.")
     return best
 
 
-def written(page: TrackPage, head: Head, form: str) -> bytes:
+def encode(page: TrackPage, head: Head, form: str) -> bytes:
+    """Return the page in the format `form`."""
     return _WRITERS[form](page, head)
 
 
@@ -56,21 +57,23 @@ def _feature(pose: dict[str, Any]) -> dict[str, Any]:
     return {"type": "Feature", "geometry": geometry, "properties": pose}
 
 
-def _csv(page: TrackPage, head: Head) -> bytes:  # noqa: ARG001 - a table has no place for it
+def _csv(page: TrackPage, head: Head) -> bytes:  # noqa: ARG001 - a table has no place for the head
     names = [name for name in page.columns if name != "covariance"]
     text = io.StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow([*names, *_COVARIANCES])
     for pose in page.rows():
         cov = pose["covariance"]
-        spread = ["" if cov is None else cov[i][j] for i, j in _COVARIANCES.values()]
-        writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *spread])
+        variances = ["" if cov is None else cov[i][j] for i, j in _COVARIANCES.values()]
+        writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *variances])
     return text.getvalue().encode()
 
 
 def _gpx(page: TrackPage, head: Head) -> bytes:
-    """GPX 1.1. It has no place for an uncertainty: `type` is the state of the pose, and tags that may have been
-    somewhere else are left out."""
+    """Return the page as GPX 1.1.
+
+    GPX cannot express uncertainty. So `type` holds the state of a pose, and ambiguous poses are left out.
+    """
     return "".join(_gpx_lines(page, head["tag"])).encode()
 
 

@@ -1,1 +1,1 @@
-"""What every request passes: access, limits, errors, headers, and the server itself."""
+"""Everything around the routes: access control, limits, errors, headers, and the HTTP server."""

@@ -1,4 +1,4 @@
-"""Every error is a problem (RFC 9457, application/problem+json) with a type that stays the same."""
+"""Errors as problem documents (RFC 9457, application/problem+json) with stable types."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -20,35 +20,35 @@ _MAX_LOCATION = 200
 
 
 class Kind(Enum):
-    """The kinds of problem: status and title."""
+    """The kinds of problem, each with its HTTP status and title."""
 
-    UNAUTHENTICATED = (401, "Nobody is known by this")
-    FORBIDDEN = (403, "This is not allowed to whoever asks")
-    NOT_FOUND = (404, "There is nothing here")
-    UNKNOWN_TAG = (404, "The tag is not known")
+    UNAUTHENTICATED = (401, "The request has no valid credentials")
+    FORBIDDEN = (403, "The credentials do not allow this request")
+    NOT_FOUND = (404, "There is no resource at this path")
+    UNKNOWN_TAG = (404, "The tag is unknown")
     NO_POSE_YET = (404, "The tag has no pose yet")
-    NO_POSE_THEN = (404, "The tag has no pose for that time")
-    UNKNOWN_ANCHOR = (404, "The site has no such anchor")
-    METHOD_NOT_ALLOWED = (405, "The method is not allowed here")
-    NOT_ACCEPTABLE = (406, "None of the accepted media types is offered")
-    UNKNOWN_RECORDING = (404, "There is no such recording")
-    NO_HISTORY = (409, "The service keeps no history")
+    NO_POSE_THEN = (404, "The tag has no pose at that time")
+    UNKNOWN_ANCHOR = (404, "The anchor is unknown")
+    METHOD_NOT_ALLOWED = (405, "The resource does not allow this method")
+    NOT_ACCEPTABLE = (406, "The service offers none of the accepted media types")
+    UNKNOWN_RECORDING = (404, "The recording does not exist")
+    NO_HISTORY = (409, "The service stores no history")
     NO_RECORDER = (409, "The service cannot record")
-    RECORDS_ALREADY = (409, "The service records already")
-    RECORDS_NOTHING = (409, "The service does not record")
-    TOO_FAR_AHEAD = (409, "That time is too far ahead of the newest pose")
+    RECORDS_ALREADY = (409, "A recording is running already")
+    RECORDS_NOTHING = (409, "No recording is running")
+    TOO_FAR_AHEAD = (409, "The time is too far ahead of the newest pose")
     NOT_GEOREFERENCED = (409, "The site has no georeference")
     SITE_ID_FIXED = (409, "The site's id cannot change while the service runs")
-    ANCHOR_ID_DIFFERS = (409, "The id in the body is not that in the path")
-    TAGS_FULL = (409, "The service holds as many tags as it may")
+    ANCHOR_ID_DIFFERS = (409, "The id in the body differs from the id in the path")
+    TAGS_FULL = (409, "The service has reached its limit of tags")
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")
     TOO_MANY_REQUESTS = (429, "Too many requests")
-    INTERNAL = (500, "The service made a mistake")
+    INTERNAL = (500, "An internal error occurred")
     NOT_SAVED = (503, "The change could not be saved")
     HISTORY_UNREADABLE = (503, "The history cannot be read")
     NOT_READY = (503, "The service is not ready")
-    OTHER = (400, "The request cannot be answered")
+    OTHER = (400, "The request failed")
 
     def __init__(self, status: int, title: str) -> None:
         self.status = status
@@ -60,7 +60,7 @@ class Kind(Enum):
 
 
 class ProblemError(HTTPException):
-    """Raised anywhere behind a route. members: more members of the problem."""
+    """An error of a route, returned to the client as a problem. members: extension members of the problem."""
 
     def __init__(self, kind: Kind, detail: str, **members: Any) -> None:
         super().__init__(kind.status, detail)
@@ -77,9 +77,10 @@ def problem_response(
     status: int | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
+    """Return a problem of this kind. status: overrides the status of the kind. members: extension members."""
     status = kind.status if status is None else status
     problem = {"type": kind.type, "title": kind.title, "status": status, "detail": detail, "instance": _path(request)}
-    # ASCII: a request may hold lone surrogates, which no UTF-8 can carry.
+    # ASCII: a request may hold lone surrogates, which UTF-8 cannot encode.
     body = json.dumps(problem | dict(members or {}), ensure_ascii=True).encode()
     return Response(body, status, {"cache-control": "no-store", **(headers or {})}, MEDIA_TYPE)
 
@@ -91,13 +92,13 @@ def add_error_handlers(app: FastAPI) -> None:
 
 
 def problems(*kinds: Kind) -> dict[int | str, dict[str, Any]]:
-    """How a route declares them in OpenAPI."""
+    """Return the OpenAPI responses of a route that can fail with these kinds."""
     content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     by_status: dict[int | str, dict[str, Any]] = {}
     for kind in kinds:
-        said = by_status.get(kind.status, {}).get("description")
+        earlier = by_status.get(kind.status, {}).get("description")
         line = f"`{kind.type}`: {kind.title}."
-        by_status[kind.status] = {"description": f"{said} {line}" if said else line, "content": content}
+        by_status[kind.status] = {"description": f"{earlier} {line}" if earlier else line, "content": content}
     return by_status
 
 
@@ -110,7 +111,7 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
             return problem_response(request, Kind.NOT_FOUND, f"There is no resource at {_path(request)}.")
         case 405:
             allow = ", ".join(_allowed_methods(request))
-            detail = f"{request.method} is not allowed; {allow} is."
+            detail = f"This resource does not allow {request.method}. It allows {allow}."
             return problem_response(request, Kind.METHOD_NOT_ALLOWED, detail, headers={"allow": allow})
         case 400:
             return problem_response(request, Kind.INVALID_REQUEST, "The body cannot be read as JSON.")
@@ -121,8 +122,8 @@ async def _on_http_exception(request: Request, error: Exception) -> Response:
 async def _on_invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     parts = [
-        # Never the input itself: it may be a secret, or a number that JSON cannot carry.
-        {"location": _location(part["loc"]), "detail": _sentence(part)}
+        # Never repeat the input: it may be a secret, or a number that JSON cannot express.
+        {"location": _location(part["loc"]), "detail": _message(part)}
         for part in error.errors()[:_MAX_PARTS]
     ]
     detail = "; ".join(f"{part['location']}: {part['detail']}" for part in parts[:3])
@@ -130,11 +131,13 @@ async def _on_invalid_request(request: Request, error: Exception) -> Response:
 
 
 async def _on_exception(request: Request, error: Exception) -> Response:  # noqa: ARG001 - the server logs it
-    return problem_response(request, Kind.INTERNAL, "An unexpected error; the service's log says more.")
+    return problem_response(
+        request, Kind.INTERNAL, "An unexpected error occurred. The log of the service has the details."
+    )
 
 
 def _path(request: Request) -> str:
-    """As it was sent."""
+    """Return the path as the client sent it."""
     return str(request.scope.get("raw_path", b"").decode("latin-1"))
 
 
@@ -142,16 +145,16 @@ def _location(parts: Iterable[Any]) -> str:
     return ".".join(str(part) for part in parts)[:_MAX_LOCATION]
 
 
-def _sentence(part: Mapping[str, Any]) -> str:
+def _message(part: Mapping[str, Any]) -> str:
     if part["type"] == "json_invalid":
         return f"is not JSON: {part['ctx']['error']}"
     if part["type"] == "extra_forbidden":
-        return "is not known"
+        return "is unknown"
     return str(part["msg"]).removeprefix("Value error, ")
 
 
 def _allowed_methods(request: Request) -> list[str]:
-    """Of all routes that have this path."""
+    """Return the methods of all routes with this path."""
     scope = {"type": "http", "path": request.scope["path"], "root_path": "", "headers": []}
     routes = request.app.router.routes
     return [

@@ -1,9 +1,9 @@
-"""Headers of every answer. There is no CORS: pages of other origins read nothing here."""
+"""Security headers of every response. There is no CORS, so pages of other origins cannot read the responses."""
 
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-_EVERYWHERE = {
+_HEADERS = {
     "content-security-policy": "default-src 'none'; frame-ancestors 'none'",
     "cross-origin-resource-policy": "same-origin",
     "referrer-policy": "no-referrer",
@@ -12,7 +12,7 @@ _EVERYWHERE = {
 
 
 class SecurityHeaders:
-    """ASGI: those that the answer does not have of its own."""
+    """ASGI middleware that adds each header unless the response already has it."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -21,7 +21,7 @@ class SecurityHeaders:
         async def sending(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                for name, value in _EVERYWHERE.items():
+                for name, value in _HEADERS.items():
                     headers.setdefault(name, value)
             await send(message)
 

@@ -1,4 +1,4 @@
-"""What one client can take from the others: nothing. Bodies have a size, requests and reading have a deadline."""
+"""Limits that protect clients from each other: the size of bodies, and deadlines for requests and for reading."""
 
 import asyncio
 from typing import Any
@@ -13,19 +13,19 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problem_respo
 
 
 class BodyLimit:
-    """ASGI: a request body of more than max_bytes is answered with 413, as soon as it is announced or too long."""
+    """ASGI middleware that answers 413 to a larger body, by its `content-length` or once it has grown too large."""
 
     def __init__(self, app: ASGIApp, max_bytes: int) -> None:
         self._app = app
         self._max_bytes = max_bytes
-        self._detail = f"A request body holds at most {max_bytes} bytes."
+        self._detail = f"A request body may have at most {max_bytes} bytes."
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        announced = Headers(scope=scope).get("content-length", "0")
-        if announced.isdigit() and int(announced[:20]) > self._max_bytes:
+        content_length = Headers(scope=scope).get("content-length", "0")
+        if content_length.isdigit() and int(content_length[:20]) > self._max_bytes:
             response = problem_response(Request(scope), Kind.BODY_TOO_LARGE, self._detail)
             await response(scope, receive, send)
             return
@@ -46,7 +46,7 @@ class BodyLimit:
 
 
 class EscapedPath:
-    """ASGI: paths of the interface reach the routes as they were sent, so that an id may hold an escaped slash."""
+    """ASGI middleware that keeps the paths of the interface escaped, so that an id may contain an escaped slash."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -59,8 +59,10 @@ class EscapedPath:
 
 
 class GuardedProtocol(H11Protocol):
-    """HTTP/1.1 with the two deadlines that uvicorn lacks: a request has to be complete in time, and a client that
-    does not take what it asked for is cut."""
+    """HTTP/1.1 with two deadlines that uvicorn lacks.
+
+    It disconnects a client that does not complete its request in time, and one that stops reading its response.
+    """
 
     request_s = 10.0
     stalled_s = 10.0
@@ -71,8 +73,8 @@ class GuardedProtocol(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
-        # Nothing waits in this process: whatever the kernel does not take at once pauses the writer. (1: with 0 even an
-        # empty buffer counts as full in asyncio's TLS transport.)
+        # Pause the writer as soon as the kernel does not accept data, so that nothing piles up in this process. The
+        # limit is 1 because asyncio's TLS transport treats even an empty buffer as full with 0.
         transport.set_write_buffer_limits(high=1)
         self._deadline = self.loop.call_later(self.request_s, self._cut)
 
@@ -119,6 +121,6 @@ class GuardedProtocol(H11Protocol):
 
 
 def _cancelled(timer: asyncio.TimerHandle | None) -> Any:
-    """None, for the place where the timer was."""
+    """Cancel a timer if there is one. Return None, to assign to where the timer was stored."""
     if timer is not None:
         timer.cancel()

@@ -1,4 +1,4 @@
-"""The HTTP server: uvicorn with limits that uvicorn does not set by itself."""
+"""The HTTP server: uvicorn with additional limits."""
 
 import asyncio
 import errno
@@ -12,17 +12,17 @@ from starlette.types import ASGIApp
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.security.certificate import Certificate
 
-GRACE_S = 1  # for requests under way; clients that are stuck take all of it
-_SEND_BUFFER_BYTES = 262_144  # what a client that stops reading can hold back in the kernel
+GRACE_S = 1  # for open requests at shutdown; stuck clients use all of it
+_SEND_BUFFER_BYTES = 262_144  # how much data a client that stops reading can hold in the kernel
 _MAX_HEADER_BYTES = 16_384
 
 
 class ListenError(OSError):
-    """The address cannot be listened on. The message says why and what to do."""
+    """The server cannot listen on the address. The message says why and what to do."""
 
 
 class Server(uvicorn.Server):
-    """Sets `stopping` before it waits for open requests, so that streams end by themselves, and cuts what is left."""
+    """Sets `stopping` before it waits for open requests, so that streams end, and then aborts what is left."""
 
     def __init__(self, config: uvicorn.Config, stopping: Event) -> None:
         super().__init__(config)
@@ -33,7 +33,7 @@ class Server(uvicorn.Server):
         await super().shutdown(sockets)
         for connection in list(self.server_state.connections):
             connection.transport.abort()
-        await asyncio.sleep(0)  # the sockets are closed in the loop's next round
+        await asyncio.sleep(0)  # the loop closes the sockets in its next iteration
 
 
 def build_server(
@@ -42,8 +42,10 @@ def build_server(
     protocol: type[GuardedProtocol] = GuardedProtocol,
     certificate: Certificate | None = None,
 ) -> Server:
-    """A server for `await server.serve(sockets=[listen(host, port)])`. stopping: the event that `app` was made with.
-    Raises ListenError when the certificate cannot be used."""
+    """Return a server, to run with `await server.serve(sockets=[listen(host, port)])`.
+
+    stopping: the event that `app` was created with. Raises ListenError when the certificate cannot be used.
+    """
     config = uvicorn.Config(
         app,
         http=protocol,
@@ -59,12 +61,12 @@ def build_server(
     try:
         config.load()
     except (OSError, ssl.SSLError) as error:
-        raise ListenError(f"cannot serve HTTPS: certificate {config.ssl_certfile}: {error}") from error
+        raise ListenError(f"cannot serve HTTPS with the certificate {config.ssl_certfile}: {error}") from error
     return Server(config, stopping)
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A socket bound to this address; port 0 takes a free one. Raises ListenError."""
+    """Return a socket bound to this address; port 0 selects a free port. Raises ListenError."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except socket.gaierror as error:

@@ -1,4 +1,4 @@
-"""The HTTP server in a thread of its own, so that the main thread is free to watch and to stop it."""
+"""Run the HTTP server in its own thread, so that the main thread can supervise and stop it."""
 
 import asyncio
 import socket
@@ -12,7 +12,7 @@ HANDSHAKE_S = 10.0
 
 
 class _Loop(asyncio.SelectorEventLoop):
-    """Cuts clients that do not get on with TLS. asyncio gives them a minute, and uvicorn has no setting for it."""
+    """Shortens the TLS handshake timeout. asyncio waits a minute, and uvicorn has no setting for it."""
 
     async def create_server(self, *args: Any, **options: Any) -> Any:
         handshake = {"ssl_handshake_timeout": HANDSHAKE_S} if options.get("ssl") else {}
@@ -21,7 +21,7 @@ class _Loop(asyncio.SelectorEventLoop):
 
 
 class HttpThread:
-    """Serves on a socket that is bound already."""
+    """Serves on a socket that is already bound."""
 
     def __init__(self, server: uvicorn.Server, bound: socket.socket) -> None:
         self._server = server
@@ -29,12 +29,13 @@ class HttpThread:
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
 
     def start(self) -> None:
-        """Returns when requests are answered, or when the server has failed to start."""
+        """Start the thread. Return when the server answers requests or has failed to start."""
         self._thread.start()
         while self.is_alive and not self._server.started:
             time.sleep(0.005)
 
     def ask_to_stop(self) -> None:
+        """Tell the server to shut down, without waiting."""
         self._server.should_exit = True
 
     def join(self, timeout_s: float) -> None:

@@ -1,1 +1,1 @@
-"""The routes, one module per resource."""
+"""The REST routes, one module per resource."""

@@ -1,4 +1,4 @@
-"""How a tag connects to this site."""
+"""The route that says how a tag connects to this site."""
 
 import ipaddress
 
@@ -9,7 +9,7 @@ from dropanchor_schemas.answers import Connect
 from dropanchor_service.answers.connect_command import reachable_endpoint, simulate_command, tag_command
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, shown
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.store.site import SiteStore
 
@@ -23,31 +23,34 @@ def connect_router(store: SiteStore, endpoints: tuple[str, ...], credentials: Se
     @router.get(
         "/connect",
         operation_id="get_connect",
-        summary="Where tags connect, and a command that starts a simulated one",
+        summary="Get the endpoints for tags, and a command that starts a simulated tag",
         response_model=Connect,
-        responses=shown(examples.CONNECT) | problems(Kind.INVALID_REQUEST),
+        responses=example_response(examples.CONNECT) | problems(Kind.INVALID_REQUEST),
     )
     async def get_connect(request: Request) -> Response:
         site, is_local = store.site, _is_local(request)
-        reached = [reachable_endpoint(endpoint, _host(request)) for endpoint in endpoints]
+        reachable = [reachable_endpoint(endpoint, _host(request)) for endpoint in endpoints]
         folder = None
         if credentials is not None:
             folder = str(credentials.bundle(SIMULATED_TAG).resolve()) if is_local else SIMULATED_TAG
         program, anchors = tag_command(show_path=is_local), [anchor.id for anchor in site.anchors]
-        command = simulate_command(program, reached, site.id, anchors, folder)
-        return json_response({"endpoints": reached, "credentials": credentials is not None, "simulate": command})
+        command = simulate_command(program, reachable, site.id, anchors, folder)
+        return json_response({"endpoints": reachable, "credentials": credentials is not None, "simulate": command})
 
     return router
 
 
 def _host(request: Request) -> str:
-    """The name by which whoever asks has reached this machine."""
+    """Return the host name or address that the client used to reach this machine."""
     name = request.url.hostname or "localhost"
     return f"[{name}]" if ":" in name else name
 
 
 def _is_local(request: Request) -> bool:
-    """Whether somebody on this machine asks: paths are for them alone. A proxy on this machine asks for others."""
+    """Return whether the client runs on this machine. Only then may the answer hold local paths.
+
+    A request with headers of a proxy may come from another machine, so it does not count as local.
+    """
     if request.client is None or any(name in request.headers for name in _FORWARDED):
         return False
     return _is_loopback(request.client.host) and _is_loopback(request.url.hostname or "")

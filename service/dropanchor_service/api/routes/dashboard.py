@@ -1,4 +1,4 @@
-"""The page: static files beside the interface, always revalidated, and allowed to load nothing from elsewhere."""
+"""The dashboard: static files that browsers always revalidate and that may load nothing from other origins."""
 
 from pathlib import Path
 
@@ -24,15 +24,15 @@ class _Files(StaticFiles):
 
 
 class DashboardMount(Mount):
-    """At the root, for every path but those of the interface, whose own 404 and 405 it must not hide."""
+    """Serves the dashboard at the root. It leaves out `/api/`, so that the interface answers its own 404 and 405."""
 
     def __init__(self, folder: Path) -> None:
-        """Raises RuntimeError when there is no such folder."""
+        """Serve the files in `folder`. Raises RuntimeError when it does not exist."""
         super().__init__("/", app=_Files(directory=folder, html=True), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        reading = scope["method"] in ("GET", "HEAD")
+        is_read = scope["method"] in ("GET", "HEAD")
         if scope["path"].startswith("/api/"):
             return Match.NONE, {}
         match, child_scope = super().matches(scope)
-        return (match if reading or match is Match.NONE else Match.PARTIAL), child_scope
+        return (match if is_read or match is Match.NONE else Match.PARTIAL), child_scope

@@ -1,4 +1,4 @@
-"""One example of each answer, for the OpenAPI document."""
+"""One example of each response, for the OpenAPI document."""
 
 from typing import Any
 

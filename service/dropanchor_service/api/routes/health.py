@@ -1,4 +1,4 @@
-"""Health for supervisors, metrics for Prometheus."""
+"""Health checks for supervisors, and metrics for Prometheus."""
 
 from collections.abc import Callable, Sequence
 
@@ -21,7 +21,7 @@ def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
     @router.get(
         "/health/live",
         operation_id="get_live",
-        summary="Whether the service answers at all",
+        summary="Check whether the service responds",
         response_model=Health,
         responses=problems(Kind.INVALID_REQUEST),
     )
@@ -31,7 +31,7 @@ def health_router(ready: Ready, impaired: Impaired) -> APIRouter:
     @router.get(
         "/health/ready",
         operation_id="get_ready",
-        summary="Whether the service can do its work",
+        summary="Check whether the service can do its work",
         response_model=Health,
         responses=problems(Kind.INVALID_REQUEST, Kind.NOT_READY),
     )
@@ -50,7 +50,7 @@ def metrics_router(registry: CollectorRegistry) -> APIRouter:
     @router.get(
         "/metrics",
         operation_id="get_metrics",
-        summary="Metrics for Prometheus",
+        summary="Get metrics for Prometheus",
         response_class=Response,
         responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
     )

@@ -1,4 +1,4 @@
-"""What the routes share: ids in paths, filters in queries, JSON answers."""
+"""What the routes share: ids in paths, query parameters, and JSON responses."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,14 +20,16 @@ def json_response(answer: Any, media_type: str = "application/json", status: int
 
 
 async def refuse_query(request: Request) -> None:
-    """For routes without query parameters: a misspelt one must not look as if it had worked."""
+    """Refuse query parameters on a route without any, so that a misspelt one does not seem to work."""
     if request.query_params:
         name = next(iter(request.query_params))
-        raise ProblemError(Kind.INVALID_REQUEST, f"query.{name[:64]}: is not known; no query parameter is taken here")
+        raise ProblemError(
+            Kind.INVALID_REQUEST, f"query.{name[:64]}: is unknown; this resource takes no query parameters"
+        )
 
 
-def shown(example: Any, status: int = 200) -> dict[int | str, dict[str, Any]]:
-    """How a route declares what it answers."""
+def example_response(example: Any, status: int = 200) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI response of a route with this example of its JSON."""
     return {status: {"content": {"application/json": {"example": example}}}}
 
 
@@ -35,14 +37,14 @@ NO_QUERY = Depends(refuse_query)
 
 
 def id_of(escaped: str) -> str:
-    """The id of a path segment, which arrives escaped so that an id may hold a slash. Raises ProblemError."""
+    """Return the id in an escaped path segment, which may contain an escaped slash. Raises ProblemError."""
     try:
         identifier = unquote(escaped, errors="strict")
         chunk_from_id(identifier)
     except UnicodeDecodeError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, "the id in the path is not percent-escaped UTF-8") from error
+        raise ProblemError(Kind.INVALID_REQUEST, "The id in the path is not percent-escaped UTF-8.") from error
     except InvalidKeyError as error:
-        raise ProblemError(Kind.INVALID_REQUEST, f"the id in the path cannot be used: {error}") from error
+        raise ProblemError(Kind.INVALID_REQUEST, f"The id in the path is not valid: {error}.") from error
     return identifier
 
 
@@ -77,20 +79,20 @@ Ids = Annotated[str, Field(min_length=1, json_schema_extra={"format": "dropancho
 
 
 class TagFilter(BaseModel):
-    """The query of a route that can be asked for some tags only."""
+    """The query of a route that can return selected tags."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     tags: Annotated[list[Ids], AfterValidator(_split)] = Field(
         default=[],
-        description="Only these tags: separated by commas, or the parameter repeated. A tag that is not known is left "
-        "out. Without it: all tags.",
+        description="Return only these tags. Separate ids with commas, or repeat the parameter. Unknown tags are left "
+        "out. The default is all tags.",
         examples=[["tag-1,tag-2"]],
     )
 
 
 class AtTime(BaseModel):
-    """The query of a route that can answer for another time."""
+    """The query of a route that can return the state at another time."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -98,26 +100,27 @@ class AtTime(BaseModel):
         default=None,
         ge=0,
         lt=2**63,
-        description="UTC, ns: the pose at that time instead of the latest one. In the past between two poses that are "
-        "at most 1 s apart, as far back as the memory goes (a minute, less in a very large fleet); before that, where "
-        "the service keeps a history, between two poses at most 10 s apart, with a covariance that says how far the "
-        "tag can have strayed between them; up to 2 s after the newest pose, carried on with its speed and yaw rate, "
-        "with a covariance that grows. Without hypotheses.",
+        description="Return the pose at this time (UTC, ns) instead of the latest one. For the last minute (less in a "
+        "very large fleet), the pose is interpolated between two poses in memory that are at most 1 s apart. For "
+        "earlier times, it is interpolated between two stored poses at most 10 s apart, if the service stores a "
+        "history; the covariance then includes how far the tag may have moved off the line between them. Up to 2 s "
+        "after the newest pose, the pose is extrapolated with its speed and yaw rate, and the covariance grows. Such "
+        "poses have no hypotheses.",
         examples=[1_800_000_000_000_000_000],
     )
 
 
 class LastInnovations(BaseModel):
-    """The query of an explanation."""
+    """The query of the route that explains a pose."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    last: int = Field(default=50, ge=1, le=300, description="How many innovations, the newest ones.")
+    last: int = Field(default=50, ge=1, le=300, description="How many of the newest innovations to return.")
 
 
 @contextmanager
 def saving() -> Iterator[None]:
-    """Around a change of the site: what could not be written was not changed either."""
+    """Turn a failed write of the site into a problem. The site does not change when it cannot be written."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Poses: one, or many."""
+"""The routes for poses: one tag, many tags, and the explanation of a pose."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
@@ -22,13 +22,13 @@ from dropanchor_service.api.routes.parameters import (
     LastInnovations,
     TagFilter,
     TagId,
+    example_response,
     id_of,
     json_response,
-    shown,
 )
 from dropanchor_service.store.tags import Tag
 
-PIECE_BYTES = 400_000  # sent at once: what the kernel does not take is copied, again and again
+PIECE_BYTES = 400_000  # larger writes are copied repeatedly while the kernel does not accept all of them
 
 _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUEST)
 
@@ -37,10 +37,10 @@ def poses_router(answers: Answers) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
-        as_geojson = geojson.wanted(request, answers)
+        as_geojson = geojson.is_preferred(request, answers)
         if query.at is None:
             pose = _pose_of(answers, tag)
-        else:  # may have to read from disk
+        else:  # may read from disk
             pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
         return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
 
@@ -50,18 +50,21 @@ def poses_router(answers: Answers) -> APIRouter:
         methods=["GET"],
         route_class_override=PlainPose,
         operation_id="get_pose",
-        summary="The latest pose of a tag, or its pose at a time",
+        summary="Get the latest pose of a tag, or its pose at a time",
         response_model=Pose,
-        responses=_offers(examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the place is unknown.")
+        responses=_offers(
+            examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the position is unknown."
+        )
         | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
     )
 
     @router.get(
         "/tags/{tag}/explain",
         operation_id="explain_pose",
-        summary="Why the latest pose of a tag is what it is",
+        summary="Explain the latest pose of a tag",
         response_model=Explanation,
-        responses=shown(examples.EXPLANATION) | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
+        responses=example_response(examples.EXPLANATION)
+        | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
     )
     async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()]) -> Response:
         explanation = explanation_of(answers, _known(answers, tag), query.last)
@@ -72,41 +75,43 @@ def poses_router(answers: Answers) -> APIRouter:
     @router.get(
         "/poses",
         operation_id="list_poses",
-        summary="The latest poses of all tags, or of some",
+        summary="List the latest poses of all or selected tags",
         response_model=PoseList,
         responses=_offers(examples.POSE_LIST, "A GeoJSON FeatureCollection (RFC 7946).") | problems(*_NEGOTIATION),
     )
     async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
-        as_geojson = geojson.wanted(request, answers)
+        as_geojson = geojson.is_preferred(request, answers)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
-        wanted = found if query.tags else None
+        tags = found if query.tags else None
         if as_geojson:
-            return _response(geojson.collection_of(answers.pose_list(wanted)), geojson.MEDIA_TYPE)
+            return _response(geojson.collection_of(answers.pose_list(tags)), geojson.MEDIA_TYPE)
         headers = {"cache-control": "no-store", "vary": "accept"}
-        return StreamingResponse(_in_turn(answers.pose_list_json(wanted)), media_type=geojson.JSON, headers=headers)
+        return StreamingResponse(_in_pieces(answers.pose_list_json(tags)), media_type=geojson.JSON, headers=headers)
 
     return router
 
 
 class PlainPose(APIRoute):
-    """Where nothing but a tag is asked for, its id is all that has to be found out: solving the declared parameters,
-    none of which is there, would take longer than the answer."""
+    """Skips FastAPI's parameter handling for a request without a query.
+
+    Only the id of the tag has to be read then. Solving the declared parameters would take longer than the response.
+    """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         with_parameters = super().get_route_handler()
-        nothing = AtTime()
+        no_query = AtTime()
 
         async def handle(request: Request) -> Response:
             if request.scope["query_string"]:
                 return await with_parameters(request)
-            answer: Response = await self.endpoint(id_of(request.path_params["tag"]), nothing, request)
+            answer: Response = await self.endpoint(id_of(request.path_params["tag"]), no_query, request)
             return answer
 
         return handle
 
 
-async def _in_turn(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
-    """Other answers have their turn between two chunks."""
+async def _in_pieces(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
+    """Yield the chunks in pieces, and let other requests run between two chunks."""
     for chunk in chunks:
         for begin in range(0, len(chunk), PIECE_BYTES):
             yield chunk[begin : begin + PIECE_BYTES]
@@ -116,13 +121,15 @@ async def _in_turn(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes 
 def _known(answers: Answers, name: str) -> Tag:
     tag = answers.tags.find(name)
     if tag is None:
-        raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {name!r} has been heard or configured.")
+        raise ProblemError(Kind.UNKNOWN_TAG, f"Tag {name!r} has neither sent messages nor been configured.")
     return tag
 
 
 def _no_pose_yet(answers: Answers, name: str) -> ProblemError:
     hint = answers.hint_of(_known(answers, name))
-    return ProblemError(Kind.NO_POSE_YET, f"No range of tag {name!r} has been used yet. {hint}".rstrip())
+    return ProblemError(
+        Kind.NO_POSE_YET, f"Tag {name!r} has no pose, because no range of it has been used yet. {hint}".rstrip()
+    )
 
 
 def _pose_of(answers: Answers, name: str) -> Answer:

@@ -1,4 +1,4 @@
-"""Recordings: started, stopped, listed and fetched."""
+"""The routes that start, stop, list and download recordings."""
 
 import os
 from collections.abc import Iterator
@@ -10,12 +10,18 @@ from starlette.responses import Response, StreamingResponse
 from dropanchor_schemas.recordings import RecordingList, RecordingRequest, RecordingState
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, json_response, saving, shown
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.recording.recorder import Recorder
 
 MEDIA_TYPE = "application/octet-stream"
 CHUNK_BYTES = 262_144
-FileName = Annotated[str, Path(description="As the list names it.", examples=["yard-20270115T080000-000000Z.mcap"])]
+FileName = Annotated[
+    str,
+    Path(
+        description="The name of the file, as in the list of recordings.",
+        examples=["yard-20270115T080000-000000Z.mcap"],
+    ),
+]
 
 
 def recordings_router(recorder: Recorder | None) -> APIRouter:
@@ -24,9 +30,9 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
     @router.get(
         "/recordings",
         operation_id="list_recordings",
-        summary="What is recorded, and the files",
+        summary="Get the state of the recorder and the list of files",
         response_model=RecordingList,
-        responses=shown(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
+        responses=example_response(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
     )
     def list_recordings() -> Response:
         found = _required(recorder)
@@ -39,10 +45,10 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
     @router.post(
         "/recordings",
         operation_id="start_recording",
-        summary="Record raw samples and poses from now on",
+        summary="Start a recording of raw samples and poses",
         status_code=201,
         response_model=RecordingState,
-        responses=shown(examples.RECORDING, 201)
+        responses=example_response(examples.RECORDING, 201)
         | problems(
             *(Kind.NO_RECORDER, Kind.RECORDS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
         ),
@@ -52,26 +58,29 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
         with saving():
             found.prepare()
         if not found.start(request.tags):
-            raise ProblemError(Kind.RECORDS_ALREADY, "Stop it first, with POST /api/v1/recordings/stop.")
+            raise ProblemError(
+                Kind.RECORDS_ALREADY, "A recording is running. Stop it first with POST /api/v1/recordings/stop."
+            )
         return json_response(_state(found), status=201)
 
     @router.post(
         "/recordings/stop",
         operation_id="stop_recording",
-        summary="Record no longer",
+        summary="Stop the recording",
         response_model=RecordingState,
-        responses=shown(examples.NO_RECORDING) | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
+        responses=example_response(examples.NO_RECORDING)
+        | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
     )
     def stop_recording() -> Response:
         found = _required(recorder)
         if not found.stop():
-            raise ProblemError(Kind.RECORDS_NOTHING, "Nothing is being recorded.")
+            raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
         return json_response(_state(found))
 
     @router.get(
         "/recordings/{name}",
         operation_id="get_recording",
-        summary="A file, to open in Foxglove or Lichtblick, or to replay",
+        summary="Download a recording, to replay it or to open it in Foxglove or Lichtblick",
         response_class=StreamingResponse,
         responses=_file() | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.INVALID_REQUEST),
     )
@@ -79,17 +88,19 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
         path = _required(recorder).path_of(name)
         try:
             file = None if path is None else path.open("rb")
-        except FileNotFoundError:  # pruned meanwhile
+        except FileNotFoundError:  # deleted by the retention limit meanwhile
             file = None
         if file is None:
-            raise ProblemError(Kind.UNKNOWN_RECORDING, "GET /api/v1/recordings names those that there are.")
+            raise ProblemError(
+                Kind.UNKNOWN_RECORDING, f"There is no recording {name!r}. GET /api/v1/recordings lists the files."
+            )
         return _download(file, name)
 
     return router
 
 
 def _download(file: BinaryIO, name: str) -> Response:
-    """As much of the file as there is now: it may be growing."""
+    """Return the file up to its current size, since it may still grow."""
     size = os.fstat(file.fileno()).st_size
     headers = {
         "cache-control": "no-store",
@@ -108,7 +119,7 @@ def _chunks(file: BinaryIO, size: int) -> Iterator[bytes]:
 
 def _required(recorder: Recorder | None) -> Recorder:
     if recorder is None:
-        raise ProblemError(Kind.NO_RECORDER, "Set `data_dir`: recordings are kept there.")
+        raise ProblemError(Kind.NO_RECORDER, "Set `data_dir`, where the service stores recordings.")
     return recorder
 
 

@@ -1,4 +1,4 @@
-"""The site and its anchors."""
+"""The routes for the site and its anchors."""
 
 from typing import Annotated
 
@@ -10,7 +10,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, AnchorId, json_response, saving, shown
+from dropanchor_service.api.routes.parameters import NO_QUERY, AnchorId, example_response, json_response, saving
 from dropanchor_service.store.site import SiteStore
 
 _BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
@@ -27,9 +27,9 @@ def _add_site_routes(router: APIRouter, store: SiteStore) -> None:
     @router.get(
         "/site",
         operation_id="get_site",
-        summary="The site: its frame, georeference and anchors",
+        summary="Get the site: its frame, georeference and anchors",
         response_model=Site,
-        responses=shown(examples.SITE) | problems(Kind.INVALID_REQUEST),
+        responses=example_response(examples.SITE) | problems(Kind.INVALID_REQUEST),
     )
     async def get_site() -> Response:
         return json_response(store.site.model_dump())
@@ -39,7 +39,7 @@ def _add_site_routes(router: APIRouter, store: SiteStore) -> None:
         operation_id="put_site",
         summary="Replace the site's frame, georeference and anchors",
         response_model=Site,
-        responses=shown(examples.SITE) | problems(Kind.SITE_ID_FIXED, *_BAD_CHANGE),
+        responses=example_response(examples.SITE) | problems(Kind.SITE_ID_FIXED, *_BAD_CHANGE),
     )
     def put_site(site: Annotated[Site, Body(examples=[examples.SITE])]) -> Response:
         with saving():
@@ -54,9 +54,9 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
     @router.get(
         "/anchors",
         operation_id="list_anchors",
-        summary="The anchors of the site",
+        summary="List the anchors of the site",
         response_model=AnchorList,
-        responses=shown({"anchors": [examples.ANCHOR]}) | problems(Kind.INVALID_REQUEST),
+        responses=example_response({"anchors": [examples.ANCHOR]}) | problems(Kind.INVALID_REQUEST),
     )
     async def list_anchors() -> Response:
         return json_response({"anchors": [anchor.model_dump() for anchor in store.site.anchors]})
@@ -64,26 +64,26 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
     @router.get(
         "/anchors/{anchor}",
         operation_id="get_anchor",
-        summary="One anchor",
+        summary="Get an anchor",
         response_model=Anchor,
-        responses=shown(examples.ANCHOR) | problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST),
+        responses=example_response(examples.ANCHOR) | problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST),
     )
     async def get_anchor(anchor: AnchorId) -> Response:
-        for known in store.site.anchors:
-            if known.number == anchor_number(anchor):
-                return json_response(known.model_dump())
+        for candidate in store.site.anchors:
+            if candidate.number == anchor_number(anchor):
+                return json_response(candidate.model_dump())
         raise _unknown(anchor)
 
     @router.put(
         "/anchors/{anchor}",
         operation_id="put_anchor",
-        summary="Place an anchor, new or known",
+        summary="Create or move an anchor",
         response_model=Anchor,
-        responses=shown(examples.ANCHOR) | problems(Kind.ANCHOR_ID_DIFFERS, *_BAD_CHANGE),
+        responses=example_response(examples.ANCHOR) | problems(Kind.ANCHOR_ID_DIFFERS, *_BAD_CHANGE),
     )
     def put_anchor(anchor: AnchorId, body: Annotated[Anchor, Body(examples=[examples.ANCHOR])]) -> Response:
         if body.id != anchor:
-            raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The path says {anchor!r}, the body {body.id!r}.")
+            raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The id is {anchor!r} in the path and {body.id!r} in the body.")
         with saving():
             store.set_anchor(body)
         return json_response(body.model_dump())
@@ -91,7 +91,7 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
     @router.delete(
         "/anchors/{anchor}",
         operation_id="delete_anchor",
-        summary="Take an anchor out of the site",
+        summary="Remove an anchor from the site",
         status_code=204,
         responses=problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )

@@ -1,6 +1,6 @@
-"""Poses as server-sent events: first a snapshot, then what has changed, never faster than the client asked for.
+"""Poses as server-sent events: first a snapshot, then the changes, at most as often as the client requests.
 
-Every client reads the store at its own pace: what it missed is overwritten there, so nothing waits for it anywhere.
+Every client reads the store at its own pace. A slow client gets the newest poses, so no queue builds up for it.
 """
 
 import asyncio
@@ -24,18 +24,19 @@ Array = NDArray[Any]  # POSE rows of the store
 
 MEDIA_TYPE = "text/event-stream"
 HEARTBEAT_S = 5.0
-SWEEP_S = 0.5
+STATE_CHECK_S = 0.5
 _NAP_S = 0.2
 
 _DESCRIPTION = """\
-Server-sent events. `snapshot` comes first and names every tag that has a pose; `poses` then name the tags that have
-changed since. The data of both is a `PoseFrame`. A client that reads slowly is sent the newest poses when it is ready
-again; one that stops reading is cut. A comment is sent when there is nothing to say."""
+Server-sent events. The first event, `snapshot`, holds every tag that has a pose. Each `poses` event then holds the tags
+that have changed since. The data of both is a `PoseFrame`. A client that reads slowly gets the newest poses when it is
+ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every
+5 s."""
 
 
 class StreamQuery(TagFilter):
     max_hz: float = Field(
-        default=10.0, ge=0.1, le=30, allow_inf_nan=False, description="At most so many events a second."
+        default=10.0, ge=0.1, le=30, allow_inf_nan=False, description="The maximum rate of events, Hz."
     )
 
 
@@ -45,7 +46,7 @@ def stream_router(answers: Answers, stopping: Event) -> APIRouter:
     @router.get(
         "/stream",
         operation_id="stream_poses",
-        summary="Poses as they change",
+        summary="Stream poses as they change",
         description=_DESCRIPTION,
         response_class=StreamingResponse,
         responses=_event_stream() | problems(Kind.INVALID_REQUEST),
@@ -59,41 +60,42 @@ def stream_router(answers: Answers, stopping: Event) -> APIRouter:
 
 
 class Changes:
-    """What one client has not seen yet."""
+    """Tracks which changes one client has not received yet."""
 
     def __init__(self, answers: Answers, names: list[str]) -> None:
         self._answers = answers
         self._names = names
         self._version = 0
-        self._shown: dict[str, tuple[str, bool]] = {}  # tag → (state, online)
-        self._swept_s = time.monotonic()
+        self._sent: dict[str, tuple[str, bool]] = {}  # tag → (state, online)
+        self._checked_s = time.monotonic()
 
     def snapshot(self) -> Answer:
+        """Return a frame of all selected tags."""
         return self._frame(self._newer())
 
     def next(self) -> Answer | None:
-        """A frame of the tags that have changed, None when there is none."""
+        """Return a frame of the tags that have changed; None when there are none."""
         poses = self._newer()
-        if time.monotonic() - self._swept_s >= SWEEP_S:
-            self._swept_s = time.monotonic()
-            poses = self._silent_changes(poses)
+        if time.monotonic() - self._checked_s >= STATE_CHECK_S:
+            self._checked_s = time.monotonic()
+            poses = self._with_state_changes(poses)
         return self._frame(poses) if len(poses) else None
 
     def _newer(self) -> Array:
         self._version, poses = self._answers.latest.since(self._version)
-        return self._chosen(poses)
+        return self._selected(poses)
 
-    def _silent_changes(self, newer: Array) -> Array:
-        """`newer`, and the tags whose age or liveliness says something else now: nobody writes a pose for that."""
-        everyone = self._chosen(self._answers.latest.since()[1])
-        frame = self._answers.frame_of(everyone, self._answers.now_ns())
+    def _with_state_changes(self, newer: Array) -> Array:
+        """Return `newer` and the tags whose state or liveliness has changed without a new pose."""
+        all_poses = self._selected(self._answers.latest.since()[1])
+        frame = self._answers.frame_of(all_poses, self._answers.now_ns())
         changed = [
-            self._shown.get(tag) != (state, online)
+            self._sent.get(tag) != (state, online)
             for tag, state, online in zip(frame["tags"], frame["state"], frame["online"], strict=True)
         ]
-        return everyone[np.array(changed, bool) | np.isin(everyone["row"], newer["row"])]
+        return all_poses[np.array(changed, bool) | np.isin(all_poses["row"], newer["row"])]
 
-    def _chosen(self, poses: Array) -> Array:
+    def _selected(self, poses: Array) -> Array:
         if not self._names:
             return poses
         rows = [tag.row for tag in map(self._answers.tags.find, self._names) if tag is not None]
@@ -101,27 +103,27 @@ class Changes:
 
     def _frame(self, poses: Array) -> Answer:
         frame = self._answers.frame_of(poses, self._answers.now_ns())
-        said = zip(frame["state"], frame["online"], strict=True)
-        self._shown.update(zip(frame["tags"], said, strict=True))
+        sent = zip(frame["state"], frame["online"], strict=True)
+        self._sent.update(zip(frame["tags"], sent, strict=True))
         return frame
 
 
 async def _events(changes: Changes, period_s: float, stopping: Event) -> AsyncIterator[bytes]:
     yield _event("snapshot", changes.snapshot())
-    said_s = time.monotonic()
+    sent_s = time.monotonic()
     while not await _stopped_within(period_s, stopping):
         frame = changes.next()
         if frame is not None:
             yield _event("poses", frame)
-        elif time.monotonic() - said_s >= HEARTBEAT_S:
+        elif time.monotonic() - sent_s >= HEARTBEAT_S:
             yield b": alive\n\n"
         else:
             continue
-        said_s = time.monotonic()
+        sent_s = time.monotonic()
 
 
 async def _stopped_within(period_s: float, stopping: Event) -> bool:
-    """Sleep for the period, but notice within _NAP_S that the service stops."""
+    """Sleep for the period and return False; return True within _NAP_S once the service stops."""
     end_s = time.monotonic() + period_s
     while not stopping.is_set():
         left_s = end_s - time.monotonic()

@@ -1,4 +1,4 @@
-"""Tags: what was heard from them, and what an operator says about them."""
+"""The routes for tags: what they have sent, and their settings."""
 
 from collections.abc import Iterator
 from typing import Annotated
@@ -12,7 +12,7 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, json_response, saving, shown
+from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
 
 _REASON_NAMES = [reason.value for reason in REASONS]
@@ -24,9 +24,9 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     @router.get(
         "/tags",
         operation_id="list_tags",
-        summary="All tags that have been heard or configured",
+        summary="List all tags that have sent messages or been configured",
         response_model=TagList,
-        responses=shown(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
+        responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_tags() -> Response:
         return json_response({"t_ns": answers.now_ns(), "tags": list(_statuses(answers, answers.tags.all()))})
@@ -34,31 +34,31 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     @router.get(
         "/newcomers",
         operation_id="list_newcomers",
-        summary="Tags that have been heard and are not admitted",
-        description='With `unknown_tags = "quarantine"` they stay here until their settings are put, `{}` at least; '
-        "with `accept` until they have sent a second message, where many are new at once. As many as `max_tags` are "
-        "remembered, those that were heard last. A restart forgets them.",
+        summary="List tags that have sent messages but are not admitted yet",
+        description='With `unknown_tags = "quarantine"`, a tag stays in this list until you put its settings (`{}` is '
+        "enough). With `accept`, a tag stays only while many tags are new at once, until its second message. The list "
+        "holds up to `max_tags` tags, those that sent most recently. A restart clears it.",
         response_model=NewcomerList,
-        responses=shown(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
+        responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_newcomers() -> Response:
-        newcomers = [
+        pending = [
             {
-                "tag": newcomer.name,
-                "first_heard_ns": newcomer.first_heard_ns,
-                "last_heard_ns": newcomer.last_heard_ns,
-                "messages": newcomer.messages,
+                "tag": tag.name,
+                "first_heard_ns": tag.first_heard_ns,
+                "last_heard_ns": tag.last_heard_ns,
+                "messages": tag.messages,
             }
-            for newcomer in answers.pending_tags.all()
+            for tag in answers.pending_tags.all()
         ]
-        return json_response({"t_ns": answers.now_ns(), "newcomers": newcomers})
+        return json_response({"t_ns": answers.now_ns(), "newcomers": pending})
 
     @router.get(
         "/tags/{tag}",
         operation_id="get_tag",
-        summary="One tag",
+        summary="Get a tag",
         response_model=TagStatus,
-        responses=shown(examples.TAG) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
+        responses=example_response(examples.TAG) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag(tag: TagId) -> Response:
         return json_response(next(_statuses(answers, [_known(answers, tag)])))
@@ -66,9 +66,9 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     @router.get(
         "/tags/{tag}/settings",
         operation_id="get_tag_settings",
-        summary="The settings of a tag",
+        summary="Get the settings of a tag",
         response_model=TagSettings,
-        responses=shown(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
+        responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag_settings(tag: TagId) -> Response:
         return json_response(answers.site.tag_settings(_known(answers, tag).name).model_dump())
@@ -76,11 +76,11 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     @router.put(
         "/tags/{tag}/settings",
         operation_id="put_tag_settings",
-        summary="Set what is known about a tag",
-        description="A tag that is not known is registered. The tag's estimator starts afresh with the new settings, "
-        "from `start` where it is given.",
+        summary="Replace the settings of a tag",
+        description="An unknown tag is registered. The estimator of the tag restarts with the new settings, from "
+        "`start` if it is given.",
         response_model=TagSettings,
-        responses=shown(examples.TAG_SETTINGS)
+        responses=example_response(examples.TAG_SETTINGS)
         | problems(Kind.TAGS_FULL, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
     def put_tag_settings(
@@ -91,7 +91,9 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         except InvalidKeyError as error:
             raise ProblemError(Kind.INVALID_REQUEST, f"path.tag: {error}") from error
         if answers.tags.find(tag) is None and len(answers.tags) >= max_tags:
-            raise ProblemError(Kind.TAGS_FULL, f"{max_tags} tags are registered, and no more are allowed.")
+            raise ProblemError(
+                Kind.TAGS_FULL, f"{max_tags} tags are registered already. Raise `max_tags` to allow more."
+            )
         with saving():
             answers.site.set_tag(tag, settings)
         answers.tags.register(tag)
@@ -103,12 +105,12 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
 def _known(answers: Answers, name: str) -> Tag:
     tag = answers.tags.find(name)
     if tag is None:
-        raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {name!r} has been heard or configured.")
+        raise ProblemError(Kind.UNKNOWN_TAG, f"Tag {name!r} has neither sent messages nor been configured.")
     return tag
 
 
 def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
-    """`TagStatus` of each."""
+    """Yield the `TagStatus` of each tag."""
     default = TagSettings().model_dump()
     configured = answers.site.tags
     for tag in tags:

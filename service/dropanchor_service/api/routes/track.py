@@ -1,4 +1,4 @@
-"""The track of a tag: where it was, page by page."""
+"""The route for the track of a tag: its stored poses, page by page."""
 
 import sqlite3
 from typing import Annotated, Any, Literal
@@ -19,31 +19,39 @@ from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.history.tracks import Tracks
 
 HOUR_NS = 3_600_000_000_000
-MOST_NS = 31 * 24 * HOUR_NS
-MOST_POSES = 10_000
+MAX_WINDOW_NS = 31 * 24 * HOUR_NS
+MAX_POSES = 10_000
 
 _DESCRIPTION = """\
-Poses that were kept, in order of time: thinned, as the service's settings say, and written about two seconds after
-they were made. A page ends after `limit` poses; `next` (and the header `Link` with rel="next") leads to the next one.
-GeoJSON and GPX need a georeferenced site; GPX holds the poses that are `tracking`, `coasting` or `degraded`, which it
-says in `type`."""
+The stored poses of a tag in order of time. The settings of the service say how many poses it stores. It writes them
+about two seconds after they are computed. A page holds up to `limit` poses. `next`, and the header `Link` with
+rel="next", lead to the next page. GeoJSON and GPX need a georeferenced site. GPX holds only poses that are `tracking`,
+`coasting` or `degraded`, and gives the state in `type`."""
 
 
 class TrackQuery(BaseModel):
-    """Which part of a track, and in which form."""
+    """The part of a track to return, and its format."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
     from_ns: int | None = Field(
-        default=None, alias="from", ge=0, lt=2**62, description="UTC, ns; an hour before `to` if left out."
+        default=None,
+        alias="from",
+        ge=0,
+        lt=2**62,
+        description="Start of the track, UTC, ns. The default is one hour before `to`.",
     )
     to_ns: int | None = Field(
-        default=None, alias="to", ge=0, lt=2**62, description="UTC, ns, at most 31 days after `from`; now if left out."
+        default=None,
+        alias="to",
+        ge=0,
+        lt=2**62,
+        description="End of the track, UTC, ns, at most 31 days after `from`. The default is now.",
     )
-    limit: int = Field(default=1000, ge=1, le=MOST_POSES, description="At most so many poses.")
-    cursor: int | None = Field(default=None, ge=0, lt=2**62, description="`next` of the page before this one.")
+    limit: int = Field(default=1000, ge=1, le=MAX_POSES, description="The maximum number of poses on a page.")
+    cursor: int | None = Field(default=None, ge=0, lt=2**62, description="The value of `next` on the previous page.")
     format: Literal["json", "geojson", "csv", "gpx"] | None = Field(
-        default=None, description="If left out, what the header `Accept` says."
+        default=None, description="The format of the response. The default depends on the header `Accept`."
     )
 
 
@@ -53,7 +61,7 @@ def track_router(answers: Answers) -> APIRouter:
     @router.get(
         "/tags/{tag}/track",
         operation_id="get_track",
-        summary="Where a tag was",
+        summary="Get the track of a tag",
         description=_DESCRIPTION,
         response_model=Track,
         responses=_offers()
@@ -63,7 +71,7 @@ def track_router(answers: Answers) -> APIRouter:
         ),
     )
     def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Request) -> Response:
-        form = track_formats.chosen(request, query.format)
+        form = track_formats.negotiate(request, query.format)
         if form in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
         from_ns, to_ns = _window(query, answers.now_ns())
@@ -74,7 +82,7 @@ def track_router(answers: Answers) -> APIRouter:
         if following is not None:
             headers["link"] = _link({"from": from_ns, "to": to_ns, "limit": query.limit, "cursor": following}, form)
         media_type = track_formats.MEDIA_TYPES[form]
-        return Response(track_formats.written(page, head, form), media_type=media_type, headers=headers)
+        return Response(track_formats.encode(page, head, form), media_type=media_type, headers=headers)
 
     return router
 
@@ -83,27 +91,27 @@ def _window(query: TrackQuery, now_ns: int) -> tuple[int, int]:
     to_ns = now_ns if query.to_ns is None else query.to_ns
     from_ns = max(0, to_ns - HOUR_NS) if query.from_ns is None else query.from_ns
     if from_ns > to_ns:
-        raise ProblemError(Kind.INVALID_REQUEST, "query.from: lies after `to`")
-    if to_ns - from_ns > MOST_NS:
-        raise ProblemError(Kind.INVALID_REQUEST, "query.from: lies more than 31 days before `to`")
+        raise ProblemError(Kind.INVALID_REQUEST, "query.from: is later than `to`")
+    if to_ns - from_ns > MAX_WINDOW_NS:
+        raise ProblemError(Kind.INVALID_REQUEST, "query.from: is more than 31 days before `to`")
     return from_ns, to_ns
 
 
 def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
     tracks = answers.tracks
     if tracks is None:
-        raise ProblemError(Kind.NO_HISTORY, "Set `data_dir`, and do not set `history.enabled` to false.")
+        raise ProblemError(Kind.NO_HISTORY, "Set `data_dir`, and leave `history.enabled` at true.")
     try:
         _require_known(answers, tracks, tag)
         return track_page(tracks, answers.site, tag, from_ns, to_ns, limit)
     except sqlite3.Error as error:
-        raise ProblemError(Kind.HISTORY_UNREADABLE, f"The file of the history cannot be read: {error}.") from error
+        raise ProblemError(Kind.HISTORY_UNREADABLE, f"The history file cannot be read: {error}.") from error
 
 
 def _require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
-    """A tag that has not been heard since the start may have been heard before."""
+    """Raise ProblemError when neither this process nor the stored history has seen the tag."""
     if answers.tags.find(tag) is None and not tracks.has_tag(tag):
-        raise ProblemError(Kind.UNKNOWN_TAG, f"No tag {tag!r} has been heard or configured.")
+        raise ProblemError(Kind.UNKNOWN_TAG, f"Tag {tag!r} has neither sent messages nor been configured.")
 
 
 def _link(query: dict[str, Any], form: str) -> str:

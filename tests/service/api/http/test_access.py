@@ -1,4 +1,4 @@
-"""Who may ask what over REST, and how often."""
+"""Authentication, authorization and rate limits of the REST interface."""
 
 import json
 from pathlib import Path
@@ -9,8 +9,8 @@ import pytest
 from fastapi import FastAPI
 
 from api_house import ask, kind_of, make_house
-from dropanchor_service.api.http.access import OPEN
-from dropanchor_service.api.http.rates import MOST, RateLimiter
+from dropanchor_service.api.http.access import OPEN_PATHS
+from dropanchor_service.api.http.rates import MAX_CLIENTS, RateLimiter
 from dropanchor_service.api.routes import examples
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
@@ -31,8 +31,8 @@ class Guarded:
         self.app: FastAPI = self.house.app(authenticator=Authenticator({SOURCE: self.keys}), rate_limiter=rate_limiter)
 
     def ask(self, method: str, path: str, secret: str | Scope | None = None, **options: Any) -> httpx.Response:
-        shown = self.secrets[secret] if isinstance(secret, Scope) else secret
-        headers = {} if shown is None else {"authorization": f"Bearer {shown}"}
+        credential = self.secrets[secret] if isinstance(secret, Scope) else secret
+        headers = {} if credential is None else {"authorization": f"Bearer {credential}"}
         return ask(self.app, method, path, headers=headers, **options)
 
 
@@ -47,9 +47,9 @@ def every_operation() -> list[tuple[str, str]]:
 
 
 @pytest.mark.parametrize(("method", "path"), every_operation())
-def test_every_operation_asks_who_it_is_but_those_that_say_nothing(guarded: Guarded, method: str, path: str) -> None:
+def test_every_operation_but_the_open_ones_needs_credentials(guarded: Guarded, method: str, path: str) -> None:
     response = guarded.ask(method, path.replace("{tag}", "a").replace("{anchor}", "17"))
-    if path in OPEN:
+    if path in OPEN_PATHS:
         assert response.status_code == 200
     else:
         assert kind_of(response) == "unauthenticated"
@@ -68,14 +68,14 @@ def test_every_operation_asks_who_it_is_but_those_that_say_nothing(guarded: Guar
         "/api/v1/poses?tags=a",
     ],
 )
-def test_no_spelling_of_a_path_gets_around_it(guarded: Guarded, path: str) -> None:
+def test_no_spelling_of_a_path_bypasses_authentication(guarded: Guarded, path: str) -> None:
     response = guarded.ask("GET", path)
     assert response.status_code in (401, 404)
     assert "covariance" not in response.text
 
 
 @pytest.mark.parametrize(
-    ("method", "path", "body", "needed"),
+    ("method", "path", "body", "required"),
     [
         ("GET", "/api/v1/poses", None, READ),
         ("GET", "/metrics", None, READ),
@@ -85,34 +85,34 @@ def test_no_spelling_of_a_path_gets_around_it(guarded: Guarded, path: str) -> No
         ("DELETE", "/api/v1/anchors/17", None, ADMIN),
     ],
 )
-def test_a_key_does_what_its_scope_says_and_no_more(
-    guarded: Guarded, method: str, path: str, body: Any, needed: Scope
+def test_a_key_allows_what_its_scope_includes_and_no_more(
+    guarded: Guarded, method: str, path: str, body: Any, required: Scope
 ) -> None:
     for scope in Scope:
         response = guarded.ask(method, path, scope, json=body)
-        if scope >= needed:
+        if scope >= required:
             assert response.status_code < 300, response.text
             break
         assert kind_of(response) == "forbidden"
-        assert f"this needs {needed.word}" in response.json()["detail"]
+        assert f"this request needs the scope {required.word}" in response.json()["detail"]
 
 
 @pytest.mark.parametrize(
     "header", ["", "Bearer", "Bearer ", "Basic YTpi", "Bearer dropanchor_00000000_x", "Bearer a.b.c", "Bearer \xff"]
 )
-def test_what_is_no_key_is_told_so(guarded: Guarded, header: str) -> None:
+def test_invalid_credentials_are_refused(guarded: Guarded, header: str) -> None:
     response = ask(guarded.app, "GET", "/api/v1/poses", headers={"authorization": header.encode("latin-1")})
     assert kind_of(response) == "unauthenticated"
 
 
-def test_a_key_that_differs_in_one_letter_is_not_that_key(guarded: Guarded) -> None:
+def test_a_key_that_differs_in_one_letter_is_refused(guarded: Guarded) -> None:
     secret = guarded.secrets[READ]
     other = secret[:-1] + ("A" if secret[-1] != "A" else "B")
     assert guarded.ask("GET", "/api/v1/poses", secret).status_code == 200
     assert kind_of(guarded.ask("GET", "/api/v1/poses", other)) == "unauthenticated"
 
 
-def test_a_revoked_key_ends_its_streams_too(tmp_path: Path) -> None:
+def test_revoking_a_key_ends_its_streams(tmp_path: Path) -> None:
     guarded = Guarded(tmp_path)
     headers = {"authorization": f"Bearer {guarded.secrets[READ]}"}
     with running_server(guarded.app, guarded.house.stopping) as port:
@@ -130,27 +130,27 @@ def test_a_revoked_key_ends_its_streams_too(tmp_path: Path) -> None:
         assert httpx.get(url, headers=headers, trust_env=False).status_code == 401
 
 
-def test_too_many_requests_are_held_back_each_client_alone(tmp_path: Path) -> None:
+def test_the_rate_limit_applies_to_each_client_separately(tmp_path: Path) -> None:
     now_s = 0.0
     guarded = Guarded(tmp_path, RateLimiter(per_s=2.0, burst=3, clock=lambda: now_s))
     statuses = [guarded.ask("GET", "/api/v1/poses", READ).status_code for _ in range(4)]
     assert statuses == [200, 200, 200, 429]
-    held_back = guarded.ask("GET", "/api/v1/poses", READ)
-    assert kind_of(held_back) == "too-many-requests"
-    assert held_back.headers["retry-after"] == "1"
+    limited = guarded.ask("GET", "/api/v1/poses", READ)
+    assert kind_of(limited) == "too-many-requests"
+    assert limited.headers["retry-after"] == "1"
     assert guarded.ask("GET", "/api/v1/poses", WRITE).status_code == 200
     now_s = 0.6
     assert guarded.ask("GET", "/api/v1/poses", READ).status_code == 200
 
 
-def test_whoever_guesses_keys_is_held_back_by_address(tmp_path: Path) -> None:
+def test_guessed_keys_are_rate_limited_by_address(tmp_path: Path) -> None:
     guarded = Guarded(tmp_path, RateLimiter(per_s=1.0, burst=3, clock=lambda: 0.0))
     guesses = [guarded.ask("GET", "/api/v1/poses", f"guess-{n}", address="192.0.2.1").status_code for n in range(5)]
     assert guesses == [401, 401, 401, 429, 429]
     assert guarded.ask("GET", "/api/v1/poses", READ, address="192.0.2.1").status_code == 200
 
 
-def test_without_credentials_the_loopback_is_not_held_back_and_others_are() -> None:
+def test_without_credentials_only_loopback_has_no_rate_limit() -> None:
     app = make_house().app(rate_limiter=RateLimiter(per_s=1.0, burst=2, clock=lambda: 0.0))
 
     def statuses(*addresses: str) -> set[int]:
@@ -161,28 +161,28 @@ def test_without_credentials_the_loopback_is_not_held_back_and_others_are() -> N
     assert statuses("2001:db8::1", "2001:db8::2", "2001:db8::3") == {200, 429}
 
 
-def test_the_clients_that_are_remembered_are_bounded() -> None:
+def test_the_rate_limiter_remembers_a_bounded_number_of_clients() -> None:
     rate_limiter = RateLimiter(per_s=1.0, burst=1, clock=lambda: 0.0)
     assert rate_limiter.wait_s("first") == 0.0
     assert rate_limiter.wait_s("first") == 1.0
-    for number in range(MOST):
+    for number in range(MAX_CLIENTS):
         rate_limiter.wait_s(str(number))
     assert rate_limiter.wait_s("first") == 0.0
 
 
-def test_every_answer_has_headers_that_browsers_obey_and_no_other_origin_may_read_it(guarded: Guarded) -> None:
+def test_every_response_has_security_headers_and_no_other_origin_may_read_it(guarded: Guarded) -> None:
     for path in ("/api/v1/poses", "/api/v1/nothing", "/api/v1/health/live"):
         response = guarded.ask("GET", path, READ, address="192.0.2.1")
         assert response.headers["x-content-type-options"] == "nosniff"
         assert response.headers["referrer-policy"] == "no-referrer"
         assert "default-src 'none'" in response.headers["content-security-policy"]
-    asked = ask(guarded.app, "GET", "/api/v1/health/live", headers={"origin": "https://evil.example"})
-    assert not any(name.startswith("access-control") for name in asked.headers)
+    response = ask(guarded.app, "GET", "/api/v1/health/live", headers={"origin": "https://evil.example"})
+    assert not any(name.startswith("access-control") for name in response.headers)
 
 
-def test_the_document_says_how_to_be_known(guarded: Guarded) -> None:
+def test_the_document_declares_authentication_and_its_errors(guarded: Guarded) -> None:
     document = json.loads(guarded.ask("GET", "/api/v1/openapi.json").text)
     assert document["components"]["securitySchemes"]["bearer"]["scheme"] == "bearer"
     for path, operations in document["paths"].items():
         for operation in operations.values():
-            assert ({"401", "403", "429"} <= set(operation["responses"])) == (path not in OPEN)
+            assert ({"401", "403", "429"} <= set(operation["responses"])) == (path not in OPEN_PATHS)

@@ -1,4 +1,4 @@
-"""Problems everywhere, health, metrics, the page, and the OpenAPI document."""
+"""Problem responses, health, metrics, the dashboard, and the OpenAPI document."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from dropanchor_service.api.routes import examples
 
 
 @pytest.mark.parametrize("path", ["/api/v1/nothing", "/api/v2/poses", "/nothing", "/api/v1/tags/", "/api/v1/poses/"])
-def test_a_path_that_is_nothing_is_a_problem(path: str, tmp_path: Path) -> None:
+def test_an_unknown_path_is_a_problem(path: str, tmp_path: Path) -> None:
     for dashboard in (None, tmp_path):
         response = ask(make_house().app(dashboard), "GET", path)
         assert kind_of(response) == "not-found"
@@ -33,13 +33,13 @@ def test_a_path_that_is_nothing_is_a_problem(path: str, tmp_path: Path) -> None:
         ("POST", "/metrics", "GET"),
     ],
 )
-def test_a_method_that_is_not_allowed_is_told_which_ones_are(method: str, path: str, allow: str) -> None:
+def test_a_method_that_is_not_allowed_is_answered_with_those_that_are(method: str, path: str, allow: str) -> None:
     response = ask(make_house().app(), method, path)
     assert kind_of(response) == "method-not-allowed"
     assert response.headers["allow"] == allow
 
 
-def test_the_page_can_only_be_read(tmp_path: Path) -> None:
+def test_the_dashboard_is_read_only(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("<!doctype html>")
     response = ask(make_house().app(tmp_path), "POST", "/")
     assert kind_of(response) == "method-not-allowed"
@@ -47,7 +47,7 @@ def test_the_page_can_only_be_read(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", ["tags", "tags/a", "site", "anchors", "anchors/17", "health/live", "health/ready"])
-def test_a_misspelt_query_is_not_ignored(path: str) -> None:
+def test_an_unknown_query_parameter_is_refused(path: str) -> None:
     house = make_house()
     house.answers.tags.register("a")
     app = house.app()
@@ -55,7 +55,7 @@ def test_a_misspelt_query_is_not_ignored(path: str) -> None:
     assert kind_of(ask(app, "GET", f"/api/v1/{path}?verbose=1")) == "invalid-request"
 
 
-def test_a_mistake_of_ours_is_a_problem_that_gives_nothing_away() -> None:
+def test_an_internal_error_is_a_problem_without_details() -> None:
     house = make_house()
     house.move("a")
     house.answers.now_ns = lambda: int("a secret")
@@ -64,21 +64,21 @@ def test_a_mistake_of_ours_is_a_problem_that_gives_nothing_away() -> None:
     assert "secret" not in response.text
 
 
-def test_a_body_that_is_too_large_is_refused_by_its_announcement_and_by_its_size() -> None:
+def test_a_body_that_is_too_large_is_refused_by_its_content_length_and_by_its_size() -> None:
     app = make_house().app()
     headers = {"content-type": "application/json"}
     body = b" " * (MAX_BODY_BYTES - 2) + b"{}"
     assert ask(app, "PUT", "/api/v1/tags/a/settings", content=body, headers=headers).status_code == 200
     assert kind_of(ask(app, "PUT", "/api/v1/tags/a/settings", content=b" " + body, headers=headers)) == "body-too-large"
 
-    async def without_announcement() -> object:
+    async def without_content_length() -> object:
         yield b" " + body
 
-    response = ask(app, "PUT", "/api/v1/tags/a/settings", content=without_announcement(), headers=headers)
+    response = ask(app, "PUT", "/api/v1/tags/a/settings", content=without_content_length(), headers=headers)
     assert kind_of(response) == "body-too-large"
 
 
-def test_readiness_says_why_not() -> None:
+def test_readiness_gives_the_reasons_when_the_service_is_not_ready() -> None:
     house = make_house()
     app = house.app()
     assert ask(app, "GET", "/api/v1/health/live").json() == {"status": "live"}
@@ -90,7 +90,7 @@ def test_readiness_says_why_not() -> None:
     assert ask(app, "GET", "/api/v1/health/live").status_code == 200
 
 
-def test_metrics_come_from_the_registry_that_was_passed_in() -> None:
+def test_metrics_come_from_the_given_registry() -> None:
     house = make_house()
     Counter("eggs", "Eggs laid", registry=house.registry).inc(3)
     response = ask(house.app(), "GET", "/metrics")
@@ -100,7 +100,7 @@ def test_metrics_come_from_the_registry_that_was_passed_in() -> None:
     assert openmetrics.headers["content-type"].startswith("application/openmetrics-text")
 
 
-def test_the_page_is_revalidated_and_may_load_nothing_from_elsewhere(tmp_path: Path) -> None:
+def test_the_dashboard_is_revalidated_and_may_load_nothing_from_other_origins(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("<!doctype html>the page")
     (tmp_path / "a.js").write_text("export {};")
     app = make_house().app(tmp_path)
@@ -116,12 +116,12 @@ def test_the_page_is_revalidated_and_may_load_nothing_from_elsewhere(tmp_path: P
     assert kind_of(ask(app, "GET", "/%2e%2e/secret")) == "not-found"
 
 
-def test_the_openapi_document_is_current_and_is_what_the_service_shows() -> None:
+def test_the_openapi_document_is_current_and_is_what_the_service_returns() -> None:
     assert export.main(["--check"]) == 0, "run python -m dropanchor_service.api.export"
     assert ask(make_house().app(), "GET", "/api/v1/openapi.json").json() == make_house().app().openapi()
 
 
-def test_every_operation_is_named_grouped_and_declares_its_problems() -> None:
+def test_every_operation_has_a_name_a_tag_a_summary_and_its_problems() -> None:
     paths = make_house().app().openapi()["paths"]
     operations = [operation for path in paths.values() for operation in path.values()]
     names = [operation["operationId"] for operation in operations]
@@ -138,7 +138,7 @@ def test_every_kind_of_problem_is_documented() -> None:
     assert all(f"`{kind.type}`" in description for kind in Kind)
 
 
-def test_the_examples_are_true_to_the_contract() -> None:
+def test_the_examples_follow_the_contract() -> None:
     PoseList.model_validate(examples.POSE_LIST, strict=False)
     PoseFrame.model_validate(examples.POSE_FRAME)
     Explanation.model_validate(examples.EXPLANATION)

@@ -1,4 +1,4 @@
-"""A real uvicorn on loopback: the stream, and clients that would harm the others if they could."""
+"""A real uvicorn on loopback: the stream, and clients that misbehave."""
 
 import asyncio
 import json
@@ -20,22 +20,22 @@ from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import ListenError, build_server, listen
 from dropanchor_service.api.routes import stream
 
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 
 
-class Impatient(GuardedProtocol):
+class ShortDeadlines(GuardedProtocol):
     request_s = 0.5
     stalled_s = 0.5
 
 
-class Fair(GuardedProtocol):
+class LongDeadlines(GuardedProtocol):
     request_s = 2.0
     stalled_s = 2.0
 
 
 @contextmanager
 def serving(house: House, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
-    """The port of a server that has ended, with its streams, when the block has."""
+    """Run a server and yield its port. The server and its streams have ended after the block."""
     server = build_server(house.app(), house.stopping, protocol)
     bound = listen("127.0.0.1", 0)
     port = int(bound.getsockname()[1])
@@ -46,15 +46,15 @@ def serving(house: House, protocol: type[GuardedProtocol] = GuardedProtocol) -> 
         yield port
     finally:
         server.should_exit = True
-        thread.join(PATIENCE_S)
+        thread.join(TIMEOUT_S)
     assert not thread.is_alive()
 
 
 @contextmanager
 def streaming(port: int, query: str = "max_hz=30") -> Iterator[Iterator[tuple[str, Any]]]:
-    """The events of a stream: name and frame; comments have no name."""
+    """Open a stream and yield its events: name and frame. A comment has an empty name."""
     url = f"http://127.0.0.1:{port}/api/v1/stream?{query}"
-    with httpx.Client(timeout=PATIENCE_S, trust_env=False) as client, client.stream("GET", url) as response:
+    with httpx.Client(timeout=TIMEOUT_S, trust_env=False) as client, client.stream("GET", url) as response:
         assert response.headers["content-type"].startswith("text/event-stream")
         yield _events(response)
 
@@ -70,26 +70,26 @@ def _events(response: httpx.Response) -> Iterator[tuple[str, Any]]:
             yield "", line
 
 
-def _wait_for(happened: Any) -> None:
-    end_s = time.monotonic() + PATIENCE_S
-    while not happened():
-        assert time.monotonic() < end_s, "it did not happen"
+def _wait_for(condition: Any) -> None:
+    end_s = time.monotonic() + TIMEOUT_S
+    while not condition():
+        assert time.monotonic() < end_s, "the condition did not become true in time"
         time.sleep(0.01)
 
 
 def _get(port: int, path: str = "/api/v1/health/live") -> httpx.Response:
-    return httpx.get(f"http://127.0.0.1:{port}{path}", timeout=PATIENCE_S, trust_env=False)
+    return httpx.get(f"http://127.0.0.1:{port}{path}", timeout=TIMEOUT_S, trust_env=False)
 
 
 def _connected(port: int, *sent: bytes) -> socket.socket:
-    client = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S)
+    client = socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT_S)
     for data in sent:
         client.sendall(data)
     return client
 
 
 def _answer(client: socket.socket) -> bytes:
-    """Head and body of an answer in JSON, which may come in several pieces."""
+    """Return head and body of a JSON response, which may arrive in several pieces."""
     answer = b""
     while not answer.endswith(b"}"):
         received = client.recv(65536)
@@ -99,8 +99,8 @@ def _answer(client: socket.socket) -> bytes:
 
 
 def _ended(client: socket.socket) -> bool:
-    """Whether the server has closed the connection, reading what it still sent."""
-    end_s = time.monotonic() + PATIENCE_S
+    """Read until the server has closed the connection; fail when it stays open."""
+    end_s = time.monotonic() + TIMEOUT_S
     try:
         while client.recv(65536):
             assert time.monotonic() < end_s, "the connection is still open"
@@ -109,7 +109,7 @@ def _ended(client: socket.socket) -> bool:
     return True
 
 
-def test_a_stream_begins_with_everything_and_goes_on_with_what_changes() -> None:
+def test_a_stream_starts_with_all_tags_and_continues_with_changes() -> None:
     house = make_house()
     house.move("a", "b", x=1.0)
     with serving(house) as port, streaming(port) as events:
@@ -123,13 +123,13 @@ def test_a_stream_begins_with_everything_and_goes_on_with_what_changes() -> None
         assert next(events)[1]["tags"] == ["c"]
 
 
-def test_a_stream_of_nothing_begins_with_an_empty_snapshot() -> None:
+def test_a_stream_without_poses_starts_with_an_empty_snapshot() -> None:
     with serving(make_house()) as port, streaming(port) as events:
         name, frame = next(events)
         assert (name, frame["tags"]) == ("snapshot", [])
 
 
-def test_a_stream_of_some_tags_leaves_the_others_out_and_takes_late_ones_in() -> None:
+def test_a_stream_of_selected_tags_includes_those_that_appear_later() -> None:
     house = make_house()
     house.move("a", "b")
     with serving(house) as port, streaming(port, "max_hz=30&tags=b,late") as events:
@@ -139,23 +139,23 @@ def test_a_stream_of_some_tags_leaves_the_others_out_and_takes_late_ones_in() ->
         assert next(events)[1]["tags"] == ["late"]
 
 
-def test_a_client_gets_the_newest_poses_and_no_more_events_than_it_asked_for() -> None:
+def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
     house = make_house()
     house.move("a", x=0.0)
     with serving(house) as port, streaming(port, "max_hz=5") as events:
         next(events)
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         seen: list[float] = []
         for count in range(1, 101):
             house.move("a", x=float(count))
             time.sleep(0.01)
         while not seen or seen[-1] != 100.0:
             seen.append(next(events)[1]["x"][0])
-        assert len(seen) <= (time.monotonic() - begun_s) * 5 + 1
+        assert len(seen) <= (time.monotonic() - start_s) * 5 + 1
         assert seen == sorted(set(seen))
 
 
-def test_a_tag_that_falls_silent_or_offline_is_said_though_nobody_writes() -> None:
+def test_a_tag_that_falls_silent_or_goes_offline_is_reported_without_a_new_pose() -> None:
     house = make_house()
     house.move("a", "b")
     house.answers.tags.set_online("b", True)
@@ -168,7 +168,7 @@ def test_a_tag_that_falls_silent_or_offline_is_said_though_nobody_writes() -> No
         assert next(events)[1]["state"] == ["coasting", "coasting"]
 
 
-def test_a_quiet_stream_shows_that_it_lives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_quiet_stream_sends_heartbeats(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "HEARTBEAT_S", 0.1)
     with serving(make_house()) as port, streaming(port) as events:
         next(events)
@@ -176,19 +176,19 @@ def test_a_quiet_stream_shows_that_it_lives(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("query", ["max_hz=nan", "max_hz=inf", "max_hz=0.09", "max_hz=30.1", "max_hz=fast", "hz=1"])
-def test_a_stream_that_cannot_be_is_a_problem(query: str) -> None:
+def test_invalid_stream_parameters_are_a_problem(query: str) -> None:
     with serving(make_house()) as port:
         assert kind_of(_get(port, f"/api/v1/stream?{query}")) == "invalid-request"
 
 
-def test_streams_end_by_themselves_when_the_server_stops() -> None:
+def test_streams_end_when_the_server_stops() -> None:
     house = make_house()
     with serving(house) as port, streaming(port, "max_hz=0.1") as events:
         next(events)
         house.stopping.set()
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         assert list(events) == []
-        assert time.monotonic() - begun_s < 8.0
+        assert time.monotonic() - start_s < 8.0
 
 
 def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
@@ -199,24 +199,24 @@ def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
         for _ in range(10):
             house.move(*(f"tag-{number}" for number in range(2000)))
             time.sleep(0.05)
-        begun_s = time.monotonic()
-    assert time.monotonic() - begun_s < 20.0
+        start_s = time.monotonic()
+    assert time.monotonic() - start_s < 20.0
     client.close()
 
 
-def test_a_client_that_stops_reading_is_cut_and_harms_nobody() -> None:
+def test_a_client_that_stops_reading_is_disconnected_and_does_not_delay_others() -> None:
     house = make_house()
     names = [f"tag-{number}" for number in range(2000)]
     house.move(*names)
-    with serving(house, Impatient) as port, streaming(port) as events:
+    with serving(house, ShortDeadlines) as port, streaming(port) as events:
         next(events)
         stuck = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
         gaps_s, end_s = [], time.monotonic() + 3.0
         while time.monotonic() < end_s:
             house.move(*names)
-            begun_s = time.monotonic()
+            start_s = time.monotonic()
             next(events)
-            gaps_s.append(time.monotonic() - begun_s)
+            gaps_s.append(time.monotonic() - start_s)
         assert statistics.median(gaps_s) < 2.0
         with closing(stuck):
             received = stuck.recv(2**26, socket.MSG_WAITALL)
@@ -233,32 +233,32 @@ def test_a_client_that_stops_reading_is_cut_and_harms_nobody() -> None:
         b"PUT /api/v1/site HTTP/1.1\r\nhost: x\r\ncontent-type: application/json\r\ncontent-length: 9\r\n\r\n{",
     ],
 )
-def test_half_a_request_is_cut(sent: bytes) -> None:
-    with serving(make_house(), Impatient) as port:
+def test_an_incomplete_request_is_disconnected(sent: bytes) -> None:
+    with serving(make_house(), ShortDeadlines) as port:
         clients = [_connected(port, sent) for _ in range(50)]
         assert _get(port).status_code == 200
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         assert all(_ended(client) for client in clients)
-        assert time.monotonic() - begun_s < 30.0
+        assert time.monotonic() - start_s < 30.0
         for client in clients:
             client.close()
 
 
-def test_half_a_second_request_is_cut_too() -> None:
+def test_an_incomplete_second_request_is_disconnected_too() -> None:
     with (
-        serving(make_house(), Impatient) as port,
+        serving(make_house(), ShortDeadlines) as port,
         closing(_connected(port, b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n")) as client,
     ):
         assert _answer(client).startswith(b"HTTP/1.1 200")
-        begun_s = time.monotonic()
+        start_s = time.monotonic()
         client.sendall(b"G")
         assert _ended(client)
-        assert time.monotonic() - begun_s < 30.0
+        assert time.monotonic() - start_s < 30.0
 
 
-def test_a_slow_but_honest_request_and_a_long_stream_are_left_alone() -> None:
+def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
     house = make_house()
-    with serving(house, Fair) as port, streaming(port) as events:
+    with serving(house, LongDeadlines) as port, streaming(port) as events:
         next(events)
         request = b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n"
         client = _connected(port, request[:20])
@@ -273,7 +273,7 @@ def test_a_slow_but_honest_request_and_a_long_stream_are_left_alone() -> None:
         assert next(events)[1]["tags"] == ["a"]
 
 
-def test_a_large_body_is_refused_before_it_is_sent() -> None:
+def test_a_large_body_is_refused_by_its_content_length() -> None:
     head = f"PUT /api/v1/site HTTP/1.1\r\nhost: x\r\ncontent-length: {MAX_BODY_BYTES + 1}\r\n\r\n"
     with serving(make_house()) as port, closing(_connected(port, head.encode())) as client:
         answer = _answer(client)
@@ -281,7 +281,7 @@ def test_a_large_body_is_refused_before_it_is_sent() -> None:
         assert b"application/problem+json" in answer
 
 
-def test_junk_and_endless_headers_are_refused_and_the_service_lives() -> None:
+def test_the_server_survives_junk_and_endless_headers() -> None:
     with serving(make_house()) as port:
         for sent in (b"\x16\x03\x01" * 100, b"GET / HTTP/1.1\r\n" + b"x: y\r\n" * 20_000):
             with closing(_connected(port, sent)) as client:
@@ -289,13 +289,13 @@ def test_junk_and_endless_headers_are_refused_and_the_service_lives() -> None:
         assert _get(port).status_code == 200
 
 
-def test_a_port_that_is_taken_is_said_in_a_sentence() -> None:
+def test_a_port_in_use_is_explained() -> None:
     with closing(listen("127.0.0.1", 0)) as first:
         first.listen()
         with pytest.raises(ListenError, match="another program uses it"):
             listen("127.0.0.1", first.getsockname()[1])
 
 
-def test_an_address_of_another_machine_is_said_in_a_sentence() -> None:
+def test_an_address_of_another_machine_is_explained() -> None:
     with pytest.raises(ListenError, match="does not have the address"):
         listen("192.0.2.1", 0)

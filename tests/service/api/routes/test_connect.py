@@ -1,4 +1,4 @@
-"""Where tags connect, for the page: with the path of the program only for people on the machine itself."""
+"""The connection details for tags. Only clients on the machine itself get the path of the program."""
 
 import subprocess
 import sysconfig
@@ -13,7 +13,7 @@ from dropanchor_service.zenoh_io.endpoints import endpoints_of
 SCRIPTS = sysconfig.get_path("scripts")
 
 
-def test_a_browser_on_this_machine_is_told_the_path_of_the_program() -> None:
+def test_a_browser_on_this_machine_gets_the_path_of_the_program() -> None:
     app = make_house().app(endpoints=("tcp/0.0.0.0:19747",))
     answer = ask(app, "GET", "/api/v1/connect", headers={"host": "127.0.0.1:8080"}).json()
     assert answer["endpoints"] == ["tcp/127.0.0.1:19747"]
@@ -34,7 +34,7 @@ def test_a_browser_on_this_machine_is_told_the_path_of_the_program() -> None:
         ("127.0.0.1", {"host": "127.0.0.1", "forwarded": "for=192.0.2.9"}),
     ],
 )
-def test_nobody_else_is_told_a_path_of_this_machine(address: str, headers: dict[str, str]) -> None:
+def test_other_clients_get_no_path_of_this_machine(address: str, headers: dict[str, str]) -> None:
     app = make_house().app(endpoints=("tcp/0.0.0.0:19747", "tcp/[::]:19748"))
     response = ask(app, "GET", "/api/v1/connect", address, headers=headers)
     assert SCRIPTS not in response.text
@@ -43,7 +43,7 @@ def test_nobody_else_is_told_a_path_of_this_machine(address: str, headers: dict[
     assert response.json()["simulate"] == f"dropanchor-tag simulate --connect tcp/{name}:19747 --anchor 17"
 
 
-def test_a_router_elsewhere_and_one_with_a_configuration_of_its_own_are_named(tmp_path: Path) -> None:
+def test_endpoints_of_an_external_router_and_of_a_configuration_file_are_listed(tmp_path: Path) -> None:
     assert endpoints_of(ZenohSettings(connect=("tcp/192.0.2.1:7447",)), None) == ("tcp/192.0.2.1:7447",)
     file = tmp_path / "zenoh.json5"
     file.write_text('{mode: "router", listen: {endpoints: ["tcp/127.0.0.1:19999"]}}')

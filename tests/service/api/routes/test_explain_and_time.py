@@ -30,7 +30,7 @@ def problem_at(house: House, offset_s: float) -> tuple[str, str]:
     return kind_of(response), response.json()["detail"]
 
 
-def test_the_past_lies_between_the_poses_that_were() -> None:
+def test_a_past_pose_is_interpolated_between_the_poses_in_memory() -> None:
     house = driven()
     for offset_s in (-4.0, -3.33, -0.05, 0.0):
         pose = pose_at(house, offset_s)
@@ -40,13 +40,13 @@ def test_the_past_lies_between_the_poses_that_were() -> None:
         assert pose.state == "tracking"
 
 
-def test_a_moment_of_the_past_does_not_get_old() -> None:
+def test_the_state_of_a_past_pose_does_not_age() -> None:
     house = driven()
     house.now_ns = T_NS + 20 * SECOND
     assert pose_at(house, -2.0).state == "tracking"
 
 
-def test_the_near_future_goes_on_as_the_tag_moves_and_is_less_certain() -> None:
+def test_a_pose_in_the_near_future_is_extrapolated_with_a_growing_covariance() -> None:
     house = driven()
     now, soon, later = (pose_at(house, offset_s) for offset_s in (0.0, 0.5, 2.0))
     assert [soon.x, later.x] == pytest.approx([11.0, 14.0])
@@ -55,7 +55,7 @@ def test_the_near_future_goes_on_as_the_tag_moves_and_is_less_certain() -> None:
     assert sizes == sorted(set(sizes))
 
 
-def test_what_cannot_be_said_is_refused_with_its_reason() -> None:
+def test_a_time_without_a_pose_is_refused_with_its_reason() -> None:
     house = driven()
     assert problem_at(house, 2.1)[0] == "too-far-ahead"
     kind, detail = problem_at(house, -9.0)
@@ -74,7 +74,7 @@ def test_a_jump_of_the_estimate_is_not_interpolated() -> None:
     assert (kind, "jumped" in detail) == ("no-pose-then", True)
 
 
-def test_a_tag_that_may_be_in_several_places_is_not_carried_ahead() -> None:
+def test_an_ambiguous_pose_is_not_extrapolated() -> None:
     house = driven()
     house.now_ns = T_NS + SECOND // 10
     house.move("a", x=10.2, speed=2.0, sigma_pos=2.0, state=State.AMBIGUOUS)
@@ -82,7 +82,7 @@ def test_a_tag_that_may_be_in_several_places_is_not_carried_ahead() -> None:
 
 
 @pytest.mark.parametrize("query", ["at=noon", "at=-1", "at=9223372036854775808", "when=5", "at=1&at=x"])
-def test_a_time_that_is_none_is_refused(query: str) -> None:
+def test_an_invalid_time_is_refused(query: str) -> None:
     assert kind_of(ask(driven(0.1).app(), "GET", f"/api/v1/tags/a/pose?{query}")) == "invalid-request"
 
 
@@ -100,38 +100,38 @@ def explained_house() -> House:
     return house
 
 
-def test_an_explanation_holds_the_last_innovations_and_what_the_ranges_say_of_the_speed() -> None:
+def test_an_explanation_holds_the_last_innovations_and_the_range_rate() -> None:
     app = explained_house().app()
-    told = Explanation.model_validate(ask(app, "GET", "/api/v1/tags/a/explain").json())
-    assert len(told.innovations) == 50
-    last = told.innovations[-1]
+    explanation = Explanation.model_validate(ask(app, "GET", "/api/v1/tags/a/explain").json())
+    assert len(explanation.innovations) == 50
+    last = explanation.innovations[-1]
     assert (last.kind, last.anchor, last.fused, last.p_outlier) == ("range", "17", False, 0.99)
     assert last.nis == pytest.approx(9.0 / 0.04)
-    assert told.refused == 1
-    assert told.speed.predicted_range_rate_mps == pytest.approx(2.0)
-    assert told.speed.range_rate_mps == pytest.approx(2.2, abs=0.3)
-    assert len(told.speed_track.t_ns) == len(told.speed_track.speed_mps) >= 20
-    assert set(told.speed_track.speed_mps) == {2.0}
+    assert explanation.refused == 1
+    assert explanation.speed.predicted_range_rate_mps == pytest.approx(2.0)
+    assert explanation.speed.range_rate_mps == pytest.approx(2.2, abs=0.3)
+    assert len(explanation.speed_track.t_ns) == len(explanation.speed_track.speed_mps) >= 20
+    assert set(explanation.speed_track.speed_mps) == {2.0}
     assert len(ask(app, "GET", "/api/v1/tags/a/explain?last=7").json()["innovations"]) == 7
 
 
-def test_a_gate_has_no_outlier_probability() -> None:
+def test_an_innovation_that_was_only_gated_has_no_outlier_probability() -> None:
     house = make_house()
     house.move("a")
     record = np.zeros(1, INNOVATION)
     record["S"], record["p_outlier"] = 1.0, np.nan
     pose = house.answers.latest.since()[1]
     house.answers.latest.write(pose, np.empty(0, HYPOTHESIS), record)
-    told = Explanation.model_validate(ask(house.app(), "GET", "/api/v1/tags/a/explain").json())
-    assert told.innovations[0].p_outlier is None
+    explanation = Explanation.model_validate(ask(house.app(), "GET", "/api/v1/tags/a/explain").json())
+    assert explanation.innovations[0].p_outlier is None
 
 
 @pytest.mark.parametrize("query", ["last=0", "last=301", "last=x", "first=3"])
-def test_a_misspelt_question_for_an_explanation_is_refused(query: str) -> None:
+def test_an_invalid_query_for_an_explanation_is_refused(query: str) -> None:
     assert kind_of(ask(driven(0.1).app(), "GET", f"/api/v1/tags/a/explain?{query}")) == "invalid-request"
 
 
-def test_what_is_not_there_cannot_be_explained() -> None:
+def test_an_unknown_tag_and_a_tag_without_a_pose_cannot_be_explained() -> None:
     house = make_house()
     house.answers.tags.register("quiet")
     assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/explain")) == "unknown-tag"

@@ -10,7 +10,7 @@ from dropanchor_schemas.site import Georeference, Site
 GEOREFERENCED = Site(georeference=Georeference(lat=52.5, lon=13.4))
 
 
-def test_a_pose_is_the_latest_one() -> None:
+def test_the_pose_of_a_tag_is_its_latest_one() -> None:
     house = make_house()
     house.move("a", x=1.0)
     house.move("a", x=2.0, heading=0.5)
@@ -18,7 +18,7 @@ def test_a_pose_is_the_latest_one() -> None:
     assert (pose.tag, pose.x, pose.heading_rad, pose.t_ns) == ("a", 2.0, 0.5, T_NS)
 
 
-def test_a_tag_that_nobody_knows_and_one_without_a_pose_are_different_problems() -> None:
+def test_an_unknown_tag_and_a_tag_without_a_pose_are_different_problems() -> None:
     house = make_house()
     house.answers.tags.register("quiet")
     app = house.app()
@@ -26,7 +26,7 @@ def test_a_tag_that_nobody_knows_and_one_without_a_pose_are_different_problems()
     assert kind_of(ask(app, "GET", "/api/v1/tags/quiet/pose")) == "no-pose-yet"
 
 
-def test_an_id_may_hold_anything_printable_even_a_slash() -> None:
+def test_an_id_may_contain_any_printable_character_even_a_slash() -> None:
     house = make_house()
     house.move("a/pose", x=1.0)
     house.move("Gerät 7%", x=2.0)
@@ -36,33 +36,33 @@ def test_an_id_may_hold_anything_printable_even_a_slash() -> None:
 
 
 @pytest.mark.parametrize("chunk", ["%FF", "x" * 65, "%00", "%0A"])
-def test_an_id_that_cannot_be_one_is_a_problem(chunk: str) -> None:
+def test_an_invalid_id_is_a_problem(chunk: str) -> None:
     for path in (f"/api/v1/tags/{chunk}/pose", f"/api/v1/tags/{chunk}", f"/api/v1/anchors/{chunk}"):
         assert kind_of(ask(make_house().app(), "GET", path)) == "invalid-request"
 
 
-def test_a_list_holds_all_poses_or_the_chosen_ones() -> None:
+def test_a_list_holds_all_poses_or_the_selected_ones() -> None:
     house = make_house()
     house.move("a", "b", "c")
     app = house.app()
-    everyone = PoseList.model_validate(ask(app, "GET", "/api/v1/poses").json())
-    assert everyone.t_ns == T_NS
-    assert [pose.tag for pose in everyone.poses] == ["a", "b", "c"]
+    all_poses = PoseList.model_validate(ask(app, "GET", "/api/v1/poses").json())
+    assert all_poses.t_ns == T_NS
+    assert [pose.tag for pose in all_poses.poses] == ["a", "b", "c"]
     for query in ("tags=c,a,nobody", "tags=c&tags=a"):
         assert [pose["tag"] for pose in ask(app, "GET", f"/api/v1/poses?{query}").json()["poses"]] == ["c", "a"]
     assert ask(app, "GET", "/api/v1/poses?tags=nobody").json()["poses"] == []
 
 
 @pytest.mark.parametrize("query", ["tags=", "tags=a,,b", "tag=a", "limit=3", "tags=%00", "tags=" + "x" * 65])
-def test_a_query_that_is_not_understood_is_a_problem(query: str) -> None:
+def test_an_invalid_query_is_a_problem(query: str) -> None:
     assert kind_of(ask(make_house().app(), "GET", f"/api/v1/poses?{query}")) == "invalid-request"
 
 
-def test_a_single_pose_takes_no_query_but_a_time() -> None:
+def test_a_single_pose_accepts_only_a_time_as_its_query() -> None:
     assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/pose?tags=a")) == "invalid-request"
 
 
-def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_place() -> None:
+def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_position() -> None:
     house = make_house(GEOREFERENCED)
     house.move("a", x=1000.0)
     house.move("b", x=np.nan, y=np.nan)

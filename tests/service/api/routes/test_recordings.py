@@ -22,7 +22,7 @@ def house(tmp_path: Path) -> House:
     return house
 
 
-def test_a_recording_is_started_stopped_listed_and_fetched(house: House) -> None:
+def test_a_recording_is_started_stopped_listed_and_downloaded(house: House) -> None:
     app, recorder = house.app(), house.recorder
     assert recorder is not None
     started = ask(app, "POST", "/api/v1/recordings", json={"tags": ["a"]})
@@ -38,25 +38,25 @@ def test_a_recording_is_started_stopped_listed_and_fetched(house: House) -> None
     recorder.writer.flush()
     assert kind_of(ask(app, "POST", "/api/v1/recordings/stop")) == "records-nothing"
     file = RecordingList.model_validate(ask(app, "GET", "/api/v1/recordings").json()).files[0]
-    fetched = ask(app, "GET", f"/api/v1/recordings/{file.name}")
+    download = ask(app, "GET", f"/api/v1/recordings/{file.name}")
     assert file.finished
-    assert fetched.content == (recorder.folder / file.name).read_bytes()
-    assert fetched.headers["content-disposition"] == f'attachment; filename="{file.name}"'
+    assert download.content == (recorder.folder / file.name).read_bytes()
+    assert download.headers["content-disposition"] == f'attachment; filename="{file.name}"'
 
 
 @pytest.mark.parametrize("name", ["x.mcap", "..%2Fsite.json", "%2Fetc%2Fpasswd", "..", "x"])
-def test_only_recordings_can_be_fetched(house: House, name: str, tmp_path: Path) -> None:
+def test_only_recordings_can_be_downloaded(house: House, name: str, tmp_path: Path) -> None:
     (tmp_path / "site.json").write_text("{}")
     assert ask(house.app(), "GET", f"/api/v1/recordings/{name}").status_code == 404
 
 
-def test_without_a_folder_nothing_can_be_recorded() -> None:
+def test_recording_needs_a_data_folder() -> None:
     app = make_house().app()
     for method, path in (("GET", ""), ("POST", "/stop"), ("GET", "/x.mcap")):
         assert kind_of(ask(app, method, f"/api/v1/recordings{path}")) == "no-recorder"
     assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "no-recorder"
 
 
-def test_a_folder_that_cannot_be_made_is_said_at_once(house: House, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_reported_at_once(house: House, tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("in the way")
     assert kind_of(ask(house.app(), "POST", "/api/v1/recordings", json={})) == "not-saved"

@@ -1,4 +1,4 @@
-"""What an operator reads and sets."""
+"""Tags, settings, the site and its anchors over REST."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Reason
 
 
-def test_a_tag_says_what_was_heard_from_it() -> None:
+def test_a_tag_shows_its_counts_of_messages_samples_and_rejections() -> None:
     house = make_house()
     tags = house.answers.tags
     rows = np.array([tags.register("a").row])
@@ -25,7 +25,7 @@ def test_a_tag_says_what_was_heard_from_it() -> None:
     assert (tag.samples, tag.rejected, tag.settings) == ({"range": 3}, {"late": 1}, TagSettings())
 
 
-def test_the_list_of_tags_holds_those_that_were_never_heard_too() -> None:
+def test_the_list_of_tags_includes_those_that_have_sent_nothing() -> None:
     house = make_house()
     house.answers.tags.register("b")
     house.answers.tags.register("a")
@@ -33,7 +33,7 @@ def test_the_list_of_tags_holds_those_that_were_never_heard_too() -> None:
     assert [(tag.tag, tag.first_heard_ns) for tag in tags] == [("b", None), ("a", None)]
 
 
-def test_newcomers_are_listed_by_when_they_were_heard_last() -> None:
+def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
     house = make_house()
     for name, t_ns in (("a", 10), ("b", 20), ("a", 30)):
         house.answers.pending_tags.on_message(name, t_ns)
@@ -44,7 +44,7 @@ def test_newcomers_are_listed_by_when_they_were_heard_last() -> None:
     ]
 
 
-def test_settings_are_kept_and_register_a_new_tag() -> None:
+def test_settings_are_stored_and_register_a_new_tag() -> None:
     house = make_house()
     app = house.app()
     settings = {"height_m": 1.5, "start": {"x": 1, "y": 2}}
@@ -58,7 +58,7 @@ def test_settings_are_kept_and_register_a_new_tag() -> None:
     assert kind_of(ask(app, "GET", "/api/v1/tags/other/settings")) == "unknown-tag"
 
 
-def test_no_more_tags_are_registered_than_the_service_may_hold() -> None:
+def test_no_more_than_max_tags_are_registered() -> None:
     house = make_house()
     app = house.app(max_tags=1)
     assert ask(app, "PUT", "/api/v1/tags/a/settings", json={}).status_code == 200
@@ -89,7 +89,7 @@ def test_no_more_tags_are_registered_than_the_service_may_hold() -> None:
         (b"[" * 100_000, None),
     ],
 )
-def test_settings_that_cannot_be_used_are_a_problem_that_names_the_place(body: bytes, location: str | None) -> None:
+def test_invalid_settings_are_a_problem_that_names_the_field(body: bytes, location: str | None) -> None:
     house = make_house()
     headers = {"content-type": "application/json"}
     response = ask(house.app(), "PUT", "/api/v1/tags/a/settings", content=body, headers=headers)
@@ -98,13 +98,13 @@ def test_settings_that_cannot_be_used_are_a_problem_that_names_the_place(body: b
     assert len(house.answers.tags) == 0
 
 
-def test_a_body_that_is_not_called_json_is_a_problem() -> None:
+def test_a_body_without_the_json_media_type_is_a_problem() -> None:
     app = make_house().app()
     response = ask(app, "PUT", "/api/v1/tags/a/settings", content=b"{}", headers={"content-type": "text/plain"})
     assert kind_of(response) == "invalid-request"
 
 
-def test_a_problem_does_not_repeat_what_was_sent() -> None:
+def test_a_problem_does_not_repeat_the_input() -> None:
     response = ask(make_house().app(), "PUT", "/api/v1/tags/a/settings", json={"height_m": "a secret"})
     assert kind_of(response) == "invalid-request"
     assert "a secret" not in response.text
@@ -128,7 +128,7 @@ def test_the_id_of_the_site_is_fixed() -> None:
 @pytest.mark.parametrize(
     "anchors", [[{"id": "1"}, {"id": "1"}], [{"id": ""}], [{"id": "a\nb"}], [{"id": "1", "x": "far"}], {}]
 )
-def test_anchors_that_cannot_be_used_are_a_problem(anchors: Any) -> None:
+def test_invalid_anchors_are_a_problem(anchors: Any) -> None:
     assert kind_of(ask(make_house().app(), "PUT", "/api/v1/site", json={"anchors": anchors})) == "invalid-request"
 
 
@@ -147,7 +147,7 @@ def test_an_anchor_is_placed_moved_read_and_removed() -> None:
     assert house.answers.site.site.anchors == [Anchor(id="17")]
 
 
-def test_an_anchor_has_one_id() -> None:
+def test_the_ids_of_an_anchor_in_path_and_body_must_match() -> None:
     response = ask(make_house().app(), "PUT", "/api/v1/anchors/1", json={"id": "2"})
     assert kind_of(response) == "anchor-id-differs"
 
@@ -164,7 +164,7 @@ def test_a_change_that_cannot_be_saved_is_not_made(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("escaped", ["*", "%2A", "forklift-*"])
-def test_a_pattern_in_the_place_of_a_tag_is_refused_with_a_sentence(escaped: str) -> None:
+def test_a_pattern_instead_of_a_tag_is_refused_with_an_explanation(escaped: str) -> None:
     house = make_house()
     response = ask(house.app(), "PUT", f"/api/v1/tags/{escaped}/settings", json={})
     assert kind_of(response) == "invalid-request"

@@ -1,4 +1,4 @@
-"""Tracks over REST, and poses of long ago."""
+"""Tracks over REST, and poses from the stored history."""
 
 import csv
 import io
@@ -17,14 +17,14 @@ from dropanchor_service.history.tracks import Retention
 from dropanchor_service.store import LatestPoses
 
 SECOND = 1_000_000_000
-KEEPING = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
+RETENTION = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
 GEOREFERENCED = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4))
 SECONDS = 600
 
 
 def driven(folder: Path, site: Site | None = None) -> House:
-    """A tag that drove east at 2 m/s for ten minutes; only the history remembers."""
-    house = make_house(site, folder, KEEPING)
+    """A tag that drove east at 2 m/s for ten minutes. Its poses are only in the stored history."""
+    house = make_house(site, folder, RETENTION)
     for second in range(SECONDS + 1):
         house.now_ns = T_NS - (SECONDS - second) * SECOND
         house.move("a", x=2.0 * second, speed=2.0, sigma_pos=0.2, anchor=0)
@@ -39,19 +39,19 @@ def track(house: House, query: str = "") -> Track:
     return Track.model_validate(response.json())
 
 
-def test_a_track_is_the_last_hour_unless_asked_otherwise(tmp_path: Path) -> None:
+def test_a_track_covers_the_last_hour_by_default(tmp_path: Path) -> None:
     house = driven(tmp_path)
-    everything = track(house)
-    assert (len(everything.poses), everything.next) == (SECONDS + 1, None)
-    assert everything.to_ns - everything.from_ns == 3600 * SECOND
-    some = track(house, f"from={T_NS - 20 * SECOND}&to={T_NS - 10 * SECOND}")
-    assert [(pose.t_ns - T_NS) // SECOND for pose in some.poses] == list(range(-20, -9))
-    last = some.poses[-1]
+    default = track(house)
+    assert (len(default.poses), default.next) == (SECONDS + 1, None)
+    assert default.to_ns - default.from_ns == 3600 * SECOND
+    selected = track(house, f"from={T_NS - 20 * SECOND}&to={T_NS - 10 * SECOND}")
+    assert [(pose.t_ns - T_NS) // SECOND for pose in selected.poses] == list(range(-20, -9))
+    last = selected.poses[-1]
     assert (last.x, last.speed_mps, last.anchor, last.state) == (1180.0, 2.0, "17", "tracking")
     assert last.covariance == [[0.04, 0, 0], [0, 0.01, 0], [0, 0, 0.001]]
 
 
-def test_pages_follow_each_other_without_a_gap_by_cursor_and_by_link(tmp_path: Path) -> None:
+def test_pages_follow_each_other_without_a_gap(tmp_path: Path) -> None:
     house = driven(tmp_path)
     found, path = [], f"/api/v1/tags/a/track?to={T_NS}&limit=250"
     while path:
@@ -64,7 +64,7 @@ def test_pages_follow_each_other_without_a_gap_by_cursor_and_by_link(tmp_path: P
     assert found == [T_NS - second * SECOND for second in range(SECONDS, -1, -1)]
 
 
-def test_a_table_has_every_number_and_latitudes_only_where_there_are_any(tmp_path: Path) -> None:
+def test_csv_has_every_column_and_latitudes_only_on_a_georeferenced_site(tmp_path: Path) -> None:
     house = driven(tmp_path)
     response = ask(house.app(), "GET", "/api/v1/tags/a/track", headers={"accept": "text/csv"})
     rows = list(csv.DictReader(io.StringIO(response.text)))
@@ -74,11 +74,11 @@ def test_a_table_has_every_number_and_latitudes_only_where_there_are_any(tmp_pat
 
 
 @pytest.mark.parametrize("form", ["geojson", "gpx"])
-def test_what_holds_latitudes_needs_a_georeference(tmp_path: Path, form: str) -> None:
+def test_geojson_and_gpx_need_a_georeference(tmp_path: Path, form: str) -> None:
     assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?format={form}")) == "not-georeferenced"
 
 
-def test_gpx_and_geojson_show_where_on_the_earth(tmp_path: Path) -> None:
+def test_gpx_and_geojson_hold_geographic_coordinates(tmp_path: Path) -> None:
     house = driven(tmp_path, GEOREFERENCED)
     gpx = ask(house.app(), "GET", "/api/v1/tags/a/track?format=gpx")
     points = list(ElementTree.fromstring(gpx.text).iter("{http://www.topografix.com/GPX/1/1}trkpt"))
@@ -92,7 +92,7 @@ def test_gpx_and_geojson_show_where_on_the_earth(tmp_path: Path) -> None:
     assert features[-1]["properties"]["covariance"][0][0] == 0.04
 
 
-def test_gpx_leaves_out_where_a_tag_only_may_have_been(tmp_path: Path) -> None:
+def test_gpx_leaves_out_ambiguous_poses(tmp_path: Path) -> None:
     house = driven(tmp_path, GEOREFERENCED)
     house.now_ns = T_NS + SECOND
     house.move("a", x=0.0, state=State.AMBIGUOUS)
@@ -104,11 +104,11 @@ def test_gpx_leaves_out_where_a_tag_only_may_have_been(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "query", ["from=2&to=1", "limit=0", "limit=10001", "from=-1", "cursor=x", "format=kml", "form=csv", "from=0"]
 )
-def test_a_question_that_is_none_is_refused(tmp_path: Path, query: str) -> None:
+def test_invalid_track_parameters_are_refused(tmp_path: Path, query: str) -> None:
     assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track?{query}")) == "invalid-request"
 
 
-def test_unknown_tags_no_history_and_a_broken_one_are_different_problems(tmp_path: Path) -> None:
+def test_an_unknown_tag_a_missing_history_and_a_damaged_one_are_different_problems(tmp_path: Path) -> None:
     house = driven(tmp_path)
     assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/track")) == "unknown-tag"
     assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/track")) == "no-history"
@@ -123,20 +123,20 @@ def pose_at(house: House, offset_s: float) -> Pose:
     return Pose.model_validate(response.json())
 
 
-def test_a_pose_of_long_ago_lies_between_its_neighbours_and_says_how_far_the_tag_can_have_strayed(
+def test_a_stored_pose_is_interpolated_and_its_covariance_grows_between_its_neighbours(
     tmp_path: Path,
 ) -> None:
     house = driven(tmp_path)
-    exactly, between = pose_at(house, -300.0), pose_at(house, -299.5)
-    assert (exactly.x, between.x) == (600.0, 601.0)
-    assert exactly.covariance is not None
+    exact, between = pose_at(house, -300.0), pose_at(house, -299.5)
+    assert (exact.x, between.x) == (600.0, 601.0)
+    assert exact.covariance is not None
     assert between.covariance is not None
-    assert exactly.covariance[0][0] == pytest.approx(0.04)
+    assert exact.covariance[0][0] == pytest.approx(0.04)
     assert between.covariance[0][0] == pytest.approx(0.04 + 0.125**2)  # 1 m/s² over half a gap of 1 s
     assert (between.anchor, between.age_s, between.hypotheses) == ("17", 299.5, [])
 
 
-def test_a_pose_of_long_ago_is_refused_where_nothing_near_was_kept(tmp_path: Path) -> None:
+def test_a_past_pose_is_refused_where_no_stored_pose_is_near(tmp_path: Path) -> None:
     house = driven(tmp_path)
     house.now_ns = T_NS + 60 * SECOND
     house.move("a", x=1200.0)
