@@ -157,7 +157,7 @@ def test_mistakes_of_the_caller_are_errors(router_endpoint: str) -> None:
             tag.publish_range("x" * 65, 1.0)
         with pytest.raises(ValueError, match="between 0"):
             tag.publish_range(-1, 1.0)
-        with pytest.raises(RuntimeError, match="is open already"):
+        with pytest.raises(RuntimeError, match="is already open"):
             tag.open()
     with pytest.raises(RuntimeError, match="is not open"):
         tag.publish_range(1, 1.0)
@@ -209,6 +209,6 @@ def test_a_name_and_password_open_the_door_and_a_wrong_one_does_not(tmp_path: Pa
         wrong = SessionSettings(connect=endpoint, user="tag-a", password="guess")
         with pytest.raises(ConnectError, match="user and password"):
             TagClient("a", connect=wrong, connect_timeout_s=0.5).open()
-        with pytest.raises(ConnectError, match="wants a certificate or a password"):
+        with pytest.raises(ConnectError, match="requires a certificate or a password"):
             TagClient("a", connect=endpoint, connect_timeout_s=0.5).open()
     assert "guess" not in repr(wrong)
