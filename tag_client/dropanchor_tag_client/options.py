@@ -30,10 +30,14 @@ def add_connection_options(parser: argparse.ArgumentParser) -> None:
         help=f"Zenoh router: tcp/host:port or tls/host:port (default: {DEFAULT_CONNECT})",
     )
     group.add_argument("--encoding", choices=["packed", "json"], default="packed", help="default: %(default)s")
-    group.add_argument("--ca", metavar="PEM", help="certificate of the authority that signed the router's certificate (tls/)")
+    group.add_argument(
+        "--ca", metavar="PEM", help="certificate of the authority that signed the router's certificate (tls/)"
+    )
     group.add_argument("--cert", metavar="PEM", help="client certificate, if the router requires one")
     group.add_argument("--key", metavar="PEM", help="private key of --cert")
-    group.add_argument("--user", help=f"user name; the password comes from the environment variable {PASSWORD_VARIABLE}")
+    group.add_argument(
+        "--user", help=f"user name; the password comes from the environment variable {PASSWORD_VARIABLE}"
+    )
     group.add_argument(
         "--connect-timeout",
         type=float,
