@@ -30,7 +30,7 @@ def recoverable_publisher(
 
 
 class PlainPublisher:
-    """Put messages without declaring a publisher. Nothing can be recovered, but thousands of tags fit into a session."""
+    """Put messages without declaring a publisher. Nothing is recovered, but a session holds thousands of tags."""
 
     def __init__(self, session: zenoh.Session, key: str, encoding: str, *, wait_when_congested: bool) -> None:
         self._session = session

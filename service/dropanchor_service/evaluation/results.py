@@ -1,8 +1,8 @@
-"""Tables of measured figures in the documents: a command writes them, and a check says when they are no longer true.
+"""Tables of measured figures in the documentation. A command writes them, and a check detects outdated ones.
 
-A table stands between two markers in a Markdown file. The first marker says when, where and of which commit it was
-measured. It also holds two digests: of the table, so that an edit by hand is noticed, and of the sources that the table
-measures, so that a table older than they are is noticed. Comments, docstrings and formatting do not count as a change.
+A table stands between two markers in a Markdown file. A sentence below it gives the time, the commit and the machine.
+The first marker holds two digests. The digest of the table detects manual edits. The digest of the measured sources
+detects tables that are older than the code; comments, docstrings and formatting do not change it.
 """
 
 import ast
@@ -36,7 +36,7 @@ class Measured:
 
 
 def write(root: Path, page: Path, name: str, text: str, measured: Measured) -> None:
-    """Put `text` between the markers of `name` in the page. Raises NoPlaceError where there are none."""
+    """Write `text` between the markers of `name` in the page. Raises NoPlaceError if the page has no such markers."""
     old = page.read_text(encoding="utf-8")
     found = next((block for block in _BLOCK.finditer(old) if block["name"] == name), None)
     if found is None:
@@ -54,7 +54,7 @@ def write(root: Path, page: Path, name: str, text: str, measured: Measured) -> N
 
 
 def problems(root: Path, pages: Sequence[Path]) -> Iterator[str]:
-    """Yield a sentence for each table that was edited by hand, never measured, or is older than what it measures."""
+    """Yield a message for each table that was never measured, was edited by hand, or is older than its sources."""
     for page in pages:
         for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
             facts = dict(_FACT.findall(block["facts"]))
@@ -102,7 +102,7 @@ def _sentence(root: Path, measured: Measured) -> str:
 
 
 def commit(root: Path) -> str:
-    """Return the short hash of the commit, with a plus where the tree differs from it; "unknown" outside of git."""
+    """Return the short hash of the commit, with a plus if the tree has changes; "unknown" outside of git."""
     try:
         described = subprocess.run(
             ["git", "describe", "--always", "--dirty=+", "--exclude=*"],

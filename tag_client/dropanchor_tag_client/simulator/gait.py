@@ -130,7 +130,7 @@ def _slow(rng: np.random.Generator, n: int, dt: float) -> Array:
 
 
 def _sum(phase: Array, shape: Shape, rng: np.random.Generator, rate: Array | None = None) -> Array:
-    """Return the sum of the multiples. With `rate` (rad/s of each), return the angle whose derivative has this shape."""
+    """Return the sum of the multiples. With `rate` (rad/s of each): the angle whose derivative has this shape."""
     amplitude = math.sqrt(2.0) * np.asarray(shape.rms)
     shift = rng.uniform(-math.pi, math.pi, len(MULTIPLES))
     for index, known in ((1, shape.first), (3, shape.second)):

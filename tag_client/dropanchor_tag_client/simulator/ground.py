@@ -35,7 +35,7 @@ class Rolling:
 
 @dataclass(frozen=True)
 class Forklift:
-    """A forklift that drives ahead, stops, reverses in a curve, stops, and drives ahead again, without turning round."""
+    """A forklift that drives ahead, stops, reverses in a curve, stops, and drives on, without turning round."""
 
     speed: Range = (1.0, 2.6)
     reverse_speed: Range = (0.5, 1.2)

@@ -20,7 +20,7 @@ class AnchorPlace(NamedTuple):
 
 
 class Ranges(NamedTuple):
-    """Ranges as columns (n,), in order of time. anchor: index of the anchor; std_m: the deviation the sensor reports."""
+    """Ranges as columns (n,), in order of time. anchor: index of the anchor; std_m: as the sensor reports it."""
 
     t_s: Array
     anchor: NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""Tables in documents: written between markers, and checked for age and for edits by hand."""
+"""Tables in the documentation are written between markers and checked for age and manual edits."""
 
 from pathlib import Path
 
@@ -47,14 +47,14 @@ def test_writing_again_replaces_the_table(root: Path) -> None:
     assert found(root) == []
 
 
-def test_an_edit_by_hand_is_noticed(root: Path) -> None:
+def test_a_manual_edit_is_detected(root: Path) -> None:
     measure(root)
     page = root / "page.md"
     page.write_text(page.read_text().replace("| 1 |", "| 0 |"))
     assert found(root) == ["page.md, speed: the table was edited by hand; measure it again"]
 
 
-def test_a_change_of_the_code_makes_a_table_old_and_a_change_of_comments_does_not(root: Path) -> None:
+def test_a_code_change_makes_a_table_outdated_and_a_comment_change_does_not(root: Path) -> None:
     measure(root)
     (root / "code.py").write_text(CODE.replace("Double.", "Return the double.").replace("# why", "# because"))
     assert found(root) == []
@@ -62,6 +62,6 @@ def test_a_change_of_the_code_makes_a_table_old_and_a_change_of_comments_does_no
     assert found(root) == ["page.md, speed: code.py changed since; measure it again"]
 
 
-def test_a_page_without_a_place_is_an_error(root: Path) -> None:
+def test_a_page_without_markers_is_an_error(root: Path) -> None:
     with pytest.raises(NoPlaceError, match=r"page\.md has no place for height"):
         write(root, root / "page.md", "height", "", Measured(["code.py"]))
