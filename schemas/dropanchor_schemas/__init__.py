@@ -1,7 +1,7 @@
 """The contract of Dropanchor: what tags send, what the service answers, and under which keys.
 
-`keys` and `wire` need the standard library only, so that a tag can import them; the pydantic models
-are loaded when they are first asked for.
+`keys` and `wire` need only the standard library, so a tag can import them. The pydantic models are imported on
+first use.
 """
 
 from importlib import import_module
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dropanchor_schemas.samples import SamplesMessage, decode_json
     from dropanchor_schemas.site import Anchor, Georeference, Site, StartPose, TagSettings
 
-_HOMES = {
+_MODULES = {
     "Ellipse": "pose",
     "Hypothesis": "pose",
     "Pose": "pose",
@@ -46,6 +46,6 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

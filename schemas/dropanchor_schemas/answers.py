@@ -1,4 +1,4 @@
-"""What the service answers besides poses one by one: frames of poses, tags, lists and problems."""
+"""Models of the service's answers other than single poses: pose frames, tags, lists and problems."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,11 +11,12 @@ class _Answer(BaseModel):
 
 
 class PoseFrame(_Answer):
-    """Poses of many tags in columns: entry i of every column belongs to tag i. Names and units as in a pose; metres
-    and radians are rounded to 4 decimals, degrees to 9. `lat` and `lon` only where the site is georeferenced."""
+    """Poses of many tags in columns: entry i of every column belongs to tag i. Names and units are those of a pose.
+    Metres and radians are rounded to 4 decimals, degrees to 9. `lat` and `lon` exist only if the site is
+    georeferenced."""
 
     t_ns: int = Field(
-        description="UTC, ns: the moment of the frame; the pose of tag i, unless it is a replay, is age_s[i] older."
+        description="UTC, ns: the time of the frame. The pose of tag i is age_s[i] older, unless the tag is a replay."
     )
     tags: list[str]
     online: list[bool]
@@ -33,40 +34,40 @@ class PoseFrame(_Answer):
     p_mode: list[float | None]
     sigma_pos_m: list[float | None]
     sigma_obs_m: list[float | None]
-    semi_major_m: list[float | None] = Field(description="Of the 95 % ellipse.")
+    semi_major_m: list[float | None] = Field(description="Semi-major axis of the 95 % ellipse, m.")
     semi_minor_m: list[float | None]
     angle_rad: list[float | None]
-    hypotheses: list[list[Hypothesis] | None] = Field(description="Of tags that are ambiguous, null for others.")
+    hypotheses: list[list[Hypothesis] | None] = Field(description="Hypotheses of an ambiguous tag; null otherwise.")
     lat: list[float | None] | None = None
     lon: list[float | None] | None = None
 
 
 class TagStatus(_Answer):
-    """One tag: when it was heard, what came from it, and its settings."""
+    """The status of one tag: when it last sent data, what was received from it, and its settings."""
 
     tag: str
     online: bool = Field(description="Whether the tag's liveliness token is present.")
-    first_heard_ns: int | None = Field(description="UTC, ns; null while nothing has been heard.")
+    first_heard_ns: int | None = Field(description="UTC, ns; null if the tag has sent nothing yet.")
     last_heard_ns: int | None
     messages: int
     samples: dict[str, int] = Field(description="Samples that were used, by kind.")
     rejected: dict[str, int] = Field(description="Messages and samples that were not used, by reason.")
     hint: str = Field(
-        description="What a human can do so that more of it is used, such as for an anchor that the site does not "
-        "have; empty when nothing is needed."
+        description="What an operator can do about rejected data, for example add a missing anchor to the site; empty "
+        "if nothing needs to be done."
     )
     settings: TagSettings
 
 
 class TagList(_Answer):
-    """Every tag that has been heard or configured."""
+    """Every tag that has sent data or is configured."""
 
-    t_ns: int = Field(description="UTC, ns: the moment of the answer.")
+    t_ns: int = Field(description="UTC, ns: the time of the answer.")
     tags: list[TagStatus]
 
 
 class Newcomer(_Answer):
-    """A tag that has been heard and has no row."""
+    """A pending tag: it sends data, but the service has not admitted it."""
 
     tag: str
     first_heard_ns: int = Field(description="UTC, ns.")
@@ -75,9 +76,9 @@ class Newcomer(_Answer):
 
 
 class NewcomerList(_Answer):
-    """Who would like to be a tag of this site, heard last first."""
+    """The pending tags, most recently received first."""
 
-    t_ns: int = Field(description="UTC, ns: the moment of the answer.")
+    t_ns: int = Field(description="UTC, ns: the time of the answer.")
     newcomers: list[Newcomer]
 
 
@@ -90,37 +91,38 @@ class AnchorList(_Answer):
 class Connect(_Answer):
     """How a tag connects to this site."""
 
-    endpoints: list[str] = Field(description="Of the Zenoh router, such as tcp/127.0.0.1:7447.")
+    endpoints: list[str] = Field(description="Endpoints of the Zenoh router, such as tcp/127.0.0.1:7447.")
     credentials: bool = Field(description="Whether a tag needs the folder that `dropanchor tag add` makes for it.")
     simulate: str = Field(
-        description="A command that starts a simulated tag. Whoever asks from the machine of the service gets it with "
-        "the path of the program."
+        description="A command that starts a simulated tag. A client on the service's own machine gets the command "
+        "with the full path of the program."
     )
 
 
 class Health(_Answer):
-    """The service answers (live), or can do its work (ready)."""
+    """Whether the service is live (it answers) or ready (it can process samples)."""
 
     status: str
     impaired: list[str] = Field(
-        default=[], description="What does not work although live poses do: a history that cannot be written."
+        default=[],
+        description="Functions that fail while live poses still work, for example a history that cannot be written.",
     )
 
 
 class InvalidPart(_Answer):
-    """What is wrong at one place of a request."""
+    """One error in a request."""
 
-    location: str = Field(description="body, query or path, then the way to the value, joined by dots.")
+    location: str = Field(description="`body`, `query` or `path`, then the path to the value, joined by dots.")
     detail: str
 
 
 class Problem(_Answer):
-    """A problem as in RFC 9457."""
+    """Problem details (RFC 9457)."""
 
     type: str = Field(description="A URI that stays the same for problems of the same kind.")
     title: str
     status: int
     detail: str
-    instance: str = Field(description="The path that was asked.")
-    errors: list[InvalidPart] | None = Field(default=None, description="What is wrong with the request, part by part.")
+    instance: str = Field(description="The path of the request.")
+    errors: list[InvalidPart] | None = Field(default=None, description="The errors in the request, one per location.")
     reasons: list[str] | None = Field(default=None, description="Why the service is not ready.")

@@ -1,6 +1,6 @@
-"""The AsyncAPI 3 document of the Zenoh contract: which key carries what, and who may put it there.
+"""The AsyncAPI 3 document of the Zenoh contract: what each key carries and who publishes it.
 
-AsyncAPI has no binding for Zenoh, so what only Zenoh knows (queryables, liveliness tokens) stands in `x-zenoh`.
+AsyncAPI has no Zenoh binding, so Zenoh's own concepts (queryables, liveliness tokens) stand in `x-zenoh`.
 """
 
 from typing import Any
@@ -19,9 +19,9 @@ _PARAMETERS = {
     "site": "Id of the site; `default` unless the settings say otherwise.",
     "tag": "Id of the tag.",
     "anchor": "Id of the anchor.",
-    "service": "Id of the running service; a new one at every start.",
+    "service": "Id of the running service; it is new at every start.",
 }
-_ESCAPING = "1 to 64 printable characters; all but A-Z a-z 0-9 . _ - are percent-escaped as UTF-8."
+_ESCAPING = "1 to 64 printable characters. All characters except A-Z a-z 0-9 . _ - are percent-escaped as UTF-8."
 
 
 def document() -> dict[str, Any]:
@@ -31,8 +31,8 @@ def document() -> dict[str, Any]:
         "info": {
             "title": "Dropanchor over Zenoh",
             "version": "1",
-            "description": "Tags put raw samples, the service answers with poses. SI units; the site frame is ENU "
-            "with x east; times are UTC in ns unless a message says that its clock counts from boot.",
+            "description": "Tags publish raw samples; the service publishes poses. Units are SI. The site frame is "
+            "ENU with x east. Times are UTC in ns, unless a message declares a clock that counts from boot.",
             "license": {"name": "Apache-2.0"},
         },
         "defaultContentType": ENCODING_JSON,
@@ -40,7 +40,7 @@ def document() -> dict[str, Any]:
             "router": {
                 "host": "{router}:7447",
                 "protocol": "zenoh",
-                "description": "A Zenoh router: the service's own, or one that stands by itself.",
+                "description": "A Zenoh router: the service's own or a separate one.",
                 "variables": {"router": {"default": "127.0.0.1"}},
             }
         },
@@ -51,7 +51,7 @@ def document() -> dict[str, Any]:
 
 
 def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
-    """Return for each channel its key, its messages, its description and what Zenoh adds."""
+    """Return the key, the messages, the description and the Zenoh details of each channel."""
     return {
         "samples": (
             _readable(keys.samples_key("{site}", "{tag}")),
@@ -68,14 +68,14 @@ def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
         "pose": (
             _readable(keys.pose_key("{site}", "{tag}")),
             ["pose"],
-            "The latest pose of one tag. A query may ask `?at=<t_ns>` for the pose at another time.",
-            {"kind": ["queryable", "put"], "put": "on change, at most 20 Hz, while somebody subscribes"},
+            "The latest pose of one tag. A query with `?at=<t_ns>` returns the pose at another time.",
+            {"kind": ["queryable", "put"], "put": "on change, at most 20 Hz, while there is a subscriber"},
         ),
         "poses": (
             _readable(keys.poses_key("{site}")),
             ["poseFrame"],
             "The poses of all tags in columns.",
-            {"kind": "put", "put": "at most 10 Hz, while somebody subscribes"},
+            {"kind": "put", "put": "at most 10 Hz, while there is a subscriber"},
         ),
         "anchor": (
             _readable(keys.anchor_key("{site}", "{anchor}")),
@@ -93,7 +93,7 @@ def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
 
 
 def _readable(key: str) -> str:
-    """Return the key with its placeholders, whose braces `keys` has escaped."""
+    """Return the key with plain braces around its placeholders; `keys` percent-escapes them."""
     return key.replace("%7B", "{").replace("%7D", "}")
 
 
@@ -112,7 +112,7 @@ def _channel(address: str, messages: list[str], description: str, zenoh: dict[st
 
 
 def _operations() -> dict[str, Any]:
-    """Return what the service does: it receives what tags send, and sends poses."""
+    """Return the operations of the service: it receives the tags' messages and sends poses."""
     received = ("samples", "tagAlive")
     sent = ("pose", "poses", "anchor", "serviceAlive")
     return {
@@ -124,16 +124,16 @@ def _operations() -> dict[str, Any]:
 
 def _messages() -> dict[str, Any]:
     return {
-        "samplesJson": _json_message(SamplesMessage, "The canonical form: anyone can send it from anything."),
+        "samplesJson": _json_message(SamplesMessage, "The canonical form, which any program can send."),
         "samplesPacked": {
             "contentType": ENCODING_PACKED,
-            "summary": "Packed little-endian records, for microcontrollers and for speed.",
+            "summary": "Packed little-endian records for microcontrollers and high rates.",
             "payload": {
                 "type": "string",
                 "format": "binary",
                 "minLength": HEADER.size,
                 "maxLength": MAX_PAYLOAD_BYTES,
-                "description": "The README of dropanchor-schemas gives the layout byte by byte.",
+                "description": "The README of dropanchor-schemas describes the layout byte by byte.",
             },
         },
         "pose": _json_message(Pose, "One pose with its state, reason and covariance."),
@@ -151,7 +151,7 @@ def _json_message(model: type[BaseModel], summary: str) -> dict[str, Any]:
 
 
 def _schemas() -> dict[str, Any]:
-    """Return the JSON Schemas of all models, with shared parts once."""
+    """Return the JSON Schemas of all models; shared definitions appear once."""
     schemas: dict[str, Any] = {}
     for model in _MODELS:
         schema = model.model_json_schema(ref_template="#/components/schemas/{model}")

@@ -1,4 +1,4 @@
-"""Why a pose is what it is: the answer of the service for one tag."""
+"""Models that explain the latest pose of one tag."""
 
 from enum import StrEnum
 
@@ -8,7 +8,7 @@ from dropanchor_schemas.pose import Hypothesis, Pose
 
 
 class MeasurementKind(StrEnum):
-    """What was measured; a range in metres, a bearing in radians."""
+    """The kind of a measurement: a range in metres or a bearing in radians."""
 
     RANGE = "range"
     BEARING = "bearing"
@@ -19,7 +19,7 @@ class _Answer(BaseModel):
 
 
 class Innovation(_Answer):
-    """One measurement beside what the likeliest hypothesis expected of it."""
+    """One measurement, compared with the prediction of the most likely hypothesis."""
 
     t_ns: int
     kind: MeasurementKind
@@ -27,39 +27,42 @@ class Innovation(_Answer):
     measured: float
     predicted: float
     innovation: float = Field(description="Measured minus predicted.")
-    variance: float = Field(description="S, of the innovation.")
-    nis: float = Field(description="Innovation² / S: what the gate looks at; 1 on average when the model is right.")
-    p_outlier: float | None = Field(
-        description="Probability that the measurement is an outlier; null where the engine has a hard gate instead."
+    variance: float = Field(description="Innovation variance S.")
+    nis: float = Field(
+        description="Normalised innovation squared, innovation² / S. The gate tests it; its mean is 1 if the model is "
+        "right."
     )
-    fused: bool = Field(description="Whether it moved the pose; false: gated, or more likely an outlier than not.")
+    p_outlier: float | None = Field(
+        description="Probability that the measurement is an outlier; null if the engine uses a hard gate instead."
+    )
+    fused: bool = Field(description="Whether it was fused; false if it was gated or is probably an outlier.")
 
 
 class SpeedEvidence(_Answer):
-    """Whether the ranges agree with the speed: a tag that moves along its line of sight changes its range as fast."""
+    """Whether the ranges agree with the speed: the range rate equals the speed along the line of sight."""
 
     speed_mps: float | None
     range_rate_mps: float | None = Field(
-        description="Slope of the ranges of the last 2 s to the anchor of the last range; null when there are too few."
+        description="Slope of the last 2 s of ranges to the anchor of the last range; null if there are too few."
     )
-    predicted_range_rate_mps: float | None = Field(description="Slope of what was predicted for the same ranges.")
+    predicted_range_rate_mps: float | None = Field(description="Slope of the predictions of the same ranges.")
 
 
 class SpeedTrack(_Answer):
-    """Speeds of the last minute, in columns; a minute is shorter in a very large fleet."""
+    """Speeds of the last minute, in columns. In a very large fleet the history is shorter."""
 
     t_ns: list[int]
     speed_mps: list[float | None]
 
 
 class Explanation(_Answer):
-    """What led to the latest pose of a tag."""
+    """The evidence behind the latest pose of a tag."""
 
     pose: Pose
     hypotheses: list[Hypothesis] = Field(description="Where the tag may be, while it is ambiguous.")
     speed: SpeedEvidence
     speed_track: SpeedTrack
-    innovations: list[Innovation] = Field(description="The last ones, oldest first.")
+    innovations: list[Innovation] = Field(description="The most recent innovations, oldest first.")
     refused: int = Field(description="How many of these innovations were not fused.")
     samples: dict[str, int] = Field(description="Samples that were used, by kind.")
     rejected: dict[str, int] = Field(description="Messages and samples that were not used, by reason.")

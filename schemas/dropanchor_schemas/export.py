@@ -1,4 +1,4 @@
-"""Write the JSON Schemas and the AsyncAPI document of the contract; with --check say whether they are current."""
+"""Write the JSON Schemas and the AsyncAPI document of the contract. With --check, test whether they are current."""
 
 import json
 import sys

@@ -1,4 +1,4 @@
-"""Zenoh key expressions, spelled once. Standard library only: tags import this."""
+"""Zenoh key expressions, defined in one place. This module needs only the standard library, because tags import it."""
 
 from urllib.parse import quote, unquote
 
@@ -11,9 +11,10 @@ class InvalidKeyError(ValueError):
 
 
 def chunk_from_id(identifier: str) -> str:
-    """The key chunk of a site, tag or anchor id: `[A-Za-z0-9._-]` as they are, all else percent-escaped UTF-8.
+    """Return the key chunk of a site, tag or anchor id.
 
-    Raises InvalidKeyError when the id is empty, longer than 64 characters, or holds control characters.
+    `[A-Za-z0-9._-]` stand for themselves; all other characters are percent-escaped as UTF-8. Raises InvalidKeyError
+    if the id is empty, longer than 64 characters, or has characters that are not printable.
     """
     if not 0 < len(identifier) <= MAX_ID_LENGTH:
         raise InvalidKeyError(f"an id has 1 to {MAX_ID_LENGTH} characters, this one has {len(identifier)}")
@@ -23,16 +24,16 @@ def chunk_from_id(identifier: str) -> str:
 
 
 def refuse_pattern(identifier: str) -> None:
-    """Raises InvalidKeyError for an id that looks like a pattern for several tags: settings know none."""
+    """Raise InvalidKeyError if the id looks like a pattern for several tags, which settings do not support."""
     if "*" in identifier:
         raise InvalidKeyError(
-            f"{identifier!r} would be the id of one tag, not a pattern: settings for all tags do not exist, give each "
+            f"{identifier!r} would be the id of one tag, not a pattern: there are no settings for all tags; give each "
             "tag its own"
         )
 
 
 def id_from_chunk(chunk: str) -> str:
-    """The id of a key chunk. Raises InvalidKeyError unless the chunk is exactly what `chunk_from_id` makes of it."""
+    """Return the id of a key chunk. Raises InvalidKeyError unless `chunk_from_id` gives this chunk back."""
     try:
         identifier = unquote(chunk, errors="strict")
     except UnicodeDecodeError as error:
@@ -67,7 +68,7 @@ def service_alive_key(site: str, service: str) -> str:
 
 
 def all_tags(site: str, leaf: str) -> str:
-    """The key expression that selects `leaf` ("samples", "alive" or "pose") of every tag of the site."""
+    """Return the key expression of `leaf` ("samples", "alive" or "pose") of every tag of the site."""
     return f"{_site_prefix(site)}/tag/*/{leaf}"
 
 
@@ -80,12 +81,12 @@ def all_services_alive(site: str) -> str:
 
 
 def everything(site: str) -> str:
-    """All keys of the site, but for verbatim chunks such as Zenoh's own `@adv`."""
+    """Return the key expression of all keys of the site, except verbatim chunks such as Zenoh's own `@adv`."""
     return f"{_site_prefix(site)}/**"
 
 
 def tag_from_key(key: str) -> str:
-    """The tag id in a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError when the key has another form."""
+    """Return the tag id of a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError if the key has another form."""
     chunks = key.split("/")
     if len(chunks) != 6 or "/".join(chunks[:2]) != PREFIX or chunks[3] != "tag":
         raise InvalidKeyError(f"{key!r} is not {PREFIX}/<site>/tag/<tag>/<leaf>")

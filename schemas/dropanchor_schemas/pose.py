@@ -1,4 +1,4 @@
-"""What the service answers: poses with their uncertainty and state."""
+"""Models of poses with their uncertainty and tracking state."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class TrackingState(StrEnum):
-    """How far a pose may be believed."""
+    """How far a pose can be trusted."""
 
     INITIALISING = "initialising"
     AMBIGUOUS = "ambiguous"
@@ -17,7 +17,7 @@ class TrackingState(StrEnum):
 
 
 class StateReason(StrEnum):
-    """The machine reason of a state."""
+    """The machine-readable reason of a tracking state."""
 
     NO_RANGE = "no_range"
     NO_HEADING = "no_heading"
@@ -38,7 +38,7 @@ class _Answer(BaseModel):
 
 
 class Ellipse(_Answer):
-    """The 95 % ellipse of the position."""
+    """The 95 % confidence ellipse of the position."""
 
     semi_major_m: float
     semi_minor_m: float
@@ -46,7 +46,7 @@ class Ellipse(_Answer):
 
 
 class Hypothesis(_Answer):
-    """One of the places where an ambiguous tag may be."""
+    """One possible pose of an ambiguous tag."""
 
     weight: float = Field(ge=0, le=1)
     x: float
@@ -57,17 +57,17 @@ class Hypothesis(_Answer):
 
 
 class Pose(_Answer):
-    """The pose of one tag at one time, in the site frame (ENU, metres, x east). Among the poses of many tags its
-    numbers are rounded: `covariance`, `lat` and `lon` to 9 decimals, the others to 6."""
+    """The pose of one tag at one time, in the site frame (ENU, metres, x east). Lists of poses round `covariance`,
+    `lat` and `lon` to 9 decimals and all other numbers to 6."""
 
     tag: str
     t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")
     age_s: float = Field(
-        description="Seconds from t_ns to the moment of the answer; of a replay, to where its recording has come to."
+        description="Seconds from t_ns to the time of the answer; for a replay, to the current time of the recording."
     )
     state: TrackingState
-    reason: StateReason = Field(description="Machine-readable cause of the state.")
-    hint: str = Field(description="What a human can do about it; empty when nothing is needed.")
+    reason: StateReason = Field(description="Machine-readable reason of the state.")
+    hint: str = Field(description="What an operator can do about it; empty if nothing needs to be done.")
     x: float | None = Field(description="East, m; null while unknown.")
     y: float | None = Field(description="North, m; null while unknown.")
     heading_rad: float | None = Field(description="Counter-clockwise from east.")
@@ -75,13 +75,13 @@ class Pose(_Answer):
     yaw_rate_radps: float | None
     covariance: list[list[float]] | None = Field(description="3 × 3, of (x, y, heading_rad).")
     ellipse_95: Ellipse | None
-    p_mode: float | None = Field(description="Probability of the published mode; 1 − p_mode is the chance of another.")
+    p_mode: float | None = Field(description="Probability that the published mode is the right one.")
     sigma_pos_m: float | None = Field(description="sqrt(Pxx + Pyy), m.")
-    sigma_obs_m: float | None = Field(description="Position accuracy that the last 10 s alone can deliver, m.")
+    sigma_obs_m: float | None = Field(description="Position accuracy that the last 10 s of data alone can reach, m.")
     range_m: float | None = Field(description="Last range that was fused, m.")
     anchor: str | None = Field(description="The anchor of that range.")
     hypotheses: list[Hypothesis] = []
-    lat: float | None = Field(default=None, description="Degrees, where the site is georeferenced.")
+    lat: float | None = Field(default=None, description="Degrees; null unless the site is georeferenced.")
     lon: float | None = None
     online: bool = Field(description="Whether the tag's liveliness token is present.")
 
@@ -89,5 +89,5 @@ class Pose(_Answer):
 class PoseList(_Answer):
     """Poses of many tags."""
 
-    t_ns: int = Field(description="UTC, ns: the moment of the answer.")
+    t_ns: int = Field(description="UTC, ns: the time of the answer.")
     poses: list[Pose]

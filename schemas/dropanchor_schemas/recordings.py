@@ -1,4 +1,4 @@
-"""What the service answers about recordings."""
+"""Models of requests and answers about recordings."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -6,36 +6,36 @@ from dropanchor_schemas.site import Id
 
 
 class RecordingRequest(BaseModel):
-    """What shall be recorded."""
+    """Which tags to record."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    tags: list[Id] | None = Field(default=None, max_length=10_000, description="Only these tags; null: all.")
+    tags: list[Id] | None = Field(default=None, max_length=10_000, description="The tags to record; null for all tags.")
 
 
 class RecordingState(BaseModel):
-    """Whether and what the service records."""
+    """Whether the service is recording, and what."""
 
     model_config = ConfigDict(frozen=True)
 
     recording: bool
-    since_ns: int | None = Field(default=None, description="UTC, ns.")
-    tags: list[str] | None = Field(default=None, description="Null: all.")
-    file: str | None = Field(default=None, description="The one that is being written, if there is any yet.")
+    since_ns: int | None = Field(default=None, description="UTC, ns: when the recording started.")
+    tags: list[str] | None = Field(default=None, description="The recorded tags; null for all tags.")
+    file: str | None = Field(default=None, description="The current file; null until the first one is created.")
 
 
 class RecordedFile(BaseModel):
-    """A file with a recording."""
+    """A recording file."""
 
     model_config = ConfigDict(frozen=True)
 
     name: str
     bytes: int
-    changed_ns: int = Field(description="UTC, ns, when it was last written to.")
-    finished: bool = Field(description="Whether it has its index: one that is still written, or was torn, has none.")
+    changed_ns: int = Field(description="UTC, ns: the time of the last write.")
+    finished: bool = Field(description="Whether the file is complete and has its index; false while it is written.")
 
 
 class RecordingList(RecordingState):
-    """The state, and the files that there are."""
+    """The recording state and all recording files."""
 
-    files: list[RecordedFile] = Field(description="The oldest first.")
+    files: list[RecordedFile] = Field(description="All files, oldest first.")

@@ -1,49 +1,52 @@
-"""What each rejection means, in words: for documents and for people."""
+"""Explanations of all rejection reasons, for the documentation and for operators."""
 
 from typing import NamedTuple
 
 from dropanchor_schemas.wire import Reason
 
 
-class Explained(NamedTuple):
-    """of: what is refused, a whole message or one sample of it. why: the cause in words."""
+class Explanation(NamedTuple):
+    """Explanation of one reason.
 
-    of: str
-    why: str
+    scope: what is rejected, the whole message or a single sample. cause: why, in words.
+    """
+
+    scope: str
+    cause: str
 
 
-REASONS_EXPLAINED: dict[Reason, Explained] = {
-    Reason.ENCODING_UNKNOWN: Explained(
+REASONS_EXPLAINED: dict[Reason, Explanation] = {
+    Reason.ENCODING_UNKNOWN: Explanation(
         "message", "the Zenoh encoding is neither of the two (a schema after `;` is ignored)"
     ),
-    Reason.PAYLOAD_EMPTY: Explained("message", "no bytes"),
-    Reason.PAYLOAD_TOO_LARGE: Explained("message", "more than 65,536 bytes"),
-    Reason.HEADER_TRUNCATED: Explained("message", "packed, fewer than 32 bytes"),
-    Reason.VERSION_UNKNOWN: Explained("message", "the version is not 1"),
-    Reason.FLAGS_UNKNOWN: Explained("message", "a flag bit other than bit 0 is set"),
-    Reason.RESERVED_NOT_ZERO: Explained("message", "one of the header's last six bytes is not zero"),
-    Reason.LENGTH_MISMATCH: Explained("message", "the length is not what the four counts ask for"),
-    Reason.NO_SAMPLES: Explained("message", "it holds no sample"),
-    Reason.JSON_SYNTAX: Explained("message", "not JSON in UTF-8"),
-    Reason.JSON_SCHEMA: Explained("message", "JSON, but not what the schema asks for"),
-    Reason.TIME_OUT_OF_RANGE: Explained("message, sample", "a time before 0 or not before 2⁶² ns"),
-    Reason.NOT_FINITE: Explained("sample", "NaN or infinity where a value belongs"),
-    Reason.RANGE_NEGATIVE: Explained("sample", "a range below zero"),
-    Reason.RANGE_ABSURD: Explained("sample", "a range no UWB radio reaches"),
-    Reason.IMU_ABSURD: Explained("sample", "beyond what such sensors can measure"),
-    Reason.HEADING_ABSURD: Explained("sample", "an angle of hundreds of turns"),
-    Reason.BEARING_ABSURD: Explained("sample", "an angle of hundreds of turns"),
-    Reason.STD_INVALID: Explained("sample", "a standard deviation that is negative, zero or absurd"),
-    Reason.ANCHOR_UNKNOWN: Explained("sample", "an anchor that the site does not have"),
-    Reason.LATE: Explained("sample", "older than what the estimator can still go back to"),
-    Reason.DUPLICATE: Explained("message", "this sequence of this boot id was used already"),
-    Reason.KEY_INVALID: Explained("message", "the key is not of this contract"),
-    Reason.TAG_UNKNOWN: Explained("message", "the service admits registered tags only"),
-    Reason.TAG_UNPROVEN: Explained(
-        "message", "many tags are new, and this one did not send another message while it was remembered"
+    Reason.PAYLOAD_EMPTY: Explanation("message", "the payload is empty"),
+    Reason.PAYLOAD_TOO_LARGE: Explanation("message", "more than 65,536 bytes"),
+    Reason.HEADER_TRUNCATED: Explanation("message", "packed, shorter than the 32-byte header"),
+    Reason.VERSION_UNKNOWN: Explanation("message", "the version is not 1"),
+    Reason.FLAGS_UNKNOWN: Explanation("message", "a flag bit other than bits 0 and 1 is set"),
+    Reason.RESERVED_NOT_ZERO: Explanation("message", "one of the header's last six bytes is not zero"),
+    Reason.LENGTH_MISMATCH: Explanation("message", "the length does not match the four counts"),
+    Reason.NO_SAMPLES: Explanation("message", "the message has no samples"),
+    Reason.JSON_SYNTAX: Explanation("message", "not JSON in UTF-8"),
+    Reason.JSON_SCHEMA: Explanation("message", "JSON that does not match the schema"),
+    Reason.TIME_OUT_OF_RANGE: Explanation("message, sample", "a time before 0 or not before 2⁶² ns"),
+    Reason.NOT_FINITE: Explanation("sample", "NaN or infinity where a value belongs"),
+    Reason.RANGE_NEGATIVE: Explanation("sample", "a range below zero"),
+    Reason.RANGE_ABSURD: Explanation("sample", "a range beyond the reach of UWB radios"),
+    Reason.IMU_ABSURD: Explanation("sample", "a value beyond the range of such sensors"),
+    Reason.HEADING_ABSURD: Explanation("sample", "an angle of hundreds of turns"),
+    Reason.BEARING_ABSURD: Explanation("sample", "an angle of hundreds of turns"),
+    Reason.STD_INVALID: Explanation("sample", "a standard deviation that is negative, zero or absurd"),
+    Reason.ANCHOR_UNKNOWN: Explanation("sample", "an anchor that the site does not have"),
+    Reason.LATE: Explanation("sample", "older than the samples that the estimator can still go back to"),
+    Reason.DUPLICATE: Explanation("message", "this sequence of this boot id was already used"),
+    Reason.KEY_INVALID: Explanation("message", "the key does not follow this contract"),
+    Reason.TAG_UNKNOWN: Explanation("message", "the service admits registered tags only"),
+    Reason.TAG_UNPROVEN: Explanation(
+        "message", "there are many new tags, and this one sent no second message before it was forgotten"
     ),
-    Reason.TAG_QUARANTINED: Explained("message", "the tag is new, and nobody has let it in yet"),
-    Reason.TAGS_FULL: Explained("message", "the service has as many tags as it may"),
-    Reason.SHED: Explained("message", "the service was overloaded and let it go"),
-    Reason.ESTIMATOR_FAULT: Explained("sample", "the estimator of this tag failed on it"),
+    Reason.TAG_QUARANTINED: Explanation("message", "the tag is new, and an operator has not admitted it yet"),
+    Reason.TAGS_FULL: Explanation("message", "the service has reached its maximum number of tags"),
+    Reason.SHED: Explanation("message", "the service was overloaded and dropped it"),
+    Reason.ESTIMATOR_FAULT: Explanation("sample", "the estimator of this tag failed on it"),
 }

@@ -1,4 +1,4 @@
-"""The JSON payload of samples: one object that anything can send."""
+"""The JSON payload of samples: one object that any program can send."""
 
 import json
 import math
@@ -26,11 +26,11 @@ AnchorId = Annotated[
     Field(description='Anchor id: a number or a text. "7" and 7 name the same anchor.'),
 ]
 Vector = tuple[float, float, float]
-Std = Annotated[float | None, Field(description="Standard deviation; leave it out when unknown.")]
+Std = Annotated[float | None, Field(description="Standard deviation; omit it if unknown.")]
 
 
 class _Message(BaseModel):
-    """Strict: a text or a truth value where a number belongs is a mistake of the sender, not a number."""
+    """Base class in strict mode: a string or a boolean in place of a number is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -41,11 +41,11 @@ class Imu(_Message):
     t_ns: TimeNs
     acc: Vector = Field(description="Specific force, m/s² (at rest, level: 0, 0, +9.81).")
     gyro: Vector = Field(description="Angular rate, rad/s.")
-    mag: Vector | None = Field(default=None, description="Magnetic field, µT; leave it out without a magnetometer.")
+    mag: Vector | None = Field(default=None, description="Magnetic field, µT; omit it without a magnetometer.")
 
 
 class Range(_Message):
-    """One two-way range."""
+    """One two-way range to an anchor."""
 
     t_ns: TimeNs
     anchor: AnchorId
@@ -54,7 +54,7 @@ class Range(_Message):
 
 
 class Heading(_Message):
-    """A heading that the platform itself has (a robot, a phone)."""
+    """A heading from the tag's platform, for example a robot or a phone."""
 
     t_ns: TimeNs
     heading_rad: float = Field(description="Counter-clockwise from east, rad.")
@@ -62,7 +62,7 @@ class Heading(_Message):
 
 
 class Bearing(_Message):
-    """The bearing of the tag as the anchor sees it."""
+    """The bearing of the tag, seen from the anchor."""
 
     t_ns: TimeNs
     anchor: AnchorId
@@ -96,16 +96,18 @@ class SamplesMessage(_Message):
         },
     )
 
-    version: int = Field(default=1, ge=1, le=1, description="Of this schema; decoders refuse what they do not know.")
+    version: int = Field(default=1, ge=1, le=1, description="Version of this schema; decoders reject others.")
     clock: Literal["utc", "boot"] = Field(
-        default="utc", description="utc: ns since 1970; boot: ns since the tag's start."
+        default="utc", description="`utc`: ns since 1970; `boot`: ns since the tag's start."
     )
     replay: bool = Field(
         default=False,
-        description="The samples are of a recording that is played now; ages count from where it has come to.",
+        description="Whether the samples come from a replayed recording; ages then count from its current time.",
     )
-    sequence: int | None = Field(default=None, ge=0, lt=2**32, description="Counts the messages of one publisher.")
-    boot_id: int | None = Field(default=None, ge=0, lt=2**32, description="Random per start of the publisher.")
+    sequence: int | None = Field(default=None, ge=0, lt=2**32, description="Message counter of the publisher.")
+    boot_id: int | None = Field(
+        default=None, ge=0, lt=2**32, description="Random number, drawn at each start of the publisher."
+    )
     imu: list[Imu] = []
     range: list[Range] = []
     heading: list[Heading] = []
@@ -113,7 +115,7 @@ class SamplesMessage(_Message):
 
 
 def decode_json(payload: bytes) -> Frame | Rejection:
-    """The frame of a JSON payload, or why there is none. Values are not judged here, only the form."""
+    """Decode a JSON payload. Return its frame, or a rejection. This checks the form only, not the values."""
     if len(payload) == 0:
         return Rejection(Reason.PAYLOAD_EMPTY, "the payload is empty")
     if len(payload) > MAX_PAYLOAD_BYTES:
@@ -127,7 +129,7 @@ def decode_json(payload: bytes) -> Frame | Rejection:
 
 
 def _unknown_version(payload: bytes) -> Rejection | None:
-    """Why a payload that this schema does not fit was refused, when its version says that it need not fit."""
+    """Return the rejection of a payload of another version, or None if the version is not the problem."""
     try:
         message = json.loads(payload)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""What the service answers: the track of a tag, page by page."""
+"""Models of the track of a tag, which the service returns page by page."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -10,12 +10,12 @@ class _Answer(BaseModel):
 
 
 class TrackPose(_Answer):
-    """A pose as it was kept: what it claimed then. Numbers have the precision of float32."""
+    """A pose as it was stored when it was computed. Numbers have float32 precision."""
 
-    t_ns: int = Field(description="UTC, ns.")
+    t_ns: int = Field(description="UTC, ns: the time of the pose.")
     state: TrackingState
-    reason: str = Field(description="Machine-readable cause of the state.")
-    x: float | None = Field(description="East, m; null where it was unknown.")
+    reason: str = Field(description="Machine-readable reason of the state.")
+    x: float | None = Field(description="East, m; null if it was unknown.")
     y: float | None = Field(description="North, m.")
     heading_rad: float | None
     speed_mps: float | None
@@ -26,15 +26,15 @@ class TrackPose(_Answer):
     range_m: float | None
     covariance: list[list[float]] | None = Field(description="3 × 3, of (x, y, heading_rad).")
     anchor: str | None
-    lat: float | None = Field(default=None, description="With the georeference that the site has now.")
+    lat: float | None = Field(default=None, description="Degrees, with the site's current georeference.")
     lon: float | None = None
 
 
 class Track(_Answer):
-    """A page of the track of a tag."""
+    """One page of the track of a tag."""
 
     tag: str
-    from_ns: int = Field(description="UTC, ns: the poses lie between the two, both included.")
-    to_ns: int
-    poses: list[TrackPose] = Field(description="In order of time.")
-    next: str | None = Field(description="`cursor` of the next page; null on the last one.")
+    from_ns: int = Field(description="UTC, ns: start of the interval, inclusive.")
+    to_ns: int = Field(description="UTC, ns: end of the interval, inclusive.")
+    poses: list[TrackPose] = Field(description="Poses in order of time.")
+    next: str | None = Field(description="`cursor` of the next page; null on the last page.")

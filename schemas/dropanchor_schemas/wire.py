@@ -1,8 +1,8 @@
-"""The samples of a tag on the wire. Standard library only: tags import this.
+"""The samples of a tag on the wire. This module needs only the standard library, because tags import it.
 
-Two payloads carry the same frame, told apart by the Zenoh encoding: packed little-endian structs (below, and byte
-by byte in the README of this distribution) and JSON (`samples.py`). Decoding never raises: bytes become a `Frame`
-or a `Rejection` that says why.
+Two payloads carry the same frame: packed little-endian structs and JSON. The Zenoh encoding distinguishes them. The
+README of this distribution describes the packed layout byte by byte; `samples.py` defines the JSON. Decoding never
+raises: it returns a `Frame`, or a `Rejection` with its reason.
 """
 
 import json
@@ -34,7 +34,7 @@ Vector = tuple[float, float, float]
 
 
 class Reason(StrEnum):
-    """Why a payload, a sample or a key was not used. Every rejection is counted under one of these names."""
+    """Why a payload, a sample or a key was rejected. The service counts rejections by these names."""
 
     ENCODING_UNKNOWN = "encoding_unknown"
     PAYLOAD_EMPTY = "payload_empty"
@@ -73,7 +73,10 @@ class Rejection(NamedTuple):
 
 
 class ImuSample(NamedTuple):
-    """Body frame x forward, y left, z up. acc: specific force, m/s². gyro: rad/s. mag: µT, None without one."""
+    """One IMU sample; body frame x forward, y left, z up.
+
+    acc: specific force, m/s². gyro: angular rate, rad/s. mag: magnetic field, µT; None without a magnetometer.
+    """
 
     t_ns: int
     acc: Vector
@@ -82,7 +85,7 @@ class ImuSample(NamedTuple):
 
 
 class RangeSample(NamedTuple):
-    """Slant range to the anchor with this number, m. std_m: standard deviation, NaN when unknown."""
+    """Slant range to the anchor with this number, m. std_m: standard deviation, NaN if unknown."""
 
     t_ns: int
     anchor: int
@@ -91,7 +94,7 @@ class RangeSample(NamedTuple):
 
 
 class HeadingSample(NamedTuple):
-    """Heading that the platform itself has, counter-clockwise from east, rad. std_rad: NaN when unknown."""
+    """Heading from the tag's platform, counter-clockwise from east, rad. std_rad: NaN if unknown."""
 
     t_ns: int
     heading_rad: float
@@ -99,7 +102,7 @@ class HeadingSample(NamedTuple):
 
 
 class BearingSample(NamedTuple):
-    """Bearing of the tag seen from the anchor, counter-clockwise from east, rad. std_rad: NaN when unknown."""
+    """Bearing of the tag seen from the anchor, counter-clockwise from east, rad. std_rad: NaN if unknown."""
 
     t_ns: int
     anchor: int
@@ -109,12 +112,12 @@ class BearingSample(NamedTuple):
 
 @dataclass(slots=True)
 class Frame:
-    """The samples of one message. Times are UTC, or since the tag's boot when `boot_clock` is set.
+    """The samples of one message. Times are UTC, or since the tag's boot if `boot_clock` is set.
 
-    sequence: counts the messages of one publisher, None when it does not count.
-    boot_id: random per start of the publisher; None or 0 when it has none, and then its messages are not numbered.
-    replay: the samples are of a recording, played now; their times are those of the recording.
-    anchor_names: number → text of the anchors that the message named by text.
+    sequence: message counter of the publisher; None if it does not count.
+    boot_id: random number, drawn at each start of the publisher. With None or 0 its messages are not numbered.
+    replay: whether the samples come from a replayed recording; their times are those of the recording.
+    anchor_names: number → name of the anchors that the message names by text.
     """
 
     imu: list[ImuSample] = field(default_factory=list)
@@ -143,9 +146,10 @@ def payload_encoding(zenoh_encoding: str) -> str:
 
 
 def anchor_number(anchor: int | str) -> int:
-    """The u32 that names an anchor in packed payloads.
+    """Return the u32 that names an anchor in packed payloads.
 
-    A canonical decimal ("7", not "07") below 2³² is that number; any other text is its CRC-32 (IEEE, of the UTF-8).
+    A canonical decimal ("7", not "07") below 2³² gives that number. Any other text gives the CRC-32 (IEEE) of its
+    UTF-8.
     Raises ValueError for numbers outside u32 and for empty text.
     """
     if isinstance(anchor, str):
@@ -160,10 +164,10 @@ def anchor_number(anchor: int | str) -> int:
 
 
 def encode_packed(frame: Frame) -> bytes:
-    """The packed payload of a frame.
+    """Return the packed payload of a frame.
 
-    Raises ValueError when the samples span more than 4,294 s, the payload would exceed MAX_PAYLOAD_BYTES, or a value
-    does not fit into its field (a number beyond float32, an anchor beyond u32).
+    Raises ValueError if the samples span more than 4,294 s, if the payload would exceed MAX_PAYLOAD_BYTES, or if a
+    value does not fit into its field (a number beyond float32, an anchor beyond u32).
     """
     times = frame.times()
     t0_ns = min(times, default=0)
@@ -179,12 +183,12 @@ def encode_packed(frame: Frame) -> bytes:
 
 
 def packed_size(imu: int, ranges: int, headings: int, bearings: int) -> int:
-    """Bytes of a packed payload with these counts of samples."""
+    """Return the size, in bytes, of a packed payload with these counts of samples."""
     return HEADER.size + IMU.size * imu + RANGE.size * ranges + HEADING.size * headings + BEARING.size * bearings
 
 
 def decode_packed(payload: bytes) -> Frame | Rejection:
-    """The frame of a packed payload, or why there is none. Values are not judged here, only the form."""
+    """Decode a packed payload. Return its frame, or a rejection. This checks the form only, not the values."""
     header = read_header(payload)
     if isinstance(header, Rejection):
         return header
@@ -211,7 +215,10 @@ Header = tuple[int, tuple[int, int, int, int], int, int, int]
 
 
 def read_header(payload: bytes) -> Header | Rejection:
-    """(flags, counts of imu/range/heading/bearing, sequence, boot id, t0_ns) of a payload of the right form."""
+    """Check the form of a packed payload and return its header, or a rejection.
+
+    The header is (flags, counts of imu/range/heading/bearing, sequence, boot id, t0_ns).
+    """
     if len(payload) == 0:
         return Rejection(Reason.PAYLOAD_EMPTY, "the payload is empty")
     if len(payload) > MAX_PAYLOAD_BYTES:
@@ -236,7 +243,7 @@ def read_header(payload: bytes) -> Header | Rejection:
 
 
 def encode_json(frame: Frame) -> bytes:
-    """The JSON payload of a frame. Raises ValueError for values JSON cannot hold (NaN where a value is needed)."""
+    """Return the JSON payload of a frame. Raises ValueError for values that JSON cannot hold, such as NaN."""
     message: dict[str, Any] = {"version": VERSION, "clock": "boot" if frame.boot_clock else "utc"}
     if frame.replay:
         message["replay"] = True

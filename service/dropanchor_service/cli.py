@@ -1,4 +1,4 @@
-"""`dropanchor`: one module of `commands` per subcommand; only the chosen one is imported."""
+"""The command `dropanchor`. Each subcommand is a module of `commands`; only the chosen one is imported."""
 
 import argparse
 import gc
@@ -11,31 +11,31 @@ from types import ModuleType
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 
 _COMMANDS = {
-    "demo": "the service with simulated tags, to look at in a browser",
+    "demo": "run the service with simulated tags and watch them in a browser",
     "serve": "run the service",
-    "router": "run a Zenoh router alone",
-    "security": "make the credentials of a site",
-    "tag": "give tags their certificates, or take them away",
+    "router": "run a separate Zenoh router",
+    "security": "create the credentials of a site",
+    "tag": "issue and revoke the certificates of tags",
     "compile": "compile the estimator ahead of the first start",
-    "key": "API keys of the REST interface",
-    "record": "record what a service hears, and fetch the files",
+    "key": "manage API keys of the REST interface",
+    "record": "record the samples and poses of a service, and download the files",
     "replay": "run an engine on a recording, offline",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }
 _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
-Tags publish raw ranges and IMU samples over Zenoh; the service answers with poses over Zenoh and REST.
+Tags publish raw ranges and IMU samples over Zenoh; the service provides their poses over Zenoh and REST.
 """
 _EVALUATION = ("matplotlib", "scipy", "sympy")
 _EVALUATION_IS_MISSING = """\
 This needs the extra 'evaluation': pip install 'dropanchor-service[evaluation]' (in a clone: make install)"""
 _EPILOG = """\
 examples:
-  dropanchor demo                          the service with simulated tags: look at it in a browser
-  dropanchor serve                         the service with a Zenoh router of its own, nothing to configure
-  dropanchor replay RECORDING --anchor 1   the same estimator on a recording, with its error
-  dropanchor evaluate paper --out report   the paper's experiments, its figures beside ours
-  dropanchor COMMAND --help                everything about one command
+  dropanchor demo                          run the service with simulated tags and watch them in a browser
+  dropanchor serve                         run the service with a built-in Zenoh router and default settings
+  dropanchor replay RECORDING --anchor 1   run the same estimator on a recording and report its error
+  dropanchor evaluate paper --out report   run the paper's experiments and compare the figures
+  dropanchor COMMAND --help                show all options of a command
 """
 
 
@@ -62,7 +62,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     for name, brief in _COMMANDS.items():
         one = commands.add_parser(name, help=brief, formatter_class=argparse.RawDescriptionHelpFormatter)
         if words[:1] == [name]:
-            use_kernel_cache()  # before a command imports what is compiled
+            use_kernel_cache()  # before a command imports compiled kernels
             command = _imported(f"dropanchor_service.commands.{name}")
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
@@ -72,7 +72,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _imported(name: str) -> ModuleType:
-    """What is imported stays: looking through it for garbage again and again would take a tenth of the start."""
+    """Import a module with the garbage collector off. Imported objects stay, and collecting costs 10 % of the start."""
     gc.disable()
     try:
         return import_module(name)
@@ -82,7 +82,7 @@ def _imported(name: str) -> ModuleType:
 
 
 def _with_negative_values(arguments: Sequence[str]) -> list[str]:
-    """`--start -1,2,0` as `--start=-1,2,0`: argparse takes what begins with a minus for an option."""
+    """Turn `--start -1,2,0` into `--start=-1,2,0`, because argparse takes an argument with a minus for an option."""
     joined: list[str] = []
     for argument in arguments:
         if joined and re.fullmatch(r"--[a-z-]+", joined[-1]) and re.match(r"-\.?\d", argument):

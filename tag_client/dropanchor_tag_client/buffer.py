@@ -1,4 +1,4 @@
-"""Samples that wait to be sent in one message."""
+"""The buffer of samples that the client sends in its next message."""
 
 import math
 
@@ -6,13 +6,13 @@ from dropanchor_schemas.wire import MAX_T_NS, BearingSample, Frame, HeadingSampl
 
 Sample = ImuSample | RangeSample | HeadingSample | BearingSample
 
-# Packed payloads count microseconds in 32 bits; a message spans far less in any case.
+# Packed payloads count microseconds in 32 bits (4,294 s). This limit stays far below that.
 _MAX_SPAN_NS = 60_000_000_000
 _MAX_FLOAT32 = 3.4028234663852886e38
 
 
 class SampleBuffer:
-    """A frame in the making. Not thread-safe: its owner holds a lock."""
+    """Collect samples into a frame. Not thread-safe: the owner holds a lock."""
 
     def __init__(self, max_samples: int) -> None:
         self._max_samples = max_samples
@@ -26,8 +26,8 @@ class SampleBuffer:
     def is_full(self) -> bool:
         return len(self._frame) >= self._max_samples
 
-    def spans(self, t_ns: int) -> bool:
-        """Whether a sample of this time may join the samples that wait."""
+    def accepts(self, t_ns: int) -> bool:
+        """Return whether a sample of this time fits into the same message as the buffered samples."""
         return not len(self._frame) or abs(t_ns - self._first_ns) <= _MAX_SPAN_NS
 
     def add(self, sample: Sample, anchor: int | str | None = None) -> None:
@@ -46,13 +46,13 @@ class SampleBuffer:
             self._frame.anchor_names[sample.anchor] = anchor
 
     def take(self) -> Frame:
-        """The samples that waited; afterwards none wait."""
+        """Return the buffered samples and empty the buffer."""
         frame, self._frame = self._frame, Frame()
         return frame
 
 
-def unsendable(sample: Sample) -> Reason | None:
-    """Why a payload cannot hold this sample; None when it can. A standard deviation of NaN means unknown."""
+def rejection_reason(sample: Sample) -> Reason | None:
+    """Return why a payload cannot hold this sample, or None if it can. A standard deviation of NaN means unknown."""
     if not 0 <= sample.t_ns < MAX_T_NS:
         return Reason.TIME_OUT_OF_RANGE
     match sample:

@@ -1,4 +1,4 @@
-"""The client of one tag: takes raw samples one by one, sends them in batches."""
+"""The client of one tag. It takes raw samples one by one and sends them in batches."""
 
 import logging
 import math
@@ -28,17 +28,17 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_tag_client.buffer import Sample, SampleBuffer, unsendable
+from dropanchor_tag_client.buffer import Sample, SampleBuffer, rejection_reason
 from dropanchor_tag_client.publisher import PlainPublisher, Publisher, recoverable_publisher
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
 
-_MAX_BATCH = 50  # in JSON some 8 kB, which is what routers in the field let through
+_MAX_BATCH = 50  # about 8 kB in JSON, the limit that routers in the field are configured for
 
 _log = logging.getLogger(__name__)
 
 
 class Sent(NamedTuple):
-    """Counts since the client was opened."""
+    """What the client has sent since it was created."""
 
     samples: int
     messages: int
@@ -46,20 +46,20 @@ class Sent(NamedTuple):
 
 
 class TagClient:
-    """Publishes the raw samples of one tag. Use it with `with`; its methods may be called from any thread.
+    """Publish the raw samples of one tag. Use the client as a context manager. All methods are thread-safe.
 
-    connect: the endpoint of the router, `SessionSettings` (TLS, password), or a session that several tags of one
-        process share and that stays open.
-    clock: what `t_ns` counts from: "utc" (1970) or "boot" (any start that is the same until `boot_id` changes).
-    batch_samples, batch_s: a message is sent when it holds that many samples, or when its first one has waited so
-        long. With batch_s=None no thread watches the time: call `flush`.
-    cache_messages: messages kept for a service that missed them (a killed router or service loses nothing as long as
-        they cover the gap); 0 publishes plainly.
-    replay: the samples are of a recording that is played now, at any speed; the service then counts ages from where
-        the recording has come to.
-    wait_when_congested: publishing waits for a slow router instead of dropping; not for live data.
-    connect_timeout_s: how long opening waits for the router before it raises ConnectError; None: for ever, and says so
-        in the log. An open client reconnects by itself for ever; its publishing never blocks.
+    connect: the endpoint of the router; `SessionSettings` (TLS, password); or an open session, which several tags of
+        one process can share and which the client does not close.
+    clock: what `t_ns` counts from: "utc" (1970) or "boot" (any start that is fixed until `boot_id` changes).
+    batch_samples, batch_s: the client sends a message when it has this many samples, or when its first sample is this
+        old. With batch_s=None no thread watches the time: call `flush`.
+    cache_messages: number of messages to keep for a service that missed them. Nothing is lost in an outage of the
+        router or the service as long as they cover the gap. 0 publishes without a cache.
+    replay: whether the samples come from a recording, at any speed. The service then counts ages from the current time
+        of the recording.
+    wait_when_congested: wait for a slow router instead of dropping messages. Do not use this for live data.
+    connect_timeout_s: how long `open` waits for the router before it raises ConnectError. With None it waits without a
+        limit and logs a warning. An open client always reconnects by itself, and publishing never blocks.
     """
 
     _session: zenoh.Session | None = None
@@ -100,7 +100,7 @@ class TagClient:
         self._wait_when_congested = wait_when_congested
         self._connect_timeout_s = connect_timeout_s
         self._buffer = SampleBuffer(batch_samples)
-        self._wake = threading.Condition()
+        self._condition = threading.Condition()
 
     def __enter__(self) -> Self:
         self.open()
@@ -112,9 +112,9 @@ class TagClient:
         self.close()
 
     def open(self) -> None:
-        """Connects. Raises ConnectError when that takes longer than `connect_timeout_s`."""
+        """Connect to the router. Raises ConnectError if that takes longer than `connect_timeout_s`."""
         if self._publisher is not None:
-            raise RuntimeError(f"the client of tag {self.tag!r} is open already")
+            raise RuntimeError(f"the client of tag {self.tag!r} is already open")
         if isinstance(self._connect, SessionSettings):
             self._session = open_session(self._connect, self._connect_timeout_s)
         else:
@@ -122,17 +122,17 @@ class TagClient:
         self._publisher = self._declare_publisher(self._session)
         self._token = self._session.liveliness().declare_token(self._alive_key)
         if self._batch_s is not None:
-            self._timer = threading.Thread(target=self._flush_in_time, name=f"flush {self.tag}", daemon=True)
+            self._timer = threading.Thread(target=self._flush_when_due, name=f"flush {self.tag}", daemon=True)
             self._timer.start()
 
     def close(self) -> None:
-        """Sends what waits, then leaves. Closing twice does nothing."""
-        with self._wake:
+        """Send the buffered samples and disconnect. Closing a closed client does nothing."""
+        with self._condition:
             if self._publisher is None:
                 return
             self._send()
             publisher, self._publisher = self._publisher, None
-            self._wake.notify_all()
+            self._condition.notify_all()
         if self._timer is not None:
             self._timer.join()
         if self._token is not None:
@@ -144,7 +144,7 @@ class TagClient:
     def publish_range(
         self, anchor: int | str, range_m: float, *, t_ns: int | None = None, std_m: float = math.nan
     ) -> None:
-        """One two-way range to an anchor, m."""
+        """Publish one two-way range to an anchor, m."""
         self._add(RangeSample(self._time(t_ns), _anchor_number(anchor), float(range_m), float(std_m)), anchor)
 
     def publish_imu(
@@ -155,27 +155,31 @@ class TagClient:
         *,
         t_ns: int | None = None,
     ) -> None:
-        """One IMU sample (body frame x forward, y left, z up): specific force m/s², rate rad/s, magnetic field µT."""
+        """Publish one IMU sample; body frame x forward, y left, z up.
+
+        acc: specific force, m/s². gyro: angular rate, rad/s. mag: magnetic field, µT.
+        """
         field = None if mag is None else _vector("mag", mag)
         self._add(ImuSample(self._time(t_ns), _vector("acc", acc), _vector("gyro", gyro), field))
 
     def publish_heading(self, heading_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan) -> None:
-        """A heading that the platform itself has, counter-clockwise from east, rad."""
+        """Publish a heading from the tag's platform, counter-clockwise from east, rad."""
         self._add(HeadingSample(self._time(t_ns), float(heading_rad), float(std_rad)))
 
     def publish_bearing(
         self, anchor: int | str, bearing_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan
     ) -> None:
-        """The bearing of the tag as the anchor sees it, counter-clockwise from east, rad."""
+        """Publish the bearing of the tag, seen from the anchor, counter-clockwise from east, rad."""
         self._add(BearingSample(self._time(t_ns), _anchor_number(anchor), float(bearing_rad), float(std_rad)), anchor)
 
     def flush(self) -> None:
-        """Sends what waits, now."""
-        with self._wake:
+        """Send all buffered samples now."""
+        with self._condition:
             self._send()
 
     @property
     def sent(self) -> Sent:
+        """Return what the client has sent since it was created."""
         return self._sent
 
     def _declare_publisher(self, session: zenoh.Session) -> Publisher:
@@ -196,28 +200,28 @@ class TagClient:
         return time.monotonic_ns() if self._boot_clock else time.time_ns()
 
     def _add(self, sample: Sample, anchor: int | str | None = None) -> None:
-        with self._wake:
+        with self._condition:
             if self._publisher is None:
                 raise RuntimeError(f"the client of tag {self.tag!r} is not open: use it with `with`")
-            if reason := unsendable(sample):
+            if reason := rejection_reason(sample):
                 self._refuse(reason)
                 return
-            if not self._buffer.spans(sample.t_ns):
+            if not self._buffer.accepts(sample.t_ns):
                 self._send()
             self._buffer.add(sample, anchor)
             if self._buffer.is_full:
                 self._send()
             elif len(self._buffer) == 1 and self._batch_s is not None:
                 self._due_s = time.monotonic() + self._batch_s
-                self._wake.notify_all()
+                self._condition.notify_all()
 
     def _refuse(self, reason: Reason) -> None:
         self.refused[reason] += 1
         if self.refused[reason] == 1:
-            _log.warning("tag %s: a sample was left out (%s); more are counted silently", self.tag, reason)
+            _log.warning("tag %s: dropped a sample (%s); more are only counted, in `refused`", self.tag, reason)
 
     def _send(self) -> None:
-        """Sends the frame in the making. The lock is held."""
+        """Send the buffered samples. The caller holds the lock."""
         self._due_s = math.inf
         if not len(self._buffer) or self._publisher is None:
             return
@@ -229,7 +233,7 @@ class TagClient:
         try:
             self._publisher.put(payload)
         except zenoh.ZError as error:
-            _log.error("tag %s: a message was not sent: %s", self.tag, error)
+            _log.error("tag %s: could not send a message: %s", self.tag, error)
 
     def _payload(self, frame: Frame) -> bytes:
         frame.sequence = self._sent.messages % 2**32
@@ -238,14 +242,14 @@ class TagClient:
         frame.replay = self._replay
         return encode_packed(frame) if self._packed else encode_json(frame)
 
-    def _flush_in_time(self) -> None:
-        with self._wake:
+    def _flush_when_due(self) -> None:
+        with self._condition:
             while self._publisher is not None:
                 left_s = self._due_s - time.monotonic()
                 if left_s <= 0:
                     self._send()
                 else:
-                    self._wake.wait(None if left_s == math.inf else left_s)
+                    self._condition.wait(None if left_s == math.inf else left_s)
 
 
 def _anchor_number(anchor: int | str) -> int:

@@ -1,4 +1,4 @@
-"""The folder that `dropanchor tag add` makes for a tag: who it is, where it connects, and its certificate."""
+"""Read the folder that `dropanchor tag add` creates for a tag: its id, its endpoint and its certificate."""
 
 import json
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dropanchor_tag_client.session import SessionSettings
 
 @dataclass(frozen=True, slots=True)
 class Credentials:
-    """Of one tag."""
+    """Identity and session settings of one tag."""
 
     tag: str
     site: str
@@ -17,15 +17,18 @@ class Credentials:
 
 
 def read_credentials(folder: str | Path, connect: str | None = None) -> Credentials:
-    """connect: another endpoint than the one in the folder. Raises ValueError when the folder is not complete."""
+    """Return the credentials in a folder. Raises ValueError if the folder is not complete.
+
+    connect: an endpoint that replaces the one in the folder.
+    """
     path = Path(folder)
     try:
-        about = json.loads((path / "tag.json").read_bytes())
-        tag, site, endpoint = (str(about[name]) for name in ("tag", "site", "connect"))
+        metadata = json.loads((path / "tag.json").read_bytes())
+        tag, site, endpoint = (str(metadata[name]) for name in ("tag", "site", "connect"))
     except OSError as error:
         raise ValueError(f"{path} holds no credentials of a tag: {error.strerror}: tag.json") from error
     except (ValueError, TypeError, KeyError) as error:
-        raise ValueError(f"{path / 'tag.json'} is damaged") from error
+        raise ValueError(f"{path / 'tag.json'} is damaged: run `dropanchor tag add --renew` for the tag") from error
     session = SessionSettings(
         connect=connect or endpoint, ca=path / "ca.pem", cert=path / "tag.pem", key=path / "tag.key"
     )

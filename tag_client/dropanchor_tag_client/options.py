@@ -1,4 +1,4 @@
-"""Command-line options that every source shares, and what is built from them."""
+"""The connection options of all subcommands, and the clients and sessions built from them."""
 
 import argparse
 import os
@@ -21,7 +21,7 @@ def add_connection_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--credentials",
         metavar="FOLDER",
-        help="what `dropanchor tag add` made for the tag: certificates, and defaults for --tag, --site and --connect",
+        help="folder from `dropanchor tag add`: certificates, and defaults for --tag, --site and --connect",
     )
     group.add_argument("--site", help="site that the tag belongs to (default: default)")
     group.add_argument(
@@ -30,20 +30,24 @@ def add_connection_options(parser: argparse.ArgumentParser) -> None:
         help=f"Zenoh router: tcp/host:port or tls/host:port (default: {DEFAULT_CONNECT})",
     )
     group.add_argument("--encoding", choices=["packed", "json"], default="packed", help="default: %(default)s")
-    group.add_argument("--ca", metavar="PEM", help="certificate of the authority that signed the router's (tls/)")
-    group.add_argument("--cert", metavar="PEM", help="own certificate, where the router asks for one")
+    group.add_argument(
+        "--ca", metavar="PEM", help="certificate of the authority that signed the router's certificate (tls/)"
+    )
+    group.add_argument("--cert", metavar="PEM", help="client certificate, if the router requires one")
     group.add_argument("--key", metavar="PEM", help="private key of --cert")
-    group.add_argument("--user", help=f"user name; the password is taken from the environment, {PASSWORD_VARIABLE}")
+    group.add_argument(
+        "--user", help=f"user name; the password comes from the environment variable {PASSWORD_VARIABLE}"
+    )
     group.add_argument(
         "--connect-timeout",
         type=float,
         metavar="S",
-        help="give up when the router has not answered for so long (default: try for ever)",
+        help="give up after S seconds without an answer from the router (default: try without a limit)",
     )
 
 
-def complete(arguments: argparse.Namespace) -> None:
-    """Fills in what was not given: from the credentials, else the defaults. Raises ValueError."""
+def apply_defaults(arguments: argparse.Namespace) -> None:
+    """Fill in missing options from the credentials folder, then from the defaults. Raises ValueError."""
     if arguments.credentials is not None:
         given = read_credentials(arguments.credentials, arguments.connect)
         arguments.site = arguments.site or given.site
@@ -56,10 +60,10 @@ def complete(arguments: argparse.Namespace) -> None:
 
 
 def session_settings(arguments: argparse.Namespace) -> SessionSettings:
-    """Raises ValueError for options that do not go together."""
+    """Return the session settings of the options. Raises ValueError if options contradict each other."""
     password = os.environ.get(PASSWORD_VARIABLE) if arguments.user else None
     if arguments.user and password is None:
-        raise ValueError(f"--user is given; put the password into the environment variable {PASSWORD_VARIABLE}")
+        raise ValueError(f"--user needs a password: set the environment variable {PASSWORD_VARIABLE}")
     return SessionSettings(
         connect=arguments.connect,
         ca=arguments.ca,
@@ -72,7 +76,7 @@ def session_settings(arguments: argparse.Namespace) -> SessionSettings:
 
 @contextmanager
 def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> Iterator[TagClient]:
-    """The client of a tag with the common options, open inside the `with`. Ctrl-C while it connects ends at once."""
+    """Open the client of a tag for the duration of the `with` block. Ctrl-C while it connects exits immediately."""
     client = TagClient(
         tag,
         site=arguments.site,
@@ -91,7 +95,7 @@ def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> I
 
 @contextmanager
 def opened_session(arguments: argparse.Namespace) -> Iterator[zenoh.Session]:
-    """One session for many tags, with the common options. Ctrl-C while it connects ends at once."""
+    """Open one session for many tags. Ctrl-C while it connects exits immediately."""
     with _interruptible():
         session = open_session(session_settings(arguments), arguments.connect_timeout)
     try:
@@ -102,7 +106,10 @@ def opened_session(arguments: argparse.Namespace) -> Iterator[zenoh.Session]:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Python looks at signals only between its own steps; an attempt to connect is one long step."""
+    """Restore the default signal handlers while connecting.
+
+    Python runs its own handlers only between bytecodes, and a connection attempt is one long native call.
+    """
     before = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield

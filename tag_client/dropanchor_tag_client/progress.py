@@ -1,4 +1,4 @@
-"""A line on standard error that says how far long work is."""
+"""A progress line on standard error."""
 
 import sys
 import time
@@ -6,7 +6,7 @@ from typing import TextIO
 
 
 class Progress:
-    """Rewrites its line a few times a second on a terminal; elsewhere writes a line every ten seconds."""
+    """On a terminal, rewrite one line five times a second. Elsewhere, write a new line every ten seconds."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr

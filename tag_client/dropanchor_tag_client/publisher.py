@@ -1,4 +1,4 @@
-"""What carries payloads to the router: with a cache that fills the gaps of an outage, or plainly."""
+"""Zenoh publishers for payloads: one with a cache that covers outages, and a plain one."""
 
 from typing import Any, Protocol
 
@@ -17,7 +17,7 @@ class Publisher(Protocol):
 def recoverable_publisher(
     session: zenoh.Session, key: str, encoding: str, *, cache_messages: int, wait_when_congested: bool
 ) -> Publisher:
-    """A publisher that keeps its last messages, so that a subscriber can ask for those it missed."""
+    """Return a publisher that keeps its last messages, so that a subscriber can fetch the ones it missed."""
     return zenoh.ext.declare_advanced_publisher(
         session,
         key,
@@ -30,7 +30,7 @@ def recoverable_publisher(
 
 
 class PlainPublisher:
-    """Puts without declaring a publisher: nothing is recovered, and thousands of tags fit into one session."""
+    """Put messages without declaring a publisher. Nothing is recovered, but a session holds thousands of tags."""
 
     def __init__(self, session: zenoh.Session, key: str, encoding: str, *, wait_when_congested: bool) -> None:
         self._session = session
@@ -42,7 +42,7 @@ class PlainPublisher:
         self._session.put(self._key, payload, encoding=self._encoding, congestion_control=self._congestion_control)
 
     def undeclare(self) -> None:
-        """Nothing was declared."""
+        """Do nothing: this publisher declares nothing."""
 
 
 def _congestion_control(wait_when_congested: bool) -> zenoh.CongestionControl:

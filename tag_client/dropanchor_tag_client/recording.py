@@ -1,4 +1,4 @@
-"""Recordings: a folder of CSV files, plain or gzipped, with what a tag measured and perhaps where it really was."""
+"""Read recordings: folders of CSV files, plain or gzipped, with the samples of a tag and optionally the truth."""
 
 import csv
 import gzip
@@ -13,12 +13,12 @@ from pathlib import Path
 
 
 class RecordingError(Exception):
-    """The folder is not a recording, or a file of it cannot be read. The text says where, and what was expected."""
+    """The folder is not a recording, or one of its files cannot be read. The message says where and what is wrong."""
 
 
 @dataclass(frozen=True)
 class Anchor:
-    """Position in the frame of the recording, m."""
+    """An anchor and its position in the frame of the recording, m."""
 
     id: str
     x: float
@@ -28,9 +28,9 @@ class Anchor:
 
 @dataclass(frozen=True)
 class Recording:
-    """Columns in order of time; t in s, the rest in SI units. An absent file gives empty columns.
+    """The columns of a recording in order of time, in SI units. A missing file gives empty columns.
 
-    ranges: t_s, range_m, std_m (NaN: unknown), with `range_anchors`, the id of each range's anchor.
+    ranges: t_s, range_m, std_m (NaN: unknown); `range_anchors` holds the anchor id of each range.
     imu: t_s, ax ay az, gx gy gz, mx my mz (NaN: no magnetometer). headings: t_s, yaw_rad, std_rad (NaN: unknown).
     truth: t_s, x, y, z, yaw_rad.
     """
@@ -44,7 +44,7 @@ class Recording:
     truth: dict[str, "array[float]"] = field(default_factory=dict)
 
     def anchor(self, identifier: str) -> Anchor:
-        """Raises RecordingError, with the ids there are, when there is none of this id."""
+        """Return the anchor with this id. Raises RecordingError, which lists the ids, if there is none."""
         for anchor in self.anchors:
             if anchor.id == identifier:
                 return anchor
@@ -61,9 +61,10 @@ MAY_BE_NAN = OPTIONAL | {"z", "yaw_rad"}
 
 
 def read_recording(folder: Path | str) -> Recording:
-    """The recording in a folder: range.csv and anchors.csv, and imu.csv, heading.csv, truth.csv where there are any.
+    """Return the recording in a folder. Raises RecordingError.
 
-    Every file may be gzipped (range.csv.gz). Raises RecordingError.
+    range.csv and anchors.csv are required; imu.csv, heading.csv and truth.csv are optional. Any file may be gzipped
+    (range.csv.gz).
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -98,7 +99,7 @@ def _anchors(folder: Path) -> tuple[Anchor, ...]:
 def _table(
     folder: Path, name: str, columns: tuple[str, ...], text: str | None = None, required: bool = True
 ) -> tuple[list[str], dict[str, "array[float]"]]:
-    """The text column and the number columns of a file, in order of time (a stable sort by t_s)."""
+    """Return the text column and the number columns of a file, in order of time (a stable sort by t_s)."""
     path = _path(folder, name)
     texts: list[str] = []
     values = {column: array("d") for column in columns}
@@ -119,7 +120,7 @@ def _path(folder: Path, name: str) -> Path | None:
 
 
 def _rows(path: Path, needed: set[str]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Each row of the file with its place, for messages."""
+    """Yield each row of the file with its location for error messages."""
     try:
         raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
         reader = csv.DictReader(io.StringIO(raw.decode("utf-8-sig")), restkey="")

@@ -1,4 +1,4 @@
-"""The Zenoh session of a tag: who to connect to, how to prove who we are, and what not to leave at its default."""
+"""The Zenoh session of a tag: its endpoint, its credentials, and the options that must not keep their defaults."""
 
 import json
 import logging
@@ -19,17 +19,17 @@ _log = logging.getLogger(__name__)
 
 
 class ConnectError(Exception):
-    """The router could not be reached in the time given, or it refused us; Zenoh does not say which."""
+    """The router did not answer in time, or it rejected the client. Zenoh does not report which."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionSettings:
-    """How to reach the router.
+    """How to reach the router. Raises ValueError for settings that cannot work.
 
-    connect: Zenoh endpoint, `tcp/host:port`, or `tls/host:port` with `ca` (and `cert`, `key` where the router asks
-    for certificates of its clients). Files are PEM. user, password: where the router asks for them.
-    thin_link: small send buffers, so that a link too thin for the data delivers fewer but younger samples.
-    Raises ValueError for settings that cannot work.
+    connect: Zenoh endpoint, `tcp/host:port` or `tls/host:port`.
+    ca, cert, key: PEM files for TLS. cert and key are needed if the router requires client certificates.
+    user, password: needed if the router requires them.
+    thin_link: use small send buffers. A link that is too slow for the data then delivers fewer but newer samples.
     """
 
     connect: str = DEFAULT_CONNECT
@@ -56,9 +56,9 @@ class SessionSettings:
 
 
 def open_session(settings: SessionSettings, timeout_s: float | None = None) -> zenoh.Session:
-    """A session that is connected, and that reconnects by itself for ever.
+    """Return a connected session, which reconnects by itself without a limit.
 
-    Tries for `timeout_s`, or for ever with a line in the log every few seconds; raises ConnectError.
+    Try for `timeout_s`, then raise ConnectError. With None, try without a limit and log a warning every 10 s.
     """
     deadline_s = math.inf if timeout_s is None else time.monotonic() + timeout_s
     attempt_s, next_line_s = _FIRST_ATTEMPT_S, 0.0
@@ -73,16 +73,16 @@ def open_session(settings: SessionSettings, timeout_s: float | None = None) -> z
             next_line_s = time.monotonic() + _LOG_EVERY_S
             _log.warning("%s Still trying.", _what_to_check(settings))
         attempt_s = _ATTEMPT_S
-        time.sleep(0.1)  # some settings fail at once, every time
+        time.sleep(0.1)  # some settings fail immediately, every time
 
 
 def configuration(settings: SessionSettings, attempt_s: float = _ATTEMPT_S) -> dict[str, Any]:
-    """The Zenoh configuration (client mode)."""
+    """Return the Zenoh configuration (client mode)."""
     return {
         "mode": "client",
         "connect": {
             "endpoints": [settings.connect],
-            # An endless attempt inside Zenoh could not be interrupted; a finite one still reconnects for ever.
+            # An endless attempt inside Zenoh could not be interrupted. A session from a finite one still reconnects.
             "timeout_ms": max(1, round(attempt_s * 1000)),
             "exit_on_failure": True,
             "retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2},
@@ -126,5 +126,5 @@ def _what_to_check(settings: SessionSettings) -> str:
     if settings.user is not None:
         checks.append("user and password")
     else:
-        checks.append("whether the router wants a certificate or a password")
+        checks.append("whether the router requires a certificate or a password")
     return f"Cannot connect to {settings.connect}: check {', '.join(checks[:-1])} and {checks[-1]}."

@@ -42,7 +42,7 @@ def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
         service.process.wait(60.0)
     assert main(["replay", str(tmp_path / "recordings"), "--out", str(tmp_path / "poses.csv")]) == 0
     said = capsys.readouterr()
-    assert "ends before its end" in said.err
+    assert "is truncated" in said.err
     words = said.out.split("recorded poses: ")[1].split()
     assert words[0] == words[2]
     assert int(words[0]) >= 380

@@ -86,6 +86,6 @@ def test_systemd_hears_of_no_progress_while_samples_are_not_fused(tmp_path: Path
         manager.bind(str(tmp_path / "notify"))
         manager.setblocking(False)
         systemd = Systemd({"NOTIFY_SOCKET": str(tmp_path / "notify")})
-        assert serve.goes_on(Stuck(), systemd, HeapTrimmer())
+        assert serve.supervise(Stuck(), systemd, HeapTrimmer())
         with pytest.raises(BlockingIOError):
             manager.recv(100)

@@ -8,7 +8,7 @@ import pytest
 
 from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.evaluation.simulated import Known, run_engine
+from dropanchor_service.evaluation.simulated import PriorKnowledge, run_engine
 from dropanchor_tag_client.simulator.perturbations import perturbed
 from dropanchor_tag_client.simulator.sensors import SensorModels
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
@@ -82,7 +82,7 @@ FAULTS = (as_it_is, imu_off, ranges_off, everything_off, spikes, frozen_range, b
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
 def test_no_tracking_pose_is_off_by_more_than_five_sigma(fault: Fault, start_known: bool) -> None:
     runs = [fault(simulate("M5", seed)) for seed in SEEDS]
-    tracks = run_engine(FleetEngine(), runs, Known("raw", start_known)).tracks
+    tracks = run_engine(FleetEngine(), runs, PriorKnowledge("raw", start_known)).tracks
     worst = [worst_tracking(track.poses, simulate("M5", run.seed)) for track, run in zip(tracks, runs, strict=True)]
     assert max(worst) <= LIMIT
     if start_known:  # an engine that never says tracking is never wrong either
@@ -92,7 +92,7 @@ def test_no_tracking_pose_is_off_by_more_than_five_sigma(fault: Fault, start_kno
 @pytest.mark.parametrize("name", ["late15", "nlosburst", "magdist"])
 def test_nor_when_it_is_switched_on_midway_or_disturbed(name: str) -> None:
     runs = [simulate("M5", seed, perturbed(SensorModels(), name)) for seed in SEEDS]
-    tracks = run_engine(FleetEngine(), runs, Known("raw", start=False)).tracks
+    tracks = run_engine(FleetEngine(), runs, PriorKnowledge("raw", start=False)).tracks
     worst = [worst_tracking(track.poses, simulate("M5", run.seed)) for track, run in zip(tracks, runs, strict=True)]
     assert max(worst) <= LIMIT
 

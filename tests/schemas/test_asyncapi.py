@@ -1,4 +1,4 @@
-"""The AsyncAPI document: valid by AsyncAPI's own schema, and true to the keys and models of the contract."""
+"""The AsyncAPI document is valid by AsyncAPI's own schema and matches the keys and models of the contract."""
 
 import json
 import shutil
@@ -18,7 +18,7 @@ SPECS = "@asyncapi/specs@6.10.0"
 
 @pytest.fixture(scope="module")
 def specification(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """AsyncAPI's own JSON Schema of a 3.0 document, from npm."""
+    """Fetch AsyncAPI's own JSON Schema of a 3.0 document from npm."""
     folder = tmp_path_factory.mktemp("specs")
     if shutil.which("npm") is None:
         pytest.skip("npm is not installed: AsyncAPI's own schema cannot be fetched")
@@ -38,13 +38,13 @@ def test_the_document_is_valid_asyncapi(specification: dict[str, Any]) -> None:
     assert errors == []
 
 
-def test_a_broken_document_is_refused(specification: dict[str, Any]) -> None:
+def test_a_broken_document_is_invalid(specification: dict[str, Any]) -> None:
     document = asyncapi.document()
     document["operations"]["receiveSamples"]["action"] = "listen"
     assert not Draft7Validator(specification).is_valid(document)
 
 
-def test_every_reference_leads_somewhere() -> None:
+def test_every_reference_resolves() -> None:
     document = asyncapi.document()
     for reference in _references(document):
         target: Any = document
@@ -66,7 +66,7 @@ def test_the_addresses_are_the_keys_of_the_contract() -> None:
     }
 
 
-def test_the_schemas_describe_the_examples() -> None:
+def test_the_examples_validate_against_the_schemas() -> None:
     document = asyncapi.document()
     schema = {"$ref": "#/components/schemas/SamplesMessage", "components": document["components"]}
     for example in SamplesMessage.model_json_schema()["examples"]:
@@ -82,6 +82,6 @@ def _references(part: Any) -> list[str]:
     return []
 
 
-def test_the_exported_file_lies_beside_the_schemas() -> None:
+def test_the_exported_file_is_current() -> None:
     file = Path(asyncapi.__file__).parent / "json" / "asyncapi.json"
     assert json.loads(file.read_text()) == asyncapi.document()

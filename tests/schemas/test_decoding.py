@@ -1,4 +1,4 @@
-"""Whatever bytes arrive, they become a frame or a rejection with a name."""
+"""Any bytes decode to a frame or to a named rejection."""
 
 import json
 
@@ -44,23 +44,23 @@ def check(payload: bytes) -> None:
 
 
 @given(st.binary(max_size=400))
-def test_any_bytes_become_a_frame_or_a_rejection(payload: bytes) -> None:
+def test_any_bytes_decode_to_a_frame_or_a_rejection(payload: bytes) -> None:
     check(payload)
 
 
 @given(st.builds(lambda header, rest: header + rest, headers, st.binary(max_size=200)))
-def test_any_header_with_anything_behind_it_becomes_a_frame_or_a_rejection(payload: bytes) -> None:
+def test_any_header_with_any_body_decodes_to_a_frame_or_a_rejection(payload: bytes) -> None:
     check(payload)
 
 
 @given(st.recursive(st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=5), st.lists))
-def test_any_json_becomes_a_frame_or_a_rejection(value: object) -> None:
+def test_any_json_decodes_to_a_frame_or_a_rejection(value: object) -> None:
     check(json.dumps(value).encode())
     check(json.dumps({"range": value, "version": value}).encode())
 
 
 @given(mutated_payloads())
-def test_real_payloads_gone_wrong_become_a_frame_or_a_rejection(payload: bytes) -> None:
+def test_mutated_payloads_decode_to_a_frame_or_a_rejection(payload: bytes) -> None:
     check(payload)
 
 
@@ -71,7 +71,7 @@ def test_every_frame_survives_both_payloads(frame: Frame) -> None:
 
 
 @given(frames(), st.data())
-def test_a_packed_payload_that_is_cut_is_always_noticed(frame: Frame, data: st.DataObject) -> None:
+def test_a_truncated_packed_payload_is_always_rejected(frame: Frame, data: st.DataObject) -> None:
     payload = encode_packed(frame)
     assert isinstance(decode_packed(payload[: data.draw(st.integers(0, len(payload) - 1))]), Rejection)
 
@@ -115,27 +115,27 @@ JSON = {
 
 
 @pytest.mark.parametrize(("reason", "payload"), [(r, p) for r, payloads in PACKED.items() for p in payloads])
-def test_every_reason_for_a_packed_payload_can_be_had(reason: Reason, payload: bytes) -> None:
+def test_a_bad_packed_payload_is_rejected_with_its_reason(reason: Reason, payload: bytes) -> None:
     decoded = decode_packed(payload)
     assert isinstance(decoded, Rejection)
     assert decoded.reason == reason
 
 
 @pytest.mark.parametrize(("reason", "payload"), [(r, p) for r, payloads in JSON.items() for p in payloads])
-def test_every_reason_for_a_json_payload_can_be_had(reason: Reason, payload: bytes) -> None:
+def test_a_bad_json_payload_is_rejected_with_its_reason(reason: Reason, payload: bytes) -> None:
     decoded = decode_json(payload)
     assert isinstance(decoded, Rejection)
     assert decoded.reason == reason
 
 
-def test_a_schema_error_names_the_place() -> None:
+def test_a_schema_error_names_its_location() -> None:
     decoded = decode_json(
         b'{"range": [{"t_ns": 1, "anchor": 7, "range_m": 1}, {"t_ns": 1, "anchor": 7, "range_m": "x"}]}'
     )
     assert decoded == (Reason.JSON_SCHEMA, "range.1.range_m: Input should be a valid number")
 
 
-def test_the_largest_payload_is_still_taken() -> None:
+def test_the_largest_payload_is_accepted() -> None:
     count = (MAX_PAYLOAD_BYTES - HEADER.size) // BEARING.size
     assert isinstance(decode_packed(header(ranges=count) + ONE * count), Frame)
     assert isinstance(decode_json((RANGE_JSON % b"").ljust(MAX_PAYLOAD_BYTES)), Frame)

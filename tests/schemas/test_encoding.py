@@ -1,4 +1,4 @@
-"""Encoding says what it cannot do, and anchors have one number each."""
+"""Encoding rejects what it cannot express, and each anchor has one number."""
 
 import math
 
@@ -27,7 +27,7 @@ def headings(*times: int) -> Frame:
         (Frame(headings=[HeadingSample(T, 1.0)], boot_id=2**32), "does not fit"),
     ],
 )
-def test_a_frame_that_the_packed_payload_cannot_hold_is_an_error(frame: Frame, message: str) -> None:
+def test_a_frame_that_a_packed_payload_cannot_hold_is_an_error(frame: Frame, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         encode_packed(frame)
 
@@ -37,7 +37,7 @@ def test_the_longest_span_still_fits() -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
-def test_json_cannot_hold_what_is_not_a_number(value: float) -> None:
+def test_nan_and_infinity_are_errors_in_json(value: float) -> None:
     with pytest.raises(ValueError, match="not JSON compliant"):
         encode_json(Frame(headings=[HeadingSample(T, value)]))
 
@@ -65,6 +65,6 @@ def test_only_the_shortest_decimal_is_a_number(text: str) -> None:
 
 
 @pytest.mark.parametrize("anchor", ["", -1, 2**32])
-def test_what_cannot_name_an_anchor_is_an_error(anchor: int | str) -> None:
+def test_an_invalid_anchor_id_is_an_error(anchor: int | str) -> None:
     with pytest.raises(ValueError, match="anchor"):
         anchor_number(anchor)

@@ -1,4 +1,4 @@
-"""What a tag imports of the contract needs the standard library only."""
+"""The modules of the contract that a tag imports need only the standard library."""
 
 import pytest
 
@@ -12,11 +12,11 @@ def loaded_by(statement: str) -> set[str]:
 
 
 @pytest.mark.parametrize("module", ["wire", "keys"])
-def test_the_publishing_path_pulls_in_neither_pydantic_nor_numpy(module: str) -> None:
+def test_the_publishing_path_imports_neither_pydantic_nor_numpy(module: str) -> None:
     loaded = loaded_by(f"import dropanchor_schemas.{module}")
     assert "dropanchor_schemas" in loaded
     assert not loaded & {"pydantic", "pydantic_core", "numpy", "zenoh"}
 
 
-def test_the_models_come_when_they_are_asked_for() -> None:
+def test_the_models_are_imported_on_first_use() -> None:
     assert "pydantic" in loaded_by("from dropanchor_schemas import Pose")

@@ -1,4 +1,4 @@
-"""The exported JSON Schemas: valid, current, and of one mind with the decoders."""
+"""The exported JSON Schemas are valid and current, and agree with the decoders."""
 
 import json
 from copy import deepcopy
@@ -30,12 +30,14 @@ def test_every_schema_is_valid(name: str) -> None:
     Draft202012Validator.check_schema(schema(name))
 
 
-def test_every_schema_is_current_and_no_other_lies_beside_them() -> None:
+def test_every_schema_is_current_and_no_other_file_is_in_the_folder() -> None:
     assert export.main(["--check"]) == 0
     assert sorted(export.FOLDER.glob("*.json")) == sorted(export.schemas())
 
 
-def test_drift_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_check_reports_schemas_that_are_not_current(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(export, "FOLDER", tmp_path)
     assert export.main(["--check"]) == 1
     assert "samples.schema.json" in capsys.readouterr().err
@@ -66,7 +68,7 @@ def test_what_a_tag_encodes_is_valid(frame: Frame) -> None:
 
 
 def places(value: Any) -> list[tuple[Any, Any]]:
-    """Every (container, key) inside a JSON value."""
+    """Return every (container, key) pair inside a JSON value."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     return [place for key, inner in items for place in [(value, key), *places(inner)]]
 
@@ -75,7 +77,7 @@ WRONG: list[Any] = [None, True, -1, 0, 1, 2**32, 2**62, 0.5, "", "7", "utc", "x"
 
 
 @given(frames(), st.sampled_from(WRONG), st.data())
-def test_the_schema_and_the_decoder_refuse_the_same_messages(frame: Frame, value: Any, data: st.DataObject) -> None:
+def test_the_schema_and_the_decoder_reject_the_same_messages(frame: Frame, value: Any, data: st.DataObject) -> None:
     message = json.loads(encode_json(frame))
     container, key = data.draw(st.sampled_from(places(message)))
     if data.draw(st.booleans()):

@@ -1,4 +1,4 @@
-"""Ids and the key chunks that stand for them, both ways."""
+"""The conversion between ids and key chunks, in both directions."""
 
 import pytest
 import zenoh
@@ -11,14 +11,14 @@ printable = st.text(min_size=1, max_size=64).filter(str.isprintable)
 
 
 @given(printable)
-def test_every_id_comes_back_from_its_chunk(identifier: str) -> None:
+def test_every_id_survives_the_conversion_to_a_chunk(identifier: str) -> None:
     chunk = keys.chunk_from_id(identifier)
     assert keys.id_from_chunk(chunk) == identifier
     assert all(c.isascii() and (c.isalnum() or c in "._-%") for c in chunk)
 
 
 @given(st.text(max_size=20))
-def test_a_chunk_is_refused_or_is_the_one_form_of_its_id(chunk: str) -> None:
+def test_a_chunk_is_rejected_unless_it_is_the_escaped_form_of_an_id(chunk: str) -> None:
     try:
         identifier = keys.id_from_chunk(chunk)
     except keys.InvalidKeyError:
@@ -27,7 +27,7 @@ def test_a_chunk_is_refused_or_is_the_one_form_of_its_id(chunk: str) -> None:
 
 
 @given(printable, printable)
-def test_every_key_of_a_tag_gives_the_tag_back_and_is_a_key_of_zenoh(site: str, tag: str) -> None:
+def test_every_key_of_a_tag_contains_its_id_and_is_a_valid_zenoh_key(site: str, tag: str) -> None:
     for key in (keys.samples_key(site, tag), keys.tag_alive_key(site, tag), keys.pose_key(site, tag)):
         assert keys.tag_from_key(key) == tag
         assert str(zenoh.KeyExpr(key)) == key
@@ -36,7 +36,7 @@ def test_every_key_of_a_tag_gives_the_tag_back_and_is_a_key_of_zenoh(site: str, 
 
 
 @given(st.text(max_size=60))
-def test_any_text_is_a_tag_key_or_an_invalid_one(text: str) -> None:
+def test_any_text_is_a_tag_key_or_is_rejected(text: str) -> None:
     for key in (text, f"dropanchor/@v1/default/tag/{text}/samples"):
         try:
             tag = keys.tag_from_key(key)
@@ -46,13 +46,13 @@ def test_any_text_is_a_tag_key_or_an_invalid_one(text: str) -> None:
 
 
 @pytest.mark.parametrize("identifier", ["", "x" * 65, "a\nb", "\0", "\ud800", "\u200b"])
-def test_an_id_that_no_key_can_hold_is_refused(identifier: str) -> None:
+def test_an_invalid_id_is_rejected(identifier: str) -> None:
     with pytest.raises(keys.InvalidKeyError):
         keys.chunk_from_id(identifier)
 
 
 @pytest.mark.parametrize("chunk", ["", "%", "%2", "%zz", "%ff", "a b", "%61", "%2f", "*", "**", "@a", "~", "x" * 65])
-def test_a_chunk_that_no_id_makes_is_refused(chunk: str) -> None:
+def test_an_invalid_chunk_is_rejected(chunk: str) -> None:
     with pytest.raises(keys.InvalidKeyError):
         keys.id_from_chunk(chunk)
 
@@ -68,12 +68,12 @@ def test_a_chunk_that_no_id_makes_is_refused(chunk: str) -> None:
         "/dropanchor/@v1/default/tag/a/samples",
     ],
 )
-def test_a_key_of_another_form_is_refused(key: str) -> None:
+def test_a_key_of_another_form_is_rejected(key: str) -> None:
     with pytest.raises(keys.InvalidKeyError, match="is not dropanchor/@v1/"):
         keys.tag_from_key(key)
 
 
 @given(printable)
-def test_anchor_and_service_keys_are_keys_of_zenoh(identifier: str) -> None:
+def test_anchor_and_service_keys_are_valid_zenoh_keys(identifier: str) -> None:
     assert zenoh.KeyExpr(keys.all_anchors("s")).includes(zenoh.KeyExpr(keys.anchor_key("s", identifier)))
     assert str(zenoh.KeyExpr(keys.service_alive_key("s", identifier))).endswith("/alive")

@@ -1,4 +1,4 @@
-"""What the README of the protocol shows is what the decoders understand."""
+"""The examples and tables in the README of the protocol agree with the code."""
 
 import json
 import math
@@ -39,24 +39,24 @@ def blocks(language: str) -> list[str]:
 
 
 def bytes_of(hexadecimal: str) -> bytes:
-    """The bytes at the start of each line; what follows after several blanks explains them."""
+    """Return the bytes at the start of each line, without the explanation after several blanks."""
     return bytes.fromhex(" ".join(re.split(r"\s{3,}", line)[0] for line in hexadecimal.splitlines()))
 
 
 def rows(heading: str) -> list[list[str]]:
-    """The cells of the table under a heading, without its first row."""
+    """Return the cells of the table under a heading, without the header row."""
     section = README.split(f"\n## {heading}\n")[1].split("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
-def test_the_worked_example_decodes_to_what_it_says() -> None:
+def test_the_worked_example_decodes_to_the_described_samples() -> None:
     (example,) = blocks("hex")
     assert repr(decode_packed(bytes_of(example))) == repr(EXAMPLE)
     assert encode_packed(EXAMPLE) == bytes_of(example)
 
 
-def test_the_json_example_holds_the_same_samples() -> None:
+def test_the_json_example_contains_the_same_samples() -> None:
     decoded = decode_json(blocks("json")[1].encode())
     assert isinstance(decoded, Frame)
     assert decoded.anchor_names == {anchor_number("L0"): "L0"}
@@ -64,7 +64,7 @@ def test_the_json_example_holds_the_same_samples() -> None:
     assert repr(decoded) == repr(EXAMPLE)
 
 
-def test_the_shortest_tag_there_is_is_understood() -> None:
+def test_the_simplest_message_decodes() -> None:
     decoded = decode_json(blocks("json")[0].encode())
     assert isinstance(decoded, Frame)
     assert decoded.ranges[0][:3] == (T, 1, 12.34)
@@ -99,7 +99,7 @@ def one_range(payload: bytes) -> None:
     assert math.isnan(sample.std_m)
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 def test_the_c_program_writes_a_payload_that_decodes(tmp_path: Path) -> None:
     (program,) = blocks("c")
     (tmp_path / "tag.c").write_text(program)
@@ -108,7 +108,7 @@ def test_the_c_program_writes_a_payload_that_decodes(tmp_path: Path) -> None:
     one_range(subprocess.run([tmp_path / "tag"], check=True, capture_output=True).stdout)
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node here")
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
 def test_the_javascript_writes_a_payload_that_decodes() -> None:
     (program,) = blocks("js")
     one_range(subprocess.run(["node", "-e", program], check=True, capture_output=True).stdout)

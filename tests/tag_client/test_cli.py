@@ -1,4 +1,4 @@
-"""The command line: it teaches, it fails with a sentence, and it ends when it is told to."""
+"""The command line: help with examples, clear errors, and a clean end on signals."""
 
 import signal
 import time
@@ -23,7 +23,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("command", [[], ["replay"], ["publish"], ["serial"], ["simulate"]])
-def test_help_teaches_with_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_help_has_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main([*command, "--help"])
     assert end.value.code == 0
@@ -43,26 +43,26 @@ def test_help_teaches_with_examples(command: list[str], capsys: pytest.CaptureFi
         (["publish", "--tag", "a", "--connect", free_endpoint(), "--connect-timeout", "0.2"], "Cannot connect to"),
     ],
 )
-def test_what_cannot_work_ends_with_a_sentence_and_code_2(
+def test_an_error_prints_a_message_and_exits_with_code_2(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert "Traceback" not in said
+    errors = capsys.readouterr().err
+    assert message in errors
+    assert "Traceback" not in errors
 
 
 @pytest.mark.parametrize(
     "arguments",
     [[], ["dance"], ["replay"], ["replay", "x", "--speed", "-1"], ["replay", "x", "--speed", "fast"]],
 )
-def test_a_command_line_that_makes_no_sense_ends_with_code_2(arguments: list[str]) -> None:
+def test_an_invalid_command_line_exits_with_code_2(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(arguments)
     assert end.value.code == 2
 
 
-def test_an_anchor_that_the_recording_does_not_have_is_named_with_those_it_has(
+def test_a_missing_anchor_is_an_error_that_lists_the_anchors_of_the_recording(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["replay", str(recording), "--anchor", "9"]) == 2
@@ -70,7 +70,7 @@ def test_an_anchor_that_the_recording_does_not_have_is_named_with_those_it_has(
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_ctrl_c_ends_a_replay_quickly_and_sends_what_waits(
+def test_a_signal_ends_a_replay_quickly_and_buffered_samples_are_sent(
     router_endpoint: str, recording: Path, number: signal.Signals, code: int
 ) -> None:
     with listening(router_endpoint) as heard:
@@ -78,14 +78,14 @@ def test_ctrl_c_ends_a_replay_quickly_and_sends_what_waits(
         wait_until(lambda: len(heard.ranges()) >= 3)
         began = time.monotonic()
         process.send_signal(number)
-        _, said = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=60)
         assert time.monotonic() - began < 30.0
     assert process.returncode == code
-    assert "Traceback" not in said
+    assert "Traceback" not in errors
     assert heard.ranges() == [float(i) for i in range(len(heard.ranges()))]
 
 
-def test_ctrl_c_ends_a_client_that_still_looks_for_its_router(recording: Path) -> None:
+def test_ctrl_c_ends_a_client_that_is_still_connecting(recording: Path) -> None:
     endpoint = free_endpoint()
     process = start_python(*COMMAND, "replay", str(recording), "--connect", endpoint)
     assert process.stderr is not None
@@ -95,7 +95,7 @@ def test_ctrl_c_ends_a_client_that_still_looks_for_its_router(recording: Path) -
     assert process.returncode == -signal.SIGINT
 
 
-def test_a_replay_says_how_much_it_sent(router_endpoint: str, recording: Path) -> None:
+def test_a_replay_reports_how_much_it_sent(router_endpoint: str, recording: Path) -> None:
     done = python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--speed", "0")
     assert done.returncode == 0
     assert "1000 samples of" in done.stderr

@@ -1,4 +1,4 @@
-"""A tag client beside a real router: what it publishes arrives, whole and in order."""
+"""A tag client with a real router: everything it publishes arrives, complete and in order."""
 
 import logging
 import math
@@ -40,7 +40,7 @@ def test_every_kind_of_sample_arrives_in_either_encoding(
     assert frame.anchor_names == ({} if encoding == "packed" else {anchor_number("L0"): "L0"})
 
 
-def test_a_full_batch_leaves_at_once_and_messages_are_numbered(router_endpoint: str) -> None:
+def test_a_full_batch_is_sent_immediately_and_messages_are_numbered(router_endpoint: str) -> None:
     with listening(router_endpoint) as heard:
         with TagClient("a", connect=router_endpoint, batch_samples=5, batch_s=None) as tag:
             for i in range(12):
@@ -53,7 +53,7 @@ def test_a_full_batch_leaves_at_once_and_messages_are_numbered(router_endpoint: 
     assert tag.sent[:2] == (12, 3)
 
 
-def test_a_lonely_sample_leaves_when_its_time_is_up(router_endpoint: str) -> None:
+def test_a_single_sample_is_sent_after_the_batch_time(router_endpoint: str) -> None:
     with listening(router_endpoint) as heard, TagClient("a", connect=router_endpoint, batch_s=0.05) as tag:
         tag.publish_range(1, 1.0)
         wait_until(lambda: heard.ranges() == [1.0])
@@ -61,14 +61,14 @@ def test_a_lonely_sample_leaves_when_its_time_is_up(router_endpoint: str) -> Non
         wait_until(lambda: heard.ranges() == [1.0, 2.0])
 
 
-def test_flush_sends_what_waits(router_endpoint: str) -> None:
+def test_flush_sends_the_buffered_samples(router_endpoint: str) -> None:
     with listening(router_endpoint) as heard, TagClient("a", connect=router_endpoint, batch_s=None) as tag:
         tag.publish_range(1, 1.0)
         tag.flush()
         wait_until(lambda: heard.ranges() == [1.0])
 
 
-def test_samples_too_far_apart_for_one_message_go_in_two(router_endpoint: str) -> None:
+def test_samples_too_far_apart_for_one_message_are_sent_in_several(router_endpoint: str) -> None:
     with listening(router_endpoint) as heard:
         with TagClient("a", connect=router_endpoint, batch_s=None) as tag:
             for hour in range(3):
@@ -77,7 +77,7 @@ def test_samples_too_far_apart_for_one_message_go_in_two(router_endpoint: str) -
     assert [frame.ranges[0].t_ns - T for frame in heard.frames] == [hour * 3_600_000_000_000 for hour in range(3)]
 
 
-def test_many_threads_may_publish_through_one_client(router_endpoint: str) -> None:
+def test_many_threads_can_publish_through_one_client(router_endpoint: str) -> None:
     with listening(router_endpoint) as heard:
         with TagClient("a", connect=router_endpoint, batch_samples=7, batch_s=0.001) as tag:
 
@@ -108,7 +108,7 @@ def test_several_tags_share_a_session_that_stays_open(router_endpoint: str) -> N
     assert sorted(heard.keys) == [keys.samples_key("default", "a"), keys.samples_key("default", "b")]
 
 
-def test_the_liveliness_token_lives_as_long_as_the_client(router_endpoint: str) -> None:
+def test_the_liveliness_token_exists_as_long_as_the_client_is_open(router_endpoint: str) -> None:
     def alive() -> list[str]:
         replies = session.liveliness().get(keys.all_tags("yard", "alive"), timeout=2.0)
         return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
@@ -130,7 +130,7 @@ def test_a_boot_clock_counts_from_the_start_of_the_machine(router_endpoint: str)
 
 
 @pytest.mark.parametrize("encoding", ["packed", "json"])
-def test_what_a_payload_cannot_hold_is_counted_and_the_rest_is_sent(
+def test_invalid_samples_are_dropped_and_counted_and_the_rest_is_sent(
     router_endpoint: str, encoding: Literal["packed", "json"], caplog: pytest.LogCaptureFixture
 ) -> None:
     with listening(router_endpoint) as heard:
@@ -147,7 +147,7 @@ def test_what_a_payload_cannot_hold_is_counted_and_the_rest_is_sent(
     assert len(caplog.records) == 3
 
 
-def test_mistakes_of_the_caller_are_errors(router_endpoint: str) -> None:
+def test_invalid_calls_raise_errors(router_endpoint: str) -> None:
     with TagClient("a", connect=router_endpoint) as tag:
         with pytest.raises(ValueError, match="acc has three components, not 2"):
             tag.publish_imu((0.0, 0.0), (0.0, 0.0, 0.0))
@@ -157,7 +157,7 @@ def test_mistakes_of_the_caller_are_errors(router_endpoint: str) -> None:
             tag.publish_range("x" * 65, 1.0)
         with pytest.raises(ValueError, match="between 0"):
             tag.publish_range(-1, 1.0)
-        with pytest.raises(RuntimeError, match="is open already"):
+        with pytest.raises(RuntimeError, match="is already open"):
             tag.open()
     with pytest.raises(RuntimeError, match="is not open"):
         tag.publish_range(1, 1.0)
@@ -168,7 +168,7 @@ def test_mistakes_of_the_caller_are_errors(router_endpoint: str) -> None:
         TagClient("")
 
 
-def test_a_router_that_is_not_there_is_a_clear_error_in_the_time_given() -> None:
+def test_a_missing_router_is_a_clear_error_within_the_timeout() -> None:
     endpoint = free_endpoint()
     began = time.monotonic()
     with pytest.raises(ConnectError, match=f"Cannot connect to {endpoint}: check the address"):
@@ -176,7 +176,7 @@ def test_a_router_that_is_not_there_is_a_clear_error_in_the_time_given() -> None
     assert time.monotonic() - began < 15.0
 
 
-def test_a_client_waits_for_a_router_that_comes_later(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_client_waits_for_a_router_that_starts_later(caplog: pytest.LogCaptureFixture) -> None:
     endpoint = free_endpoint()
     opened = threading.Event()
     leave = threading.Event()
@@ -189,7 +189,7 @@ def test_a_client_waits_for_a_router_that_comes_later(caplog: pytest.LogCaptureF
     caplog.set_level(logging.WARNING)
     thread = threading.Thread(target=run)
     thread.start()
-    time.sleep(0.3)
+    wait_until(lambda: "Still trying." in caplog.text)
     assert not opened.is_set()
     with running_router(endpoint):
         assert opened.wait(10.0)
@@ -197,7 +197,7 @@ def test_a_client_waits_for_a_router_that_comes_later(caplog: pytest.LogCaptureF
         thread.join()
 
 
-def test_a_name_and_password_open_the_door_and_a_wrong_one_does_not(tmp_path: Path) -> None:
+def test_a_password_admits_a_client_and_a_wrong_one_does_not(tmp_path: Path) -> None:
     users = tmp_path / "users.txt"
     users.write_text("tag-a:secret\n")
     endpoint = free_endpoint()
@@ -209,6 +209,6 @@ def test_a_name_and_password_open_the_door_and_a_wrong_one_does_not(tmp_path: Pa
         wrong = SessionSettings(connect=endpoint, user="tag-a", password="guess")
         with pytest.raises(ConnectError, match="user and password"):
             TagClient("a", connect=wrong, connect_timeout_s=0.5).open()
-        with pytest.raises(ConnectError, match="wants a certificate or a password"):
+        with pytest.raises(ConnectError, match="requires a certificate or a password"):
             TagClient("a", connect=endpoint, connect_timeout_s=0.5).open()
     assert "guess" not in repr(wrong)

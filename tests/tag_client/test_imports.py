@@ -1,4 +1,4 @@
-"""The publishing path stays light: which modules a tag loads."""
+"""The publishing path stays light: it loads none of the heavy modules."""
 
 import pytest
 
@@ -31,7 +31,7 @@ def test_publishing_loads_neither_numpy_nor_pydantic(encoding: str) -> None:
 
 
 @pytest.mark.parametrize("source", ["replay", "publish", "serial"])
-def test_the_commands_for_recordings_scripts_and_modules_load_neither_as_well(source: str) -> None:
+def test_the_commands_replay_publish_and_serial_load_neither_of_them(source: str) -> None:
     done = python(
         "-c", f"import sys, dropanchor_tag_client.cli, dropanchor_tag_client.sources.{source}\nprint(*sys.modules)"
     )

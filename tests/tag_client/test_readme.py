@@ -1,4 +1,4 @@
-"""The programs in the README of the tag client do what it says."""
+"""The programs in the README of the tag client work as described."""
 
 import json
 import re
@@ -28,7 +28,7 @@ def test_a_tag_in_five_lines_publishes(router_endpoint: str) -> None:
     assert heard.frames[0].imu[0].acc == pytest.approx((0.0, 0.0, 9.81), abs=1e-6)
 
 
-def test_the_secure_tag_can_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_programs_with_credentials_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("ca.pem", "cart-1.pem", "cart-1.key"):
         Path(name).touch()
@@ -43,7 +43,7 @@ def test_the_secure_tag_can_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert len(PROGRAMS) == 3
 
 
-def test_the_lines_for_publish_are_samples() -> None:
+def test_the_example_lines_for_publish_are_valid_samples() -> None:
     lines = re.findall(r"`(\{.*?\})`", README)
     assert len(lines) == 2
     assert [kind for line in lines for kind, _ in samples_of(json.dumps(json.loads(line)).encode())] == ["range", "imu"]

@@ -1,4 +1,4 @@
-"""Reading recordings."""
+"""Recordings are read from folders of CSV files."""
 
 import gzip
 import math
@@ -58,12 +58,12 @@ def test_gzipped_files_and_optional_columns_are_read(tmp_path: Path) -> None:
         ({"anchors": ANCHORS, "range": RANGES, "imu": "t_s,ax\n0,1\n"}, "line 1: the columns ay, az, gx, gy, gz are"),
     ],
 )
-def test_a_bad_folder_gets_an_error_that_names_the_place(tmp_path: Path, files: dict[str, str], message: str) -> None:
+def test_a_bad_folder_is_an_error_that_names_the_location(tmp_path: Path, files: dict[str, str], message: str) -> None:
     with pytest.raises(RecordingError, match=message):
         read_recording(write(tmp_path, **files))
 
 
-def test_a_torn_gzip_file_and_bytes_that_are_no_text_are_errors(tmp_path: Path) -> None:
+def test_a_truncated_gzip_file_and_invalid_utf_8_are_errors(tmp_path: Path) -> None:
     write(tmp_path, anchors=ANCHORS)
     (tmp_path / "range.csv.gz").write_bytes(gzip.compress(RANGES.encode())[:-9])
     with pytest.raises(RecordingError, match="cannot be read"):
@@ -73,12 +73,12 @@ def test_a_torn_gzip_file_and_bytes_that_are_no_text_are_errors(tmp_path: Path) 
         read_recording(tmp_path)
 
 
-def test_a_file_or_nothing_in_place_of_the_folder_is_an_error(tmp_path: Path) -> None:
+def test_a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="is not a folder"):
         read_recording(tmp_path / "nothing")
 
 
-def test_an_anchor_that_is_not_there_is_named_with_those_that_are(tmp_path: Path) -> None:
+def test_a_missing_anchor_is_an_error_that_lists_the_anchors(tmp_path: Path) -> None:
     recording = read_recording(write(tmp_path, anchors=ANCHORS, range=RANGES))
     with pytest.raises(RecordingError, match="no anchor 'X'; it has: L0, 7"):
         recording.anchor("X")

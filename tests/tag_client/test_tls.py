@@ -1,4 +1,4 @@
-"""Certificates: a tag that brings the right one is let in, others are told what to check."""
+"""TLS: the router admits a tag with the right certificate; other tags get an error that says what to check."""
 
 import shutil
 import subprocess
@@ -31,10 +31,10 @@ def certificate(folder: Path, name: str, ca: str) -> None:
 
 
 @needs_openssl
-def test_only_a_tag_with_a_certificate_of_the_right_authority_is_let_in(tmp_path: Path) -> None:
+def test_only_a_tag_with_a_certificate_of_the_right_authority_can_connect(tmp_path: Path) -> None:
     for ca in ("ours", "theirs"):
         authority(tmp_path, ca)
-    for name, ca in (("router", "ours"), ("tag", "ours"), ("stranger", "theirs")):
+    for name, ca in (("router", "ours"), ("tag", "ours"), ("foreign", "theirs")):
         certificate(tmp_path, name, ca)
     tls, plain = f"tls/localhost:{free_port()}", f"tcp/127.0.0.1:{free_port()}"
     files = {
@@ -53,7 +53,7 @@ def test_only_a_tag_with_a_certificate_of_the_right_authority_is_let_in(tmp_path
         with client("tag") as tag:
             tag.publish_range(1, 1.0)
             wait_until(lambda: heard.ranges() == [1.0])
-        for refused in (client("stranger"), client(None), client("tag", ca="theirs")):
+        for refused in (client("foreign"), client(None), client("tag", ca="theirs")):
             with pytest.raises(ConnectError, match="the certificates"):
                 refused.open()
 
@@ -69,6 +69,6 @@ def test_only_a_tag_with_a_certificate_of_the_right_authority_is_let_in(tmp_path
         ({"user": "a"}, "user and password go together"),
     ],
 )
-def test_settings_that_cannot_work_are_refused_before_anything_is_tried(settings: dict[str, str], message: str) -> None:
+def test_settings_that_cannot_work_are_errors_before_any_connection(settings: dict[str, str], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         SessionSettings(**settings)  # type: ignore[arg-type]

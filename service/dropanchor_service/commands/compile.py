@@ -1,4 +1,4 @@
-"""`dropanchor compile`: what the first start would do, done when an image or a machine is prepared."""
+"""`dropanchor compile`: compile the estimator ahead of the first start, for example when an image is built."""
 
 import argparse
 
@@ -9,14 +9,14 @@ from dropanchor_service.runtime import logs
 from dropanchor_service.settings.model import Settings
 
 DESCRIPTION = """\
-Compiles the estimator and keeps the result, so that the first start of `dropanchor serve` is as fast as any other.
-The result lies in $XDG_CACHE_HOME/dropanchor (~/.cache/dropanchor), or in $NUMBA_CACHE_DIR where that is set. It is
-made for the processor it is compiled on and for this version; for another one the service compiles again.
+Compiles the estimator and caches the result, so that the first start of `dropanchor serve` is as fast as any other.
+The cache is in $XDG_CACHE_HOME/dropanchor (~/.cache/dropanchor), or in $NUMBA_CACHE_DIR if that is set. It is valid for
+this version on this type of processor; otherwise the service compiles again.
 """
 EPILOG = """\
 examples:
   dropanchor compile
-  XDG_CACHE_HOME=/var/cache dropanchor compile      for a service that runs with the same XDG_CACHE_HOME
+  XDG_CACHE_HOME=/var/cache dropanchor compile      for a service with the same XDG_CACHE_HOME
 """
 
 

@@ -1,4 +1,4 @@
-"""`dropanchor evaluate`: the experiments of the paper, real recordings, and the product as users get it."""
+"""`dropanchor evaluate`: run the experiments of the paper, real recordings, and the whole engine."""
 
 import argparse
 import os
@@ -19,19 +19,19 @@ from dropanchor_service.evaluation.results import ROOT, Measured, NoPlaceError, 
 from dropanchor_tag_client.recording import RecordingError
 
 DESCRIPTION = """\
-paper       every experiment of the paper that needs none of its hardware, as a report with the paper's own numbers
-            beside ours: report.html, report.md, results.json and pictures; some minutes on two cores
-recordings  the paper's filter and our engine on real recordings with ground truth
-product     the whole engine on what tags send: scalar, 9-axis, 6-axis; everything, the mounting angle or nothing told;
-            known and unknown start; vehicles, smooth rolling, forklift, walks, recordings
+paper       all experiments of the paper that need none of its hardware, in a report with the paper's own numbers:
+            report.html, report.md, results.json and pictures; takes some minutes on two cores
+recordings  the paper's filter and the engine fleet on real recordings with ground truth
+product     the whole engine on the samples of tags: scalar, 9-axis or 6-axis sensors; everything, the mounting angle
+            or nothing configured; known and unknown start; vehicles, trolley, forklift, walks, recordings
 """
 EPILOG = """\
 examples:
   dropanchor evaluate paper --out report            the whole report
-  dropanchor evaluate paper --out report --quick    a handful of seeds: does it run?
+  dropanchor evaluate paper --out report --quick    a few seeds, to test that it runs
   dropanchor evaluate recordings --plaza            real ranges and RTK truth from PyPI's gtsam
-  dropanchor evaluate recordings --data FOLDER      recordings of your own, one folder each, with truth.csv
-  dropanchor evaluate product --quick               a handful of development seeds
+  dropanchor evaluate recordings --data FOLDER      your own recordings, one folder each, with truth.csv
+  dropanchor evaluate product --quick               a few rows and three development seeds
   dropanchor evaluate product --rows 'S5/*' 'walk-*/9-axis/*' --seeds 5000-5019
 """
 DATA = Path("../shared/data")
@@ -41,16 +41,18 @@ SOURCES = ("service/dropanchor_service/estimation", "service/dropanchor_service/
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     what = parser.add_subparsers(required=True, metavar="WHAT", dest="what")
     paper = what.add_parser("paper", help="the experiments of the paper")
-    paper.add_argument("--out", type=Path, default=Path("report"), metavar="DIR", help="where to write (report)")
-    paper.add_argument("--quick", action="store_true", help="few seeds: shows that it runs, not how good it is")
+    paper.add_argument(
+        "--out", type=Path, default=Path("report"), metavar="DIR", help="output folder (default: report)"
+    )
+    paper.add_argument("--quick", action="store_true", help="few seeds: a test that it runs, not of its accuracy")
     _add_into(paper)
     _add_common(paper)
     real = what.add_parser("recordings", help="real recordings with ground truth")
     real.add_argument("--plaza", action="store_true", help="the Plaza sets of the package gtsam")
-    real.add_argument("--out", type=Path, metavar="DIR", help="write a report there, too")
+    real.add_argument("--out", type=Path, metavar="DIR", help="also write a report to this folder")
     _add_into(real)
     _add_common(real)
-    product.add_arguments(what.add_parser("product", help="the whole engine on what tags send"))
+    product.add_arguments(what.add_parser("product", help="the whole engine on the samples of tags"))
     _add_common(what.choices["product"])
 
 
@@ -64,15 +66,20 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path(os.environ.get("DROPANCHOR_DATA", DATA)),
         metavar="DIR",
-        help=f"folder with recordings ($DROPANCHOR_DATA, else {DATA})",
+        help=f"folder of recordings (default: $DROPANCHOR_DATA or {DATA})",
     )
     parser.add_argument(
-        "--processes", "--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="(one per core)"
+        "--processes",
+        "--jobs",
+        type=int,
+        default=os.cpu_count() or 1,
+        metavar="N",
+        help="number of processes (default: one per core)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it ran to the end, 2 when recordings cannot be used or nothing can be written, 130 on Ctrl-C."""
+    """Run an evaluation. Return 0 on success, 2 if recordings are unusable or nothing can be written, 130 on Ctrl-C."""
     try:
         return {"paper": _paper, "recordings": _recordings, "product": product.run}[arguments.what](arguments)
     except (RecordingError, NoRowError, NoPlaceError, OSError) as error:
@@ -112,7 +119,7 @@ def _recordings(arguments: argparse.Namespace) -> int:
         else:
             folders = recordings.recordings_in(arguments.data)
             if not folders:
-                raise RecordingError(f"{arguments.data} holds no recording with a truth.csv")
+                raise RecordingError(f"{arguments.data} holds no recording with a truth.csv; give a folder with --data")
             todo = Experiment("recordings", len(folders), lambda step: recordings.run(workers, step, folders))
         sections = _run_all([todo])
     for section in sections:

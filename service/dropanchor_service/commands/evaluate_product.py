@@ -1,4 +1,4 @@
-"""`dropanchor evaluate product`: the whole engine on what tags send, as a table."""
+"""`dropanchor evaluate product`: evaluate the whole engine on the samples of tags, as a table."""
 
 import argparse
 from pathlib import Path
@@ -26,17 +26,18 @@ QUICK_SEEDS = range(DEVELOPMENT_SEEDS[0], DEVELOPMENT_SEEDS[0] + 3)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="fewer rows and three development seeds")
     parser.add_argument(
-        "--rows", nargs="+", metavar="PATTERN", help="motion/sensors/told/start, with * and ?; --list shows all"
+        "--rows", nargs="+", metavar="PATTERN", help="motion/sensors/configured/start, with * and ?; --list shows all"
     )
     parser.add_argument(
         "--seeds",
         type=seed_range,
         metavar="A-B",
-        help=f"({SEEDS[0]}-{SEEDS[-1]}); development uses {DEVELOPMENT_SEEDS[0]}-{DEVELOPMENT_SEEDS[-1]} only",
+        help=f"seeds of the runs (default: {SEEDS[0]}-{SEEDS[-1]}); for development use "
+        f"{DEVELOPMENT_SEEDS[0]}-{DEVELOPMENT_SEEDS[-1]} only",
     )
-    parser.add_argument("--list", action="store_true", help="print the names of the rows and stop")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write product.json and product.md there")
-    parser.add_argument("--into", type=Path, metavar="PAGE", help="put the table between its markers in a page")
+    parser.add_argument("--list", action="store_true", help="print the names of the rows and exit")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write product.json and product.md to this folder")
+    parser.add_argument("--into", type=Path, metavar="PAGE", help="write the table between its markers in this page")
 
 
 def seed_range(text: str) -> range:
@@ -51,7 +52,7 @@ def seed_range(text: str) -> range:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Return 0. Raises NoRowError, NoPlaceError, RecordingError and OSError."""
+    """Run the selected rows and return 0. Raises NoRowError, NoPlaceError, RecordingError and OSError."""
     every = [*simulated_rows(), *recorded_rows(arguments.data)]
     rows = selected(every, arguments.rows or (QUICK if arguments.quick and not arguments.list else ()))
     if arguments.list:
@@ -62,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.into:
         require_place(arguments.into, NAME)
     seeds = arguments.seeds or (QUICK_SEEDS if arguments.quick else SEEDS)
-    prepare()  # once, before two processes would compile the same
+    prepare()  # once, so that the processes do not all compile the same kernels
     results: list[Result] = []
     with Workers(arguments.processes) as workers, tqdm(total=len(rows), unit="row") as bar:
         for found in workers.map(work, tasks(rows, seeds)):

@@ -1,4 +1,4 @@
-"""`dropanchor key`: API keys."""
+"""`dropanchor key`: manage API keys."""
 
 import argparse
 import sys
@@ -10,8 +10,9 @@ from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import SCOPES, Scope
 
 DESCRIPTION = """\
-API keys of the REST interface and the page. A key is shown once and kept as a hash. A running service follows within a
-second. read: poses, tags, metrics, the stream; write: also settings of tags and anchors; admin: everything.
+Manages the API keys of the REST interface and the page. A key is shown once and stored as a hash. A running service
+applies changes within a second. Scopes: read allows poses, tags, metrics and the stream; write also allows settings of
+tags and anchors; admin allows everything.
 """
 EPILOG = """\
 examples:
@@ -20,35 +21,35 @@ examples:
   dropanchor key revoke dashboard
   curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
 """
-UNUSABLE = 2
+EXIT_ERROR = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    add = actions.add_parser("add", help="make a key")
-    add.add_argument("name", metavar="NAME", help="who will use it")
-    add.add_argument("--scope", choices=SCOPES, default="read", help="what it allows (default: %(default)s)")
-    add.add_argument("--days", type=positive, metavar="N", help="it expires after so long (default: never)")
-    revoke = actions.add_parser("revoke", help="take a key back")
+    add = actions.add_parser("add", help="create a key")
+    add.add_argument("name", metavar="NAME", help="name of the user or program")
+    add.add_argument("--scope", choices=SCOPES, default="read", help="what the key allows (default: %(default)s)")
+    add.add_argument("--days", type=positive, metavar="N", help="days until the key expires (default: never)")
+    revoke = actions.add_parser("revoke", help="revoke a key")
     revoke.add_argument("name", metavar="NAME")
-    listed = actions.add_parser("list", help="the keys, without their secrets")
+    listed = actions.add_parser("list", help="list the keys, without their secrets")
     for action in (add, revoke, listed):
         add_folder_option(action)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0, or 2 when nothing could be done."""
+    """Run the action. Return 0, or 2 on an error."""
     try:
         keys = ApiKeys(SecurityFolder.open(arguments.security).path)
         {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](keys, arguments)
     except (SecurityError, ApiKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor key: {error}\n")
-        return UNUSABLE
+        return EXIT_ERROR
     return 0
 
 
 def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
-    """The key alone goes to standard output, so that a script can take it."""
+    """Add a key. Only the key goes to standard output, so that a script can read it."""
     print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
     sys.stderr.write("The key above is shown once. Send it as: Authorization: Bearer KEY\n")
 

@@ -1,4 +1,4 @@
-"""Options that several commands have, and the settings they make."""
+"""Options shared by several commands, and the settings built from them."""
 
 import argparse
 from pathlib import Path
@@ -9,22 +9,24 @@ from dropanchor_service.settings.sources import load_settings
 
 
 def add_service_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings (TOML); options given here win over it")
-    parser.add_argument("--host", help="address of the page and the REST interface (127.0.0.1)")
-    parser.add_argument("--port", type=int, help="its port (8080); 0 takes any free one")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML); options override it")
+    parser.add_argument("--host", help="address of the page and the REST interface (default: 127.0.0.1)")
+    parser.add_argument("--port", type=int, help="port of the page and the REST interface (default: 8080); 0: any free")
     zenoh = parser.add_mutually_exclusive_group()
     zenoh.add_argument(
-        "--zenoh-listen", metavar="ENDPOINT", help="where our own Zenoh router listens (tcp/127.0.0.1:7447)"
+        "--zenoh-listen", metavar="ENDPOINT", help="endpoint of the built-in Zenoh router (default: tcp/127.0.0.1:7447)"
     )
-    zenoh.add_argument("--zenoh-connect", metavar="ENDPOINT", help="use the Zenoh router there, start none")
-    parser.add_argument("--engine", metavar="NAME", help="the estimator: fleet (default) or paper")
-    parser.add_argument("--data-dir", metavar="FOLDER", help="keep changes made over REST here")
+    zenoh.add_argument("--zenoh-connect", metavar="ENDPOINT", help="connect to this Zenoh router and start none")
+    parser.add_argument("--engine", metavar="NAME", help="estimator: fleet (default) or paper")
+    parser.add_argument(
+        "--data-dir", metavar="FOLDER", help="folder for changes made over REST, history and recordings"
+    )
     add_security_options(parser)
     add_log_option(parser)
 
 
 def add_security_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--security", metavar="FOLDER", help="credentials made by `dropanchor security init`")
+    parser.add_argument("--security", metavar="FOLDER", help="folder of credentials from `dropanchor security init`")
     parser.add_argument(
         "--insecure", action="store_true", default=None, help="listen beyond the loopback without credentials"
     )
@@ -42,7 +44,7 @@ def positive(text: str) -> int:
 
 
 def settings_of(arguments: argparse.Namespace, **more: Any) -> Settings:
-    """Raises SettingsError."""
+    """Return the settings from the options, the environment and the settings file. Raises SettingsError."""
     options: dict[str, Any] = {
         "http": _given(host=arguments.host, port=arguments.port),
         "zenoh": _given(listen=arguments.zenoh_listen, connect=arguments.zenoh_connect),
@@ -54,7 +56,7 @@ def settings_of(arguments: argparse.Namespace, **more: Any) -> Settings:
 
 
 def router_settings(arguments: argparse.Namespace) -> Settings:
-    """Of a router alone: the settings of everything else do not matter. Raises SettingsError."""
+    """Return the settings of a separate router; all others keep their defaults. Raises SettingsError."""
     options = {
         "http": {"host": "127.0.0.1"},
         "zenoh": {"connect": []} | _given(listen=arguments.zenoh_listen),

@@ -1,4 +1,4 @@
-"""`dropanchor record`: recordings of a service that runs, over its REST interface."""
+"""`dropanchor record`: control the recordings of a running service over its REST interface."""
 
 import argparse
 import json
@@ -15,9 +15,9 @@ from urllib.request import Request, urlopen
 
 KEY_VARIABLE = "DROPANCHOR_API_KEY"
 DESCRIPTION = f"""\
-Starts and stops the recording of raw samples and poses by a service that runs with a `data_dir`, lists the files and
-fetches them. They are MCAP: Foxglove and Lichtblick open them, `dropanchor replay` runs them again. Where the service
-wants an API key it is taken from ${KEY_VARIABLE}.
+Starts and stops recordings of raw samples and poses, lists the files and downloads them. The service must run with a
+`data_dir`. The files are MCAP: open them in Foxglove or Lichtblick, or replay them with `dropanchor replay`. If the
+service requires an API key, set the environment variable {KEY_VARIABLE}.
 """
 EPILOG = """\
 examples:
@@ -27,35 +27,35 @@ examples:
   dropanchor record list
   dropanchor record fetch yard-20270115T080000-000000Z.mcap
 """
-UNUSABLE = 2
+EXIT_ERROR = 2
 TIMEOUT_S = 30.0
 
 
 class RefusedError(Exception):
-    """The service does not do it, or does not answer; the message says why."""
+    """The service rejected the request or did not answer. The message says why."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    start = actions.add_parser("start", help="record from now on")
-    start.add_argument("tags", metavar="TAG", nargs="*", help="only these (all)")
-    stop = actions.add_parser("stop", help="record no longer")
-    listed = actions.add_parser("list", help="what is recorded, and the files")
-    fetch = actions.add_parser("fetch", help="get a file")
+    start = actions.add_parser("start", help="start a recording")
+    start.add_argument("tags", metavar="TAG", nargs="*", help="tags to record (default: all)")
+    stop = actions.add_parser("stop", help="stop the recording")
+    listed = actions.add_parser("list", help="list the files and the state of the recording")
+    fetch = actions.add_parser("fetch", help="download a file")
     fetch.add_argument("name", metavar="NAME")
-    fetch.add_argument("--out", type=Path, metavar="FILE", help="where to write it (NAME in this folder)")
+    fetch.add_argument("--out", type=Path, metavar="FILE", help="output file (default: NAME in the current folder)")
     for action in (start, stop, listed, fetch):
-        action.add_argument("--url", default="http://127.0.0.1:8080", help="of the service (%(default)s)")
-        action.add_argument("--ca", type=Path, metavar="FILE", help="certificate to know it by, with https")
+        action.add_argument("--url", default="http://127.0.0.1:8080", help="URL of the service (default: %(default)s)")
+        action.add_argument("--ca", type=Path, metavar="FILE", help="CA certificate of the service, for https")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0, or 2 when nothing could be done."""
+    """Run the action. Return 0, or 2 on an error."""
     try:
         {"start": _start, "stop": _stop, "list": _list, "fetch": _fetch}[arguments.action](arguments)
     except (RefusedError, OSError) as error:
         sys.stderr.write(f"dropanchor record: {error}\n")
-        return UNUSABLE
+        return EXIT_ERROR
     return 0
 
 
@@ -102,7 +102,8 @@ def _opened(arguments: argparse.Namespace, method: str, path: str, body: Any = N
         with error:
             raise RefusedError(_reason(error)) from error
     except (URLError, HTTPException, ValueError) as error:
-        raise RefusedError(f"{arguments.url} does not answer: {getattr(error, 'reason', error)}") from error
+        reason = getattr(error, "reason", error)
+        raise RefusedError(f"{arguments.url} does not answer ({reason}): check --url and that it runs") from error
     return answer
 
 

@@ -1,4 +1,4 @@
-"""A recording as the tag of the demo: its anchors, what an operator knows of the tag, and files to replay."""
+"""A recording as the tag of the demo: its anchors, the operator's settings of the tag, and the files to replay."""
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,32 +17,32 @@ from dropanchor_tag_client.recording import Recording, RecordingError, read_reco
 
 
 @dataclass(frozen=True)
-class Recorded:
-    """name: of the recording and of its tag; folder: where it can be replayed from."""
+class RecordedTag:
+    """The tag of a recording. name: of the recording and the tag. folder: files that `dropanchor-tag replay` reads."""
 
     name: str
     folder: Path
     anchors: list[Anchor]
     tag: TagSettings
 
-    def into(self, settings: Settings) -> Settings:
-        """The settings with its anchors and its tag; a tag of that name that they have already stays as it is."""
+    def add_to(self, settings: Settings) -> Settings:
+        """Return the settings with the recording's anchors and tag. They keep a tag that they already have."""
         site = settings.site.model_copy(update={"anchors": self.anchors})
         return settings.model_copy(update={"site": site, "tags": {self.name: self.tag} | dict(settings.tags)})
 
 
 @contextmanager
-def recorded(name: str) -> Iterator[Recorded]:
-    """plaza1, plaza2, or the folder of a recording. Raises RecordingError."""
+def recorded_tag(name: str) -> Iterator[RecordedTag]:
+    """Provide the tag of `plaza1`, `plaza2` or the folder of a recording. Raises RecordingError."""
     if name not in FILES:
         recording = read_recording(name)
-        yield Recorded(recording.name, Path(name), _anchors(recording), _tag(recording))
+        yield RecordedTag(recording.name, Path(name), _anchors(recording), _tag(recording))
         return
     plaza = read_plaza(name)
     with TemporaryDirectory() as folder:
         _write(plaza, Path(folder))
-        known = {"range_scale": PLAZA_SCALE, "range_std_m": PLAZA_STD}
-        yield Recorded(name, Path(folder), _anchors(plaza), _tag(plaza).model_copy(update=known))
+        calibration = {"range_scale": PLAZA_SCALE, "range_std_m": PLAZA_STD}
+        yield RecordedTag(name, Path(folder), _anchors(plaza), _tag(plaza).model_copy(update=calibration))
 
 
 def _anchors(recording: Recording) -> list[Anchor]:
@@ -50,7 +50,7 @@ def _anchors(recording: Recording) -> list[Anchor]:
 
 
 def _tag(recording: Recording) -> TagSettings:
-    """The start at the first range, with its heading, and the mean height, where there is a truth."""
+    """Return the true start pose at the first range and the mean height, or defaults without a truth."""
     truth = {name: np.asarray(column) for name, column in recording.truth.items()}
     if not len(truth["t_s"]):
         return TagSettings()
@@ -64,7 +64,7 @@ def _tag(recording: Recording) -> TagSettings:
 
 
 def _write(recording: Recording, folder: Path) -> None:
-    """What a replay needs: anchors, ranges and headings."""
+    """Write the files that a replay needs: anchors, ranges and headings."""
     ranges, headings = recording.ranges, recording.headings
     ids, x, y, z = zip(*((a.id, a.x, a.y, a.z) for a in recording.anchors), strict=True)
     _table(folder / "anchors.csv", {"id": ids, "x": x, "y": y, "z": z})

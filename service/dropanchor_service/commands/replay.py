@@ -1,4 +1,4 @@
-"""`dropanchor replay`: an engine on a recording, with a report where the recording knows the truth."""
+"""`dropanchor replay`: run an engine on a recording, and report its error if the recording has a truth."""
 
 import argparse
 import csv
@@ -31,11 +31,11 @@ from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
 
 DESCRIPTION = """\
-Runs the same engine as the service on a recording, as fast as it can, and reports the error where the recording
-brings the truth. A recording is a folder with range.csv and anchors.csv, and imu.csv, heading.csv and truth.csv where
-there are any (plain or gzipped). x and y are in the coordinates of anchors.csv.
-Or it is a file that the service has recorded, or a folder of them (MCAP): then all tags run as they did, with the site
-and the settings of the recording; --engine, --config and --out are what can be chosen.
+Runs the engine of the service on a recording, as fast as possible, and reports its error if the recording has a truth.
+A recording is a folder with range.csv and anchors.csv, and optionally imu.csv, heading.csv and truth.csv (plain or
+gzipped). x and y are in the coordinates of anchors.csv.
+A recording can also be an MCAP file from the service, or a folder of such files. All its tags then run with the site
+and the settings of the recording; only --engine, --config and --out can be given.
 """
 EPILOG = """\
 examples:
@@ -43,7 +43,7 @@ examples:
   dropanchor replay recordings/yard --anchor 1 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
   dropanchor replay recordings/yard --anchor 1 --start=10,0 --smooth --out track.csv
   dropanchor replay yard-20270115T080000-000000Z.mcap --out poses.csv
-  dropanchor-tag simulate --out recordings/yard      makes a recording with truth to try it on
+  dropanchor-tag simulate --out recordings/yard      creates a recording with truth to try it on
 """
 LAG_S, MAX_LAG_S = 2.0, 60.0
 COLUMNS = ("t_s", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
@@ -56,60 +56,66 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--anchor",
         action="append",
         metavar="ID",
-        help="anchor whose ranges are used; the recording's only one if left out",
+        help="use the ranges of this anchor; may be repeated; needed if the recording has several anchors",
     )
     add("--engine", metavar="NAME", help="estimator: fleet (default) or paper")
     add(
         "--start",
         type=_start,
         metavar="X,Y[,HEADING]",
-        help="where the tag is at first: m, m, rad counter-clockwise from east; unknown if left out",
+        help="start of the tag: m, m, rad counter-clockwise from east (default: unknown)",
     )
     add(
         "--heading",
         choices=("auto", "imu", "platform"),
         default="auto",
-        help="heading from our attitude filter on the IMU, or from heading.csv (default: the IMU where there is one)",
+        help="source of the heading: the IMU, or heading.csv (default: auto, the IMU if the recording has one)",
     )
-    known = parser.add_argument_group("what an operator knows (measured range = scale · distance + bias)")
+    known = parser.add_argument_group("settings of the tag (measured range = scale · distance + bias)")
     known.add_argument("--tag-height", type=float, default=0.0, metavar="M", help="on the z axis of anchors.csv (0)")
     known.add_argument("--range-std", type=float, metavar="M", help="standard deviation of one range")
     known.add_argument("--range-bias", type=float, default=0.0, metavar="M")
-    known.add_argument("--range-bias-std", type=float, metavar="M", help="how well the bias is known; 0: exactly")
+    known.add_argument("--range-bias-std", type=float, metavar="M", help="standard deviation of the bias; 0: exact")
     known.add_argument("--range-scale", type=float, default=1.0, metavar="K")
     known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
-    known.add_argument("--mount-angle-std", type=float, metavar="RAD", help="how well that is known; 0: exactly")
+    known.add_argument("--mount-angle-std", type=float, metavar="RAD", help="standard deviation of that; 0: exact")
     known.add_argument(
-        "--lever-forward", type=float, default=0.0, metavar="M", help="tag before what follows the course"
+        "--lever-forward",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="distance of the tag in front of the point that follows the course",
     )
-    known.add_argument("--lever-left", type=float, default=0.0, metavar="M", help="and to the left of it")
-    known.add_argument("--slip-std", type=float, metavar="RAD", help="of the direction of travel about that; 0: none")
-    known.add_argument("--heading-std", type=float, metavar="RAD", help="of a platform's heading that does not drift")
-    known.add_argument("--speed-max", type=float, metavar="M/S", help="it never moves faster")
+    known.add_argument("--lever-left", type=float, default=0.0, metavar="M", help="distance to the left of that point")
+    known.add_argument("--slip-std", type=float, metavar="RAD", help="standard deviation of the slip angle; 0: no slip")
+    known.add_argument(
+        "--heading-std", type=float, metavar="RAD", help="error of a platform heading that does not drift"
+    )
+    known.add_argument("--speed-max", type=float, metavar="M/S", help="top speed of the tag")
     known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
-    smoothing = parser.add_argument_group("smoothing (engine fleet): each pose is estimated from later samples too")
-    smoothing.add_argument("--smooth", action="store_true", help="from all samples of the recording")
+    smoothing = parser.add_argument_group("smoothing (engine fleet): estimate each pose from later samples too")
+    smoothing.add_argument("--smooth", action="store_true", help="use all samples of the recording")
     smoothing.add_argument(
         "--lag",
         type=_lag,
         nargs="?",
         const=LAG_S,
         metavar="S",
-        help=f"with --smooth: only from samples up to S seconds after the pose ({LAG_S:g})",
+        help=f"with --smooth: use only samples up to S seconds after the pose ({LAG_S:g})",
     )
-    add("--out", type=Path, metavar="CSV", help=f"write the poses: {','.join(COLUMNS)}")
-    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth where there is one")
-    add("--config", type=Path, metavar="FILE", help="settings file of the service, for parameters of the engine")
+    add("--out", type=Path, metavar="CSV", help=f"write the poses to this file: {','.join(COLUMNS)}")
+    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth if there is one")
+    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it ran to the end, 2 when recording or options cannot be used, 130 on Ctrl-C."""
+    """Run the replay. Return 0 on success, 2 if the recording or the options are unusable, 130 on Ctrl-C."""
     if arguments.plot:
-        import_module("dropanchor_service.evaluation.track_plot")  # what is missing is told before the work, not after
+        import_module("dropanchor_service.evaluation.track_plot")  # fails early if matplotlib is missing
     try:
         files = files_of(arguments.recording)
         if files:
-            _refuse_what_the_files_know(arguments)
+            _reject_options_of_folders(arguments)
             return replay_files(arguments, files)
         recording = read_recording(arguments.recording)
         anchors = arguments.anchor or _only_anchor(recording)
@@ -124,13 +130,14 @@ def run(arguments: argparse.Namespace) -> int:
         return 130
 
 
-def _refuse_what_the_files_know(arguments: argparse.Namespace) -> None:
+def _reject_options_of_folders(arguments: argparse.Namespace) -> None:
+    """Raise SettingsError for an option that an MCAP recording itself defines."""
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     defaults = parser.parse_args([str(arguments.recording)])
     for name, default in vars(defaults).items():
         if name not in ("engine", "out", "config") and getattr(arguments, name) != default:
-            raise SettingsError(f"--{name.replace('_', '-')}: an MCAP recording knows that by itself")
+            raise SettingsError(f"--{name.replace('_', '-')} cannot be given: the MCAP recording defines it")
 
 
 def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples) -> Track:
@@ -148,7 +155,7 @@ def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples
 
 def _engine(arguments: argparse.Namespace) -> Engine:
     if arguments.lag is not None and not arguments.smooth:
-        raise SettingsError("--lag says how far --smooth may look ahead: give both")
+        raise SettingsError("--lag limits --smooth: give both")
     settings = load_settings(arguments.config, {"engine": arguments.engine} if arguments.engine else None)
     if not arguments.smooth:
         return create_engine(settings)
@@ -208,7 +215,7 @@ def _conclude(
 
 
 def _advice(arguments: argparse.Namespace) -> str:
-    return "" if arguments.start else "; the engine did not find the start by itself: give --start X,Y,HEADING"
+    return "" if arguments.start else "; the engine did not find the start: give --start X,Y,HEADING"
 
 
 def _report(track: Track, result: Accuracy | None, samples: Samples) -> list[str]:
@@ -229,7 +236,7 @@ def _report(track: Track, result: Accuracy | None, samples: Samples) -> list[str
 
 
 def write_poses(path: Path, track: Track) -> None:
-    """One row per range; numbers that are not known are `nan`. Raises OSError."""
+    """Write one row per pose. An unknown number is `nan`. Raises OSError."""
     poses = track.poses
     cov = poses["cov"]
     columns = [track.t, *(poses[name] for name in ("x", "y", "heading", "speed"))]
@@ -264,6 +271,6 @@ def _lag(text: str) -> float:
 
 def _only_anchor(recording: Recording) -> list[str]:
     if len(recording.anchors) > 1:
-        known = ", ".join(anchor.id for anchor in recording.anchors)
-        raise RecordingError(f"recording {recording.name} has several anchors, choose one with --anchor: {known}")
+        ids = ", ".join(anchor.id for anchor in recording.anchors)
+        raise RecordingError(f"recording {recording.name} has several anchors, choose one with --anchor: {ids}")
     return [recording.anchors[0].id]

@@ -1,4 +1,4 @@
-"""`dropanchor replay` of MCAP recordings: all tags, through the same ingest and engine as live."""
+"""`dropanchor replay` of MCAP recordings: run all tags through the same ingest and engine as live."""
 
 import argparse
 import csv
@@ -24,22 +24,22 @@ from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client.recording import RecordingError
 
 COLUMNS = ("tag", "t_ns", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
-SAME_M = 1e-9
+TOLERANCE_M = 1e-9
 Write = Callable[[Iterable[list[Any]]], None]
-MOST_WAITING = 100_000  # poses that wait for what was recorded of them
+MAX_PENDING = 100_000  # poses that wait for the recorded estimates of the same times
 
 
 def files_of(path: Path) -> list[Path]:
-    """A file, or the files of a folder in order of time; empty when it is something else."""
+    """Return the path of a file, or the MCAP files of a folder in order of time; empty if there are none."""
     if path.is_file():
         return [path]
     return sorted(path.glob("*.mcap")) if path.is_dir() else []
 
 
 def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
-    """0 when it ran to the end. Raises RecordingError, SettingsError, OSError."""
+    """Replay the files and return 0. Raises RecordingError, SettingsError, OSError."""
     with ExitStack() as stack:
-        write: Write = _nowhere
+        write: Write = _discard
         if arguments.out:
             writer = csv.writer(stack.enter_context(arguments.out.open("w", newline="")))
             writer.writerow(COLUMNS)
@@ -51,12 +51,12 @@ def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
     return 0
 
 
-def _nowhere(_: Iterable[list[Any]]) -> None:
+def _discard(_: Iterable[list[Any]]) -> None:
     pass
 
 
 def _session(file: Path) -> str:
-    """Of the recording that the file is a part of: another one begins with estimators of its own."""
+    """Return the session of the recording that the file belongs to. Each session starts with new estimators."""
     reader = RecordingReader(file)
     next(reader.turns(), None)
     return reader.metadata.get(SESSION, file.name)
@@ -68,7 +68,7 @@ def _replay_session(
     turns = (turn for reader in readers for turn in reader.turns())
     first = next(turns, None)
     if first is None or first.site is None:
-        raise RecordingError(f"{readers[0].path} holds nothing")
+        raise RecordingError(f"{readers[0].path} is empty")
     settings = settings_of(readers[0].metadata, load_settings(arguments.config), arguments.engine)
     service, outcome = OfflineService(settings, first.site), Outcome()
     print(f"recorded {_utc(first.t_ns)}, {len(readers)} file(s), engine {settings.engine}")
@@ -86,61 +86,67 @@ def _utc(t_ns: int) -> str:
 
 @dataclass
 class Outcome:
-    """What came out, beside what had come out when it was recorded."""
+    """Statistics of the replayed poses, and their differences from the recorded ones.
+
+    compared: poses with a recorded estimate of the same time. equal: of these, equal within TOLERANCE_M.
+    one_sided: poses whose position is known on one side only. worst_m: largest difference.
+    """
 
     poses: Counter[str] = field(default_factory=Counter)
     states: dict[str, Counter[str]] = field(default_factory=dict)
     compared: int = 0
     equal: int = 0
-    placed_once: int = 0
+    one_sided: int = 0
     worst_m: float = 0.0
-    _places: dict[tuple[str, int], tuple[float, float]] = field(default_factory=dict)
+    _positions: dict[tuple[str, int], tuple[float, float]] = field(default_factory=dict)
     _estimates: list[tuple[str, int, float, float]] = field(default_factory=list)
 
     def add(self, turn: Turn, tags: Sequence[str], poses: Array) -> None:
-        """Poses may come out a turn earlier or later than they did, so both wait for each other."""
+        """Add the poses of a turn. A pose may come a turn earlier or later than recorded, so both sides are kept."""
         for tag, t_ns, x, y, state in zip(
             tags, *(poses[name].tolist() for name in ("t_ns", "x", "y", "state")), strict=True
         ):
             self.poses[tag] += 1
             self.states.setdefault(tag, Counter())[State(state).name.lower()] += 1
-            self._places[tag, t_ns] = (x, y)
+            self._positions[tag, t_ns] = (x, y)
         for tag, estimate in turn.estimates:
             x, y = (estimate.get(name, math.nan) for name in ("x", "y"))
             self._estimates.append((tag, estimate["t_ns"], x, y))
-        if len(self._places) > MOST_WAITING:
+        if len(self._positions) > MAX_PENDING:
             self._compare()
 
     def lines(self) -> Iterator[str]:
+        """Yield the lines of the report."""
         self._compare()
         for tag, count in sorted(self.poses.items()):
             shares = ", ".join(f"{state} {n / count:.1%}" for state, n in self.states[tag].most_common())
             yield f"{tag}: {count} poses, {shares}"
         if self.compared:
-            equal = f"{self.compared} compared, {self.equal} the same within a nanometre"
+            equal = f"{self.compared} compared, {self.equal} equal within a nanometre"
             yield f"recorded poses: {equal}, worst difference {self.worst_m:.3g} m"
-        if self.placed_once:
+        if self.one_sided:
             yield (
-                f"recorded poses: {self.placed_once} not compared, for their position is known either in the recording "
-                "or in this replay only: a recording that was begun while tags were running has fresh estimators here"
+                f"recorded poses: {self.one_sided} not compared, because only the recording or only the replay has a "
+                "position. This is normal if tags were already running when the recording started: the replay starts "
+                "with new estimators"
             )
 
     def _compare(self) -> None:
-        left = []
+        pending = []
         for tag, t_ns, x, y in self._estimates:
-            place = self._places.get((tag, t_ns))
-            if place is None:
-                left.append((tag, t_ns, x, y))
+            position = self._positions.get((tag, t_ns))
+            if position is None:
+                pending.append((tag, t_ns, x, y))
                 continue
-            if math.isnan(x) != math.isnan(place[0]):
-                self.placed_once += 1
+            if math.isnan(x) != math.isnan(position[0]):
+                self.one_sided += 1
                 continue
             self.compared += 1
-            off_m = 0.0 if math.isnan(x) else math.hypot(place[0] - x, place[1] - y)
-            self.equal += off_m <= SAME_M
-            self.worst_m = max(self.worst_m, off_m)
-        self._estimates = left[-MOST_WAITING:]
-        self._places.clear()
+            difference_m = 0.0 if math.isnan(x) else math.hypot(position[0] - x, position[1] - y)
+            self.equal += difference_m <= TOLERANCE_M
+            self.worst_m = max(self.worst_m, difference_m)
+        self._estimates = pending[-MAX_PENDING:]
+        self._positions.clear()
 
 
 def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:
@@ -152,10 +158,14 @@ def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:
 
 
 def _rejections(service: OfflineService, readers: Sequence[RecordingReader]) -> Iterator[str]:
-    counts = {reason: int(service.metrics.rejected.labels(reason)._value.get()) for reason in Reason}
-    refused = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
-    if refused:
-        yield f"not used: {refused}"
+    registry = service.metrics.registry
+    counts = {
+        reason: int(registry.get_sample_value("dropanchor_rejected_total", {"reason": reason}) or 0)
+        for reason in Reason
+    }
+    rejected = ", ".join(f"{count} {reason}" for reason, count in counts.items() if count)
+    if rejected:
+        yield f"not used: {rejected}"
     for reader in readers:
         if reader.read_error is not None:
-            print(f"{reader.path} ends before its end ({reader.read_error}): the rest of it is lost", file=sys.stderr)
+            print(f"{reader.path} is truncated ({reader.read_error}): the rest of it is lost", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""`dropanchor router`: a Zenoh router alone, so that it and the service can be restarted one by one."""
+"""`dropanchor router`: run a separate Zenoh router, so that it and the service can be restarted independently."""
 
 import argparse
 import logging
@@ -12,7 +12,7 @@ from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
 from dropanchor_service.zenoh_io.session import ZenohError, listening_at, open_session
 
-DESCRIPTION = "Runs a Zenoh router until Ctrl-C or SIGTERM. Tags and services connect to it."
+DESCRIPTION = "Runs a Zenoh router for tags and services until Ctrl-C or SIGTERM."
 EPILOG = """\
 examples:
   dropanchor router
@@ -25,13 +25,15 @@ _log = logging.getLogger(__name__)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--zenoh-listen", metavar="ENDPOINT", help="where it listens (tcp/127.0.0.1:7447)")
+    parser.add_argument(
+        "--zenoh-listen", metavar="ENDPOINT", help="endpoint of the router (default: tcp/127.0.0.1:7447)"
+    )
     add_security_options(parser)
     add_log_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it was stopped, 2 when it could not start."""
+    """Run the router. Return 0 if it was stopped, 2 if it could not start."""
     logs.configure(arguments.log_level)
     open_files.raise_limit()
     try:

@@ -1,4 +1,4 @@
-"""`dropanchor security`: the credentials of a site."""
+"""`dropanchor security`: create and renew the credentials of a site."""
 
 import argparse
 import ipaddress
@@ -13,9 +13,9 @@ from dropanchor_service.commands.options import positive
 from dropanchor_service.security.folder import SecurityError, SecurityFolder, Table
 
 DESCRIPTION = """\
-Makes the credentials of a site, in a folder: a certificate authority (ca), certificates for router, service and reader,
-and a router configuration by which every tag may speak for itself alone. Nothing is ever overwritten.
-Keep the folder to yourself; ca.key is needed only to add tags and may be kept elsewhere meanwhile.
+Creates a folder with the credentials of a site: a certificate authority (ca), certificates for router, service and
+reader, and a router configuration that allows each tag to publish only its own samples. It never overwrites a file.
+Keep the folder private. Only adding tags needs ca.key, so you can store it elsewhere in between.
 """
 EPILOG = """\
 examples:
@@ -25,12 +25,12 @@ examples:
 """
 FOLDER = Path("security")
 DAYS = 730
-UNUSABLE = 2
+EXIT_ERROR = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    init = actions.add_parser("init", help="make them", description=DESCRIPTION, epilog=EPILOG)
+    init = actions.add_parser("init", help="create the credentials", description=DESCRIPTION, epilog=EPILOG)
     init.formatter_class = argparse.RawDescriptionHelpFormatter
     add_folder_option(init)
     init.add_argument("--site", default="default", help="id of the site (default: %(default)s)")
@@ -39,42 +39,48 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="name or address by which tags and browsers reach this machine; may be repeated",
+        help="name or address of this machine for tags and browsers; may be repeated",
     )
     init.add_argument(
         "--listen",
         default="tls/0.0.0.0:7447",
         metavar="ENDPOINT",
-        help="where the router listens (default: %(default)s)",
+        help="endpoint of the router (default: %(default)s)",
     )
     add_days_option(init)
-    renew = actions.add_parser(
-        "renew", help="new certificates of router, service and reader, before the old ones expire"
-    )
+    renew = actions.add_parser("renew", help="renew the certificates of router, service and reader before they expire")
     add_folder_option(renew)
-    renew.add_argument("--host", action="append", default=[], metavar="NAME", help="one more, as with init")
+    renew.add_argument("--host", action="append", default=[], metavar="NAME", help="an additional name, as with init")
     add_days_option(renew)
 
 
 def add_folder_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--security", type=Path, default=FOLDER, metavar="FOLDER", help="the credentials (default: ./%(default)s)"
+        "--security",
+        type=Path,
+        default=FOLDER,
+        metavar="FOLDER",
+        help="folder of the credentials (default: ./%(default)s)",
     )
 
 
 def add_days_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--days", type=positive, default=DAYS, metavar="N", help="certificates are valid for so long (%(default)s)"
+        "--days",
+        type=positive,
+        default=DAYS,
+        metavar="N",
+        help="days until the certificates expire (default: %(default)s)",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0, or 2 when nothing was made."""
+    """Run the action. Return 0, or 2 on an error."""
     try:
         {"init": _init, "renew": _renew}[arguments.action](arguments)
     except (SecurityError, InvalidKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor security: {error}\n")
-        return UNUSABLE
+        return EXIT_ERROR
     return 0
 
 
@@ -90,11 +96,11 @@ def _renew(arguments: argparse.Namespace) -> None:
     folder = SecurityFolder.open(arguments.security)
     folder.renew(_checked(arguments.host), arguments.days)
     print(f"Router, service and reader have new certificates for {', '.join(folder.table.hosts)}.")
-    print("In force after a restart of each. Tags keep theirs: dropanchor tag add NAME --renew")
+    print("Restart each of them to use the new certificates. To renew a tag's: dropanchor tag add NAME --renew")
 
 
 def _hosts(given: list[str]) -> tuple[str, ...]:
-    """Those that were given first: a tag is told to connect to the first one."""
+    """Return all host names, the given ones first: tags connect to the first one."""
     return tuple(dict.fromkeys([*_checked(given), socket.gethostname(), "localhost", "127.0.0.1", "::1"]))
 
 
@@ -117,11 +123,11 @@ def _next_steps(folder: Path, table: Table) -> str:
     site = table.site
     of_site = "" if site == "default" else f"\n     (with [site] id = {site!r} in its settings)"
     return f"""\
-The credentials of site {site!r} are in {folder}/. The certificates are good for: {", ".join(table.hosts)}.
-Next:
+The credentials of site {site!r} are in {folder}/. The certificates are valid for: {", ".join(table.hosts)}.
+Next steps:
   1. a tag:      dropanchor tag add NAME --security {folder}
-                 and give the folder {folder}/tags/NAME to it, over a channel that you trust
-  2. the router: dropanchor router --security {folder}        again after tags were added or revoked
+                 then copy the folder {folder}/tags/NAME to the tag over a trusted channel
+  2. the router: dropanchor router --security {folder}        restart it after tags were added or revoked
   3. the service: dropanchor serve --security {folder} --zenoh-connect {reachable_endpoint(table.listen[0])}{of_site}
   4. the page and REST (https, with the certificate {folder}/ca.pem): dropanchor key add NAME --security {folder}
 """

@@ -1,4 +1,4 @@
-"""`dropanchor serve`: the service until it is stopped."""
+"""`dropanchor serve`: run the service until it is stopped."""
 
 import argparse
 import gc
@@ -16,8 +16,8 @@ from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.session import ZenohError
 
 DESCRIPTION = """\
-Runs the service until Ctrl-C or SIGTERM. Without settings: site `default`, a Zenoh router of its own on the loopback,
-the first anchor that is heard becomes the origin, and every tag that is heard gets a track.
+Runs the service until Ctrl-C or SIGTERM. Without settings, the site is `default`, a built-in Zenoh router listens on
+the loopback, the anchor of the first range becomes the origin, and every tag that sends samples gets a track.
 """
 EPILOG = """\
 examples:
@@ -35,10 +35,11 @@ a settings file:
   height_m = 1.2
   start = { x = 10.0, y = 0.0, heading_rad = 1.57 }
 """
-GARBAGE = 10_000, 20, 20  # more objects until there is a look for cycles: messages are thousands of tuples, in none
-SWITCH_S = 0.0005  # that a thread which waits for the interpreter lets another one go on: poses are asked for meanwhile
-UNUSABLE = 2
-DIED = 1
+# The garbage collector runs less often: messages are thousands of tuples without reference cycles.
+GC_THRESHOLD = 10_000, 20, 20
+SWITCH_INTERVAL_S = 0.0005  # threads yield the interpreter soon, so that queries do not wait for the engine
+EXIT_ERROR = 2
+EXIT_DIED = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,27 +47,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0 when it was stopped, 1 when it died, 2 when it could not start."""
+    """Run the service. Return 0 if it was stopped, 1 if it died, 2 if it could not start."""
     logs.configure(arguments.log_level)
     open_files.raise_limit()
-    gc.set_threshold(*GARBAGE)
-    sys.setswitchinterval(SWITCH_S)
+    gc.set_threshold(*GC_THRESHOLD)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     systemd = Systemd()
     try:
         with interrupts() as interrupt:
-            with interrupt.raising():  # it may have to compile the estimator
-                made = Service(settings_of(arguments))
-            with made as service:
+            with interrupt.raising():  # the service may have to compile the estimator
+                created = Service(settings_of(arguments))
+            with created as service:
                 systemd.ready()
                 heap = HeapTrimmer()
-                stopped = interrupt.wait(lambda: goes_on(service, systemd, heap))
+                stopped = interrupt.wait(lambda: supervise(service, systemd, heap))
                 systemd.stopping()
     except KeyboardInterrupt:
         return 0
     except (SettingsError, ListenError, ZenohError) as error:
         sys.stderr.write(f"dropanchor serve: {error}\n")
-        return UNUSABLE
-    return 0 if stopped else DIED
+        return EXIT_ERROR
+    return 0 if stopped else EXIT_DIED
 
 
 class Supervised(Protocol):
@@ -77,8 +78,11 @@ class Supervised(Protocol):
     def has_died(self) -> bool: ...
 
 
-def goes_on(service: Supervised, systemd: Systemd, heap: HeapTrimmer) -> bool:
-    """Asked twice a second. A service that is stuck says nothing to systemd, which starts it again."""
+def supervise(service: Supervised, systemd: Systemd, heap: HeapTrimmer) -> bool:
+    """Report progress to systemd and return whether the service still runs. Call this twice a second.
+
+    A service that is stuck reports no progress, so systemd restarts it.
+    """
     if service.makes_progress:
         systemd.progress()
     heap.trim()

@@ -1,4 +1,4 @@
-"""`dropanchor tag`: certificates of tags."""
+"""`dropanchor tag`: issue and revoke the certificates of tags."""
 
 import argparse
 import sys
@@ -9,8 +9,8 @@ from dropanchor_service.commands.security import add_days_option, add_folder_opt
 from dropanchor_service.security.folder import ROUTER_FILE, SecurityError, SecurityFolder
 
 DESCRIPTION = """\
-Gives a tag its certificate, or takes it away, and writes the router's configuration anew. Zenoh reads its access
-control at its start only: restart the router afterwards. Tags and service reconnect by themselves, and nothing is lost.
+Issues or revokes the certificate of a tag and updates the router's configuration. Zenoh reads its access control only
+at the start, so restart the router afterwards. Tags and service reconnect by themselves, and nothing is lost.
 """
 EPILOG = """\
 examples:
@@ -19,37 +19,37 @@ examples:
   dropanchor tag revoke forklift-7
   dropanchor tag list
 """
-UNUSABLE = 2
+EXIT_ERROR = 2
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     add = actions.add_parser("add", help="issue a certificate")
     add.add_argument("name", metavar="NAME", nargs="+", help="id of a tag")
-    add.add_argument("--renew", action="store_true", help="a new certificate for tags that have one")
+    add.add_argument("--renew", action="store_true", help="replace the certificate of tags that have one")
     add_days_option(add)
-    revoke = actions.add_parser("revoke", help="shut a tag out")
+    revoke = actions.add_parser("revoke", help="revoke a certificate")
     revoke.add_argument("name", metavar="NAME", nargs="+", help="id of a tag")
-    listed = actions.add_parser("list", help="who has a certificate")
+    listed = actions.add_parser("list", help="list the tags and their certificates")
     for action in (add, revoke, listed):
         add_folder_option(action)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """0, or 2 when nothing could be done."""
+    """Run the action. Return 0, or 2 on an error."""
     try:
         folder = SecurityFolder.open(arguments.security)
         {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](folder, arguments)
     except (SecurityError, InvalidKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor tag: {error}\n")
-        return UNUSABLE
+        return EXIT_ERROR
     return 0
 
 
 def _add(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
     for name in arguments.name:
         bundle = folder.add_tag(name, arguments.days, arguments.renew)
-        print(f"{name}: give the folder {bundle} to the tag; there: dropanchor-tag publish --credentials {bundle.name}")
+        print(f"{name}: copy the folder {bundle} to the tag, then: dropanchor-tag publish --credentials {bundle.name}")
     print(_restart(folder.path))
 
 
@@ -68,6 +68,6 @@ def _list(folder: SecurityFolder, _arguments: argparse.Namespace) -> None:
 
 def _restart(folder: Path) -> str:
     return (
-        f"{folder / ROUTER_FILE} is written anew. In force after a restart of the router (or of the service, where it "
-        "is its own router)."
+        f"{folder / ROUTER_FILE} is updated. Restart the router to apply it (or the service, if it runs the built-in "
+        "router)."
     )

@@ -1,1 +1,1 @@
-"""Measuring the engines: on recordings with ground truth, and on the experiments of the paper."""
+"""Evaluation of the engines on recordings with ground truth and on the experiments of the paper."""

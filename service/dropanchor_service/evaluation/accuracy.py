@@ -1,4 +1,4 @@
-"""Error of a track against ground truth, and how honest its ellipses and states are."""
+"""Error of a track against ground truth, and the consistency of its ellipses and states."""
 
 from dataclasses import dataclass
 
@@ -21,12 +21,12 @@ class Truth:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Position error in m over the poses that have a position and a truth to compare with.
+    """Position error in m, over the poses with a position and a truth.
 
-    rmse and the quantiles are without any alignment. rmse_rotated: after the best rotation about the anchor, which
-    ranges alone cannot see. ate: after the best rigid motion (Horn 1987), the usual absolute trajectory error.
-    coverage: share of poses whose 95 % ellipse holds the truth. share_of_time: by state, over the whole track.
-    rmse_tracking: of the poses in state tracking alone, NaN without any.
+    rmse and the quantiles are without alignment. rmse_rotated: after the best rotation about the anchor, which ranges
+    alone cannot observe. ate: absolute trajectory error, after the best rigid motion (Horn 1987).
+    coverage: share of poses whose 95 % ellipse contains the truth. share_of_time: by state, over the whole track.
+    rmse_tracking: RMSE of the poses in state tracking; NaN without any.
     """
 
     compared: int
@@ -43,7 +43,7 @@ class Accuracy:
 
 
 def truth_at(truth: Truth, t: Array) -> tuple[Array, Array]:
-    """x and y of the truth at the times t (n,), by linear interpolation; NaN outside it and in gaps of > 1 s."""
+    """Return x and y of the truth at the times t (n,) by linear interpolation; NaN outside it and in gaps > 1 s."""
     after = np.clip(np.searchsorted(truth.t, t), 1, len(truth.t) - 1)
     bridged = (truth.t[after] - truth.t[after - 1] <= MAX_TRUTH_GAP_S) | (truth.t[after] == t)
     inside = (t >= truth.t[0]) & (t <= truth.t[-1]) & bridged
@@ -53,9 +53,9 @@ def truth_at(truth: Truth, t: Array) -> tuple[Array, Array]:
 
 
 def accuracy(t: Array, poses: Array, truth: Truth, anchor: tuple[float, float]) -> Accuracy:
-    """Compare POSE rows at the times t (n,), in s on the clock of the truth, with the truth.
+    """Compare POSE rows at the times t (n,), s on the clock of the truth, with the truth.
 
-    Raises ValueError when not one pose has both a position and a truth.
+    Raises ValueError if no pose has both a position and a truth.
     """
     x, y = truth_at(truth, t)
     used = np.isfinite(poses["x"]) & np.isfinite(poses["y"]) & np.isfinite(x)
@@ -81,7 +81,7 @@ def accuracy(t: Array, poses: Array, truth: Truth, anchor: tuple[float, float]) 
 
 
 def share_of_time(t: Array, states: Array) -> dict[str, float]:
-    """Share of the time between the first and the last pose that was spent in each state that occurs."""
+    """Return by state its share of the time between the first and the last pose."""
     spent = np.diff(t, append=t[-1])
     total = spent.sum()
     return {
@@ -96,7 +96,7 @@ def _rms(error: Array) -> float:
 
 
 def _rms_aligned(found: Array, true: Array, pivot_found: Array, pivot_true: Array) -> float:
-    """RMS distance after the rotation about the pivots that minimises it (closed form in two dimensions)."""
+    """Return the RMS distance after the rotation about the pivots that minimises it (closed form in the plane)."""
     a, b = found - pivot_found, true - pivot_true
     angle = np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum())
     rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -104,7 +104,7 @@ def _rms_aligned(found: Array, true: Array, pivot_found: Array, pivot_true: Arra
 
 
 def nees(error: Array, cov: Array) -> Array:
-    """Normalised squares of errors (n, 2) under their covariance (n, 2, 2); NaN where that is singular."""
+    """Return the normalised squares of errors (n, 2) for their covariance (n, 2, 2); NaN if that is singular."""
     det = cov[:, 0, 0] * cov[:, 1, 1] - cov[:, 0, 1] ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
         squared = (
@@ -116,5 +116,5 @@ def nees(error: Array, cov: Array) -> Array:
 
 
 def _coverage(error: Array, cov: Array) -> float:
-    """Share of errors (n, 2) inside the 95 % ellipse of their covariance (n, 2, 2); a singular one holds nothing."""
+    """Return the share of errors (n, 2) in the 95 % ellipse of their covariance (n, 2, 2); singular ones are empty."""
     return float(np.mean(nees(error, cov) <= CHI2_95_2DOF))

@@ -1,4 +1,4 @@
-"""A recording through the same ingest and engine as live, turn by turn, as fast as it goes."""
+"""Run a recording through the same ingest and engine as live data, turn by turn, as fast as possible."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -21,13 +21,13 @@ from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.store.site import SiteDocument
 
-SETTLE_NS = 1_000_000_000  # what may still wait for messages before it comes out within that
+SETTLE_NS = 1_000_000_000  # after this time no message is still waiting in a reorder buffer
 _BUFFER_BYTES = 2**30
-_MOST_TAGS = 1_000_000
+_MAX_TAGS = 1_000_000
 
 
 class RecordedClock(UtcClock):
-    """Shows the time of the turn that is replayed."""
+    """A clock that shows the time of the replayed turn."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class RecordedClock(UtcClock):
 
 
 class OfflineService:
-    """What lies between the network and the store, fed by hand. metrics: what was counted, as live."""
+    """The ingest and the engine of the service without a network. metrics: the same counters as live."""
 
     def __init__(self, settings: Settings, document: SiteDocument) -> None:
         self.tags = TagTable()
@@ -48,7 +48,7 @@ class OfflineService:
         self._buffer = MessageBuffer(_BUFFER_BYTES)
         self._poses: list[Array] = []
         settings = settings.model_copy(
-            update={"unknown_tags": "accept", "max_tags": _MOST_TAGS, "unproven_tags": _MOST_TAGS}
+            update={"unknown_tags": "accept", "max_tags": _MAX_TAGS, "unproven_tags": _MAX_TAGS}
         )
         self._ingest = Ingest(
             self._buffer,
@@ -65,7 +65,7 @@ class OfflineService:
         )
 
     def poses_of(self, turns: Iterable[Turn]) -> Iterator[tuple[Turn, Array]]:
-        """Each turn with the POSE that come out of it, and one more turn for what still waited."""
+        """Yield each turn with its POSE rows, and one last turn for messages that were still pending."""
         last_ns = 0
         for turn in turns:
             last_ns = turn.t_ns
@@ -77,7 +77,7 @@ class OfflineService:
         self._clock.t_ns = turn.t_ns
         if turn.site is not None:
             self._adopt(turn.site)
-        self._ingest.turn()  # what was held back long enough came out while nothing came in
+        self._ingest.turn()  # releases pending messages that were due before this turn
         for start in range(0, len(turn.messages), MESSAGES_PER_TURN):
             for tag, payload, encoding, arrival_ns in turn.messages[start : start + MESSAGES_PER_TURN]:
                 self._buffer.append(samples_key(self.site.site.id, tag), payload, encoding, arrival_ns)
@@ -86,19 +86,19 @@ class OfflineService:
         return poses
 
     def _adopt(self, document: SiteDocument) -> None:
-        """The site as it was from this turn on."""
+        """Apply the site and the tag settings that are valid from this turn on."""
         if document.site != self.site.site:
             self.site.set_site(document.site)
         for tag, settings in _changes(self.site.document, document):
             self.site.set_tag(tag, settings)
 
 
-def settings_of(about: Mapping[str, str], given: Settings, engine: str | None) -> Settings:
-    """Those of the recording where nothing else was asked for."""
-    update: dict[str, object] = {"engine": engine or about.get("engine", given.engine)}
+def settings_of(metadata: Mapping[str, str], given: Settings, engine: str | None) -> Settings:
+    """Return the given settings with the engine and the parameters of the recording. `engine` overrides its engine."""
+    update: dict[str, object] = {"engine": engine or metadata.get("engine", given.engine)}
     for name in ("paper", "ingest"):
-        if name in about:
-            update[name] = type(getattr(given, name)).model_validate_json(about[name])
+        if name in metadata:
+            update[name] = type(getattr(given, name)).model_validate_json(metadata[name])
     return given.model_copy(update=update)
 
 

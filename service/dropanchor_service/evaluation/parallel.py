@@ -1,4 +1,4 @@
-"""Independent tasks on several processes, with results in the order of the tasks, so that reports stay reproducible."""
+"""Run independent tasks on several processes. Results keep the order of the tasks, so reports are reproducible."""
 
 import multiprocessing
 import multiprocessing.pool
@@ -12,7 +12,7 @@ Result = TypeVar("Result")
 
 
 class Workers:
-    """A context: its processes end with it, also on Ctrl-C. With one process everything runs in this one."""
+    """A pool of processes as a context manager; they end with it, also on Ctrl-C. With 1, tasks run in this process."""
 
     def __init__(self, processes: int) -> None:
         self._processes = processes
@@ -32,7 +32,7 @@ class Workers:
             self._pool.join()
 
     def map(self, function: Callable[[Task], Result], tasks: Sequence[Task]) -> Iterator[Result]:
-        """The results, each as soon as it and all before it are there."""
+        """Yield the results in the order of the tasks, each as soon as it is available."""
         return map(function, tasks) if self._pool is None else self._pool.imap(function, tasks)
 
 

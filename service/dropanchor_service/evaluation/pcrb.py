@@ -1,7 +1,7 @@
-"""The posterior Cramér-Rao bound of the position (Tichavský, Muravchik and Nehorai 1998), on the true path of a run.
+"""The posterior Cramér-Rao bound of the position (Tichavský, Muravchik and Nehorai 1998) on the true path of a run.
 
-With additive Gaussian noise the recursion J' = (Q + F J⁻¹ Fᵀ)⁻¹ + Hᵀ R⁻¹ H is that of a Kalman filter's covariance with
-the Jacobians taken at the truth; it is run in covariance form, which allows a singular Q.
+With additive Gaussian noise, the recursion J' = (Q + F J⁻¹ Fᵀ)⁻¹ + Hᵀ R⁻¹ H is that of a Kalman filter's covariance
+with the Jacobians at the truth. The code uses the covariance form, which allows a singular Q.
 """
 
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ AT_REST_MPS = 1e-6
 
 @dataclass(frozen=True)
 class Sensors:
-    """Standard deviations of one sample (m, rad, rad/s, m/s²), and of errors constant over a run.
+    """Standard deviations of single samples (m, rad, rad/s, m/s²) and of errors that are constant over a run.
 
-    start: of x and of y; start_heading, start_speed likewise. leak: gravity leaking into the forward acceleration,
-    Gauss-Markov with leak_tau_s. zero_speed: how well a standstill is seen, m/s.
+    start: of x and of y; start_heading and start_speed likewise. leak: gravity in the forward acceleration,
+    Gauss-Markov with leak_tau_s. zero_speed: accuracy of a detected standstill, m/s.
     """
 
     range: float = 0.2
@@ -40,7 +40,7 @@ class Sensors:
 
 @dataclass(frozen=True)
 class Path:
-    """The truth, (n,) each, evenly spaced: s, m, rad, m/s; ranged: whether there is a range at that instant."""
+    """The truth at evenly spaced instants, (n,) each; s, m, rad, m/s. ranged: whether the instant has a range."""
 
     t: Array
     x: Array
@@ -54,11 +54,11 @@ Information = Literal["range+heading, jumps known", "range+heading, random-walk 
 
 
 def position_bound(path: Path, sensors: Sensors, information: Information) -> Array:
-    """The bound on E[(x - x̂)² + (y - ŷ)²] after each instant, (n,) m².
+    """Return the bound on E[(x - x̂)² + (y - ŷ)²] after each instant, (n,) m².
 
-    "range+heading, jumps known": speed may change only while it does; "random-walk speed": the same power, spread
-    over the run, which is the least that a filter with a random-walk speed can reach; "with accelerometer": forward
-    acceleration with bias and leak, and standstill seen.
+    "range+heading, jumps known": the speed may change only while the true speed changes. "range+heading, random-walk
+    speed": the same power is spread over the run; this is the bound of a filter with a random-walk speed. "with
+    accelerometer": forward acceleration with bias and leak, and detected standstills.
     """
     s = sensors
     accelerometer = information == "with accelerometer"
@@ -81,7 +81,7 @@ def position_bound(path: Path, sensors: Sensors, information: Information) -> Ar
 
 
 def _jump_power(v: Array, spread: bool) -> Array:
-    """Variance of the speed change in each step, (n,): the squares of the true changes, each spread over its ramp."""
+    """Return the variance of the speed change in each step, (n,): the squared true changes, spread over their ramps."""
     changing = np.diff(v, prepend=v[0]) != 0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], changing, [False]]).astype(int)))
     power = np.full(len(v), 1e-10)

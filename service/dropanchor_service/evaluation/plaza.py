@@ -19,19 +19,19 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_tag_client.recording import Anchor, Recording, RecordingError
 
 FILES = {"plaza1": ("Plaza1_.mat", 0.0), "plaza2": ("Plaza2_.mat", math.pi)}
-"""The file, and how far the direction of travel is from the heading in it, rad."""
+"""The file of each set, and the angle from its heading to the direction of travel, rad."""
 
 PLAZA_SCALE, PLAZA_STD = 1.069, 0.6
-"""Of its radios: measured distance over true distance, and standard deviation, m, by a fit to the truth."""
+"""Measured over true distance and standard deviation, m, of the radios, fitted to the truth."""
 
 MISSING = f"the Plaza sets come with gtsam, which is not installed: {shlex.quote(sys.executable)} -m pip install gtsam"
 
 
 def read_plaza(name: str, folder: Path | None = None) -> Recording:
-    """plaza1 or plaza2, from the installed gtsam or from a folder with its files. Raises RecordingError.
+    """Return plaza1 or plaza2 from the installed gtsam or from a folder with its files. Raises RecordingError.
 
-    Ranges stay as measured (7 % too long). The heading is the truth's first one and the turns of the dead reckoning
-    from there on, with the drift of its gyro.
+    Ranges stay as measured (7 % too long). The heading starts with the first true one and then follows the turns of the
+    dead reckoning, with the drift of its gyro.
     """
     if name not in FILES:
         raise RecordingError(f"there is no Plaza recording {name!r}; there are {', '.join(FILES)}")
@@ -46,7 +46,7 @@ def read_plaza(name: str, folder: Path | None = None) -> Recording:
 
 
 def _data_of_gtsam() -> Path:
-    """Without importing it, which takes long."""
+    """Return the data folder of gtsam without importing it, because the import is slow."""
     spec = importlib.util.find_spec("gtsam")
     if spec is None or not spec.submodule_search_locations:
         raise RecordingError(MISSING)

@@ -1,4 +1,4 @@
-"""Real recordings, each anchor alone: the paper's filter with and without its speed estimator, and our engine."""
+"""Real recordings, one anchor at a time: the paper's filter with and without its speed estimator, and the fleet."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -8,9 +8,9 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array, Engine, default_settings
 from dropanchor_service.evaluation.accuracy import Truth, accuracy
+from dropanchor_service.evaluation.operator_knowledge import PROTOTYPE, apply_operator_knowledge
 from dropanchor_service.evaluation.paper.engines import engines
 from dropanchor_service.evaluation.parallel import Workers
-from dropanchor_service.evaluation.recordings_known import PROTOTYPE, tell
 from dropanchor_service.evaluation.replay import anchors_of, replay, samples_of, track_of, truth_of
 from dropanchor_service.evaluation.report import Cell, Section, Table
 from dropanchor_tag_client.recording import Recording, RecordingError, read_recording
@@ -21,7 +21,7 @@ SAME_M = 0.05
 
 @dataclass(frozen=True)
 class Numbers:
-    """ate, rmse: m; coverage: share of the truth inside the 95 % ellipse. NaN where no pose had a position."""
+    """Accuracy of one engine. ate, rmse: m; coverage: share of the truth inside the 95 % ellipse. NaN: no position."""
 
     ate: float
     rmse: float
@@ -29,17 +29,17 @@ class Numbers:
 
 
 Results = dict[str, dict[str, Numbers]]
-"""Of one recording, by anchor, then by engine."""
+"""Results of one recording, by anchor, then by engine."""
 
 
 def recordings_in(folder: Path) -> list[Path]:
-    """The folders of recordings with truth; none where there is no such folder."""
+    """Return the folders of recordings with a truth, or none if the folder is missing."""
     truths = [*folder.glob("*/truth.csv"), *folder.glob("*/truth.csv.gz")]
     return sorted({truth.parent for truth in truths})
 
 
 def compared(recording: Recording, anchors: int | None = None) -> Results:
-    """All engines on each of the first `anchors` anchors. Raises RecordingError without a truth."""
+    """Run all engines on each of the first `anchors` anchors. Raises RecordingError without a truth."""
     truth = truth_of(recording)
     if truth is None:
         raise RecordingError(f"recording {recording.name} has no truth to compare with")
@@ -63,7 +63,7 @@ def _numbers(engine: Engine, recording: Recording, anchor_id: str, truth: Truth)
 
 
 def settings_of(recording: Recording, t: float) -> Array:
-    """Return the true start at the time t of the first range, with its heading, the mean height and what is told."""
+    """Return TAG_SETTINGS: the true start at the time t, s, the mean height, and the operator's knowledge."""
     truth = {name: np.asarray(column) for name, column in recording.truth.items()}
     height = float(np.nanmean(truth["z"])) if np.isfinite(truth["z"]).any() else 0.0
     settings = default_settings()
@@ -71,7 +71,7 @@ def settings_of(recording: Recording, t: float) -> Array:
     settings["start_known"] = True
     settings["start_x"], settings["start_y"] = (np.interp(t, truth["t_s"], truth[name]) for name in ("x", "y"))
     settings["start_heading"] = truth["yaw_rad"][np.argmin(np.abs(truth["t_s"] - t))]
-    tell(recording.name, settings)
+    apply_operator_knowledge(recording.name, settings)
     return settings
 
 
@@ -86,13 +86,16 @@ def work(task: Task) -> Results:
 
 
 def run(workers: Workers, progress: Callable[[], None], folders: Sequence[Path], anchors: int | None = None) -> Section:
-    """progress is called after each folder. Raises RecordingError. anchors: how many of each, None for all."""
+    """Evaluate all engines on recordings. Raises RecordingError.
+
+    progress: called after each folder. anchors: number of anchors of each recording; None: all.
+    """
     todo = [Task(folder, anchors) for folder in folders]
     return _section([folder.name for folder in folders], workers.map(work, todo), progress)
 
 
 def run_read(workers: Workers, progress: Callable[[], None], read: Sequence[Recording]) -> Section:
-    """The same for recordings that have been read already."""
+    """Evaluate all engines on recordings that are already read."""
     return _section([one.name for one in read], workers.map(compared, read), progress)
 
 
@@ -112,8 +115,8 @@ def section(found: dict[str, Results]) -> Section:
         finding=_finding(found) if found else "No recordings are here; give their folder with --data.",
         text=[
             "Start and heading zero are given; range bias, mounting angle and noise are not taken from the truth. "
-            "Told, as an operator could: a top speed; Plaza: the scale of its radios, 1.069, and 0.6 m; the mower: an "
-            "IMU along its wheels; starloc: a rig held 0.6 m in front of who walks; "
+            "Configured, as an operator could: a top speed; Plaza: the scale of its radios, 1.069, and 0.6 m; the "
+            "mower: an IMU along its wheels; starloc: a rig held 0.6 m in front of the walker; "
             "Hanyang: a heading that is the direction of travel. Prototype: a Gaussian-sum "
             "filter whose parameters were searched for per family on these very recordings. Heading: that of each "
             "engine's own attitude filter where the recording has an IMU, else that of the platform (Plaza's drifts "

@@ -1,4 +1,4 @@
-"""The engines offline: a recording goes through the same screening and the same `process` as live samples."""
+"""Run an engine on a recording, with the same screening and the same `process` as live samples."""
 
 from array import array
 from collections import Counter
@@ -23,7 +23,7 @@ NS_PER_S = 1e9
 
 @dataclass(frozen=True)
 class Track:
-    """What an engine made of a recording. t: (n,) s on its clock; poses: POSE (n,), one per range."""
+    """The poses of an engine on a recording. t: (n,) s on the recording's clock; poses: POSE (n,), one per range."""
 
     t: Array
     poses: Array
@@ -31,7 +31,7 @@ class Track:
 
 @dataclass(frozen=True)
 class Samples:
-    """The screened samples of a recording, for row 0 of an engine; rejected: those left out, by reason."""
+    """The screened samples of a recording for row 0 of an engine. rejected: counts of rejected samples by reason."""
 
     batch: SampleBatch
     rejected: Counter[str]
@@ -42,19 +42,19 @@ class Samples:
 
 
 def anchors_of(recording: Recording) -> Array:
-    """ANCHOR, in the order of the recording's anchors."""
+    """Return ANCHOR rows in the order of the recording's anchors."""
     return np.array([(anchor.x, anchor.y, anchor.z) for anchor in recording.anchors], ANCHOR)
 
 
 def truth_of(recording: Recording) -> Truth | None:
-    """The truth that a recording brings, None without any."""
+    """Return the truth of a recording, or None if it has none."""
     columns = recording.truth
     t, x, y = (np.asarray(columns[name]) for name in ("t_s", "x", "y"))
     return Truth(t, x, y) if len(t) > 1 else None
 
 
 def samples_of(recording: Recording, anchors: Sequence[str]) -> Samples:
-    """IMU, headings, and the ranges to these anchors. Raises RecordingError when the recording lacks one of them."""
+    """Return IMU samples, headings and the ranges to these anchors. Raises RecordingError if an anchor is missing."""
     numbers = {anchor_number(recording.anchor(anchor).id) for anchor in anchors}
     index = {anchor_number(anchor.id): i for i, anchor in enumerate(recording.anchors)}
     ranges = _scalars(recording.ranges, "range_m", "std_m")
@@ -83,8 +83,8 @@ def samples_of(recording: Recording, anchors: Sequence[str]) -> Samples:
 def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) -> Iterator[tuple[float, Array]]:
     """Feed row 0 of a fresh engine, one second of the recording at a time.
 
-    anchors: ANCHOR; settings: TAG_SETTINGS (0-d). Yields the time reached, s, and the POSE rows of that second;
-    what the engine itself rejects is added to `samples.rejected`.
+    anchors: ANCHOR; settings: TAG_SETTINGS (0-d). Yields the time reached, s, and the POSE rows of that second. Adds
+    the engine's rejections to `samples.rejected`.
     """
     engine.set_anchors(anchors)
     engine.configure(0, settings)
@@ -97,23 +97,23 @@ def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) ->
 
 
 def track_of(steps: Sequence[Array]) -> Track:
-    """The track of the POSE rows of consecutive steps."""
+    """Return the track of the POSE rows of consecutive steps."""
     poses = np.concatenate([np.empty(0, POSE), *steps])
     return Track(poses["t_ns"] / NS_PER_S, poses)
 
 
 def smoothing_engine() -> Engine:
-    """An engine whose track can be smoothed after `replay`."""
+    """Return an engine whose track can be smoothed after `replay`."""
     return TracingEngine()
 
 
 def smoothed(engine: Engine, lag_s: float | None) -> Track:
-    """The track of row 0 with what came after each pose: up to lag_s later, or all of it (None).
+    """Return the smoothed track of row 0. Each pose uses samples up to lag_s later; None: all samples.
 
     Raises TypeError unless the engine is a `smoothing_engine`.
     """
     if not isinstance(engine, TracingEngine):
-        raise TypeError(f"{engine.name} keeps nothing that could be smoothed")
+        raise TypeError(f"the engine {engine.name} does not support smoothing: use `smoothing_engine`")
     poses = smoothed_poses(engine, 0, lag_s)
     return Track(poses["t_ns"] / NS_PER_S, poses)
 

@@ -1,4 +1,4 @@
-"""A report of experiments: sections with tables, figures and numbers, written as HTML, Markdown and JSON."""
+"""Reports of experiments: sections with tables, figures and numbers, as HTML, Markdown and JSON."""
 
 import html
 import json
@@ -25,7 +25,7 @@ th:first-child, td:first-child { text-align: left } img { max-width: 100% }
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers are shown with four significant digits; NaN as a dash."""
+    """A table. Numbers have four significant digits; NaN is a dash."""
 
     caption: str
     columns: Sequence[str]
@@ -34,9 +34,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """One experiment. paper: what the paper says; finding: the honest sentence on the difference.
+    """One experiment. paper: the statement of the paper; finding: our own result in comparison.
 
-    figures: by file name without extension. results: every number of the tables, by name.
+    figures: by file name without extension. results: all numbers of the tables, by name.
     """
 
     key: str
@@ -50,9 +50,9 @@ class Section:
 
 
 def write_report(folder: Path, title: str, preface: Sequence[str], sections: Sequence[Section]) -> None:
-    """Write report.html, report.md, results.json and the PNG figures into the folder, which is made if missing.
+    """Write report.html, report.md, results.json and the PNG figures. Create the folder if needed.
 
-    Raises OSError when it cannot be written.
+    Raises OSError if the folder is not writable.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for section in sections:
@@ -65,8 +65,8 @@ def write_report(folder: Path, title: str, preface: Sequence[str], sections: Seq
     (folder / "results.json").write_text(json.dumps(results, indent=1, sort_keys=True, allow_nan=False) + "\n")
 
 
-def shown(cell: Cell) -> str:
-    """A cell as text."""
+def format_cell(cell: Cell) -> str:
+    """Return a cell as text."""
     if isinstance(cell, str):
         return cell
     if isinstance(cell, int):
@@ -78,7 +78,7 @@ def shown(cell: Cell) -> str:
 
 def markdown_table(table: Table) -> str:
     lines = ["| " + " | ".join(table.columns) + " |", "|" + "---|" * len(table.columns)]
-    lines += ["| " + " | ".join(shown(cell) for cell in row) + " |" for row in table.rows]
+    lines += ["| " + " | ".join(format_cell(cell) for cell in row) + " |" for row in table.rows]
     return "\n".join([f"*{table.caption}*", "", *lines])
 
 
@@ -114,7 +114,7 @@ def _html(title: str, preface: Sequence[str], sections: Sequence[Section]) -> st
 def _html_table(table: Table) -> str:
     head = "".join(f"<th>{html.escape(column)}</th>" for column in table.columns)
     rows = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(shown(cell))}</td>" for cell in row) + "</tr>" for row in table.rows
+        "<tr>" + "".join(f"<td>{html.escape(format_cell(cell))}</td>" for cell in row) + "</tr>" for row in table.rows
     )
     return f"<table><caption>{html.escape(table.caption)}</caption><tr>{head}</tr>{rows}</table>"
 

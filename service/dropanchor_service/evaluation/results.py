@@ -1,4 +1,4 @@
-"""Tables of measured figures in the documents: a command writes them, and a check says when they are no longer true.
+"""Tables of measured figures in the documentation. A command writes them, and a check detects outdated ones.
 
 A table stands between two markers in a Markdown file. Its last line says when, where and at which commit it was
 measured. The first marker holds two digests. That of the table shows an edit by hand. That of the sources which the
@@ -70,7 +70,7 @@ def write(root: Path, page: Path, name: str, text: str, measured: Measured) -> N
 
 
 def problems(root: Path, pages: Sequence[Path]) -> Iterator[str]:
-    """Yield a sentence for each table that was edited by hand, never measured, or is older than what it measures."""
+    """Yield a message for each table that was never measured, was edited by hand, or is older than its sources."""
     for page in pages:
         for block in _BLOCK.finditer(page.read_text(encoding="utf-8")):
             facts = dict(_FACT.findall(block["facts"]))
@@ -124,7 +124,7 @@ def _sentence(root: Path, measured: Measured) -> str:
 
 
 def commit(root: Path) -> str:
-    """Return the short hash of the commit, with a plus where the tree differs from it; "unknown" outside of git."""
+    """Return the short hash of the commit, with a plus if the tree has changes; "unknown" outside of git."""
     try:
         described = subprocess.run(
             ["git", "describe", "--always", "--dirty=+", "--exclude=*"],

@@ -1,4 +1,4 @@
-"""The engines on simulated runs: every run is a tag of its own, so that an engine takes many of them at once."""
+"""Run engines on simulated runs. Each run is a separate tag, so one engine processes many runs together."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -26,25 +26,25 @@ from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, ScalarModel
 from dropanchor_tag_client.simulator.simulation import Simulation
 
 Feed = Literal["heading", "level", "raw", "raw 6-axis", "raw 6-axis and heading"]
-"""What an engine gets beside the ranges: the scalar heading; the scalar heading and a level IMU without a magnetometer;
-raw samples of 9 or 6 axes and nothing else, so that its own attitude filter is in the loop; or 6 axes and the scalar
+"""The samples of an engine in addition to the ranges: the scalar heading; the scalar heading and a level IMU without a
+magnetometer; raw samples of 9 or 6 axes, so that the engine uses its own attitude filter; or 6 axes and the scalar
 heading."""
 
 WITHOUT_HEADING: frozenset[Feed] = frozenset({"raw", "raw 6-axis"})
 
 START_STD = 0.1  # m
 NOISE = ScalarModel()
-OTHER_AXES = 7  # names the random numbers of `_noisy`
+OTHER_AXES = 7  # random stream of `_noisy`
 
 
 @dataclass(frozen=True)
-class Known:
-    """What an operator knows of the tags of an experiment.
+class PriorKnowledge:
+    """What an operator knows about the tags of an experiment.
 
-    start: whether the true start is given (with the heading where it is raw samples that must find it). heading_std:
-    of the scalar heading, rad. calibrated: the operator says what is true of a simulated tag, that its ranges have no
-    bias and that it travels exactly as its mounting angle says; with exact_heading also that the scalar heading has no
-    error but its white noise, as the bound assumes.
+    start: whether the true start is given (with the heading if the engine must find it from raw samples).
+    heading_std: of the scalar heading, rad. calibrated: whether the settings state that ranges have no bias and that
+    the tag never slips, both true in the simulation. exact_heading: with calibrated, whether they also state that the
+    scalar heading has only white noise, as the bound assumes.
     """
 
     feed: Feed = "level"
@@ -57,7 +57,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Timed:
-    """tracks: one per run, in their order; seconds: of processor time that the engine took for all of them."""
+    """tracks: one per run, in the order of the runs; seconds: processor time of the engine for all runs."""
 
     tracks: list[Track]
     seconds: float
@@ -67,8 +67,8 @@ def truth_of(simulation: Simulation) -> Truth:
     return Truth(simulation.truth.t_s, simulation.truth.x, simulation.truth.y)
 
 
-def run_engine(engine: Engine, simulations: Sequence[Simulation], known: Known) -> Timed:
-    """Feed a fresh engine all runs, run i as row i, one second at a time. All runs must have the same anchors."""
+def run_engine(engine: Engine, simulations: Sequence[Simulation], known: PriorKnowledge) -> Timed:
+    """Run a fresh engine on all runs, run i as row i, one second at a time. All runs must have the same anchors."""
     engine.set_anchors(np.array([(a.x, a.y, a.z) for a in simulations[0].anchors], ANCHOR))
     for row, simulation in enumerate(simulations):
         engine.configure(row, _settings(simulation, known))
@@ -80,7 +80,7 @@ def run_engine(engine: Engine, simulations: Sequence[Simulation], known: Known) 
     return Timed([Track(own["t_ns"] / NS_PER_S, own) for own in by_row], seconds)
 
 
-def _settings(simulation: Simulation, known: Known) -> Array:
+def _settings(simulation: Simulation, known: PriorKnowledge) -> Array:
     truth = simulation.truth
     settings = default_settings()
     settings["height"] = truth.z[0]
@@ -99,13 +99,13 @@ def _settings(simulation: Simulation, known: Known) -> Array:
     return settings
 
 
-def _together(simulations: Sequence[Simulation], known: Known) -> SampleBatch:
-    """All samples of all runs, in order of time."""
+def _together(simulations: Sequence[Simulation], known: PriorKnowledge) -> SampleBatch:
+    """Return all samples of all runs in order of time."""
     return merged([samples_of(one, known.feed, known.heading_std, row) for row, one in enumerate(simulations)])
 
 
 def samples_of(simulation: Simulation, feed: Feed, heading_std: float = np.nan, row: int = 0) -> SampleBatch:
-    """Return what the tag sends, as samples of this row. heading_std: what the headings say of themselves, rad."""
+    """Return what the tag sends, as samples of this row. heading_std: as the heading samples report it, rad."""
     return SampleBatch(
         imu=_imu(row, simulation, feed),
         ranges=_ranges(row, simulation),
@@ -133,7 +133,7 @@ def _imu(row: int, simulation: Simulation, feed: Feed) -> Array:
 
 
 def _noisy(level: Imu, simulation: Simulation) -> Imu:
-    """Noise on the axes that the scalar sensors lack, of their kind: silent axes would tell of a standstill."""
+    """Add noise to the axes that the scalar sensors lack. Without it, these axes would indicate a standstill."""
     rng = np.random.default_rng([simulation.seed, OTHER_AXES])
     rest = np.abs(simulation.truth.v) < AT_REST_MPS
     acc_std = np.where(rest, NOISE.acceleration_std_rest, NOISE.acceleration_std)

@@ -1,1 +1,1 @@
-"""Simulated tags: scenarios, sensors, perturbations. Needs numpy (the extra `simulator`); the rest does not."""
+"""Simulated tags: scenarios, sensors and perturbations. Only this package needs numpy (the extra `simulator`)."""

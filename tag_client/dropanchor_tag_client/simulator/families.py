@@ -1,4 +1,4 @@
-"""Families of random motions, every seed another run. All begin at rest at (10, 0)."""
+"""Families of random motions, one per seed. All start at rest at (10, 0)."""
 
 import math
 from collections.abc import Iterator
@@ -18,11 +18,14 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Legs:
-    """Rest, then legs of constant speed. Speeds m/s, durations s, yaw rates rad/s, each drawn uniformly.
+    """A rest, then legs of constant speed. Speeds (m/s), durations (s) and yaw rates (rad/s) are uniform.
 
-    min_change: least difference of speed between two legs; arc_probability: that a leg is an arc of a yaw rate drawn
-    from arc_rate, with no turn at its start; stop_s: a stop before every leg but the first; backwards: indices of
-    legs that are driven in reverse. Straight legs but the first begin with a turn of ±U(0.3, 2.2) rad in 0.5 s.
+    Every straight leg except the first begins with a turn of ±U(0.3, 2.2) rad in 0.5 s.
+
+    min_change: minimum speed difference between two legs.
+    arc_probability: probability that a leg is an arc, with a yaw rate from arc_rate and no turn at its start.
+    stop_s: duration of the stop before every leg except the first; None: no stops.
+    backwards: indices of the legs that are driven in reverse.
     """
 
     speed: Range = (0.5, 4.0)
@@ -64,7 +67,7 @@ class Legs:
 
 @dataclass(frozen=True)
 class Wandering:
-    """Speed and yaw rate are Ornstein-Uhlenbeck processes from rest; the speed is clipped at 0."""
+    """Motion whose speed and yaw rate are Ornstein-Uhlenbeck processes, from rest. The speed is clipped at 0."""
 
     duration_s: float = 60.0
     speed_mean: float = 1.5

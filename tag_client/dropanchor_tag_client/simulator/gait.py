@@ -1,8 +1,8 @@
-"""How a walking person shakes a device: accelerations and swinging that repeat with every step and every stride.
+"""The motion of a device carried by a walking person: accelerations and rotations periodic in the step and the stride.
 
-The figures are medians of eight recorded walks with a real phone in the hand (50 Hz, 1 to 2 minutes each) and of 20
-walks that this module makes, put through the same measurement. RMS in bands about multiples of the step frequency,
-recorded / simulated; accelerations in m/s², rates in rad/s, gravity taken as its mean over 6 s:
+The figures below are medians over eight recorded walks with a real phone in the hand (50 Hz, 1 to 2 minutes each) and
+over 20 simulated walks, evaluated in the same way. They are RMS values in bands around multiples of the step frequency,
+recorded / simulated. Accelerations are in m/s², rates in rad/s. Gravity is the mean over 6 s:
 
     band               0.35 to 0.7  0.7 to 1.3   1.3 to 1.7   1.7 to 2.3   2.3 to 3.3   to 25 Hz
     upward             0.20 / 0.33  2.80 / 2.80  0.61 / 0.67  1.34 / 1.33  0.86 / 0.87  0.84 / 0.84
@@ -16,7 +16,7 @@ Also matched: steps per second 1.84 / 1.82, speed while walking 1.23 / 1.20 m/s,
 3.4 m/s² (of single walks 3.0 to 4.9 / 2.6 to 5.4), its quantiles 1, 5, 95 and 99 % -5.7, -4.4, 6.5, 10.4 / -5.8,
 -4.5, 6.6, 9.5 m/s², its kurtosis 5.4 / 4.6, the phase of the forward against the upward acceleration at the step
 frequency 95° / 95° (with gravity in the pitching device), and the logarithm of Kim's step length over the real one
-0.06 / 0.10. Steps are more regular than recorded ones: their times vary by 6 %, recorded by 10 to 15 %, stops included.
+0.06 / 0.10. Simulated steps are more regular: their durations vary by 6 %, recorded ones by 10 to 15 %, with stops.
 """
 
 import math
@@ -30,11 +30,14 @@ from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
 
 MULTIPLES = np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0])  # of the step frequency; 0.5: the stride
 STEP_LENGTH = 0.362  # m per (m/s²)^⅓, of the peak-to-peak upward acceleration of a step (Kim)
-PEAK_TO_PEAK = 7.3  # m/s², of a step at amplitude 1, chosen so that accelerations are as large as recorded ones
+PEAK_TO_PEAK = 7.3  # m/s², of a step at amplitude 1, fitted to the recorded accelerations
 
 
 class Shape(NamedTuple):
-    """One axis: RMS at the multiples, and the phase of the first and second against the upward one, rad (NaN: any)."""
+    """Spectrum of one axis: RMS at each multiple of the step frequency.
+
+    first, second: phase of the first and second multiple relative to the upward axis, rad; NaN: random.
+    """
 
     rms: tuple[float, ...]
     first: float = math.nan
@@ -45,8 +48,8 @@ class Shape(NamedTuple):
 class Shapes:
     """Accelerations along, left of and above the course, m/s², and rates of roll, pitch and yaw, rad/s.
 
-    The forward one is without gravity: of the recorded 0.59 m/s² at the step frequency, gravity in a pitching device
-    is a part. The phases at 1 and 2 are those recorded; they tell forward from backward.
+    The forward acceleration excludes gravity, which is part of the recorded 0.59 m/s² at the step frequency because
+    the device pitches. The phases at multiples 1 and 2 are the recorded ones; they distinguish forward from backward.
     """
 
     upward: Shape
@@ -69,9 +72,9 @@ IN_HAND = Shapes(
 
 @dataclass(frozen=True)
 class Walker:
-    """How one person walks: speed m/s, steps per second at that speed, and how far the step length differs.
+    """The gait of one person.
 
-    stride_log: logarithm of Kim's step length over the real one.
+    speed: usual speed, m/s. cadence: steps per second at that speed. stride_log: log of Kim's step length / real one.
     """
 
     speed: float
@@ -80,13 +83,13 @@ class Walker:
 
     @property
     def amplitude(self) -> float:
-        """Size of the shaking at the usual speed, 1 for PEAK_TO_PEAK: what Kim's formula wants for the step length."""
+        """Return the relative acceleration amplitude at the usual speed; PEAK_TO_PEAK is 1. From Kim's formula."""
         length = self.speed / self.cadence * math.exp(self.stride_log)
         return (length / STEP_LENGTH) ** 3 / PEAK_TO_PEAK
 
 
 def draw_walker(rng: np.random.Generator) -> Walker:
-    """Return a person at random. Recorded: 1.07 to 1.38 m/s (median 1.23 while walking), 1.80 to 1.91 steps/s."""
+    """Return a random person. Recorded: 1.07 to 1.38 m/s (median 1.23 while walking), 1.80 to 1.91 steps/s."""
     speed = float(np.clip(rng.normal(1.24, 0.09), 1.0, 1.45))
     cadence = float(1.84 + 0.15 * (speed - 1.24) + rng.normal(0.0, 0.035))
     return Walker(speed, cadence, float(rng.normal(0.05, 0.035)))
@@ -104,9 +107,9 @@ class Shaking(NamedTuple):
 
 
 def shaking(motion: Trajectory, walker: Walker, shapes: Shapes, rng: np.random.Generator) -> Shaking:
-    """Return what the steps add to the smooth motion.
+    """Return the accelerations and angles that the steps add to the smooth motion.
 
-    A person who goes at a share q of the usual speed makes √q of the steps, √q as long, so the amplitude is q^1.5.
+    At a share q of the usual speed, the cadence and the step length are both scaled by √q, so the amplitude is q^1.5.
     The step frequency varies by 6 % and amplitudes by 25 %, both over half a second.
     """
     n, dt = len(motion), motion.dt
@@ -116,7 +119,7 @@ def shaking(motion: Trajectory, walker: Walker, shapes: Shapes, rng: np.random.G
     size = walker.amplitude * q**1.5
     accelerations = (shapes.forward, shapes.leftward, shapes.upward)
     moved = [size * (1.0 + _slow(rng, n, dt)) * _sum(phase, shape, rng) for shape in accelerations]
-    # Swinging must be smooth: a gyroscope measures its derivative.
+    # The angles must be smooth, because a gyroscope measures their derivative.
     rate = 2 * np.pi * walker.cadence * MULTIPLES
     swung = [q**1.5 * _sum(phase, shape, rng, rate) for shape in (shapes.roll, shapes.pitch, shapes.yaw)]
     return Shaking(*moved, *swung)
@@ -127,13 +130,13 @@ def _slow(rng: np.random.Generator, n: int, dt: float) -> Array:
 
 
 def _sum(phase: Array, shape: Shape, rng: np.random.Generator, rate: Array | None = None) -> Array:
-    """Return the sum of the multiples; with `rate` (rad/s of each) the angle whose derivative has this shape."""
+    """Return the sum of the multiples. With `rate` (rad/s of each): the angle whose derivative has this shape."""
     amplitude = math.sqrt(2.0) * np.asarray(shape.rms)
     shift = rng.uniform(-math.pi, math.pi, len(MULTIPLES))
     for index, known in ((1, shape.first), (3, shape.second)):
         if math.isfinite(known):
             shift[index] = known + rng.normal(0.0, 0.25)
-    if shape.first == 0.0:  # the upward one: all multiples peak when the heel strikes
+    if shape.first == 0.0:  # upward axis: all multiples peak at the heel strike
         shift = rng.normal(0.0, 0.4, len(MULTIPLES))
     if rate is not None:
         amplitude, shift = amplitude / rate, shift - math.pi / 2

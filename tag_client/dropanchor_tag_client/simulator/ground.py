@@ -1,4 +1,4 @@
-"""Ground vehicles that are hard to follow: smooth rolling without vibration, and a forklift that reverses."""
+"""Ground vehicles that are hard to track: a trolley without vibration, and a forklift that reverses."""
 
 import math
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from dropanchor_tag_client.simulator.trajectory import Segment, Start, Trajector
 
 @dataclass(frozen=True)
 class Rolling:
-    """A trolley on a smooth floor: long legs, straight or slightly bent, ramps of 2 s, no shaking at all."""
+    """A trolley on a smooth floor: long legs, straight or slightly curved, with ramps of 2 s and no vibration."""
 
     speed: Range = (0.3, 1.5)
     leg_s: Range = (8.0, 14.0)
@@ -35,7 +35,7 @@ class Rolling:
 
 @dataclass(frozen=True)
 class Forklift:
-    """Drives to a place, stops, backs out in a bend, stops, and drives on; the nose points ahead all the time."""
+    """A forklift that drives ahead, stops, reverses in a curve, stops, and drives on, without turning round."""
 
     speed: Range = (1.0, 2.6)
     reverse_speed: Range = (0.5, 1.2)
@@ -65,7 +65,7 @@ class Forklift:
 
 
 def smooth(models: SensorModels) -> SensorModels:
-    """Return the sensors on a body that does not shake: 0.05 m/s² and 0.003 rad/s of noise, moving and at rest."""
+    """Return the sensors on a body without vibration: 0.05 m/s² and 0.003 rad/s of noise, moving and at rest."""
     imu = replace(
         models.imu,
         acc_std=0.05,

@@ -13,7 +13,7 @@ from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
 class HeadingErrorModel:
     """bias + drift · sin(2π t / drift_period) + Gauss-Markov(correlated_std, correlation_s). rad, s.
 
-    It is the error of the heading itself at the scalar level, and of the field's azimuth at the raw one.
+    For scalar sensors this is the error of the heading. For raw sensors it is the azimuth error of the magnetic field.
     """
 
     bias: float = 0.0
@@ -23,7 +23,7 @@ class HeadingErrorModel:
     correlation_s: float = 3.0
 
     def draw(self, motion: Trajectory, rng: np.random.Generator) -> Array:
-        """The error of the heading over a motion, (n,), rad."""
+        """Return the heading error over a motion, (n,) rad."""
         error = self.bias + self.drift * np.sin(math.tau * motion.t / self.drift_period_s)
         first = self.correlated_std * rng.standard_normal()
         return error + gauss_markov(rng, len(motion), motion.dt, self.correlated_std, self.correlation_s, first)

@@ -1,7 +1,8 @@
-"""Raw 9-axis samples of a tag: body frame x forward, y left, z up; site frame east, north, up.
+"""Raw 9-axis samples of a tag. Body frame: x forward, y left, z up. Site frame: east, north, up.
 
-Attitude: R_enu_from_body = Rz(yaw) Ry(pitch) Rx(roll). Accelerometers measure specific force,
-Rᵀ (a + (0, 0, g)); gyros the body rates of the Z-Y-X angles; magnetometers A Rᵀ m + h with hard iron h, soft iron A.
+The attitude is R_enu_from_body = Rz(yaw) Ry(pitch) Rx(roll). Accelerometers measure the specific force
+Rᵀ (a + (0, 0, g)). Gyros measure the body rates of the Z-Y-X angles. Magnetometers measure A Rᵀ m + h, with the hard
+iron h and the soft iron A.
 """
 
 import math
@@ -18,7 +19,7 @@ ROCKING_WAVES = 6
 
 
 class Imu(NamedTuple):
-    """t_s (n,); acc m/s², gyro rad/s, mag µT, each (n, 3)."""
+    """IMU samples: t_s (n,); acc m/s², gyro rad/s and mag µT, each (n, 3)."""
 
     t_s: Array
     acc: Array
@@ -36,15 +37,19 @@ class Attitude(NamedTuple):
 
 @dataclass(frozen=True)
 class ImuModel:
-    """A low-cost IMU on something that rolls. …_std of biases, iron and axes are those of the draw of a unit.
+    """A low-cost IMU on a wheeled vehicle.
 
-    hz: None: at every instant of the motion. rocking_std: roll and pitch that uneven ground causes, a smooth
-    function of the way travelled with wavelengths `rocking_m`; lean_std: their constant part, rad.
-    gyro_wander_std: of a smooth wander of the bias over minutes; gyro_drift: amplitude of a `slow_drift` about z.
-    vibration: white noise added at 1 m/s and above, growing to it linearly from rest.
-    disturbances_per_min: episodes in which a field of U(disturbance_ut), fixed in the site, is added.
-    Field: total field_ut at dip_rad below the horizon, and declination. Figures are typical of MEMS data sheets
-    (noise, bias) and of mid-latitudes (field); all are settings.
+    The …_std of biases, iron and scale describe the spread over units; `draw_unit` draws one. The defaults are typical
+    of MEMS data sheets (noise, bias) and of mid-latitudes (field).
+
+    hz: sample rate; None: one sample at every instant of the motion.
+    rocking_std: roll and pitch from uneven ground, rad; a smooth function of the distance travelled with wavelengths
+    `rocking_m`. lean_std: their constant part, rad.
+    gyro_wander_std: standard deviation of a smooth change of the bias over minutes.
+    gyro_drift: amplitude of a `slow_drift` about z.
+    vibration_acc, vibration_gyro: added white noise; it grows linearly from 0 at rest to this value at 1 m/s.
+    disturbances_per_min: rate of episodes that add a field of U(disturbance_ut), fixed in the site frame.
+    field_ut, dip_rad, declination_rad: strength of the Earth's field, its angle below the horizon, and declination.
     """
 
     hz: float | None = None
@@ -72,7 +77,7 @@ class ImuModel:
 
 
 class Waves(NamedTuple):
-    """A smooth random function: a sum of sines. amplitude, rate and phase (k,)."""
+    """A smooth random function, as a sum of sines. amplitude, rate and phase: (k,)."""
 
     amplitude: Array
     rate: Array
@@ -84,9 +89,9 @@ class Waves(NamedTuple):
 
 @dataclass(frozen=True)
 class ImuUnit:
-    """One physical unit, as mounted on one tag: what stays the same from sample to sample.
+    """One physical IMU, mounted on one tag, with its constant errors.
 
-    mount: course minus body yaw, rad. Samples of consecutive stretches of one motion fit together.
+    The samples of consecutive stretches of one motion fit together. mount: course minus body yaw, rad.
     """
 
     model: ImuModel
@@ -106,9 +111,9 @@ class ImuUnit:
         return Attitude(roll, pitch, motion.course - self.mount)
 
     def measure(self, motion: Trajectory, rng: np.random.Generator, azimuth_error: Array | float = 0.0) -> Imu:
-        """Samples at every row but for the first, which only says where the motion comes from.
+        """Return samples at every row except the first, which only gives the preceding state of the motion.
 
-        azimuth_error: (n,) or a number, rad: how far the field makes the heading seem too large.
+        azimuth_error: (n,) or a number, rad; the field makes the heading appear larger by this angle.
         """
         attitude = self.attitude(motion)
         exact = Imu(
@@ -120,9 +125,9 @@ class ImuUnit:
         return self.with_errors(exact, np.minimum(np.abs(motion.v), 1.0), rng)
 
     def with_errors(self, exact: Imu, moving: Array, rng: np.random.Generator) -> Imu:
-        """Return the samples of this unit where perfect sensors would give `exact`, without the first row.
+        """Return `exact`, the samples of perfect sensors, with the errors of this unit and without the first row.
 
-        moving: (n,), 0 at rest to 1, the share of the vibration.
+        moving: (n,), share of the vibration, from 0 at rest to 1.
         """
         model = self.model
         acc = exact.acc * self.acc_scale + self.acc_bias + _white(rng, model.acc_std, model.vibration_acc * moving)
@@ -144,7 +149,10 @@ class ImuUnit:
         return field + self._disturbance(t)
 
     def _disturbance(self, t: Array) -> Array:
-        """Episodes are drawn minute by minute from the unit's seed, so that stretches of time fit together."""
+        """Return the field of all disturbances, (n, 3) µT.
+
+        Each minute has its own random numbers, from the unit's seed, so that consecutive stretches fit together.
+        """
         field = np.zeros((len(t), 3))
         if not self.model.disturbances_per_min:
             return field
@@ -160,7 +168,7 @@ class ImuUnit:
 
 
 def draw_unit(model: ImuModel, mount: float, rng: np.random.Generator) -> ImuUnit:
-    """One unit of the model. The same random numbers, the same unit."""
+    """Return one random unit of the model."""
     soft = model.soft_iron_std * rng.standard_normal((3, 3))
     return ImuUnit(
         model=model,
@@ -178,18 +186,18 @@ def draw_unit(model: ImuModel, mount: float, rng: np.random.Generator) -> ImuUni
 
 
 def specific_force(motion: Trajectory, mount: float, attitude: Attitude) -> Array:
-    """Rᵀ (a + (0, 0, g)), (n, 3) m/s², with a the mean acceleration since the row before."""
+    """Return the specific force Rᵀ (a + (0, 0, g)), (n, 3) m/s². a is the mean acceleration since the previous row."""
     forward, leftward = path_acceleration(motion)
     return untilted(attitude, turned(forward, leftward, np.full(len(motion), GRAVITY), mount))
 
 
 def path_acceleration(motion: Trajectory) -> tuple[Array, Array]:
-    """Return the acceleration along and to the left of the course, (n,) m/s², means since the row before."""
+    """Return the mean acceleration since the previous row, along and to the left of the course, (n,) m/s²."""
     return backward_rate(motion.v, motion.dt), motion.v * backward_rate(motion.course, motion.dt)
 
 
 def turned(forward: Array, leftward: Array, up: Array, mount: Array | float) -> Array:
-    """Return a vector along, left of and above the course in the level frame of the body's yaw, (n, 3).
+    """Return a vector, given along, left of and above the course, in the level frame with the body's yaw, (n, 3).
 
     mount: course minus body yaw, rad.
     """
@@ -198,7 +206,7 @@ def turned(forward: Array, leftward: Array, up: Array, mount: Array | float) -> 
 
 
 def body_rates(attitude: Attitude, dt: float) -> Array:
-    """Angular rate in body axes of the Z-Y-X angles, (n, 3) rad/s, mean since the row before."""
+    """Return the mean angular rate since the previous row in body axes, from Z-Y-X angles, (n, 3) rad/s."""
     roll, pitch, _ = attitude
     d_roll, d_pitch, d_yaw = (backward_rate(angle, dt) for angle in attitude)
     return np.column_stack(
@@ -211,14 +219,14 @@ def body_rates(attitude: Attitude, dt: float) -> Array:
 
 
 def into_body(attitude: Attitude, vector: Array) -> Array:
-    """Rᵀ vector, (n, 3): a vector of the site frame in body axes."""
+    """Return Rᵀ vector, (n, 3): a vector of the site frame in body axes."""
     east, north, up = vector.T
     cos, sin = np.cos(attitude.yaw), np.sin(attitude.yaw)
     return untilted(attitude, np.column_stack([cos * east + sin * north, -sin * east + cos * north, up]))
 
 
 def untilted(attitude: Attitude, level: Array) -> Array:
-    """(Ry(pitch) Rx(roll))ᵀ level, (n, 3): from the level frame that has the body's yaw into body axes."""
+    """Return (Ry(pitch) Rx(roll))ᵀ level, (n, 3): from the level frame with the body's yaw to body axes."""
     x, y, z = level.T
     cos_p, sin_p, cos_r, sin_r = (f(a) for a in (attitude.pitch, attitude.roll) for f in (np.cos, np.sin))
     turned_x, turned_z = cos_p * x - sin_p * z, sin_p * x + cos_p * z
@@ -226,7 +234,7 @@ def untilted(attitude: Attitude, level: Array) -> Array:
 
 
 def quaternions(attitude: Attitude) -> Array:
-    """Unit quaternions (w, x, y, z) body → ENU, (n, 4)."""
+    """Return the unit quaternions (w, x, y, z) body → ENU, (n, 4)."""
     (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle / 2), np.sin(angle / 2)) for angle in attitude)
     return np.column_stack(
         [
@@ -251,7 +259,7 @@ def _rocking(model: ImuModel, rng: np.random.Generator) -> Waves:
 
 
 def draw_waves(rng: np.random.Generator, std: float, lengths: tuple[float, float]) -> Waves:
-    """Waves of random length (log-uniform) and phase whose sum has this standard deviation."""
+    """Return waves of random length (log-uniform) and phase. Their sum has the standard deviation `std`."""
     length = np.exp(rng.uniform(math.log(lengths[0]), math.log(lengths[1]), ROCKING_WAVES))
     amplitude = np.full(ROCKING_WAVES, std * math.sqrt(2.0 / ROCKING_WAVES))
     return Waves(amplitude, math.tau / length, rng.uniform(0.0, math.tau, ROCKING_WAVES))

@@ -1,4 +1,4 @@
-"""Simulated tags as they would be heard live: samples of the wire in order of time, made as they are needed."""
+"""Live simulated tags: wire samples in order of time, generated as they are needed."""
 
 import heapq
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ REST_BEFORE_S = 2.0
 
 
 class StartPose(NamedTuple):
-    """Where a tag is at t = 0, m, and the heading of its body, rad."""
+    """Position of a tag at t = 0, m, and heading of its body, rad."""
 
     x: float
     y: float
@@ -33,7 +33,7 @@ class StartPose(NamedTuple):
 
 
 class Delivery(NamedTuple):
-    """Samples of one tag (its index), all to be published at `due_s` after the start; each group in order of time."""
+    """Samples of the tag with index `tag`, to be published `due_s` after the start; each group in order of time."""
 
     due_s: float
     tag: int
@@ -41,7 +41,7 @@ class Delivery(NamedTuple):
     ranges: list[RangeSample]
 
 
-class _Heard(NamedTuple):
+class _Stretch(NamedTuple):
     imu: Imu
     ranges: Ranges
 
@@ -51,7 +51,7 @@ def tag_name(index: int) -> str:
 
 
 def start_poses(count: int, seed: int = 0, scenario: str = YARD, mount_rad: float = 0.0) -> list[StartPose]:
-    """The true start poses of the tags that `deliveries` makes of the same count, seed and scenario."""
+    """Return the true start poses of the tags of `deliveries` with the same count, seed and scenario."""
     if scenario == YARD:
         starts = [_wanderer(seed, index, YARD_IMU_HZ).start for index in range(count)]
         return [StartPose(start.x, start.y, start.course - mount_rad) for start in starts]
@@ -62,22 +62,23 @@ def start_poses(count: int, seed: int = 0, scenario: str = YARD, mount_rad: floa
 def deliveries(
     count: int, scenario: str, seed: int, models: SensorModels, t0_ns: int, step_s: float = 0.05
 ) -> Iterator[Delivery]:
-    """What `count` tags send, in order of time, each in bundles of `step_s`; `t0_ns` is the time of t = 0.
+    """Yield what `count` tags send, in order of time, in bundles of `step_s`. `t0_ns` is the time of t = 0.
 
-    The scenario "yard" goes on for ever and is made leg by leg; tag i of another has seed + i and begins with 2 s
-    more of rest. Raises UnknownScenarioError, and ValueError for sensors that need an end where there is none.
+    The scenario "yard" is endless and generated leg by leg. In the other scenarios tag i has seed + i and 2 s of
+    additional rest at the start. Raises UnknownScenarioError, and ValueError if the sensors need a finite scenario.
     """
     if scenario == YARD:
         _check_endless(models)
     tags = [_tag(scenario, seed, index, models) for index in range(count)]
-    bundles = [_bundles(index, heard, models.anchors, t0_ns, step_s) for index, heard in enumerate(tags)]
+    bundles = [_bundles(index, stretches, models.anchors, t0_ns, step_s) for index, stretches in enumerate(tags)]
     return heapq.merge(*bundles, key=attrgetter("due_s"))
 
 
 def simulation(scenario: str, seed: int, index: int, models: SensorModels, duration_s: float | None) -> Simulation:
-    """The run of tag `index` with its truth, for a recording. The yard needs a duration; the rest is cut to it.
+    """Return the run of tag `index` with its truth, for a recording.
 
-    The motion is that of the live tag; its noise is drawn in one go and is another.
+    The motion equals that of the live tag; the noise differs. `duration_s` cuts the motion. Without it, the yard lasts
+    60 s and other scenarios run to their end.
     """
     if scenario != YARD:
         motion = trajectory(scenario, seed + index)
@@ -121,26 +122,26 @@ def _wanderer(seed: int, index: int, hz: float) -> Wanderer:
 
 
 def _tag_seed(seed: int, index: int) -> int:
-    """A seed of its own for each tag of the yard's sensors."""
+    """Return the seed of the sensors of one tag in the yard."""
     return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1)[0])
 
 
-def _tag(scenario: str, seed: int, index: int, models: SensorModels) -> Iterator[_Heard]:
+def _tag(scenario: str, seed: int, index: int, models: SensorModels) -> Iterator[_Stretch]:
     if scenario == YARD:
         return _in_the_yard(seed, index, models)
     return _in_a_scenario(scenario, seed + index, models)
 
 
-def _in_a_scenario(scenario: str, seed: int, models: SensorModels) -> Iterator[_Heard]:
+def _in_a_scenario(scenario: str, seed: int, models: SensorModels) -> Iterator[_Stretch]:
     motion = trajectory(scenario, seed)
     if motion.v[0] == 0.0:
         motion = motion.after_rest(REST_BEFORE_S)
     hz = models.imu.hz or 1.0 / motion.dt
     run = observe(scenario, seed, motion.at(np.arange(0.0, float(motion.t[-1]) + 1e-9, 1.0 / hz)), models)
-    yield _Heard(run.imu, run.ranges)
+    yield _Stretch(run.imu, run.ranges)
 
 
-def _in_the_yard(seed: int, index: int, models: SensorModels) -> Iterator[_Heard]:
+def _in_the_yard(seed: int, index: int, models: SensorModels) -> Iterator[_Stretch]:
     own = _tag_seed(seed, index)
     unit = draw_unit(models.imu, models.mount_rad, stream(own, Stream.IMU_UNIT))
     imu_rng, range_rng = stream(own, Stream.IMU), stream(own, Stream.RANGE)
@@ -149,11 +150,11 @@ def _in_the_yard(seed: int, index: int, models: SensorModels) -> Iterator[_Heard
         error = models.heading_error.draw(motion, imu_rng)
         ranges = ranging.measure(motion, models.height_m, models.anchors, range_rng)
         new = ranges.t_s > float(motion.t[0]) + 1e-6
-        yield _Heard(unit.measure(motion, imu_rng, error), ranges.where(new & (ranges.t_s > -1e-6)))
+        yield _Stretch(unit.measure(motion, imu_rng, error), ranges.where(new & (ranges.t_s > -1e-6)))
 
 
 def _bundles(
-    tag: int, stretches: Iterator[_Heard], anchors: Sequence[AnchorPlace], t0_ns: int, step_s: float
+    tag: int, stretches: Iterator[_Stretch], anchors: Sequence[AnchorPlace], t0_ns: int, step_s: float
 ) -> Iterator[Delivery]:
     numbers = [anchor_number(anchor.id) for anchor in anchors]
     for imu, ranges in stretches:
@@ -168,7 +169,7 @@ def _bundles(
 
 
 def _counts(times: Array, edges: Array) -> list[int]:
-    """How many of the times lie before each edge and not before the edge in front of it."""
+    """Return the number of times between each edge and the previous one."""
     return [int(n) for n in np.diff(np.searchsorted(times, edges - 1e-9), prepend=0)]
 
 

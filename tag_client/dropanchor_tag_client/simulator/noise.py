@@ -9,7 +9,7 @@ from dropanchor_tag_client.simulator.trajectory import Array
 
 
 class Stream(IntEnum):
-    """What a stream of random numbers is for: changing one sensor leaves the numbers of the others as they were."""
+    """The use of a random stream. Each use has its own, so changing one sensor does not change the others."""
 
     MOTION = 0
     RANGE = 1
@@ -18,19 +18,20 @@ class Stream(IntEnum):
     IMU = 4
     HEADING_ERROR = 5
     GAIT = 6
-    BLOCKED = 7
+    NLOS = 7
 
 
 def stream(seed: int, use: Stream, index: int = 0) -> np.random.Generator:
-    """The random numbers of one seed, one use and one tag or attempt (`index`)."""
+    """Return the random generator of one seed, one use and one tag (`index`)."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(int(use), index)))
 
 
 def gauss_markov(rng: np.random.Generator, n: int, dt: float, std: float, tau: float, start: float) -> Array:
-    """First-order Gauss-Markov process, (n,): x_k = e^(-dt/tau) x_{k-1} + noise, stationary sd `std`, x_0 = start.
+    """Return a first-order Gauss-Markov process, (n,).
 
-    Solved in blocks by a cumulative sum, so that no loop runs over samples; a block spans at most 20 tau, within
-    which the weights e^(k dt/tau) lose no precision that matters.
+    x_k = e^(-dt/tau) x_{k-1} + noise, with stationary standard deviation `std` and x_0 = start. A cumulative sum
+    solves it in blocks, without a loop over samples. A block spans at most 20 tau, within which the weights
+    e^(k dt/tau) keep enough precision.
     """
     decay = math.exp(-dt / tau)
     kicks = std * math.sqrt(1 - decay * decay) * rng.standard_normal(n)

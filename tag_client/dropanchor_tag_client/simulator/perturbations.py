@@ -1,4 +1,4 @@
-"""What goes wrong in the field, as changes to the sensors of a tag."""
+"""Typical field problems, as changes to the sensor models of a tag."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -11,7 +11,7 @@ Perturbation = Callable[[SensorModels], SensorModels]
 
 
 def perturbed(models: SensorModels, *names: str) -> SensorModels:
-    """The sensors with these perturbations, one after the other. Raises ValueError when there is none of a name."""
+    """Return the sensors with these perturbations, applied in order. Raises ValueError for an unknown name."""
     for name in names:
         if name not in PERTURBATIONS:
             raise ValueError(f"there is no perturbation {name!r}; there are {', '.join(PERTURBATIONS)}")
@@ -45,10 +45,11 @@ def _combination(models: SensorModels) -> SensorModels:
     return perturbed(models, "nlos10", "drop20", "outage5", "hb0.1")
 
 
-# nlos10: 10 % of the ranges 0.3 to 2 m too long; nlosburst: four bursts of 1-3 s with one excess each;
-# drop20: 20 % lost; outage5: 5 s without; hb: constant heading error, rad; hdrift: a sine of 0.2 rad and 40 s;
-# hcorr: Gauss-Markov of 0.1 rad and 3 s instead of white, as magnetometers do; gdrift: a sine of 0.03 rad/s and
-# 60 s on the gyro; magdist: three episodes a minute of 5 to 30 µT; late15: first heard 15 s into its motion.
+# nlos10: 10 % of the ranges are 0.3 to 2 m too long. nlosburst: four bursts of 1-3 s, each with one excess.
+# drop20: 20 % of the ranges are lost. outage5: 5 s without ranges. hb: constant heading error, rad.
+# hdrift: sinusoidal heading error of 0.2 rad and 40 s. hcorr: Gauss-Markov heading error of 0.1 rad and 3 s instead of
+# white noise, typical of magnetometers. gdrift: sinusoidal gyro bias of 0.03 rad/s and 60 s. magdist: three magnetic
+# disturbances of 5 to 30 µT a minute. late15: the first sample arrives 15 s after the motion starts.
 PERTURBATIONS: Mapping[str, Perturbation] = MappingProxyType(
     {
         "nlos10": _ranges(nlos_share=0.1),

@@ -1,4 +1,4 @@
-"""Slant ranges to anchors: white noise, a positive tail without line of sight, dropouts, delay."""
+"""Slant ranges to anchors, with white noise, NLOS excess, dropouts and delay."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
 
 
 class AnchorPlace(NamedTuple):
-    """Where an anchor stands, m."""
+    """An anchor and its position, m."""
 
     id: str = "1"
     x: float = 0.0
@@ -20,7 +20,7 @@ class AnchorPlace(NamedTuple):
 
 
 class Ranges(NamedTuple):
-    """Columns (n,), in order of time. anchor: index into the anchors; std_m: what the sensor says of its own noise."""
+    """Ranges as columns (n,), in order of time. anchor: index of the anchor; std_m: as the sensor reports it."""
 
     t_s: Array
     anchor: NDArray[np.int64]
@@ -28,17 +28,19 @@ class Ranges(NamedTuple):
     std_m: Array
 
     def where(self, rows: NDArray[Any]) -> "Ranges":
-        """The rows of a mask or of indices."""
+        """Return the rows that a mask or indices select."""
         return Ranges(self.t_s[rows], self.anchor[rows], self.range_m[rows], self.std_m[rows])
 
 
 @dataclass(frozen=True)
 class RangeModel:
-    """measured = scale · slant distance + bias + white noise (+ excess without line of sight).
+    """measured = scale · slant distance + bias + white noise + NLOS excess. Lengths in m, durations in s.
 
-    hz: per anchor, None: at every instant of the motion. A share of single ranges, and `burst_count` bursts with one
-    excess each, have an excess of U(nlos_m). `outage_s` is one stretch without ranges. A range stamped t was
-    measured at t - delay_s. Deviations m, durations s.
+    hz: rate per anchor; None: a range at every instant of the motion.
+    nlos_share: share of single ranges with an excess of U(nlos_m).
+    burst_count: number of bursts of U(burst_s), each with one constant excess of U(nlos_m).
+    dropout_share: share of lost ranges. outage_s: duration of one stretch without ranges.
+    delay_s: a range with the time stamp t was measured at t - delay_s.
     """
 
     hz: float | None = None
@@ -56,7 +58,7 @@ class RangeModel:
     def measure(
         self, motion: Trajectory, height: float, anchors: Sequence[AnchorPlace], rng: np.random.Generator
     ) -> Ranges:
-        """The ranges to all anchors over a motion at one height; anchors take turns."""
+        """Return the ranges to all anchors over a motion at a constant height. Anchors alternate."""
         hz = self.hz or 1.0 / motion.dt
         count = len(anchors)
         parts = [
@@ -65,10 +67,9 @@ class RangeModel:
         ]
         t_s, which, range_m = (np.concatenate(column) for column in zip(*parts, strict=True))
         range_m = range_m + self._bursts(t_s, rng)
-        heard = Ranges(t_s, which, np.maximum(range_m, 0.0), np.full(len(t_s), self.std)).where(
-            self._received(t_s, rng)
-        )
-        return heard.where(np.argsort(heard.t_s, kind="stable"))
+        ranges = Ranges(t_s, which, np.maximum(range_m, 0.0), np.full(len(t_s), self.std))
+        received = ranges.where(self._received(t_s, rng))
+        return received.where(np.argsort(received.t_s, kind="stable"))
 
     def _to_anchor(
         self,
@@ -83,8 +84,8 @@ class RangeModel:
         there = motion.at(t_s - self.delay_s)
         distance = np.sqrt((there.x - anchor.x) ** 2 + (there.y - anchor.y) ** 2 + (height - anchor.z) ** 2)
         noise = self.std * rng.standard_normal(len(t_s))
-        blocked = rng.random(len(t_s)) < self.nlos_share
-        excess = np.where(blocked, rng.uniform(*self.nlos_m, len(t_s)), 0.0)
+        nlos = rng.random(len(t_s)) < self.nlos_share
+        excess = np.where(nlos, rng.uniform(*self.nlos_m, len(t_s)), 0.0)
         return t_s, np.full(len(t_s), index), self.scale * distance + self.bias + noise + excess
 
     def _bursts(self, t_s: Array, rng: np.random.Generator) -> Array:
@@ -98,14 +99,14 @@ class RangeModel:
     def _received(self, t_s: Array, rng: np.random.Generator) -> NDArray[np.bool_]:
         received = rng.random(len(t_s)) >= self.dropout_share
         if self.outage_s:
-            # Not within the first 5 s: a tag is heard before it is lost.
+            # Not within the first 5 s: the ranges start before the outage.
             first = rng.uniform(t_s.min() + 5.0, t_s.max() - self.outage_s)
             received &= (t_s < first) | (t_s >= first + self.outage_s)
         return received
 
 
 def sample_times(motion: Trajectory, hz: float, offset: float = 0.0) -> Array:
-    """Instants k / hz + offset, k = 0, 1, …, that lie within a motion (both ends included)."""
+    """Return the instants k / hz + offset, k = 0, 1, …, within a motion, both ends included."""
     slack = 1e-6
     first = int(np.ceil((motion.t[0] - offset) * hz - slack))
     last = int(np.floor((motion.t[-1] - offset) * hz + slack))

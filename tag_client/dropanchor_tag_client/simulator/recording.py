@@ -1,4 +1,4 @@
-"""A simulation as a recording: a folder of plain CSV files that every reader of recordings understands."""
+"""Write a simulation as a recording, a folder of plain CSV files."""
 
 import csv
 import json
@@ -17,9 +17,9 @@ TRUTH_HEADER = ("t_s", "x", "y", "z", "qw", "qx", "qy", "qz", "yaw_rad")
 
 
 def write_recording(simulation: Simulation, folder: Path, platform_heading: bool = False) -> None:
-    """Write range, imu, truth, anchors (CSV) and meta (JSON), and with `platform_heading` the scalar heading.
+    """Write range, imu, truth and anchors (CSV) and meta (JSON). With `platform_heading`, also write the heading.
 
-    Times keep microseconds, all else nine digits. An existing folder is written into.
+    Times have microseconds, other numbers nine digits. The folder may exist.
     """
     folder.mkdir(parents=True, exist_ok=True)
     truth, imu, scalars = simulation.truth, simulation.imu, simulation.scalars

@@ -1,4 +1,4 @@
-"""Scalar sensors: heading, yaw rate and forward acceleration of a level body, without raw axes."""
+"""Scalar sensors of a level body: heading, yaw rate and forward acceleration."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +12,7 @@ AT_REST_MPS = 1e-6
 
 
 class Scalars(NamedTuple):
-    """Columns (n,). A yaw rate and an acceleration are means over the time since the row before."""
+    """Scalar samples as columns (n,). Yaw rate and acceleration are means over the time since the previous row."""
 
     t_s: Array
     heading_rad: Array
@@ -22,10 +22,10 @@ class Scalars(NamedTuple):
 
 @dataclass(frozen=True)
 class ScalarModel:
-    """White noise of each sample, and errors constant over a run, drawn as N(0, …_bias_std).
+    """White noise of each sample, and biases N(0, …_bias_std) that are constant over a run. rad, m, s.
 
-    gyro_drift: amplitude of a `slow_drift` of the gyro. leak: gravity that a tilt error leaks into the forward
-    acceleration, Gauss-Markov. acceleration_std_rest holds while the tag is at rest. rad, m, s.
+    gyro_drift: amplitude of a `slow_drift` of the gyro. leak_std, leak_tau_s: Gauss-Markov error of the forward
+    acceleration, from gravity through a tilt error. acceleration_std_rest: noise while the tag is at rest.
     """
 
     heading_std: float = 0.1
@@ -39,7 +39,10 @@ class ScalarModel:
     leak_tau_s: float = 5.0
 
     def measure(self, motion: Trajectory, mount: float, heading_error: Array, rng: np.random.Generator) -> Scalars:
-        """heading_error: (n,), what the reference is wrong by beside white noise; mount: course minus body yaw."""
+        """Return the samples of a motion.
+
+        mount: course minus body yaw, rad. heading_error: (n,) rad, error of the reference in addition to white noise.
+        """
         n, dt = len(motion), motion.dt
         heading = motion.course - mount + heading_error + self.heading_std * rng.standard_normal(n)
         gyro = backward_rate(motion.course, dt) + self.gyro_std * rng.standard_normal(n)
@@ -57,15 +60,15 @@ class ScalarModel:
 
 
 def backward_rate(column: Array, dt: float) -> Array:
-    """Mean rate since the row before, as an inertial sensor integrates; 0 in the first row."""
+    """Return the mean rate since the previous row, as an inertial sensor integrates it; 0 in the first row."""
     return np.diff(column, prepend=column[0]) / dt
 
 
 def slow_drift(t: Array) -> Array:
-    """A sine of 60 s, what a gyro's bias does while the sensor warms up and cools down."""
+    """Return a sine with a period of 60 s: a gyro bias that changes with temperature."""
     return np.sin(2 * np.pi * t / 60.0)
 
 
 def wrapped(angle: Array) -> Array:
-    """The angle within [-π, π)."""
+    """Return the angle within [-π, π)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -1,4 +1,4 @@
-"""Scenarios by name: the paper's motions and the random families, redrawn until they keep a fair distance."""
+"""Scenarios by name: the paper's motions, and random families limited to a range of distances."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -9,8 +9,8 @@ from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.shapes import fig4_line, paper_stages, ten_stages, triangle, tum_letters
 from dropanchor_tag_client.simulator.trajectory import Trajectory
 
-NEAREST_M = 0.7
-FARTHEST_M = 120.0
+MIN_DISTANCE_M = 0.7
+MAX_DISTANCE_M = 120.0
 
 FAMILIES: Mapping[str, Legs | Line | Wandering | Rolling | Forklift] = MappingProxyType(
     {
@@ -48,10 +48,10 @@ class UnknownScenarioError(ValueError):
 
 
 def trajectory(scenario: str, seed: int) -> Trajectory:
-    """The motion of a scenario. Shapes are the same for every seed; families draw another one.
+    """Return the motion of a scenario. Shapes do not depend on the seed; families do.
 
-    A draw that comes closer to the anchor at the origin than 0.7 m or goes further away than 120 m is drawn again.
-    Raises UnknownScenarioError.
+    Families are redrawn until the distance to the anchor at the origin stays between 0.7 m and 120 m. Raises
+    UnknownScenarioError.
     """
     if scenario in SHAPES:
         return SHAPES[scenario]()
@@ -66,4 +66,4 @@ def trajectory(scenario: str, seed: int) -> Trajectory:
 
 def keeps_distance(motion: Trajectory) -> bool:
     distance = motion.distance
-    return bool(distance.min() >= NEAREST_M and distance.max() <= FARTHEST_M)
+    return bool(distance.min() >= MIN_DISTANCE_M and distance.max() <= MAX_DISTANCE_M)

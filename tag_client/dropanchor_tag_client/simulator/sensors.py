@@ -1,4 +1,4 @@
-"""All sensors of a simulated tag, and named settings of them."""
+"""All sensor models of a simulated tag, and presets by name."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,9 +12,10 @@ from dropanchor_tag_client.simulator.scalar import ScalarModel
 
 @dataclass(frozen=True)
 class SensorModels:
-    """mount_rad: course minus body yaw; height_m: of the tag, on the anchors' z axis.
+    """All sensors of a tag.
 
-    first_seen_s: the tag is heard only from this long after its first motion on; None: from the beginning.
+    mount_rad: course minus body yaw. height_m: height of the tag on the anchors' z axis. first_seen_s: time between the
+    first motion and the first sample; None: the samples start with the run.
     """
 
     ranges: RangeModel = field(default_factory=RangeModel)
@@ -28,7 +29,7 @@ class SensorModels:
 
 
 def noiseless() -> SensorModels:
-    """Perfect sensors on a body that neither leans nor shakes."""
+    """Return perfect sensors on a body without lean or vibration."""
     return SensorModels(
         ranges=RangeModel(std=0.0),
         scalar=ScalarModel(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
@@ -51,17 +52,17 @@ def noiseless() -> SensorModels:
 
 
 def with_noise(range_std: float, heading_std: float, range_hz: float | None = None) -> SensorModels:
-    """The default sensors, but for white range noise, m, white heading noise, rad, and the rate of ranges."""
+    """Return the default sensors with this white range noise, m, white heading noise, rad, and range rate, Hz."""
     return SensorModels(ranges=RangeModel(hz=range_hz, std=range_std), scalar=ScalarModel(heading_std=heading_std))
 
 
 def calibrated(models: SensorModels) -> SensorModels:
-    """The sensors with a magnetometer that has been calibrated: some iron is always left."""
+    """Return the sensors with a calibrated magnetometer, which keeps a small residual iron error."""
     return replace(models, imu=replace(models.imu, hard_iron_std=0.5, soft_iron_std=0.01))
 
 
-# paper: as its text says; released: what the data that its authors released really has; real: a DW1000-class tag;
-# calibrated: the same with a calibrated magnetometer; none: perfect sensors.
+# paper: the noise stated in the paper. released: the actual noise of the authors' released data. real: a DW1000-class
+# tag. calibrated: the same with a calibrated magnetometer. none: perfect sensors.
 PRESETS: Mapping[str, SensorModels] = MappingProxyType(
     {
         "paper": with_noise(0.2, 0.1),
@@ -74,7 +75,7 @@ PRESETS: Mapping[str, SensorModels] = MappingProxyType(
 
 
 def preset(name: str, range_hz: float | None = None, imu_hz: float | None = None) -> SensorModels:
-    """The sensors of this name, at other rates where given. Raises ValueError when there are none of the name."""
+    """Return the preset of this name, optionally with other rates. Raises ValueError for an unknown name."""
     if name not in PRESETS:
         raise ValueError(f"there is no noise {name!r}; there are {', '.join(PRESETS)}")
     models = PRESETS[name]

@@ -18,7 +18,7 @@ STAGE_SPEEDS = (7.8, 3.8, 2.3, 5.2, 6.2)
 STAGE_TURN_PEAKS = (4.7, 6.1, 3.5, 5.0, 7.1)
 STAGE_CHANGE_STEPS = 50
 
-# The paper draws Fig. 3 and gives no values for its ten stages; these are ours, in the same spirit.
+# The paper shows Fig. 3 without values for its ten stages. These values are our own.
 TEN_STAGES = (
     Segment(5.0, 2.0),
     Segment(5.0, 4.0, 0.30, 0.9),
@@ -42,7 +42,7 @@ TRIANGLE_CORNERS: tuple[Point, ...] = ((8.0, -6.0), (33.0, -6.0), (20.5, 15.65),
 
 
 def paper_stages() -> Trajectory:
-    """Table I's simulation: rest, then five straight stages; 50 s at 200 Hz."""
+    """Return the motion of Table I: a rest, then five straight stages; 50 s at 200 Hz."""
     v, w = np.zeros(STAGES_STEPS + 1), np.zeros(STAGES_STEPS + 1)
     before = 0.0
     x = math.pi * np.arange(STAGE_CHANGE_STEPS) / STAGE_CHANGE_STEPS
@@ -55,9 +55,9 @@ def paper_stages() -> Trajectory:
 
 
 def ten_stages(arcs: bool) -> Trajectory:
-    """Fig. 3: ten stages of 5 s, speed and yaw rate change from one instant to the next; 100 Hz.
+    """Return the motion of Fig. 3: ten stages of 5 s at 100 Hz. Speed and yaw rate change in one step.
 
-    With arcs the stages have yaw rates; without, each starts with a sudden change of course and is straight.
+    With arcs, the stages have yaw rates. Without, each stage is straight after a sudden change of course.
     """
     dt = 0.01
     v, w = [np.zeros(0)], [np.zeros(0)]
@@ -75,23 +75,23 @@ def _sudden_turn(n: int, turn: float, dt: float) -> Array:
 
 
 def fig4_line() -> Trajectory:
-    """Fig. 4: (10, 0) → (10, 250) at 10 m/s, 0.01 s."""
+    """Return the motion of Fig. 4: (10, 0) → (10, 250) at 10 m/s, 100 Hz."""
     n = 2501
     return integrate(np.full(n, 10.0), np.zeros(n), Start(10.0, 0.0, math.pi / 2), 0.01)
 
 
 def triangle() -> Trajectory:
-    """The drone experiment: 10 s of hovering, then a triangle at 2 m/s, nose along the path. The size is ours."""
+    """Return the motion of the drone: 10 s of hovering, then a triangle at 2 m/s, nose along the path. Our own size."""
     return polyline(TRIANGLE_CORNERS, speed=2.0, turn_s=2.0, rest_s=10.0)
 
 
 def tum_letters() -> Trajectory:
-    """The ground robot's experiment: the letters TUM in one line, turning on the spot at corners. Sizes are ours."""
+    """Return the motion of the ground robot: the letters TUM, with turns on the spot at corners. Our own size."""
     return polyline(TUM_CORNERS, speed=0.8, turn_s=1.5, rest_s=3.0)
 
 
 def polyline(corners: Sequence[Point], speed: float, turn_s: float, rest_s: float, dt: float = 0.01) -> Trajectory:
-    """Straight lines from corner to corner, turning on the spot at each, stopped for turn_s + 0.5 s."""
+    """Return straight lines from corner to corner. At each corner the tag stops for turn_s + 0.5 s and turns."""
     segments = [Segment(rest_s, 0.0)]
     courses = [math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(corners)]
     course = courses[0]

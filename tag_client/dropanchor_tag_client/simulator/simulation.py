@@ -1,4 +1,4 @@
-"""One run of one tag: its true motion, and what its sensors say about it."""
+"""One run of one tag: its true motion and its samples."""
 
 from dataclasses import dataclass, fields
 from typing import NamedTuple
@@ -15,8 +15,11 @@ from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
 
 
 class Truth(NamedTuple):
-    """Columns (n,): position m, heading (body yaw) and course (of the forward axis) rad, not wrapped, speed along
-    the course m/s, yaw rate rad/s; attitude (n, 4): quaternion (w, x, y, z) body → ENU."""
+    """The true motion, as columns (n,). Angles are not wrapped.
+
+    x, y, z: position, m. heading: body yaw, rad. course: direction of the forward axis, rad. v: speed along the
+    course, m/s. w: yaw rate, rad/s. attitude: (n, 4) quaternion (w, x, y, z) body → ENU.
+    """
 
     t_s: Array
     x: Array
@@ -31,9 +34,10 @@ class Truth(NamedTuple):
 
 @dataclass(frozen=True)
 class Simulation:
-    """Columns at the IMU's instants, but for the ranges, which have their own. Times s from the motion's start.
+    """Truth and samples of a run. Times are in s from the start of the motion.
 
-    imu: raw 9-axis samples; scalars: heading, yaw rate and forward acceleration with noise of their own.
+    imu: raw 9-axis samples. scalars: heading, yaw rate and forward acceleration with independent noise. truth, imu and
+    scalars share their instants; ranges have their own.
     """
 
     scenario: str
@@ -45,10 +49,10 @@ class Simulation:
     scalars: Scalars
 
     def level_imu(self) -> Imu:
-        """The scalar sensors as the samples of an IMU that is always level and has no magnetometer (NaN).
+        """Return the scalar samples as those of a level IMU without a magnetometer (NaN).
 
-        Its axes are those of the heading. The acceleration to the left of the course is the true v·w: the scalar
-        sensors have none.
+        Its x axis points along the heading. The scalar sensors do not measure the acceleration to the left of the
+        course, so it is the true v·w.
         """
         n = len(self.scalars.t_s)
         zero = np.zeros(n)
@@ -60,9 +64,9 @@ class Simulation:
 
 
 def simulate(scenario: str, seed: int, models: SensorModels | None = None) -> Simulation:
-    """The run of a scenario with these sensors (default: SensorModels()). The same arguments, the same numbers.
+    """Return the run of a scenario with these sensors (default: SensorModels()). Raises UnknownScenarioError.
 
-    Raises UnknownScenarioError.
+    The result depends only on the arguments.
     """
     models = models or SensorModels()
     motion = trajectory(scenario, seed)
@@ -72,9 +76,9 @@ def simulate(scenario: str, seed: int, models: SensorModels | None = None) -> Si
 
 
 def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) -> Simulation:
-    """What the sensors say about a motion; `scenario` only names it.
+    """Return the run of a given motion. `scenario` is only its name.
 
-    Raises ValueError when the motion ends before the tag is first seen.
+    Raises ValueError if the motion ends before the tag is first seen.
     """
     if len(motion) < 2:
         raise ValueError("the motion is shorter than the time between two IMU samples")
@@ -83,7 +87,7 @@ def observe(scenario: str, seed: int, motion: Trajectory, models: SensorModels) 
     seen = _first_seen(motion, models.first_seen_s)
     kept = motion.t >= seen
     if np.count_nonzero(kept) < 2:
-        raise ValueError(f"nothing is left: the tag is first seen at {seen:.1f} s, and the motion ends before")
+        raise ValueError(f"there are no samples: the tag is first seen at {seen:.1f} s, after the end of the motion")
     ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
     scalars = models.scalar.measure(motion, models.mount_rad, error, stream(seed, Stream.SCALAR))
     before = with_row_before(motion)
@@ -115,7 +119,7 @@ def truth_of(motion: Trajectory, unit: ImuUnit, height: float) -> Truth:
 
 
 def with_row_before(motion: Trajectory) -> Trajectory:
-    """The motion with its first row repeated one step earlier: it begins without acceleration."""
+    """Return the motion with its first row repeated one step earlier, so that it starts without acceleration."""
     columns = [np.concatenate([getattr(motion, f.name)[:1], getattr(motion, f.name)]) for f in fields(motion)]
     columns[0][0] -= motion.dt
     return Trajectory(*columns)

@@ -1,4 +1,4 @@
-"""Motion of a differential drive in the plane: segments → speed and yaw rate → the path.
+"""Motion of a differential drive in the plane: from segments to speed and yaw rate, and from these to the path.
 
 Times in s, positions in m (east, north), angles in rad counter-clockwise from east, one row per instant.
 """
@@ -15,10 +15,10 @@ Array = NDArray[np.float64]
 
 
 class Segment(NamedTuple):
-    """A stretch of constant speed and yaw rate, eased in over the first `ramp_s` by half a cosine.
+    """A stretch of constant speed and yaw rate, reached over the first `ramp_s` along half a cosine.
 
-    `turn` is an extra change of course, rad, made within the ramp as a half-sine of yaw rate.
-    A ramp of 0 changes speed and yaw rate from one instant to the next.
+    turn: additional change of course, rad, within the ramp, as a half-sine of yaw rate. With ramp_s = 0, speed and yaw
+    rate change in one step.
     """
 
     duration_s: float
@@ -29,7 +29,7 @@ class Segment(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Where a motion begins. course: direction of the vehicle's forward axis."""
+    """The start of a motion. course: direction of the vehicle's forward axis."""
 
     x: float
     y: float
@@ -40,9 +40,9 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Columns over time, all of shape (n,).
+    """A motion, as columns over time, all of shape (n,).
 
-    course: direction of the forward axis, not wrapped; v: speed along it (negative: backwards); w: yaw rate;
+    course: direction of the forward axis, not wrapped. v: speed along it (negative: backwards). w: yaw rate.
     travelled: length of the path so far.
     """
 
@@ -59,7 +59,7 @@ class Trajectory:
 
     @property
     def dt(self) -> float:
-        """Time between rows; they are evenly spaced."""
+        """Time between two rows, s. Rows are evenly spaced."""
         return float(self.t[-1] - self.t[0]) / (len(self) - 1)
 
     @property
@@ -73,12 +73,12 @@ class Trajectory:
         return Start(*(float(column[-1]) for column in last))
 
     def at(self, times: Array) -> "Trajectory":
-        """The motion at other times, by linear interpolation; outside of it, as at its ends."""
+        """Return the motion at other times by linear interpolation. Outside, it keeps the values of its ends."""
         others = [np.interp(times, self.t, getattr(self, f.name)) for f in fields(self)[1:]]
         return Trajectory(times, *others)
 
     def after_rest(self, rest_s: float) -> "Trajectory":
-        """The same motion, begun by a rest of `rest_s` at its start; it must begin at rest itself."""
+        """Return the motion with an additional rest of `rest_s` at the start. The motion must start at rest."""
         dt = self.dt
         n = round(rest_s / dt)
         columns = [np.concatenate([np.full(n, getattr(self, f.name)[0]), getattr(self, f.name)]) for f in fields(self)]
@@ -87,9 +87,9 @@ class Trajectory:
 
 
 def drive(segments: Iterable[Segment], start: Start, dt: float, previous: Segment | None = None) -> Trajectory:
-    """The path of the segments, driven one after the other; `previous` is what they continue, else rest.
+    """Return the path of consecutive segments. They continue `previous`, or start from rest.
 
-    The first row is the start itself. Durations are rounded to whole steps of `dt`.
+    The first row is `start`. Durations are rounded to whole steps of `dt`.
     """
     before = previous or Segment(0.0, 0.0)
     v, w = [np.array([before.speed])], [np.array([before.yaw_rate])]
@@ -113,15 +113,15 @@ def _ease(segment: Segment, before: Segment, dt: float) -> tuple[Array, Array]:
 
 
 def joined(first: Trajectory, then: Trajectory) -> Trajectory:
-    """Two stretches as one; the first row of the second is the last of the first."""
+    """Join two stretches. The first row of the second must equal the last row of the first."""
     columns = [np.concatenate([getattr(first, f.name), getattr(then, f.name)[1:]]) for f in fields(first)]
     return Trajectory(*columns)
 
 
 def integrate(v: Array, w: Array, start: Start, dt: float) -> Trajectory:
-    """The path of speed v and yaw rate w, both (n,) at instants `dt` apart.
+    """Return the path of the speed v and the yaw rate w, both (n,) at intervals of `dt`.
 
-    Exact for arcs: every step is the chord of the arc with the mean speed and mean yaw rate of its two ends.
+    Each step is the chord of an arc with the mean speed and the mean yaw rate of its ends, so arcs are exact.
     """
     angle = dt * (w[1:] + w[:-1]) / 2
     way = dt * (v[1:] + v[:-1]) / 2

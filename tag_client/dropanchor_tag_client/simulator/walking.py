@@ -1,4 +1,4 @@
-"""A person who walks with the tag in the hand or in a pocket: raw samples, ranges and truth."""
+"""A person who carries the tag in the hand or in a pocket: raw samples, ranges and truth."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ from dropanchor_tag_client.simulator.imu import (
 )
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, RangeModel, Ranges
-from dropanchor_tag_client.simulator.scenarios import NEAREST_M
+from dropanchor_tag_client.simulator.scenarios import MIN_DISTANCE_M
 from dropanchor_tag_client.simulator.sensors import SensorModels
 from dropanchor_tag_client.simulator.simulation import Simulation, Truth, with_row_before
 from dropanchor_tag_client.simulator.trajectory import Array, Segment, Start, Trajectory, drive
@@ -35,13 +35,13 @@ CARRIES: tuple[Carry, ...] = ("hand", "pocket", "turned")
 
 DT = 0.01
 HEIGHT_M = 1.2
-FARTHEST_M = 40.0  # from the anchor; recorded walks: 10 to 58 m, median 31 m
+MAX_DISTANCE_M = 40.0  # from the anchor; recorded walks: 10 to 58 m, median 31 m
 ANCHORS = (AnchorPlace(z=2.2),)
 TURN_S = 1.0
-BLOCKED_M = 0.6
-BLOCKED_LOST = 0.2
-# A thigh swings by about 0.35 rad with every stride. There were no recordings from a pocket: the swing and the forward
-# acceleration are typical figures, the rest is as in the hand.
+NLOS_MAX_M = 0.6
+NLOS_LOST_SHARE = 0.2
+# A thigh swings by about 0.35 rad with every stride. There were no recordings from a pocket. The swing and the forward
+# acceleration are typical values; all others are those of the hand.
 POCKET = replace(
     IN_HAND,
     pitch=Shape((1.4, 0.5, 0.2, 0.2, 0.15, 0.1, 0.09, 0.08)),
@@ -50,9 +50,10 @@ POCKET = replace(
 
 
 class Hold(NamedTuple):
-    """How the device is held. mount: course minus yaw of the device, (n,) rad.
+    """How the person holds the device.
 
-    frame: (3, 3), turns a vector of the swinging frame (x ahead, z up) into the device's axes.
+    mount: course minus yaw of the device, (n,) rad. frame: (3, 3) rotation from the swinging frame (x ahead, z up) to
+    the device's axes.
     """
 
     mount: Array
@@ -60,19 +61,20 @@ class Hold(NamedTuple):
 
 
 def walking_sensors(models: SensorModels | None = None) -> SensorModels:
-    """Return the sensors as a person carries them: without wheels' vibration, 0.08 m ranges at 10 Hz, 1 m below."""
+    """Return the sensors of a carried tag: no wheel vibration, ranges of 0.08 m at 10 Hz, 1 m below the anchor."""
     models = models or SensorModels()
     imu = replace(models.imu, vibration_acc=0.0, vibration_gyro=0.0, rocking_std=0.0, lean_std=0.03)
     return replace(models, imu=imu, ranges=RangeModel(hz=10.0, std=0.08), anchors=ANCHORS, height_m=HEIGHT_M)
 
 
 def simulate_walk(carry: Carry, seed: int, models: SensorModels | None = None) -> Simulation:
-    """Return a walk of 60 to 90 s. The same arguments, the same numbers.
+    """Return a walk of 60 to 90 s, which depends only on the arguments.
 
-    hand: held in front, off the direction of travel by N(0, 0.15) rad and swaying about it by 0.18 rad over 5 to 30 s
-    (recorded: 0.11 to 0.32, median 0.19);
-    turned: the same, and turned by ±90° within 1 s in the middle third of the walk; pocket: upright, any side ahead.
-    Ranges have a constant bias (sd 0.1 m); those from behind the walker are up to 0.6 m too long, and 20 % are lost.
+    hand: held in front, N(0, 0.15) rad off the direction of travel, with a sway of 0.18 rad over 5 to 30 s (recorded:
+    0.11 to 0.32, median 0.19). turned: the same, and turned by ±90° within 1 s in the middle third of the walk.
+    pocket: upright, with a random side ahead.
+    Ranges have a constant bias (sd 0.1 m). Ranges from behind the walker are up to 0.6 m too long, and 20 % of them are
+    lost.
     """
     models = models or walking_sensors()
     rng = stream(seed, Stream.GAIT)
@@ -96,11 +98,11 @@ def simulate_walk(carry: Carry, seed: int, models: SensorModels | None = None) -
 
 
 def walk(walker: Walker, rng: np.random.Generator) -> Trajectory:
-    """Return the path: a rest, five to seven straight or bent legs, quick turns, now and then a stop."""
+    """Return the path: a rest, then five to seven straight or curved legs with quick turns and occasional stops."""
     while True:
         start = Start(10.0, 0.0, rng.uniform(-math.pi, math.pi))
         motion = drive(_legs(walker, rng), start, DT)
-        if motion.distance.min() >= NEAREST_M and motion.distance.max() <= FARTHEST_M:
+        if motion.distance.min() >= MIN_DISTANCE_M and motion.distance.max() <= MAX_DISTANCE_M:
             return motion
 
 
@@ -158,7 +160,7 @@ def _measured(
 
 
 def _truth(motion: Trajectory, hold: Hold, attitude: Attitude, height: float) -> Truth:
-    """heading: course minus mount, without the swinging; attitude: of the swinging frame, not of a pocket's device."""
+    """Return the truth. The heading excludes the swing; the attitude is that of the swinging frame, not the device."""
     return Truth(
         t_s=motion.t,
         x=motion.x,
@@ -173,17 +175,17 @@ def _truth(motion: Trajectory, hold: Hold, attitude: Attitude, height: float) ->
 
 
 def _ranges(models: SensorModels, motion: Trajectory, seed: int) -> Ranges:
-    heard = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
-    rng = stream(seed, Stream.BLOCKED)
+    ranges = models.ranges.measure(motion, models.height_m, models.anchors, stream(seed, Stream.RANGE))
+    rng = stream(seed, Stream.NLOS)
     bias = rng.normal(0.0, 0.1)
-    behind = behind_the_walker(motion, heard, models.anchors)
-    excess = BLOCKED_M * behind * rng.random(len(behind))
-    lost = rng.random(len(behind)) < BLOCKED_LOST * (behind > 0.0)
-    return heard._replace(range_m=np.maximum(heard.range_m + bias + excess, 0.0)).where(~lost)
+    behind = behind_the_walker(motion, ranges, models.anchors)
+    excess = NLOS_MAX_M * behind * rng.random(len(behind))
+    lost = rng.random(len(behind)) < NLOS_LOST_SHARE * (behind > 0.0)
+    return ranges._replace(range_m=np.maximum(ranges.range_m + bias + excess, 0.0)).where(~lost)
 
 
 def behind_the_walker(motion: Trajectory, ranges: Ranges, anchors: Sequence[AnchorPlace]) -> Array:
-    """Return for each range how far behind its anchor is: 1 straight behind, 0 at the side and ahead."""
+    """Return for each range how far its anchor is behind the walker: 1 straight behind, 0 at the side or ahead."""
     there = motion.at(ranges.t_s)
     x, y = (np.array([anchor[axis] for anchor in anchors])[ranges.anchor] for axis in (1, 2))
     ahead = np.cos(np.arctan2(y - there.y, x - there.x) - there.course)

@@ -1,7 +1,7 @@
-"""Endless motions around an anchor at the origin: vehicles, carts and people of a yard, for live demonstrations.
+"""Endless motions around an anchor at the origin, for live demonstrations: vehicles, carts and people in a yard.
 
-A mover drives an arc until it points at its next target, then straight to it; sometimes it stops there. Motions
-are made leg by leg, so that they can go on for hours.
+A mover follows an arc until it points at its next target, then goes straight to it. Sometimes it stops there. Motions
+are generated leg by leg, so they can run for hours.
 """
 
 import math
@@ -17,7 +17,7 @@ Point = tuple[float, float]
 
 REST_S = 2.5
 RADIUS_M = 40.0
-NEAREST_M = 1.0
+MIN_DISTANCE_M = 1.0
 STEER_S = 0.6
 ACCELERATION = 1.5
 TRIALS = 20
@@ -25,10 +25,10 @@ TRIALS = 20
 
 @dataclass(frozen=True)
 class Habit:
-    """How a mover moves. Speeds m/s, lengths m, durations s, each drawn uniformly from its range.
+    """Parameters of a mover. Speeds (m/s), lengths (m) and durations (s) are uniform within their ranges.
 
-    route: targets in turn, for ever; without one they are drawn in a ring of radii `ring`.
-    pause_share: how many targets it stops at.
+    route: repeated sequence of targets; without one, random targets in a ring with the radii `ring`.
+    pause_share: share of the targets at which it stops.
     """
 
     speed: Range
@@ -39,7 +39,7 @@ class Habit:
     route: tuple[Point, ...] = ()
 
 
-# In the order in which tags get them: the first six to eight look well together on one map.
+# In the order of the tags. The first six to eight look good together on one map.
 HABITS: tuple[Habit, ...] = (
     Habit((1.5, 2.6), (2.0, 3.0), 0.35, (3.0, 8.0), ring=(5.0, 24.0)),  # forklift
     Habit((0.8, 1.4), (0.8, 1.4), 0.4, (2.0, 10.0), ring=(3.0, 18.0)),  # person
@@ -56,15 +56,12 @@ HABITS: tuple[Habit, ...] = (
         ),
     ),
     Habit((3.5, 5.0), (4.0, 6.0), 0.1, (3.0, 6.0), ring=(14.0, 34.0)),  # bicycle
-    Habit((0.5, 1.0), (0.8, 1.2), 0.6, (4.0, 15.0), ring=(2.0, 12.0)),  # person who stands about
+    Habit((0.5, 1.0), (0.8, 1.2), 0.6, (4.0, 15.0), ring=(2.0, 12.0)),  # person who often stops
 )
 
 
 class Wanderer:
-    """One mover, whose motion goes on for ever.
-
-    Stretches of it come one by one; the first row of each is the last of the one before.
-    """
+    """A mover with an endless motion, generated in stretches. Each starts with the last row of the previous one."""
 
     def __init__(self, habit: Habit, rng: np.random.Generator, dt: float) -> None:
         self._habit = habit
@@ -73,13 +70,13 @@ class Wanderer:
         self._next_target = int(rng.integers(len(habit.route))) if habit.route else 0
         first, second = self._target(), self._target()
         course = math.atan2(second[1] - first[1], second[0] - first[0])
-        self._next_target -= 1  # the second is where it goes first
+        self._next_target -= 1  # the second target is the first destination
         self._at = Start(*first, course, t=-dt)
         self._last = Segment(0.0, 0.0)
         self.start = Start(*first, course)
 
     def motions(self) -> Iterator[Trajectory]:
-        """The rest at the start, then leg after leg. The first row of all lies one step before t = 0."""
+        """Yield the rest at the start, then leg after leg. The very first row lies one step before t = 0."""
         yield self._go([Segment(REST_S + self._dt, 0.0)])
         while True:
             yield self._go(self._leg())
@@ -90,15 +87,15 @@ class Wanderer:
         return motion
 
     def _leg(self) -> list[Segment]:
-        """The next leg that stays clear of the anchor and within the yard."""
+        """Return a next leg that stays clear of the anchor and within the yard."""
         for _ in range(TRIALS):
             segments = self._towards(self._target())
-            if segments and self._is_fine(segments):
+            if segments and self._is_clear(segments):
                 return segments
         return self._turn_on_the_spot()
 
     def _towards(self, target: Point) -> list[Segment] | None:
-        """Start if at rest, steer, go straight, perhaps stop. None: the target is within the turning circle."""
+        """Return the segments to a target, or None if it lies within the turning circle."""
         speed = self._last.speed or self._rng.uniform(*self._habit.speed)
         begin = [] if self._last.speed else [Segment(_ramp(speed), speed, ramp_s=_ramp(speed))]
         run_up = speed * _ramp(speed) / 2 if begin else 0.0
@@ -114,7 +111,7 @@ class Wanderer:
         return segments
 
     def _turn_on_the_spot(self) -> list[Segment]:
-        """Stop, turn towards a target from where the way is free, and go there."""
+        """Return the segments that stop, turn to a target with a free path, and go there."""
         stop_s = _ramp(self._last.speed)
         stop = [] if not self._last.speed else [Segment(stop_s + 1.0, 0.0, ramp_s=stop_s)]
         here = drive(stop, self._at, self._dt, self._last).end
@@ -123,7 +120,7 @@ class Wanderer:
             turn = math.remainder(math.atan2(target[1] - here.y, target[0] - here.x) - here.course, math.tau)
             turn_s = 1.0 + abs(turn)
             segments = [*stop, Segment(turn_s, 0.0, turn=turn, ramp_s=turn_s), *self._straight(here, target)]
-            if self._is_fine(segments):
+            if self._is_clear(segments):
                 return segments
 
     def _straight(self, here: Start, target: Point) -> list[Segment]:
@@ -132,12 +129,12 @@ class Wanderer:
         ramp = _ramp(speed)
         return [Segment(max(ramp, way / speed), speed, ramp_s=ramp), Segment(ramp + 1.0, 0.0, ramp_s=ramp)]
 
-    def _is_fine(self, segments: list[Segment]) -> bool:
-        """Whether the leg, and a stop after it, keep clear of the anchor and within the yard."""
+    def _is_clear(self, segments: list[Segment]) -> bool:
+        """Return whether the leg, and a stop after it, stay clear of the anchor and within the yard."""
         stop_s = _ramp(segments[-1].speed)
         stop = Segment(stop_s, 0.0, ramp_s=stop_s)
         distance = drive([*segments, stop], self._at, self._dt, self._last).distance
-        return bool(distance.min() > NEAREST_M and distance.max() < RADIUS_M)
+        return bool(distance.min() > MIN_DISTANCE_M and distance.max() < RADIUS_M)
 
     def _target(self) -> Point:
         if self._habit.route:
@@ -149,9 +146,9 @@ class Wanderer:
 
 
 def steer(here: Start, target: Point, radius: float) -> tuple[float, float, float] | None:
-    """(angle, radius, way): an arc through `angle`, rad, and then `way` m straight lead to the target.
+    """Return the path to the target as (angle, radius, way): an arc through `angle`, rad, then `way` m straight.
 
-    The turn is to the side of the target. None: the target lies within the turning circle.
+    The arc turns to the side of the target. Return None if the target lies within the turning circle.
     """
     bearing = math.atan2(target[1] - here.y, target[0] - here.x)
     side = math.copysign(1.0, math.remainder(bearing - here.course, math.tau))
@@ -168,16 +165,16 @@ def steer(here: Start, target: Point, radius: float) -> tuple[float, float, floa
 
 
 def _steering(angle: float, speed: float, radius: float) -> list[Segment]:
-    """The arc; a short one is a smooth nudge instead."""
+    """Return the segments of the arc. A short arc becomes one smooth turn."""
     rate = math.copysign(speed / radius, angle)
     if angle / rate < 2 * STEER_S:
-        nudge_s = max(STEER_S, math.pi / 2 * angle / rate)  # its yaw rate peaks at that of the arc
-        return [Segment(nudge_s, speed, turn=angle, ramp_s=nudge_s)]
+        turn_s = max(STEER_S, math.pi / 2 * angle / rate)  # the peak yaw rate equals that of the arc
+        return [Segment(turn_s, speed, turn=angle, ramp_s=turn_s)]
     return [Segment(angle / rate, speed, rate, ramp_s=STEER_S)]
 
 
 def _ramp(speed: float) -> float:
-    """Time in which a speed is reached, s."""
+    """Return the time to reach a speed, s."""
     return STEER_S + abs(speed) / ACCELERATION
 
 

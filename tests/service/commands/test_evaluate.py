@@ -1,4 +1,4 @@
-"""`dropanchor evaluate` as a user calls it, with a handful of seeds."""
+"""`dropanchor evaluate` as a user calls it, with a few seeds."""
 
 import functools
 import json
@@ -94,7 +94,7 @@ def test_the_report_has_every_experiment_and_the_same_seeds_give_the_same_number
         assert (out[1] / f"{picture}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_recordings_are_compared_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_engines_are_compared_on_recordings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "square").mkdir()
     write_square(tmp_path / "square", range_std_m=0.05)
     page = tmp_path / "recordings.md"
@@ -119,12 +119,14 @@ def test_a_page_without_a_place_is_said_before_the_work(
     assert "%" not in printed
 
 
-def test_a_folder_without_recordings_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_without_recordings_is_an_error_that_names_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["evaluate", "recordings", "--data", str(tmp_path / "none"), "--processes", "1"]) == 2
     assert "none holds no recording" in capsys.readouterr().err
 
 
-def test_a_report_that_cannot_be_written_is_said_before_the_work(
+def test_a_report_folder_that_is_not_writable_is_an_error_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").touch()
@@ -132,17 +134,17 @@ def test_a_report_that_cannot_be_written_is_said_before_the_work(
     assert "file" in capsys.readouterr().err
 
 
-def test_ctrl_c_ends_it_and_its_processes_at_once(tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_command_and_its_processes(tmp_path: Path) -> None:
     command = [sys.executable, "-c", LONG, str(tmp_path)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, env=environment(), start_new_session=True)
     assert process.stderr is not None
-    shown = b""
-    while b"families" not in shown:  # by now the processes run
+    output = b""
+    while b"families" not in output:  # the worker processes now run
         read = os.read(process.stderr.fileno(), 4096)
-        assert read, shown
-        shown += read
+        assert read, output
+        output += read
     time.sleep(1.0)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all of them
+    os.killpg(process.pid, signal.SIGINT)  # to the whole group, like a terminal
     _, rest = process.communicate(timeout=60)
     assert process.returncode == 130
     assert rest.endswith(b"stopped\n")

@@ -40,23 +40,21 @@ def test_a_recording_with_a_known_start_is_tracked_and_reported(
     assert poses[300]["state"] in {"tracking", "degraded", "coasting"}
 
 
-def test_without_an_engine_named_it_is_fleet_which_needs_no_start(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_default_engine_is_fleet_which_needs_no_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "poses.csv"
     assert call(write_square(tmp_path, range_std_m=0.05), "--anchor", "A", "--out", out) == 0
     assert "fleet on" in capsys.readouterr().err
     assert math.isfinite(float(rows(out)[-1]["x"]))
 
 
-def test_no_picture_is_written_unless_it_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_picture_is_written_without_the_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     assert call(write_square(tmp_path), "--anchor", "A", "--engine", "paper", "--start=10,0,1.5708") == 0
     assert list(Path.cwd().iterdir()) == []
 
 
-def test_without_a_start_the_paper_says_that_it_cannot_know(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_start_the_engine_paper_asks_for_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call(write_square(tmp_path), "--anchor", "A", "--engine", "paper") == 0
     printed = capsys.readouterr().out
     assert "give --start X,Y,HEADING" in printed
@@ -76,7 +74,7 @@ def test_without_a_start_the_paper_says_that_it_cannot_know(tmp_path: Path, caps
         (["--anchor", "A", "--engine", "paper", "--smooth"], "--smooth works with the engine fleet only"),
     ],
 )
-def test_what_cannot_be_used_is_named_and_ends_with_2(
+def test_unusable_input_is_an_error_with_exit_code_2(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert call(write_square(tmp_path), *arguments) == 2
@@ -84,7 +82,7 @@ def test_what_cannot_be_used_is_named_and_ends_with_2(
 
 
 @pytest.mark.parametrize("lag", [[], ["--lag"]])
-def test_smoothed_poses_come_in_the_same_columns_and_with_a_report(
+def test_smoothed_poses_have_the_same_columns_and_a_report(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], lag: list[str]
 ) -> None:
     folder, filtered, smoothed = write_square(tmp_path, 0.05), tmp_path / "filtered.csv", tmp_path / "smoothed.csv"
@@ -99,19 +97,19 @@ def test_smoothed_poses_come_in_the_same_columns_and_with_a_report(
 
 
 @pytest.mark.parametrize("lag", ["-1", "61", "nan", "soon"])
-def test_a_lag_that_is_none_is_refused(tmp_path: Path, lag: str) -> None:
+def test_an_invalid_lag_is_an_error(tmp_path: Path, lag: str) -> None:
     with pytest.raises(SystemExit, match="2"):
         call(write_square(tmp_path), "--smooth", f"--lag={lag}")
 
 
 @pytest.mark.parametrize("start", ["1", "1,2,3,4", "a,b", "nan,0,0"])
-def test_a_start_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], start: str) -> None:
+def test_an_invalid_start_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str], start: str) -> None:
     with pytest.raises(SystemExit, match="2"):
         call(write_square(tmp_path), "--start", start)
     assert "X,Y,HEADING" in capsys.readouterr().err
 
 
-def test_values_may_begin_with_a_minus(tmp_path: Path) -> None:
+def test_option_values_can_begin_with_a_minus(tmp_path: Path) -> None:
     out = tmp_path / "poses.csv"
     folder = str(write_square(tmp_path))
     options = [

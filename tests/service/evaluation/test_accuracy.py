@@ -24,7 +24,7 @@ def test_an_offset_is_the_error_and_the_rigid_motion_removes_it() -> None:
     assert result.rmse_rotated > 1.0
 
 
-def test_a_rotation_about_the_anchor_is_told_apart_from_other_errors() -> None:
+def test_a_rotation_about_the_anchor_is_distinguished_from_other_errors() -> None:
     anchor = np.array([1.0, 1.0])
     c, s = np.cos(0.3), np.sin(0.3)
     turned = (np.column_stack([TRUTH.x, TRUTH.y]) - anchor) @ np.array([[c, s], [-s, c]]) + anchor
@@ -56,7 +56,7 @@ def test_a_track_without_any_position_has_no_accuracy() -> None:
         accuracy(T, track, TRUTH, (0.0, 0.0))
 
 
-def test_time_is_shared_out_among_the_states() -> None:
+def test_the_shares_of_time_are_by_state() -> None:
     track = poses(TRUTH.x, TRUTH.y)
     track["state"][:50] = State.AMBIGUOUS
     shares = accuracy(T, track, TRUTH, (0.0, 0.0)).share_of_time

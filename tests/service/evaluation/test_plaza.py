@@ -54,7 +54,7 @@ def test_it_is_a_recording_like_any_other(tmp_path: Path) -> None:
     assert found["1"]["vanilla EKF, tuned"].rmse < 2.0
 
 
-def test_what_is_missing_or_no_plaza_is_said(tmp_path: Path) -> None:
+def test_a_missing_or_invalid_file_is_a_clear_error(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="plaza1, plaza2"):
         read_plaza("plaza3", tmp_path)
     with pytest.raises(RecordingError, match=r"Plaza2_\.mat cannot be read"):

@@ -1,4 +1,4 @@
-"""Tables in documents: written between markers, and checked for age and for edits by hand."""
+"""Tables in the documentation are written between markers and checked for age and manual edits."""
 
 from pathlib import Path
 
@@ -57,14 +57,14 @@ def test_a_place_becomes_a_table_and_is_no_problem_before(root: Path) -> None:
     assert "place for" not in text
 
 
-def test_an_edit_by_hand_is_noticed(root: Path) -> None:
+def test_a_manual_edit_is_detected(root: Path) -> None:
     measure(root)
     page = root / "page.md"
     page.write_text(page.read_text().replace("| 1 |", "| 0 |"))
     assert found(root) == ["page.md, speed: the table was edited by hand; measure it again"]
 
 
-def test_a_change_of_the_code_makes_a_table_old_and_a_change_of_comments_does_not(root: Path) -> None:
+def test_a_code_change_makes_a_table_outdated_and_a_comment_change_does_not(root: Path) -> None:
     measure(root)
     (root / "code.py").write_text(CODE.replace("Double.", "Return the double.").replace("# why", "# because"))
     assert found(root) == []

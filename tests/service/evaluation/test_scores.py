@@ -90,7 +90,7 @@ def test_a_declaration_is_timed_and_judged_where_it_was_made(line: Simulation) -
     assert late.resolved_s == pytest.approx(20.0, abs=0.11)
 
 
-def test_who_never_declares_is_neither_wrong_nor_late(line: Simulation) -> None:
+def test_a_run_without_a_declaration_is_neither_wrong_nor_late(line: Simulation) -> None:
     track = beside(line, np.array([30.0, 30.0]), std=1.0)
     track.poses["state"] = State.AMBIGUOUS
     row = unknown_start.summary([unknown_start.score(line, track)])

@@ -8,8 +8,8 @@ import pytest
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
-from dropanchor_service.evaluation.paper.contestants import Paper
-from dropanchor_service.evaluation.simulated import Feed, Known, run_engine
+from dropanchor_service.evaluation.paper.estimators import PaperEstimator
+from dropanchor_service.evaluation.simulated import Feed, PriorKnowledge, run_engine
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 
@@ -22,8 +22,8 @@ def lines() -> list[Simulation]:
 def test_the_engine_paper_behind_the_adapter_gives_the_numbers_of_the_compiled_algorithm() -> None:
     runs = [simulate("L1", 3, preset("paper"))]
     parameters = replace(TUNED, range_std=0.2, heading_std=0.1)  # what the samples say of themselves
-    (one,) = run_engine(PaperEngine(parameters), runs, Known("heading", heading_std=0.1)).tracks
-    (other,) = Paper(parameters, speed_estimator=True).run(runs, Known()).tracks
+    (one,) = run_engine(PaperEngine(parameters), runs, PriorKnowledge("heading", heading_std=0.1)).tracks
+    (other,) = PaperEstimator(parameters, speed_estimator=True).run(runs, PriorKnowledge()).tracks
     assert one.t.tolist() == pytest.approx(other.t.tolist())
     for name in ("x", "y", "speed"):
         np.testing.assert_allclose(one.poses[name], other.poses[name], atol=1e-5)
@@ -31,8 +31,8 @@ def test_the_engine_paper_behind_the_adapter_gives_the_numbers_of_the_compiled_a
 
 
 @pytest.mark.parametrize("feed", ["level", "raw"])
-def test_a_run_does_not_notice_the_others_beside_it(lines: list[Simulation], feed: Feed) -> None:
-    known = Known(feed, heading_std=0.05)
+def test_runs_in_one_engine_do_not_affect_each_other(lines: list[Simulation], feed: Feed) -> None:
+    known = PriorKnowledge(feed, heading_std=0.05)
     together = run_engine(FleetEngine(), lines, known).tracks
     alone = [run_engine(FleetEngine(), [one], known).tracks[0] for one in lines]
     for one, other in zip(together, alone, strict=True):
@@ -41,8 +41,8 @@ def test_a_run_does_not_notice_the_others_beside_it(lines: list[Simulation], fee
 
 
 def test_without_a_start_the_paper_has_no_position_and_with_one_it_begins_there(lines: list[Simulation]) -> None:
-    (unknown, _) = run_engine(PaperEngine(TUNED), lines, Known("heading", start=False)).tracks
-    (known, _) = run_engine(PaperEngine(TUNED), lines, Known("heading")).tracks
+    (unknown, _) = run_engine(PaperEngine(TUNED), lines, PriorKnowledge("heading", start=False)).tracks
+    (known, _) = run_engine(PaperEngine(TUNED), lines, PriorKnowledge("heading")).tracks
     assert np.isnan(unknown.poses["x"]).all()
     assert known.poses["x"][0] == pytest.approx(10.0, abs=0.3)
     assert known.poses["y"][0] == pytest.approx(0.0, abs=0.3)

@@ -1,4 +1,4 @@
-"""Smooth rolling and the forklift."""
+"""The motions of the trolley and the forklift."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def test_the_same_seed_gives_the_same_motion() -> None:
         assert trajectory(scenario, 5000).x[-1] != trajectory(scenario, 5001).x[-1]
 
 
-def test_smooth_rolling_is_as_quiet_as_standing() -> None:
+def test_a_rolling_trolley_has_the_noise_of_one_at_rest() -> None:
     run = simulate("rolling", 5000, smooth(preset("real", imu_hz=100.0)))
     steady = (run.truth.v > 0.2) & (np.abs(np.gradient(run.truth.v, 0.01)) < 1e-6) & (np.abs(run.truth.w) < 1e-6)
     rest = run.truth.v == 0.0
@@ -29,7 +29,7 @@ def test_rolling_ramps_take_two_seconds() -> None:
     assert np.abs(np.diff(motion.v) / motion.dt).max() < 1.5 * np.pi / 4
 
 
-def test_a_forklift_reverses_between_stops_and_its_nose_stays_ahead() -> None:
+def test_a_forklift_reverses_between_stops_without_turning_round() -> None:
     motion = trajectory("forklift", 5000)
     backwards = motion.v < 0
     assert 0.08 < backwards.mean() < 0.5

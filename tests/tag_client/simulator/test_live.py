@@ -1,4 +1,4 @@
-"""The live tags: endless motions within the yard, and samples in order of time that fit them."""
+"""Live tags: endless motions within the yard, and matching samples in order of time."""
 
 import math
 import tracemalloc
@@ -27,13 +27,13 @@ def wandering(habit: int, seconds: float, seed: int = 0, dt: float = 0.02) -> Tr
     return motion
 
 
-def heard(count: int, scenario: str, seconds: float, models: SensorModels, seed: int = 0) -> list[Delivery]:
+def bundles_until(count: int, scenario: str, seconds: float, models: SensorModels, seed: int = 0) -> list[Delivery]:
     bundles = deliveries(count, scenario, seed, models, T0)
     return list(takewhile(lambda bundle: bundle.due_s <= seconds, bundles))
 
 
 @pytest.mark.parametrize("habit", range(len(HABITS)))
-def test_movers_stay_in_the_yard_clear_of_the_anchor_and_stop_now_and_then(habit: int) -> None:
+def test_movers_stay_in_the_yard_clear_of_the_anchor_and_stop_sometimes(habit: int) -> None:
     motion = wandering(habit, 1800.0)
     assert motion.distance.min() > 0.7
     assert motion.distance.max() <= RADIUS_M
@@ -73,7 +73,7 @@ def test_steering_ends_on_a_line_through_the_target() -> None:
 
 def test_tags_begin_at_their_start_poses_and_rest_for_two_seconds() -> None:
     poses = start_poses(8, seed=4)
-    bundles = heard(8, YARD, 2.0, preset("none", range_hz=10.0), seed=4)
+    bundles = bundles_until(8, YARD, 2.0, preset("none", range_hz=10.0), seed=4)
     for index, pose in enumerate(poses):
         ranges = [sample for bundle in bundles if bundle.tag == index for sample in bundle.ranges]
         imu = [sample for bundle in bundles if bundle.tag == index for sample in bundle.imu]
@@ -86,14 +86,14 @@ def test_tags_begin_at_their_start_poses_and_rest_for_two_seconds() -> None:
         assert math.remainder(math.pi / 2 - math.atan2(mag[1], mag[0]) - pose.heading_rad, math.tau) == pytest.approx(0)
 
 
-def test_start_poses_are_apart_and_of_every_scenario() -> None:
+def test_start_poses_are_apart_and_exist_for_every_scenario() -> None:
     poses = start_poses(8)
     assert len({(round(pose.x), round(pose.y)) for pose in poses}) == 8
     assert [(pose.x, pose.y) for pose in start_poses(2, 5, "S5")] == [(10.0, 0.0), (10.0, 0.0)]
 
 
 def test_samples_come_in_order_of_time_and_without_gaps() -> None:
-    bundles = heard(3, YARD, 60.0, PRESETS["calibrated"])
+    bundles = bundles_until(3, YARD, 60.0, PRESETS["calibrated"])
     dues = [bundle.due_s for bundle in bundles]
     assert dues == sorted(dues)
     for index in range(3):
@@ -112,9 +112,9 @@ def test_samples_come_in_order_of_time_and_without_gaps() -> None:
 
 
 def test_live_samples_are_those_of_the_motion() -> None:
-    """Ranges, gyro and accelerometer of perfect sensors against the recording of the same tag."""
+    """Compare ranges, gyro and accelerometer of perfect sensors with the recording of the same tag."""
     models = preset("none", range_hz=10.0)
-    bundles = heard(2, YARD, 45.0, models, seed=1)
+    bundles = bundles_until(2, YARD, 45.0, models, seed=1)
     run = simulation(YARD, 1, 1, models, 45.0)
     ranges = [sample.range_m for bundle in bundles if bundle.tag == 1 for sample in bundle.ranges]
     imu = [sample for bundle in bundles if bundle.tag == 1 for sample in bundle.imu]
@@ -126,12 +126,12 @@ def test_live_samples_are_those_of_the_motion() -> None:
     assert run.truth.v.max() > 0.5
 
 
-def test_the_same_seed_gives_the_same_samples_and_each_tag_its_own() -> None:
-    first, again = (heard(2, YARD, 10.0, PRESETS["real"], seed=9) for _ in range(2))
+def test_the_same_seed_gives_the_same_samples_and_tags_differ() -> None:
+    first, again = (bundles_until(2, YARD, 10.0, PRESETS["real"], seed=9) for _ in range(2))
     assert first == again
     one, other = ([s.range_m for b in first if b.tag == tag for s in b.ranges] for tag in (0, 1))
     assert one != other
-    assert heard(2, YARD, 10.0, PRESETS["real"], seed=10) != first
+    assert bundles_until(2, YARD, 10.0, PRESETS["real"], seed=10) != first
 
 
 def test_a_scenario_with_an_end_begins_with_more_rest_and_ends() -> None:
@@ -149,7 +149,7 @@ def test_a_duration_cuts_a_recording() -> None:
 
 
 @pytest.mark.parametrize("name", ["nlosburst", "outage5", "hcorr", "late15", "combo"])
-def test_what_needs_an_end_is_refused_in_the_yard(name: str) -> None:
+def test_a_perturbation_that_needs_a_finite_scenario_is_an_error_in_the_yard(name: str) -> None:
     with pytest.raises(ValueError, match="need a scenario with an end"):
         deliveries(1, YARD, 0, perturbed(PRESETS["real"], name), T0)
 

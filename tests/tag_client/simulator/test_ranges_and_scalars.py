@@ -1,4 +1,4 @@
-"""Ranges and scalar sensors have the noise that their settings say, and nothing else."""
+"""Ranges and scalar sensors have exactly the noise of their settings."""
 
 from dataclasses import replace
 
@@ -38,14 +38,14 @@ def test_the_same_seed_gives_the_same_numbers(names: tuple[str, ...]) -> None:
             assert np.array_equal(one, other)
 
 
-def test_changing_one_sensor_leaves_the_numbers_of_the_others() -> None:
+def test_changing_one_sensor_does_not_change_the_others() -> None:
     plain, perturbed_ranges = simulate("S5", 2), simulate("S5", 2, perturbed(SensorModels(), "nlos10", "drop20"))
     assert np.array_equal(plain.scalars.heading_rad, perturbed_ranges.scalars.heading_rad)
     assert np.array_equal(plain.imu.acc, perturbed_ranges.imu.acc)
 
 
 @pytest.mark.parametrize(("name", "range_std", "heading_std"), [("paper", 0.2, 0.1), ("real", 0.1, 0.05)])
-def test_white_noise_is_as_large_as_its_preset_says(name: str, range_std: float, heading_std: float) -> None:
+def test_white_noise_has_the_size_of_its_preset(name: str, range_std: float, heading_std: float) -> None:
     runs = [simulate("S5", seed, PRESETS[name]) for seed in range(8)]
     ranges = np.concatenate([range_errors(run) for run in runs])
     headings = np.concatenate([heading_errors(run) for run in runs])
@@ -65,7 +65,7 @@ def test_the_paper_s_run_has_a_range_at_every_one_of_its_instants() -> None:
     assert len(run.ranges.t_s) == 10_001
 
 
-def test_sensors_without_noise_tell_the_truth() -> None:
+def test_sensors_without_noise_measure_the_truth() -> None:
     run = simulate("M5", 4, noiseless())
     assert range_errors(run) == pytest.approx(np.zeros(len(run.ranges.t_s)), abs=1e-4)
     assert heading_errors(run) == pytest.approx(np.zeros(len(run.truth.t_s)), abs=1e-9)
@@ -125,15 +125,15 @@ def test_bursts_hold_one_excess_for_one_to_three_seconds() -> None:
     models = replace(noiseless(), ranges=RangeModel(std=0.0, burst_count=4))
     for seed in range(10):
         run = simulate("M5", seed, models)
-        blocked = range_errors(run) > 0.1
-        assert 1.0 <= blocked.mean() * (run.truth.t_s[-1] - run.truth.t_s[0]) <= 12.1
-        assert 1 <= len(np.unique(np.round(range_errors(run)[blocked], 2))) <= 8
+        nlos = range_errors(run) > 0.1
+        assert 1.0 <= nlos.mean() * (run.truth.t_s[-1] - run.truth.t_s[0]) <= 12.1
+        assert 1 <= len(np.unique(np.round(range_errors(run)[nlos], 2))) <= 8
 
 
 def test_a_fifth_of_the_ranges_is_lost() -> None:
     runs = pooled(("drop20",))
-    heard = sum(len(run.ranges.t_s) for run in runs) / sum(len(run.truth.t_s) for run in runs)
-    assert heard == pytest.approx(0.8, abs=0.01)
+    received = sum(len(run.ranges.t_s) for run in runs) / sum(len(run.truth.t_s) for run in runs)
+    assert received == pytest.approx(0.8, abs=0.01)
 
 
 def test_an_outage_lasts_five_seconds() -> None:
@@ -172,14 +172,14 @@ def test_gyro_drift_moves_the_gyro_by_two_degrees_a_second() -> None:
     assert raw == pytest.approx(scalar, abs=1e-9)
 
 
-def test_a_late_tag_is_first_heard_fifteen_seconds_into_its_motion() -> None:
+def test_a_late_tag_sends_its_first_sample_fifteen_seconds_into_its_motion() -> None:
     run = pooled(("late15",), range(1))[0]
     for times in (run.truth.t_s, run.imu.t_s, run.ranges.t_s, run.scalars.t_s):
         assert times[0] == pytest.approx(16.01)
     assert run.truth.v[0] > 0
 
 
-def test_the_combination_holds_all_its_parts() -> None:
+def test_the_combination_applies_all_its_parts() -> None:
     run = pooled(("combo",), range(1))[0]
     assert heading_errors(run).mean() == pytest.approx(0.1, abs=0.01)
     assert np.diff(run.ranges.t_s).max() == pytest.approx(5.0, abs=0.1)
@@ -192,14 +192,14 @@ def test_every_perturbation_changes_something(name: str) -> None:
     assert perturbed(SensorModels(), name) != SensorModels()
 
 
-def test_unknown_names_are_refused_with_the_known_ones() -> None:
+def test_an_unknown_name_is_an_error_that_lists_the_valid_names() -> None:
     with pytest.raises(ValueError, match=r"no perturbation 'rain'; there are nlos10"):
         perturbed(SensorModels(), "rain")
     with pytest.raises(ValueError, match=r"no noise 'loud'; there are paper"):
         preset("loud")
 
 
-def test_rates_may_be_given() -> None:
+def test_rates_can_be_set() -> None:
     run = simulate("S5", 0, preset("real", range_hz=5.0, imu_hz=50.0))
     assert np.diff(run.ranges.t_s) == pytest.approx(0.2)
     assert np.diff(run.imu.t_s) == pytest.approx(0.02)

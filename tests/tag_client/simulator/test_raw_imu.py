@@ -1,4 +1,4 @@
-"""Raw 9-axis samples agree with the motion they belong to."""
+"""Raw 9-axis samples agree with their motion."""
 
 import math
 from dataclasses import replace
@@ -15,20 +15,20 @@ from dropanchor_tag_client.simulator.trajectory import Array
 
 
 def rolling(mount: float = 0.0, rocking: float = 0.02) -> SensorModels:
-    """Perfect sensors on a body that leans and rocks."""
+    """Return perfect sensors on a body that leans and rocks."""
     models = noiseless()
     return replace(models, mount_rad=mount, imu=replace(models.imu, rocking_std=rocking, lean_std=0.05))
 
 
 def into_site(attitude: Array, vectors: Array) -> Array:
-    """Rotation by unit quaternions (w, x, y, z), (n, 4), of vectors (n, 3): v + 2 w (u × v) + 2 u × (u × v)."""
+    """Rotate vectors (n, 3) by unit quaternions (w, x, y, z), (n, 4): v + 2 w (u × v) + 2 u × (u × v)."""
     w, u = attitude[:, :1], attitude[:, 1:]
     once = np.cross(u, vectors)
     return np.asarray(vectors + 2 * (w * once + np.cross(u, once)))
 
 
 def level_heading(imu: Imu) -> Array:
-    """Heading of a level body from its magnetometer, magnetic north being +y."""
+    """Return the heading of a level body from its magnetometer, with magnetic north at +y."""
     return np.asarray(np.pi / 2 - np.arctan2(imu.mag[:, 1], imu.mag[:, 0]))
 
 
@@ -110,12 +110,12 @@ def test_a_body_at_rest_does_not_rock() -> None:
 
 
 def errors_of_units(models: SensorModels, seeds: range) -> list[tuple[Array, Array, Array]]:
-    """Per unit, the errors of the three sensors against perfect ones on the same motion."""
+    """Return the errors of the three sensors of each unit, relative to perfect sensors on the same motion."""
     pairs = [(simulate("S5", seed, models).imu, simulate("S5", seed, noiseless()).imu) for seed in seeds]
     return [(real.acc - ideal.acc, real.gyro - ideal.gyro, real.mag - ideal.mag) for real, ideal in pairs]
 
 
-def test_noise_and_biases_of_units_are_as_their_model_says() -> None:
+def test_noise_and_biases_of_units_follow_their_model() -> None:
     plain = SensorModels()
     models = replace(plain, imu=replace(plain.imu, rocking_std=0.0, lean_std=0.0, acc_scale_std=0.0))
     errors = errors_of_units(models, range(40))

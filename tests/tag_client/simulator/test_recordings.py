@@ -1,4 +1,4 @@
-"""A simulation written as a recording comes back the same from plain CSV files."""
+"""A simulation survives writing and reading as a recording in plain CSV files."""
 
 import csv
 import json
@@ -27,7 +27,7 @@ def numbers(path: Path, *names: str) -> Array:
     return np.array([[float(value) for value in columns[name]] for name in names]).T
 
 
-def test_a_recording_holds_the_simulation(tmp_path: Path) -> None:
+def test_a_recording_contains_the_whole_simulation(tmp_path: Path) -> None:
     run = simulate("M5", 9, perturbed(PRESETS["real"], "nlos10", "late15"))
     write_recording(run, tmp_path / "new" / "m5", platform_heading=True)
     folder = tmp_path / "new" / "m5"
@@ -47,7 +47,7 @@ def test_a_recording_holds_the_simulation(tmp_path: Path) -> None:
     assert json.loads((folder / "meta.json").read_text())["rates_hz"]["range_total"] == pytest.approx(10.0, abs=0.1)
 
 
-def test_the_heading_file_is_only_written_when_asked_for(tmp_path: Path) -> None:
+def test_the_heading_file_is_written_on_request_only(tmp_path: Path) -> None:
     write_recording(simulate("L1", 0), tmp_path)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"range.csv", "imu.csv", "truth.csv", "anchors.csv", "meta.json"}

@@ -1,4 +1,4 @@
-"""The motions: kinematically consistent, reproducible, and what their family says."""
+"""Motions are kinematically consistent, reproducible, and true to the parameters of their family."""
 
 import math
 from collections.abc import Callable
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from dropanchor_tag_client.simulator.families import Wandering
 from dropanchor_tag_client.simulator.scenarios import (
     FAMILIES,
-    FARTHEST_M,
-    NEAREST_M,
+    MAX_DISTANCE_M,
+    MIN_DISTANCE_M,
     SCENARIOS,
     UnknownScenarioError,
     trajectory,
@@ -24,13 +24,13 @@ SEEDS = range(25)
 
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """[first, last) of the stretches where a mask holds."""
+    """Return [first, last) of each stretch where the mask is true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def cruising(motion: Trajectory) -> list[Trajectory]:
-    """The stretches of constant speed and yaw rate that last 2 s or more."""
+    """Return the stretches of constant speed and yaw rate that last more than 2 s."""
     steady = (np.abs(np.diff(motion.v, prepend=0)) < 1e-9) & (np.abs(np.diff(motion.w, prepend=0)) < 1e-9)
     return [
         Trajectory(*(getattr(motion, f.name)[first:last] for f in fields(motion)))
@@ -73,8 +73,8 @@ def test_families_start_at_rest_at_ten_metres_and_keep_their_distance(scenario: 
         motion = trajectory(scenario, seed)
         assert (motion.x[0], motion.y[0], motion.v[0]) == (10.0, 0.0, 0.0)
         assert np.all(motion.v[motion.t < 0.995] == 0.0)
-        assert motion.distance.min() >= NEAREST_M
-        assert motion.distance.max() <= FARTHEST_M
+        assert motion.distance.min() >= MIN_DISTANCE_M
+        assert motion.distance.max() <= MAX_DISTANCE_M
 
 
 def test_s5_is_five_straight_legs_of_distinct_speeds() -> None:
@@ -127,7 +127,7 @@ def test_the_single_line_is_one_line_of_forty_seconds() -> None:
 
 
 def test_the_random_walk_has_its_mean_and_deviation() -> None:
-    """Drawn without the limits of distance, which would select slow walks."""
+    """Draw without the distance limits, which would select slow motions."""
     late = [Wandering().draw(np.random.default_rng(seed)) for seed in range(300)]
     speeds = np.concatenate([motion.v[3000:] for motion in late])
     rates = np.concatenate([motion.w[3000:] for motion in late])
@@ -177,7 +177,7 @@ def test_a_rest_before_a_motion_only_delays_it() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "s5", "M6"])
-def test_an_unknown_scenario_is_refused_with_the_known_ones(name: str) -> None:
+def test_an_unknown_scenario_is_an_error_that_lists_the_valid_names(name: str) -> None:
     with pytest.raises(UnknownScenarioError, match=r"there are P, .*S5"):
         trajectory(name, 0)
 

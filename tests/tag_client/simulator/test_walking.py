@@ -1,4 +1,4 @@
-"""Simulated walks: reproducible, consistent with themselves, and shaken as a real phone is."""
+"""Simulated walks are reproducible and self-consistent, and shake the device like recorded walks."""
 
 import math
 import os
@@ -20,7 +20,7 @@ BANDS = ((0.7, 1.3), (1.7, 2.3), (2.3, 3.3))  # of the step frequency
 
 
 def upward(acc: Array, hz: float) -> Array:
-    """Acceleration along gravity, which is its mean over 6 s."""
+    """Return the acceleration along gravity, estimated as the mean over 6 s."""
     kernel = np.ones(int(6 * hz)) / int(6 * hz)
     gravity = np.column_stack([np.convolve(np.pad(axis, len(kernel), "edge"), kernel, "same") for axis in acc.T])
     gravity = gravity[len(kernel) : -len(kernel)]
@@ -30,7 +30,7 @@ def upward(acc: Array, hz: float) -> Array:
 
 
 def spectrum(signal: Array, hz: float) -> tuple[float, list[float]]:
-    """The step frequency, Hz, and the RMS in the bands."""
+    """Return the step frequency, Hz, and the RMS in each band."""
     frequency = np.fft.rfftfreq(len(signal), 1 / hz)
     power = 2 * np.abs(np.fft.rfft(signal)) ** 2 / len(signal) ** 2
     near = (frequency > 1.2) & (frequency < 2.6)
@@ -54,10 +54,10 @@ def test_the_hand_shakes_as_in_recorded_walks() -> None:
     np.testing.assert_allclose(simulated(), recorded, rtol=0.2)
 
 
-def test_the_recorded_walks_still_have_these_figures() -> None:
+def test_the_recorded_walks_shake_the_hand_as_the_simulated_ones_do() -> None:
     folders = sorted(DATA.glob("phones/ms*_front"))
     if not folders:
-        pytest.skip(f"{DATA}/phones is not here")
+        pytest.skip(f"{DATA}/phones is missing: set DROPANCHOR_DATA to the folder of the recordings")
     axes = [read_recording(folder).imu for folder in folders]
     acc = [np.column_stack([np.asarray(imu[name]) for name in ("ax", "ay", "az")]) for imu in axes]
     np.testing.assert_allclose(simulated(), np.median([measured(one, 50.0) for one in acc], axis=0), rtol=0.2)
@@ -72,7 +72,7 @@ def test_the_same_seed_gives_the_same_walk_and_another_seed_another(carry: Carry
 
 
 @pytest.mark.parametrize("carry", CARRIES)
-def test_a_walk_is_a_walk_and_every_sensor_has_it(carry: Carry) -> None:
+def test_a_walk_has_a_plausible_speed_and_samples_of_every_sensor(carry: Carry) -> None:
     walk = simulate_walk(carry, 5002)
     truth = walk.truth
     assert 45.0 < truth.t_s[-1] < 120.0
@@ -111,7 +111,7 @@ def test_perfect_gyros_integrate_to_the_attitude_of_the_device(carry: Carry) -> 
     assert angle_of(turn) == pytest.approx(angle_of(first.T @ last), abs=0.1)
 
 
-def test_at_rest_the_accelerometer_feels_gravity_alone() -> None:
+def test_at_rest_the_accelerometer_measures_gravity_alone() -> None:
     for carry in CARRIES:
         walk = simulate_walk(carry, 5004, walking_sensors(noiseless()))
         still = walk.imu.acc[walk.truth.t_s < 0.9]
@@ -127,7 +127,7 @@ def test_a_turned_device_turns_by_a_right_angle_and_its_carrier_does_not() -> No
     assert float(np.ptp(held.course - held.heading)) < 1.2
 
 
-def test_ranges_are_blocked_from_behind_and_not_from_ahead() -> None:
+def test_ranges_are_nlos_from_behind_the_walker_and_not_from_ahead() -> None:
     away = drive([Segment(5.0, 1.2)], Start(10.0, 0.0, 0.0), 0.01)
     towards = drive([Segment(5.0, 1.2)], Start(20.0, 0.0, math.pi), 0.01)
     one = np.ones(1)

@@ -78,7 +78,7 @@ def test_one_tag_is_written_into_the_folder_itself(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--perturb", "late15", "--out", "x", "--scenario", "S5", "--duration", "3"], "nothing is left"),
+        (["--perturb", "late15", "--out", "x", "--scenario", "S5", "--duration", "3"], "there are no samples"),
         (["--duration", "0.001", "--out", "x"], "shorter than the time between two IMU samples"),
         (["--seed", "-1", "--out", "x"], "non-negative"),
     ],

@@ -1,1 +1,1 @@
-"""The experiments of the paper, one module each: `run(...)` gives a `Section` of the report."""
+"""The experiments of the paper, one per module. Each `run(...)` returns a `Section` of the report."""

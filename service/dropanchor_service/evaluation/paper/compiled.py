@@ -1,9 +1,8 @@
-"""Algorithm 1 compiled, for experiments with hundreds of runs: the same numbers as the engine `paper`.
+"""Algorithm 1 as compiled code, for experiments with hundreds of runs. It gives the same numbers as the engine `paper`.
 
-It covers what the simulations need: one anchor at the origin, a known start, headings as they come, no IMU. The engine
-in `estimation/` is the readable one; a test holds this one to it. The report needs both: its families alone are 10,400
-runs of the paper's filters, and a run of 10,000 instants takes 0.04 s here and 1.6 s in the engine, so that minutes
-would become hours. The vanilla EKF, which the engine does not offer, is a part of this one, too.
+It covers what the simulations need: one anchor at the origin, a known start, measured headings, no IMU. The engine in
+`estimation/` is the readable version, and a test compares the two. The report needs the speed: its families alone are
+10,400 runs of the paper's filters. This version also offers the vanilla EKF, which the engine does not.
 """
 
 import math
@@ -20,7 +19,7 @@ NEAREST = 1e-3  # m, as in the engine
 
 @dataclass(frozen=True)
 class Estimate:
-    """After each instant, (n,): x, y, m; theta, rad; v, m/s; cov (n, 2, 2) of x, y. NaN before the first range."""
+    """The estimate after each instant, (n,): x, y, m; theta, rad; v, m/s; cov (n, 2, 2) of x, y. NaN at first."""
 
     x: Array
     y: Array
@@ -37,9 +36,9 @@ def algorithm1(
     parameters: PaperParameters,
     speed_estimator: bool = True,
 ) -> Estimate:
-    """Run Algorithm 1, or without the speed estimator the vanilla EKF of the paper.
+    """Run Algorithm 1 or, without the speed estimator, the vanilla EKF of the paper.
 
-    t: (n,) s; heading: (n,) rad, ranges: (n,) m, NaN where there is none; at one instant the heading comes first.
+    t: (n,) s; heading: (n,) rad; ranges: (n,) m; NaN if there is none. At each instant the heading is used first.
     start: x, y, heading.
     """
     p = parameters
@@ -62,7 +61,7 @@ def _wrapped(angle: float) -> float:
 
 @njit(cache=True)
 def _predict(x: Array, P: Array, q: Array, dt: float) -> Array:
-    """The prior covariance; x is moved."""
+    """Propagate x in place and return the prior covariance."""
     middle = x[2] + x[4] * dt / 2
     c, s = math.cos(middle) * dt, math.sin(middle) * dt
     F = np.eye(5)
@@ -77,7 +76,7 @@ def _predict(x: Array, P: Array, q: Array, dt: float) -> Array:
 
 @njit(cache=True)
 def _update(x: Array, P: Array, y: float, h: Array, R: float) -> Array:
-    """The posterior covariance in Joseph's form; x is corrected."""
+    """Correct x in place and return the posterior covariance, in Joseph form."""
     Ph = P @ h
     K = Ph / (h @ Ph + R)
     x += K * y
@@ -88,7 +87,7 @@ def _update(x: Array, P: Array, y: float, h: Array, R: float) -> Array:
 
 @njit(cache=True)
 def _range_update(x: Array, P: Array, z: float, R: float, gate: float) -> tuple[bool, Array]:
-    """Whether the range passed the gate, and the posterior covariance."""
+    """Update with a range. Return whether it passed the gate, and the posterior covariance."""
     r = math.sqrt(x[0] ** 2 + x[1] ** 2)
     h = np.zeros(5)
     if r >= NEAREST:
@@ -101,7 +100,7 @@ def _range_update(x: Array, P: Array, z: float, R: float, gate: float) -> tuple[
 
 @njit(cache=True)
 def _smoothed(smooth: Array, t: float, z: float, q: float, R: float) -> None:
-    """The range filter; smooth holds time, range and variance, time NaN before the first range."""
+    """Update the range filter in place. smooth: time, range and variance; the time is NaN before the first range."""
     if np.isnan(smooth[0]):
         smooth[0], smooth[1], smooth[2] = t, z, R
     prior = smooth[2] + q * (t - smooth[0])
@@ -122,7 +121,10 @@ def _squared_speed(pairs: Array, spacing: int) -> float:
 
 @njit(cache=True)
 def _window_speed(smooth: Array, pairs: Array, speeds: Array, counts: Array, p: Array, spacing: int) -> float:
-    """VelEstimator: NaN where there is no new speed. counts: pairs held, speeds held, first speed of the window."""
+    """Run VelEstimator and return the speed, or NaN if there is no new one.
+
+    counts: number of pairs, number of speeds, index of the first speed of the window.
+    """
     t, r = smooth[0], smooth[1]
     last = counts[0] - 1
     if counts[0] > 0 and not (abs(r - pairs[last, 1]) > p[14] and t > pairs[last, 0]):
@@ -163,7 +165,7 @@ def _run(t: Array, heading: Array, ranges: Array, start: Array, p: Array, spacin
             if np.isnan(now):
                 now = fused = t[i]
             if t[i] - fused > p[11]:
-                out[i:] = out[i - 1]  # lost: the engine stands still from here on
+                out[i:] = out[i - 1]  # lost: the engine keeps this estimate from now on
                 break
             P = _predict(x, P, q, t[i] - now)
             now = t[i]

@@ -1,4 +1,4 @@
-"""The engines of the product that go through raw samples and recordings: the paper's filter four times, and ours."""
+"""The engines for raw samples and recordings: four variants of the paper's filter, and the engine fleet."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,11 +8,11 @@ from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 
-WITHOUT_SPEED = 1.0  # blend: the whole weight on the speed of the EKF
+WITHOUT_SPEED = 1.0  # blend: full weight on the speed of the EKF
 
 
 def engines() -> dict[str, Callable[[], Engine]]:
-    """By name. Tuned: the tuned parameters of the service."""
+    """Return the constructors of the engines by name. Tuned: the tuned parameters of the service."""
 
     def paper(parameters: PaperParameters) -> Callable[[], Engine]:
         return lambda: PaperEngine(parameters)

@@ -1,4 +1,4 @@
-"""Sec. II-C: how range noise becomes speed noise: the paper's formulas, the corrected ones, and a Monte Carlo."""
+"""Sec. II-C: propagation of range noise to the speed, by the paper's formulas, the corrected ones and a Monte Carlo."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ UNEQUAL_TIMES_S = (0.0, 0.4, 1.5)
 
 @dataclass(frozen=True)
 class Case:
-    """A tag passes (start, 0) in the y direction; three ranges dt apart with white noise."""
+    """A tag that passes (start, 0) in the y direction, with three ranges at intervals of dt and white noise."""
 
     start_m: float
     speed_mps: float
@@ -21,7 +21,7 @@ class Case:
     sigma_m: float
 
     def ranges(self) -> Array:
-        """The three true ranges, m."""
+        """Return the three true ranges, m."""
         r: Array = np.hypot(self.start_m, self.speed_mps * self.dt_s * np.arange(3))
         return r
 
@@ -43,20 +43,23 @@ CASES = [
 
 
 def paper_std(case: Case) -> float:
-    """As printed, eq. (4): (δv)² = (2 + 10·r1²/S)·δr²·Δt²."""
+    """Return eq. (4) as printed: (δv)² = (2 + 10·r1²/S)·δr²·Δt²."""
     r1 = case.ranges()[1]
     return float(np.sqrt(2 + 10 * r1**2 / case.second_difference) * case.sigma_m * case.dt_s)
 
 
 def corrected_std(case: Case) -> float:
-    """First order: (δv)² = (1 + 6·r1²/S)·δr²/(2·Δt²), from ∂v/∂r0 = r0/(2vΔt²), ∂v/∂r1 = −r1/(vΔt²), v = √(S/2)/Δt."""
+    """Return the first-order result (δv)² = (1 + 6·r1²/S)·δr²/(2·Δt²).
+
+    It follows from v = √(S/2)/Δt with ∂v/∂r0 = r0/(2vΔt²) and ∂v/∂r1 = −r1/(vΔt²).
+    """
     r1 = case.ranges()[1]
     return float(np.sqrt((1 + 6 * r1**2 / case.second_difference) / 2) * case.sigma_m / case.dt_s)
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """std and bias of v over the draws in which S > 0; negative: share of the others."""
+    """Monte Carlo result. std, bias: of v over the draws with S > 0. negative: share of the other draws."""
 
     std: float
     bias: float
@@ -72,7 +75,7 @@ def sampled(case: Case, draws: int, seed: int) -> Sampled:
 
 
 def unequal_intervals(times_s: tuple[float, float, float], speed_mps: float, start_m: float) -> tuple[float, float]:
-    """(paper's, corrected) three-point speed of a noise-free straight line, m/s.
+    """Return the paper's and the corrected three-point speed of a noise-free straight line, m/s.
 
     v² = ((r2² − r1²) − (Δt2/Δt1)(r1² − r0²)) / D, D printed as Δt1·Δt2 + Δt1², derived as Δt1·Δt2 + Δt2²: with
     r_i² = r² + (x + v·t_i)², the numerator is 2xvΔt2 + v²(Δt2² + 2Δt1Δt2) − (Δt2/Δt1)(2xvΔt1 + v²Δt1²).

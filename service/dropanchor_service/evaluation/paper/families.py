@@ -1,4 +1,4 @@
-"""Beyond one trajectory: the scenario families and what goes wrong in the field, on many seeds, against the bound."""
+"""Beyond one trajectory: scenario families and field perturbations on many seeds, compared with the bound."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -7,13 +7,13 @@ from itertools import groupby
 import numpy as np
 from matplotlib.figure import Figure
 
-from dropanchor_service.evaluation.paper.contestants import contestants
+from dropanchor_service.evaluation.paper.estimators import estimators
 from dropanchor_service.evaluation.paper.scores import Row, RunScore, bound_of, score, summary
 from dropanchor_service.evaluation.paper.tuning import STATED, Noise
 from dropanchor_service.evaluation.parallel import Workers
 from dropanchor_service.evaluation.pcrb import Sensors
 from dropanchor_service.evaluation.report import Cell, Section, Table
-from dropanchor_service.evaluation.simulated import Known
+from dropanchor_service.evaluation.simulated import PriorKnowledge
 from dropanchor_tag_client.simulator.perturbations import perturbed
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import simulate
@@ -51,7 +51,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Scores:
-    """Of one contestant on one task: a score per run; seconds of processor time; instants at which samples came."""
+    """Scores of one estimator on one task. seconds: processor time. instants: number of instants with samples."""
 
     runs: list[RunScore]
     seconds: float
@@ -71,23 +71,23 @@ def tasks(seeds: range) -> list[Task]:
 
 
 def work(task: Task) -> dict[str, Scores]:
-    """All contestants on one task, by name."""
+    """Run all estimators on one task and return their scores by name."""
     case, noise = task.case, NOISES[task.case.preset]
     models = perturbed(preset(case.preset), *case.perturbations)
     simulations = [simulate(case.family, seed, models) for seed in task.seeds]
     sensors = Sensors(range=noise.range_std, heading=noise.heading_std)
     if "late15" in case.perturbations:
         sensors = replace(sensors, start_speed=SPEED_WHEN_MOVING)
-    known = Known(heading_std=noise.heading_std, reverse=case.family == "RV", exact_heading=case.exact_heading)
-    entered = contestants(noise)
+    known = PriorKnowledge(heading_std=noise.heading_std, reverse=case.family == "RV", exact_heading=case.exact_heading)
+    candidates = estimators(noise)
     bounds = {
         information: [bound_of(one, sensors, information) for one in simulations]
-        for information in {contestant.information for contestant in entered.values()}
+        for information in {estimator.information for estimator in candidates.values()}
     }
     found = {}
-    for name, contestant in entered.items():
-        timed = contestant.run(simulations, known)
-        runs = zip(simulations, timed.tracks, bounds[contestant.information], strict=True)
+    for name, estimator in candidates.items():
+        timed = estimator.run(simulations, known)
+        runs = zip(simulations, timed.tracks, bounds[estimator.information], strict=True)
         found[name] = Scores(
             [score(*run) for run in runs], timed.seconds, sum(len(one.truth.t_s) for one in simulations)
         )
@@ -96,18 +96,18 @@ def work(task: Task) -> dict[str, Scores]:
 
 @dataclass(frozen=True)
 class Result:
-    """Of one contestant on one case. microseconds: processor time per instant at which samples came."""
+    """Result of one estimator on one case. microseconds: processor time per instant with samples."""
 
     row: Row
     microseconds: float
 
 
 Results = dict[str, dict[str, Result]]
-"""By case, then by contestant."""
+"""By case, then by estimator."""
 
 
 def run(workers: Workers, progress: Callable[[], None], seeds: range) -> Section:
-    """progress is called after each of `tasks(seeds)`."""
+    """Run all cases. progress: called after each of `tasks(seeds)`."""
     found = {
         case.name: {name: _merged([one[name] for one in parts]) for name in parts[0]}
         for case, parts in _by_case(workers, tasks(seeds), progress)
@@ -128,7 +128,7 @@ def _by_case(
 
 
 def _merged(parts: Sequence[Scores]) -> Result:
-    """The first task of a contestant may have compiled its kernels: the fastest tells its time."""
+    """Merge the scores of a case. The first task may include compilation, so the fastest one gives the time."""
     row = summary([run for part in parts for run in part.runs])
     return Result(row, min(part.seconds / part.instants for part in parts) * 1e6)
 
@@ -152,11 +152,11 @@ def section(found: Results, seeds: range) -> Section:
             "and known instants of the speed changes for the paper's two filters (they use no gyro), with the forward "
             "accelerometer for engines that use it; ratio: √(mean MSE)/√(mean bound), then the median of the runs. No "
             "bound of the first kind exists where the speed changes all the time (OU).",
-            "Calibrated: the engine is told what the bound assumes, that the tag never slips, that its ranges have no "
-            "bias and, but in hb0.1, hdrift and hcorr, that its heading has no error beside white noise.",
-            "In late15 the position is given when the tag is first heard, its speed is not. gdrift concerns only who "
-            "uses a gyro. Time: processor time per instant at which samples came, compiled, on one core of this "
-            "machine; it alone differs from run to run.",
+            "Calibrated: the settings state what the bound assumes: the tag never slips, its ranges have no bias and, "
+            "except in hb0.1, hdrift and hcorr, its heading has only white noise.",
+            "In late15 the position at the first sample is given, the speed is not. gdrift affects only estimators "
+            "with a gyro. Time: processor time per instant with samples, compiled, on one core of this machine; only "
+            "this figure differs from run to run.",
         ],
         tables=[
             *(_table(f"Preset {name}", found, names) for name, names in plain.items()),

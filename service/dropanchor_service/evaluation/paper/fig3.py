@@ -15,9 +15,9 @@ LAG_S = 0.5  # between the three ranges
 
 @dataclass(frozen=True)
 class Estimated:
-    """At the middle of each three ranges, (n,): time, true speed, estimate, what the arc makes of it; all in SI.
+    """Values at the middle of each three ranges, (n,): time, true speed, estimate, and prediction for an arc; SI.
 
-    within: whether the motion was the same from the first of the three ranges to the last.
+    within: whether speed and yaw rate were constant from the first to the last of the three ranges.
     """
 
     t: Array
@@ -33,7 +33,10 @@ class Estimated:
 
 
 def estimated(motion: Trajectory, lag_s: float = LAG_S) -> Estimated:
-    """v² = (r0² + r2² − 2·r1²)/(2Δt²), and its limit for small Δt, v² + v·w·b, with b = y·cos θ − x·sin θ."""
+    """Return the three-point speed v² = (r0² + r2² − 2·r1²)/(2Δt²) and its limit for small Δt.
+
+    The limit is v² + v·w·b, with b = y·cos θ − x·sin θ.
+    """
     k = round(lag_s / motion.dt)
     squared = motion.distance**2
     v2 = (squared[2 * k :] + squared[: -2 * k] - 2 * squared[k:-k]) / (2 * (k * motion.dt) ** 2)

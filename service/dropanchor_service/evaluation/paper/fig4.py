@@ -23,11 +23,14 @@ PAPER_TEXT = replace(RELEASED, pair_spacing=1, window_base=0.0, window_ratio=1.0
 WIDE = replace(RELEASED, th_distance=10.0, pair_spacing=1, window_base=0.0, window_ratio=2.0)
 
 Estimator = Callable[[Array, Array], Array]
-"""Times and noisy ranges (n,) → the estimate that stands at each time (n,), m/s, NaN before the first."""
+"""Times and noisy ranges (n,) → the latest estimate at each time (n,), m/s; NaN before the first."""
 
 
 def direct(lag: int, rectify: bool) -> Estimator:
-    """Three ranges, `lag` samples apart; rectify: √|v²| as in the released code, else no estimate where v² < 0."""
+    """Return the three-point estimator of ranges `lag` samples apart.
+
+    rectify: use √|v²|, as the released code does; otherwise there is no estimate if v² < 0.
+    """
 
     def estimate(t: Array, r: Array) -> Array:
         dt = (t[-1] - t[0]) / (len(t) - 1)
@@ -40,7 +43,7 @@ def direct(lag: int, rectify: bool) -> Estimator:
 
 
 def least_squares(window: int) -> Estimator:
-    """v² is the leading coefficient of the parabola fitted to r²(t) over the last `window` samples."""
+    """Return the estimator whose v² is the leading coefficient of a parabola fitted to the last `window` r²(t)."""
 
     def estimate(t: Array, r: Array) -> Array:
         tau = t[:window] - t[:window].mean()
@@ -53,7 +56,7 @@ def least_squares(window: int) -> Estimator:
 
 
 def windowed(parameters: PaperParameters) -> Estimator:
-    """Lines 13 to 18 of Algorithm 1: range filter, key range pairs, three-point speed, mean over the window."""
+    """Return lines 13 to 18 of Algorithm 1: range filter, key range pairs, three-point speed, mean over the window."""
 
     def estimate(t: Array, r: Array) -> Array:
         p = parameters
@@ -84,7 +87,7 @@ ESTIMATORS: dict[str, Estimator] = {
 
 @dataclass(frozen=True)
 class At:
-    """Error of the speed at one range over all seeds, m/s; missing: share of seeds without an estimate."""
+    """Speed error at one range over all seeds, m/s. missing: share of the seeds without an estimate."""
 
     mean: float
     std: float

@@ -1,4 +1,4 @@
-"""Sec. II-A: what range and heading determine, by Lie derivatives (Hermann and Krener 1977), and what they do not."""
+"""Sec. II-A: observability from range and heading, by Lie derivatives (Hermann and Krener 1977), and ambiguities."""
 
 from dataclasses import dataclass
 
@@ -20,14 +20,14 @@ b = -x * sp.sin(theta) + y * sp.cos(theta)  # across it
 
 
 def lie(function: sp.Expr, order: int) -> sp.Expr:
-    """L^order of a scalar function along the drift of the constant-(v, w) motion."""
+    """Return L^order of a scalar function along the drift of the constant-(v, w) motion."""
     for _ in range(order):
         function = (sp.Matrix([function]).jacobian(STATE) * DRIFT)[0]
     return sp.simplify(function)
 
 
 def gradients(order: int, speed_measured: bool) -> sp.Matrix:
-    """Rows: gradients of the Lie derivatives of range and heading up to `order`, and of v and w if measured."""
+    """Return as rows the gradients of the Lie derivatives of range and heading up to `order`, and of measured v, w."""
     functions = [lie(h, k) for h in (HALF_SQUARED_RANGE, theta) for k in range(order + 1)]
     functions += [v, w] if speed_measured else []
     return sp.Matrix(functions).jacobian(STATE)
@@ -35,7 +35,7 @@ def gradients(order: int, speed_measured: bool) -> sp.Matrix:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What must not vanish for full rank, and the generic rank without a speed sensor at each order."""
+    """The determinants that must not vanish for full rank, and the generic ranks without a speed sensor."""
 
     paper: sp.Expr
     second_order: sp.Expr
@@ -45,7 +45,7 @@ class Conditions:
 
 
 def conditions() -> Conditions:
-    """The paper's rank condition (speed measured, first order) and what second order adds (speed not measured)."""
+    """Return the paper's rank condition (speed measured, first order) and that of second order (not measured)."""
     with_speed = sp.Matrix([HALF_SQUARED_RANGE, lie(HALF_SQUARED_RANGE, 1), theta, v, w]).jacobian(STATE)
     without = sp.Matrix([*(lie(HALF_SQUARED_RANGE, k) for k in range(3)), theta, w]).jacobian(STATE)
     third = sp.simplify(lie(HALF_SQUARED_RANGE, 3) + w**2 * lie(HALF_SQUARED_RANGE, 1))
@@ -59,7 +59,7 @@ def conditions() -> Conditions:
 
 
 def rank_at(point: tuple[float, float, float, float, float], order: int, speed_measured: bool) -> int:
-    """Rank at one state (x, y, θ, v, w), numerically, relative tolerance 1e-9."""
+    """Return the numerical rank at one state (x, y, θ, v, w), with a relative tolerance of 1e-9."""
     matrix = gradients(order, speed_measured).subs(dict(zip(STATE, point, strict=True))).evalf()
     singular = np.linalg.svd(np.array(matrix, float), compute_uv=False)
     return int((singular > 1e-9 * singular[0]).sum())
@@ -67,7 +67,7 @@ def rank_at(point: tuple[float, float, float, float, float], order: int, speed_m
 
 @dataclass(frozen=True)
 class Twin:
-    """Two motions, (n, 2) each, that give the same ranges; difference: the largest difference of range, m."""
+    """Two motions, (n, 2) each, with the same ranges. difference: largest difference of range, m."""
 
     name: str
     why: str
@@ -84,7 +84,7 @@ class Twin:
 
 
 def twins() -> list[Twin]:
-    """The discrete and continuous ambiguities that are exact."""
+    """Return the exact discrete and continuous ambiguities."""
     t = np.linspace(0.0, 8.0, 400)
     leg = np.column_stack([-6 + 1.5 * t, np.full_like(t, 4.0)])
     heading = 0.4 + 0.5 * t

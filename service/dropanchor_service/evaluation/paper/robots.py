@@ -1,6 +1,6 @@
-"""The drone and the ground robot (Fig. 8-10): the shapes, simulated with raw 9-axis samples.
+"""The shapes of the drone and the ground robot (Fig. 8-10), simulated with raw 9-axis samples.
 
-The heading is that of each engine's own attitude filter; nothing but ranges and the IMU goes in.
+The engines get only ranges and IMU samples, so each uses the heading of its own attitude filter.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from dropanchor_service.evaluation.paper.engines import engines
 from dropanchor_service.evaluation.parallel import Workers
 from dropanchor_service.evaluation.replay import Track
 from dropanchor_service.evaluation.report import Cell, Section, Table
-from dropanchor_service.evaluation.simulated import Known, run_engine, truth_of
+from dropanchor_service.evaluation.simulated import PriorKnowledge, run_engine, truth_of
 from dropanchor_tag_client.simulator.sensors import SensorModels, preset
 from dropanchor_tag_client.simulator.simulation import simulate
 
@@ -34,7 +34,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Found:
-    """Per seed: ATE, RMSE, m, and share of the truth inside the 95 % ellipse; the track of the first seed."""
+    """Results per seed: ATE and RMSE, m, and share of the truth inside the 95 % ellipse. first: its first track."""
 
     ate: list[float]
     rmse: list[float]
@@ -58,7 +58,7 @@ def tasks(seeds: range) -> list[Task]:
 
 def work(task: Task) -> Found:
     simulations = [simulate(task.shape, seed, sensors(task.magnetometer)) for seed in task.seeds]
-    tracks = run_engine(engines()[task.engine](), simulations, Known(feed="raw")).tracks
+    tracks = run_engine(engines()[task.engine](), simulations, PriorKnowledge(feed="raw")).tracks
     found = [
         accuracy(track.t, track.poses, truth_of(one), (0.0, 0.0))
         for track, one in zip(tracks, simulations, strict=True)
@@ -67,7 +67,7 @@ def work(task: Task) -> Found:
 
 
 def sensors(magnetometer: str) -> SensorModels:
-    """A DW1000-class tag with a MEMS IMU; calibrated: hard and soft iron are taken out before the engine."""
+    """Return a DW1000-class tag with a MEMS IMU. calibrated: without hard and soft iron."""
     models = preset("real")
     if magnetometer == "calibrated":
         return replace(models, imu=replace(models.imu, hard_iron_std=0.0, soft_iron_std=0.0))
@@ -75,7 +75,7 @@ def sensors(magnetometer: str) -> SensorModels:
 
 
 def run(workers: Workers, progress: Callable[[], None], seeds: range = SEEDS) -> Section:
-    """progress is called after each of `tasks(seeds)`."""
+    """Run all tasks. progress: called after each of `tasks(seeds)`."""
     todo = tasks(seeds)
     found = {}
     for task, result in zip(todo, workers.map(work, todo), strict=True):

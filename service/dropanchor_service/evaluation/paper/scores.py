@@ -1,4 +1,4 @@
-"""How well an estimator did on a run with a known start, and on all runs of a case."""
+"""Scores of an estimator on a run with a known start, and over all runs of a case."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ LOST_M = 2.0
 
 @dataclass(frozen=True)
 class RunScore:
-    """mse: m², mean over the poses of one run (inf: it never had a position); bound: its Cramér-Rao bound, m².
+    """The score of one run.
 
-    nees: mean normalised squared error; coverage: share of the truth inside the 95 % ellipse; missing: share of poses
-    without a position.
+    mse: mean over its poses, m²; inf if it never had a position. bound: its Cramér-Rao bound, m². nees: mean normalised
+    squared error. coverage: share of the truth inside the 95 % ellipse. missing: share of poses without a position.
     """
 
     mse: float
@@ -32,9 +32,10 @@ class RunScore:
 
 @dataclass(frozen=True)
 class Row:
-    """A case over all its runs. RMSE of a run in m: median, 90 % quantile, worst, and the share of runs above 2 m.
+    """A case over all its runs. RMSE of the runs, m: median, 90 % quantile, worst, and the share of runs above 2 m.
 
-    nees_half: 1 when the covariance is right. ratio: √(mean MSE) / √(mean bound); median_ratio: median over the runs.
+    nees_half: NEES / 2; 1 for a consistent covariance. ratio: √(mean MSE) / √(mean bound). median_ratio: median over
+    the runs.
     """
 
     median: float
@@ -49,7 +50,7 @@ class Row:
 
 
 def score(simulation: Simulation, track: Track, bound: Array) -> RunScore:
-    """bound: (n,) m² at the instants of the truth."""
+    """Compare a track with the truth. bound: (n,) m² at the instants of the truth."""
     poses = track.poses
     x, y = truth_at(truth_of(simulation), track.t)
     known = np.isfinite(poses["x"]) & np.isfinite(x)
@@ -67,9 +68,9 @@ def score(simulation: Simulation, track: Track, bound: Array) -> RunScore:
 
 
 def bound_of(simulation: Simulation, sensors: Sensors, information: Information | None) -> Array:
-    """The bound of the run, (n,) m², with a range at the instants at which there was one.
+    """Return the bound of the run, (n,) m², with ranges at the instants of the run's own ranges.
 
-    NaN without information, and for a speed that never stops changing when the bound is one for jumps.
+    It is NaN without information, and if the bound assumes speed jumps but the speed changes all the time.
     """
     truth = simulation.truth
     if information is None or (information != "with accelerometer" and _never_constant(truth.v)):

@@ -1,4 +1,4 @@
-"""Table I, simulation, and Fig. 7: the paper's five-stage trajectory at the noise it states and at that of its data."""
+"""Table I, simulation, and Fig. 7: the paper's five-stage trajectory at the stated and at the released noise."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from dropanchor_service.estimation.paper.parameters import PaperParameters
 from dropanchor_service.evaluation.paper.tuning import RELEASED, STATED, Noise, tuned
 from dropanchor_service.evaluation.paper.tuning import run as run_algorithm1
 from dropanchor_service.evaluation.report import Section, Table
-from dropanchor_service.evaluation.simulated import Known, run_engine
+from dropanchor_service.evaluation.simulated import PriorKnowledge, run_engine
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 
@@ -24,7 +24,7 @@ RUNS_PER_SEED = 2 * 6  # noises times estimators
 
 @dataclass(frozen=True)
 class Run:
-    """One run: time, true speed, estimated speed and position error, (n,) each; SI."""
+    """One run: time, true speed, estimated speed and position error, (n,) each, in SI units."""
 
     t: Array
     true_speed: Array
@@ -52,10 +52,10 @@ def algorithm1_runner(parameters: PaperParameters, speed_estimator: bool) -> Run
 
 
 def fleet_runner(noise: Noise, calibrated: bool) -> Runner:
-    """The service's engine, which has gyro and accelerometer beside the heading; at the instants of the ranges."""
+    """Return a runner of the engine fleet, which also uses gyro and accelerometer, at the instants of the ranges."""
 
     def runner(simulation: Simulation) -> Run:
-        known = Known(feed="level", heading_std=noise.heading_std, calibrated=calibrated)
+        known = PriorKnowledge(feed="level", heading_std=noise.heading_std, calibrated=calibrated)
         (track,) = run_engine(FleetEngine(), [simulation], known).tracks
         truth, poses = simulation.truth, track.poses
         x, y, speed = (np.interp(track.t, truth.t_s, column) for column in (truth.x, truth.y, truth.v))
@@ -75,7 +75,7 @@ def runners(noise: Noise) -> dict[str, Runner]:
 
 
 def run(progress: Callable[[], None] = lambda: None, seeds: range = SEEDS) -> Section:
-    """progress is called after each of the `RUNS_PER_SEED · len(seeds)` runs."""
+    """Run all estimators at both noises. progress: called after each of the `RUNS_PER_SEED · len(seeds)` runs."""
     found: dict[str, dict[str, list[Run]]] = {}
     for label, noise in (("stated", STATED), ("released", RELEASED)):
         simulations = [simulate("P", seed, preset(noise.preset)) for seed in seeds]
@@ -98,9 +98,9 @@ def run(progress: Callable[[], None] = lambda: None, seeds: range = SEEDS) -> Se
             f"Medians over seeds {seeds.start} to {seeds.stop - 1}. Tuned: by random search on seeds 1000 to 1007.",
             "Differences from the released program: five states with w, heading initialised by the first measurement, "
             "a mean instead of a median window, no speed where v² < 0.",
-            f"{FLEET}: the engine of the service, which also has the gyro and the forward accelerometer of a tag that "
-            "knows its mounting angle; calibrated: it is told that it never slips, that its ranges have no bias, and "
-            "that its heading has no error but white noise, as is true here and as the other estimators assume.",
+            f"{FLEET}: the engine of the service, which also uses the gyro and the forward accelerometer of a tag with "
+            "a known mounting angle; calibrated: its settings state that the tag never slips, that its ranges have no "
+            "bias, and that its heading has only white noise. This is true here, and the other estimators assume it.",
         ],
         tables=[
             Table(

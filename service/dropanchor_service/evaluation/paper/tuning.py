@@ -1,6 +1,6 @@
-"""Honestly tuned parameters of the EKF and of Algorithm 1 for scenario P: found on seeds that no table uses.
+"""Tuned parameters of the EKF and of Algorithm 1 for scenario P, found on seeds that no table uses.
 
-`python -m dropanchor_service.evaluation.paper.tuning` repeats the search and prints what it finds.
+`python -m dropanchor_service.evaluation.paper.tuning` repeats the search and prints its results.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ CANDIDATES = 200
 
 @dataclass(frozen=True)
 class Noise:
-    """Named sensor settings of the simulator and their standard deviations, m and rad."""
+    """A sensor preset of the simulator and its standard deviations, m and rad."""
 
     preset: str
     range_std: float
@@ -31,12 +31,12 @@ RELEASED = Noise("released", 0.005, 0.01)
 
 
 def base(noise: Noise) -> PaperParameters:
-    """What is known without a search: the noise of the sensors."""
+    """Return the parameters without a search: only the noise of the sensors is set."""
     return replace(TUNED, range_std=noise.range_std, heading_std=noise.heading_std, gate=np.inf)
 
 
 def tuned(noise: Noise, speed_estimator: bool) -> PaperParameters:
-    """What `search` found for STATED and RELEASED."""
+    """Return the results of `search` for STATED and RELEASED."""
     found = base(noise)
     if speed_estimator:  # the same candidate won at both noises
         found = replace(found, q_position=2e-5, q_heading=6.5e-5, q_speed=0.71, q_turn_rate=26.0)
@@ -48,7 +48,7 @@ def tuned(noise: Noise, speed_estimator: bool) -> PaperParameters:
 
 
 def run(simulation: Simulation, parameters: PaperParameters, speed_estimator: bool) -> tuple[Estimate, Array]:
-    """The estimate and its position error, (n,) m, from the true start and the first heading measured."""
+    """Return the estimate and its position error, (n,) m. It starts at the true position with the first heading."""
     t, heading = simulation.scalars.t_s, simulation.scalars.heading_rad
     ranges = np.full(len(t), np.nan)
     ranges[np.searchsorted(t, simulation.ranges.t_s - 1e-6)] = simulation.ranges.range_m
@@ -59,7 +59,7 @@ def run(simulation: Simulation, parameters: PaperParameters, speed_estimator: bo
 
 
 def search(noise: Noise, speed_estimator: bool, candidates: int = CANDIDATES) -> PaperParameters:
-    """The candidate of the lowest median RMSE over the tuning seeds; drawn log-uniformly, seeded."""
+    """Return the candidate with the lowest median RMSE over the tuning seeds. Candidates are log-uniform and seeded."""
     rng = np.random.default_rng(77)
     simulations = [simulate("P", seed, preset(noise.preset)) for seed in TUNING_SEEDS]
     drawn = [base(noise), *(_candidate(noise, speed_estimator, rng) for _ in range(candidates))]

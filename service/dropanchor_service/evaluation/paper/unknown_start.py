@@ -1,4 +1,4 @@
-"""A tag whose start nobody knows: how soon an engine says where it is, and whether it is right."""
+"""Tags with an unknown start: the time until an engine declares their position, and whether it is right."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -7,13 +7,13 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees, truth_at
-from dropanchor_service.evaluation.paper.contestants import engines
+from dropanchor_service.evaluation.paper.estimators import engines
 from dropanchor_service.evaluation.paper.families import SEEDS_PER_TASK, Case, Task
 from dropanchor_service.evaluation.paper.tuning import STATED
 from dropanchor_service.evaluation.parallel import Workers
 from dropanchor_service.evaluation.replay import Track
 from dropanchor_service.evaluation.report import Section, Table
-from dropanchor_service.evaluation.simulated import Known, truth_of
+from dropanchor_service.evaluation.simulated import PriorKnowledge, truth_of
 from dropanchor_tag_client.simulator.perturbations import perturbed
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
@@ -29,11 +29,12 @@ WRONG_M, WRONG_SHARE = 2.0, 0.1  # an error above both, the second of the range,
 
 @dataclass(frozen=True)
 class RunScore:
-    """declared_s: from the first range to the first pose in state tracking, NaN: never. first_wrong: that pose was in
-    another place (NaN: never declared). right_at_end: the last pose is in the right place, declared or not. rmse: m,
-    over the poses of the second half that have a position. resolved_s: to the first pose after which all are in the
-    right place, declared or not (inf: none). coverage: of the 95 % ellipse while tracking; coverage_all, nees: over all
-    poses that have a position.
+    """The score of one run. "Right" means close to the truth, whether or not the state is tracking.
+
+    declared_s: time from the first range to the first pose in state tracking; NaN: never. first_wrong: 1 if that pose
+    was wrong; NaN: never declared. right_at_end: 1 if the last pose is right. rmse: m, over the positions of the second
+    half. resolved_s: time to the first pose after which all poses are right; inf: none. coverage: of the 95 % ellipse
+    while tracking. coverage_all, nees: over all poses with a position.
     """
 
     declared_s: float
@@ -48,9 +49,10 @@ class RunScore:
 
 @dataclass(frozen=True)
 class Row:
-    """Over all runs; times in s and RMSE in m, over the runs that have one; never: share that was not declared.
+    """Statistics over all runs. Times (s) and RMSE (m) are over the runs that have one.
 
-    above_2m: share of the runs whose RMSE is. nees_half: 1 when the covariance is right.
+    never: share of runs without a declaration. above_2m: share of runs with an RMSE above 2 m. nees_half: NEES / 2; 1
+    for a consistent covariance.
     """
 
     never: float
@@ -76,10 +78,10 @@ def tasks(seeds: range) -> list[Task]:
 def work(task: Task) -> dict[str, list[RunScore]]:
     models = perturbed(preset(task.case.preset), *task.case.perturbations)
     simulations = [simulate(task.case.family, seed, models) for seed in task.seeds]
-    known = Known(start=False, heading_std=STATED.heading_std, exact_heading=task.case.exact_heading)
+    known = PriorKnowledge(start=False, heading_std=STATED.heading_std, exact_heading=task.case.exact_heading)
     found = {}
-    for name, contestant in engines().items():
-        tracks = contestant.run(simulations, known).tracks
+    for name, estimator in engines().items():
+        tracks = estimator.run(simulations, known).tracks
         found[name] = [score(*run) for run in zip(simulations, tracks, strict=True)]
     return found
 
@@ -109,7 +111,7 @@ def score(simulation: Simulation, track: Track) -> RunScore:
 
 
 def _resolved_s(t: Array, right: Array) -> float:
-    """From the first of the instants t to the one after which the place stays right; inf where it never does."""
+    """Return the time from the first instant to the one after which all poses are right; inf if there is none."""
     wrong = np.flatnonzero(~right)
     if not len(wrong):
         return 0.0
@@ -143,7 +145,7 @@ def summary(scores: Sequence[RunScore]) -> Row:
 
 
 def run(workers: Workers, progress: Callable[[], None], seeds: range) -> Section:
-    """progress is called after each of `tasks(seeds)`."""
+    """Run all cases. progress: called after each of `tasks(seeds)`."""
     todo = tasks(seeds)
     scores: dict[str, dict[str, list[RunScore]]] = {case.name: {name: [] for name in engines()} for case in CASES}
     for task, found in zip(todo, workers.map(work, todo), strict=True):
@@ -157,13 +159,14 @@ def run(workers: Workers, progress: Callable[[], None], seeds: range) -> Section
         paper="The start is known.",
         finding=_finding(rows),
         text=[
-            f"Seeds {seeds.start} to {seeds.stop - 1}, 0.2 m and 0.1 rad; the tag is heard from rest, but for late15, "
+            f"Seeds {seeds.start} to {seeds.stop - 1}, 0.2 m and 0.1 rad; the tag starts at rest, except in late15, "
             f"where it is in motion. In the right place: within {WRONG_M:.0f} m or {WRONG_SHARE:.0%} of the range of "
             "the truth. On one straight line (L1) the mirror image explains the same ranges: never declaring it is "
             "right. hb0.1: a heading reference that is wrong by 0.1 rad turns everything about the anchor, which "
             "nothing can see; nlosburst: four bursts of ranges that are too long. RMSE over the second half. The "
-            "ellipse holds 0.1 rad for an error of the heading reference, which only hb0.1 has; a calibrated tag is "
-            "told that there is none, but in hb0.1. Algorithm 1 needs a start and is not in this table.",
+            "ellipse allows 0.1 rad for an error of the heading reference, which only hb0.1 has; the settings of a "
+            "calibrated tag state that there is none, except in hb0.1. Algorithm 1 needs a start and is not in this "
+            "table.",
         ],
         tables=[
             Table(

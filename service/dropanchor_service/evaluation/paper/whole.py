@@ -1,4 +1,4 @@
-"""The whole report on the paper: every experiment, in the order of the paper."""
+"""The whole report on the paper: all experiments, in the order of the paper."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Progress = Callable[[], None]
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is computed. Seeds are 0, 1, …; anchors: how many of each recording, None for all."""
+    """The size of the report: numbers of seeds, which are 0, 1, …. anchors: per recording; None: all."""
 
     families: int = 100
     table1: int = 20
@@ -40,7 +40,7 @@ QUICK = Plan(families=4, table1=2, fig4=4, robots=1, draws=20_000, anchors=1)
 
 @dataclass(frozen=True)
 class Experiment:
-    """steps: how often `run` calls its argument."""
+    """One experiment of the report. steps: number of progress calls by `run`."""
 
     name: str
     steps: int
@@ -48,7 +48,7 @@ class Experiment:
 
 
 def experiments(plan: Plan, workers: Workers, data: Path) -> list[Experiment]:
-    """data: the folder of the recordings, which may be missing."""
+    """Return all experiments. data: folder of the recordings, which may be missing."""
     seeds = range(plan.families)
     motions, starts = families.tasks(seeds), unknown_start.tasks(seeds)
     folders = recordings.recordings_in(data)

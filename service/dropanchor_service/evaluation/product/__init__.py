@@ -1,1 +1,1 @@
-"""The product as a user gets it: the whole engine on what tags send, with more or less told."""
+"""Evaluation of the whole engine on the samples of tags, with more or fewer settings configured."""

@@ -1,4 +1,4 @@
-"""The results as a table, as JSON, and between markers in a page."""
+"""Write the results as a table, as JSON, and between markers in a page."""
 
 import json
 import math
@@ -14,7 +14,7 @@ from dropanchor_service.evaluation.results import ROOT, Measured, commit, write
 NAME = "product"
 SOURCES = ("service/dropanchor_service/estimation", "tag_client/dropanchor_tag_client/simulator")
 COLUMNS = (
-    *("motion / sensors / told / start", "RMSE", "2nd half", "up to rotation", "lost", "tracking after", "never"),
+    *("motion / sensors / configured / start", "RMSE", "2nd half", "up to rotation", "lost", "tracking after", "never"),
     *("tracking", "95 % ellipse holds", "worst", "µs"),
 )
 LEGEND = (
@@ -28,13 +28,13 @@ LEGEND = (
 
 
 def markdown(results: Sequence[Result], seeds: range) -> str:
-    """Return the table, with what it says and where it comes from."""
+    """Return the table with its legend and origin."""
     lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS), *(_line(result) for result in results)]
     return "\n".join([*lines, "", LEGEND, "", origin(seeds)])
 
 
 def origin(seeds: range) -> str:
-    """Return what was run."""
+    """Return a sentence on the runs behind the table."""
     return (
         f"Engine fleet; seeds {seeds[0]} to {seeds[-1]} ({purpose(seeds)}); samples in batches of "
         f"{1e3 * BATCH_S:.0f} ms, all tags of a row in one engine. Recordings are development sets."
@@ -42,7 +42,7 @@ def origin(seeds: range) -> str:
 
 
 def write_json(path: Path, results: Sequence[Result], seeds: range) -> None:
-    """Write every figure of every row and tag. An infinite or missing number is null."""
+    """Write all figures of all rows and tags as JSON. An infinite or missing number is null."""
     rows = {
         result.row.name: {**asdict(result.score), "by_tag": [asdict(tag) for tag in result.tags]} for result in results
     }
@@ -51,7 +51,7 @@ def write_json(path: Path, results: Sequence[Result], seeds: range) -> None:
 
 
 def write_into(page: Path, results: Sequence[Result], seeds: range) -> None:
-    """Put the table between its markers in a page of the project. Raises NoPlaceError, OSError."""
+    """Write the table between its markers in a page of the project. Raises NoPlaceError, OSError."""
     write(ROOT, page, NAME, markdown(results, seeds), Measured(SOURCES, f"{seeds[0]}-{seeds[-1]}"))
 
 

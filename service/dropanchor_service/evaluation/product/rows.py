@@ -1,23 +1,24 @@
-"""The rows of the evaluation: what moves, what it sends, what is told, and whether the start is known."""
+"""The rows of the evaluation: motion, sensors, configured settings, and known or unknown start."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import product
 from pathlib import Path
 
 from dropanchor_service.evaluation.recordings import recordings_in
 
 DEVELOPMENT_SEEDS = range(5000, 6000)
-"""An engine may be developed and tuned on these seeds, and on no others."""
+"""Seeds for development and tuning of an engine. Never use others for that."""
 FIRST_REPORTED_SEED = 20_000
-"""Figures that are reported come from seeds from here on; nothing is ever tuned on them."""
+"""First seed of reported figures. Never tune on these seeds."""
 
 VEHICLES = ("P", "S5", "M5", "OU", "C5")
 MOTIONS = (*VEHICLES, "rolling", "forklift")
 CARRIED = ("walk-hand", "walk-pocket", "walk-turned")
 SENSORS = ("scalar", "9-axis", "6-axis")
 BARE = "9-axis-bare"
-TOLD = ("everything", "mount", "nothing")
+CONFIGURED = ("everything", "mount", "nothing")
 STARTS = ("known", "unknown")
 FAST = "-100Hz"
 QUICK = ("*/everything/known", "*/nothing/unknown", "walk-*/nothing/known", "phones-*")
@@ -25,22 +26,23 @@ QUICK = ("*/everything/known", "*/nothing/unknown", "walk-*/nothing/known", "pho
 
 @dataclass(frozen=True)
 class Row:
-    """motion: a scenario, a walk, or a name of recordings; a suffix -100Hz means 0.2 m ranges at 100 Hz.
+    """One row of the evaluation.
 
-    sensors: scalar (a platform's heading, level axes), 9-axis (calibrated magnetometer), 9-axis-bare (10 µT of hard
-    iron), 6-axis, recorded. told: everything, mount (the mounting angle alone) or nothing; operator: what the operator
-    of a recording could know. folders: of the recordings, empty for simulations.
+    motion: a scenario, a walk or a recording; the suffix -100Hz means 0.2 m ranges at 100 Hz. sensors: scalar (platform
+    heading, level axes), 9-axis (calibrated magnetometer), 9-axis-bare (10 µT of hard iron), 6-axis, or recorded.
+    configured: everything, mount (the mounting angle alone), nothing, or operator (what the operator of a recording
+    could know). folders: of the recordings; empty for simulations.
     """
 
     motion: str
     sensors: str
-    told: str
+    configured: str
     start: str
     folders: tuple[Path, ...] = ()
 
     @property
     def name(self) -> str:
-        return "/".join((self.motion, self.sensors, self.told, self.start))
+        return "/".join((self.motion, self.sensors, self.configured, self.start))
 
     @property
     def scenario(self) -> str:
@@ -48,13 +50,13 @@ class Row:
 
     @property
     def runs_of(self) -> tuple[str, bool, tuple[Path, ...]]:
-        """Rows of which this is equal can share their runs."""
+        """Key of the runs: rows with equal keys can share their runs."""
         return self.motion, self.sensors == BARE, self.folders
 
 
 def simulated_rows() -> list[Row]:
-    """All rows of simulations. No one mounting angle describes a device that turns or lies in a pocket."""
-    full = [(motion, sensors, told) for motion in (*MOTIONS, "walk-hand") for sensors in SENSORS for told in TOLD]
+    """Return all rows of simulations. A device that turns or is in a pocket has no single mounting angle."""
+    full = [(*row, configured) for row in product((*MOTIONS, "walk-hand"), SENSORS) for configured in CONFIGURED]
     loose = [(motion, sensors, "nothing") for motion in CARRIED[1:] for sensors in SENSORS]
     fast = [(motion + FAST, "scalar", "everything") for motion in ("P", "S5", "M5")]
     bare = [(motion, BARE, "nothing") for motion in (*VEHICLES[1:], "walk-hand")]
@@ -62,11 +64,11 @@ def simulated_rows() -> list[Row]:
 
 
 def recorded_rows(data: Path) -> list[Row]:
-    """The rows of the recordings in a folder and of the walks in its folder `phones`; none where it is missing."""
+    """Return the rows of the recordings in a folder and of the walks in its subfolder `phones`, if they exist."""
     rows = [
-        Row(folder.name, "recorded", told, start, (folder,))
+        Row(folder.name, "recorded", configured, start, (folder,))
         for folder in recordings_in(data)
-        for told, start in (("operator", "known"), ("nothing", "known"), ("nothing", "unknown"))
+        for configured, start in (("operator", "known"), ("nothing", "known"), ("nothing", "unknown"))
     ]
     walks = recordings_in(data / "phones")
     for kind in sorted({folder.name.rpartition("_")[2] for folder in walks}):
@@ -76,11 +78,11 @@ def recorded_rows(data: Path) -> list[Row]:
 
 
 class NoRowError(ValueError):
-    """A pattern that no row matches."""
+    """No row matches the pattern."""
 
 
 def selected(rows: Sequence[Row], patterns: Sequence[str]) -> list[Row]:
-    """Return the rows that match one of the shell patterns, in their order; all without patterns. Raises NoRowError."""
+    """Return the rows that match a shell pattern, in their order, or all rows without patterns. Raises NoRowError."""
     for pattern in patterns:
         if not any(fnmatchcase(row.name, pattern) for row in rows):
             raise NoRowError(f"no row matches {pattern!r}; --list prints all rows")
@@ -88,7 +90,7 @@ def selected(rows: Sequence[Row], patterns: Sequence[str]) -> list[Row]:
 
 
 def purpose(seeds: range) -> str:
-    """Return what these seeds are for. Raises ValueError when they are neither for development nor for reports."""
+    """Return "development" or "reported". Raises ValueError if the seeds belong to neither."""
     if not len(seeds):
         raise ValueError("there are no seeds")
     if seeds[0] in DEVELOPMENT_SEEDS and seeds[-1] in DEVELOPMENT_SEEDS:

@@ -23,14 +23,14 @@ from dropanchor_tag_client.simulator.walking import simulate_walk, walking_senso
 
 IMU_HZ = 100.0
 RANGE_HZ = 10.0
-MOUNT = 17  # names the random numbers of `mounting_angle`
+MOUNT = 17  # random stream of `mounting_angle`
 
 
 @dataclass(frozen=True)
 class TagRun:
-    """One tag. samples: of row 0, from t = 0 on; anchors: ANCHOR, the first is the one that is ranged to.
+    """One tag. samples: of row 0, from t = 0 on. anchors: ANCHOR; ranges are to the first one.
 
-    no_north: nothing says where north is, so that the track is judged up to a rotation about the anchor.
+    no_north: the samples do not determine north, so the track is scored up to a rotation about the anchor.
     """
 
     name: str
@@ -42,30 +42,30 @@ class TagRun:
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedRun:
     """One recording with one of its anchors."""
 
     recording: Recording
     anchor: str
 
 
-Source = Simulation | Recorded
+Source = Simulation | RecordedRun
 
 
 def sources(row: Row, seeds: Sequence[int]) -> list[Source]:
-    """Return the runs of a row, which all rows of the same `runs_of` share. Raises RecordingError."""
+    """Return the runs of a row. Rows with the same `runs_of` share them. Raises RecordingError."""
     if row.folders:
         return [one for folder in row.folders for one in _recorded(folder)]
     return [_simulated(row, seed) for seed in seeds]
 
 
 def tag_run(row: Row, source: Source) -> TagRun:
-    """Return what the tag of a run sends, and what is told about it."""
-    return _of_recording(row, source) if isinstance(source, Recorded) else _of_simulation(row, source)
+    """Return the samples and the settings of the tag of a run."""
+    return _of_recording(row, source) if isinstance(source, RecordedRun) else _of_simulation(row, source)
 
 
 def mounting_angle(seed: int) -> float:
-    """Return course minus body yaw: half of the tags are mounted within N(0, 0.1) rad, half within N(0, 0.5)."""
+    """Return course minus body yaw, rad: N(0, 0.1) for half of the tags, N(0, 0.5) for the others."""
     rng = np.random.default_rng([seed, MOUNT])
     return float(rng.normal(0.0, 0.1 if rng.random() < 0.5 else 0.5))
 
@@ -91,7 +91,7 @@ def _of_simulation(row: Row, run: Simulation) -> TagRun:
     return TagRun(
         name=str(run.seed),
         samples=samples_of(run, feed),
-        settings=_told(row, run),
+        settings=_settings(row, run),
         truth=simulated_truth(run),
         anchors=np.array([(a.x, a.y, a.z) for a in run.anchors], ANCHOR),
         no_north=feed == "raw 6-axis" and row.start == "unknown",
@@ -104,14 +104,14 @@ def _feed(row: Row) -> Feed:
     return "raw 6-axis" if row.sensors == "6-axis" else "raw"
 
 
-def _told(row: Row, run: Simulation) -> Array:
+def _settings(row: Row, run: Simulation) -> Array:
     truth, settings = run.truth, default_settings()
     settings["height"] = truth.z[0]
     settings["heading_source"] = HeadingSource.PLATFORM if row.sensors == "scalar" else HeadingSource.IMU
-    if row.told != "nothing":
+    if row.configured != "nothing":
         settings["mount_angle"] = _mount(run)
-    if row.told == "everything":
-        _tell_everything(row, run, settings)
+    if row.configured == "everything":
+        _configure_everything(row, run, settings)
     if row.start == "known":
         settings["start_known"], settings["start_std"] = True, START_STD
         settings["start_x"], settings["start_y"] = truth.x[0], truth.y[0]
@@ -119,8 +119,8 @@ def _told(row: Row, run: Simulation) -> Array:
     return settings
 
 
-def _tell_everything(row: Row, run: Simulation, settings: Array) -> None:
-    """Tell what is true of a simulated tag. A walker's device sways and its ranges have a bias: neither is denied."""
+def _configure_everything(row: Row, run: Simulation, settings: Array) -> None:
+    """Configure what is true of a simulated tag. A walker's device sways and its ranges are biased, so both stay."""
     settings["range_std"] = run.ranges.std_m[0]
     settings["reverse_allowed"] = row.scenario == "forklift"
     if row.scenario in CARRIED:
@@ -136,10 +136,10 @@ def _mount(run: Simulation) -> float:
 
 def _recorded(folder: Path) -> list[Source]:
     recording = read_recording(folder)
-    return [Recorded(recording, anchor.id) for anchor in recording.anchors if anchor.id in recording.range_anchors]
+    return [RecordedRun(recording, anchor.id) for anchor in recording.anchors if anchor.id in recording.range_anchors]
 
 
-def _of_recording(row: Row, source: Recorded) -> TagRun:
+def _of_recording(row: Row, source: RecordedRun) -> TagRun:
     recording = source.recording
     truth = truth_of(recording)
     if truth is None:
@@ -148,23 +148,23 @@ def _of_recording(row: Row, source: Recorded) -> TagRun:
     index = [anchor.id for anchor in recording.anchors].index(source.anchor)
     samples.ranges["anchor"] = 0
     start = min(int(kind["t_ns"][0]) for kind in (samples.imu, samples.ranges, samples.headings) if len(kind))
-    told = settings_of(recording, float(samples.ranges["t_ns"][0]) / NS_PER_S)
+    operator = settings_of(recording, float(samples.ranges["t_ns"][0]) / NS_PER_S)
     for kind in (samples.imu, samples.ranges, samples.headings):
         kind["t_ns"] -= start
     return TagRun(
         name=f"{recording.name}/{source.anchor}",
         samples=samples,
-        settings=_of_operator(row, told),
+        settings=_recorded_settings(row, operator),
         truth=Truth(truth.t - start / NS_PER_S, truth.x, truth.y),
         anchors=anchors_of(recording)[index : index + 1],
         no_north=row.start == "unknown" and len(samples.imu) > 0,  # the rooms' axes are not those of the field
     )
 
 
-def _of_operator(row: Row, told: Array) -> Array:
-    """Keep of what an operator could tell what the row allows."""
-    settings = told.copy() if row.told == "operator" else default_settings()
+def _recorded_settings(row: Row, operator: Array) -> Array:
+    """Return those of the operator's settings that the row configures."""
+    settings = operator.copy() if row.configured == "operator" else default_settings()
     kept = ["height"] + (["start_known", "start_x", "start_y", "start_heading"] if row.start == "known" else [])
     for name in kept:
-        settings[name] = told[name]
+        settings[name] = operator[name]
     return settings

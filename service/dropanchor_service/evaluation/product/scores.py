@@ -1,4 +1,4 @@
-"""How well the product did: one tag's track against its truth, and all tags of a row."""
+"""Scores of one tag's track against its truth, and of all tags of a row."""
 
 import math
 from collections.abc import Sequence
@@ -15,12 +15,13 @@ LOST_M = 2.0
 
 @dataclass(frozen=True)
 class TagScore:
-    """One tag. Errors in m over the poses with a position; inf where there is none.
+    """The score of one tag. Errors are in m over the poses with a position; inf if there is none.
 
     second_half: RMSE over the second half of the time; rotated: the same after the best rotation about the anchor.
-    end: error of the last pose, inf without a position. tracking_after_s: from the first pose to the first in state
-    tracking, inf: never. tracking_share: of the time. tracked: poses in state tracking with a truth; covered: those
-    whose 95 % ellipse holds it; worst_sigma: their largest error in units of its own deviation (NaN: none).
+    end: error of the last pose, inf without a position. tracking_after_s: time from the first pose to the first in
+    state tracking, inf: never. tracking_share: share of the time. tracked: number of poses in state tracking with a
+    truth. covered: number of these whose 95 % ellipse contains it. worst_sigma: their largest normalised error (NaN:
+    none).
     """
 
     name: str
@@ -37,11 +38,11 @@ class TagScore:
 
 @dataclass(frozen=True)
 class RowScore:
-    """A row over all its tags: medians and 90 % quantiles of their RMSE, shares, and honesty while tracking.
+    """The score of a row over all its tags: medians and 90 % quantiles of RMSE, shares, and consistency.
 
-    lost: share of the tags that are more than 2 m off at the end. tracking_after_s: median, inf if half never were.
-    never: share of the tags that never were tracking. coverage: of all tracking poses. us: processor time of the
-    engine, µs per tag and second.
+    lost: share of the tags that are more than 2 m off at the end. tracking_after_s: median, inf if half of the tags
+    never track. never: share of the tags that never track. coverage: over all tracking poses. us: processor time of
+    the engine, µs per tag and second.
     """
 
     tags: int
@@ -60,8 +61,8 @@ class RowScore:
 def score(name: str, track: Track, truth: Truth, anchor: tuple[float, float], no_north: bool) -> TagScore:
     """Compare a track with the truth.
 
-    no_north: the track's frame may be turned, so the truth is turned onto it about the anchor before all else: onto
-    the poses in state tracking, where there are any.
+    no_north: the track's frame may be rotated, so the truth is first rotated about the anchor to fit the poses in state
+    tracking, or all poses if there are none.
     """
     true = np.column_stack(truth_at(truth, track.t))
     found = np.column_stack([track.poses["x"], track.poses["y"]])
@@ -76,7 +77,7 @@ def score(name: str, track: Track, truth: Truth, anchor: tuple[float, float], no
     error = found - true
     late = used & (track.t >= (track.t[0] + track.t[-1]) / 2)
     squared = nees(error, track.poses["cov"][:, :2, :2])[used & tracking]
-    squared = np.where(np.isfinite(squared), squared, np.inf)  # a singular ellipse holds nothing
+    squared = np.where(np.isfinite(squared), squared, np.inf)  # a singular ellipse contains nothing
     return TagScore(
         name=name,
         rmse=_rms(error[used]),
@@ -92,7 +93,7 @@ def score(name: str, track: Track, truth: Truth, anchor: tuple[float, float], no
 
 
 def rotated_onto(true: Array, found: Array, used: Array, anchor: tuple[float, float]) -> Array:
-    """Return `true` (n, 2), turned about the anchor by the angle that brings its used rows nearest to `found`."""
+    """Return `true` (n, 2), rotated about the anchor so that its used rows fit `found` best."""
     pivot = np.asarray(anchor)
     a, b = (true - pivot)[used], (found - pivot)[used]
     angle = math.atan2(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum()), float((a * b).sum()))
@@ -124,7 +125,7 @@ def summary(scores: Sequence[TagScore], us: float) -> RowScore:
 
 
 def _median_and_p90(values: Sequence[float]) -> tuple[float, float]:
-    """No interpolation: it would make NaN of infinite values."""
+    """Return median and 90 % quantile. With infinite values there is no interpolation, which would give NaN."""
     median, p90 = np.quantile(values, [0.5, 0.9], method="higher" if np.isinf(values).any() else "linear")
     return float(median), float(p90)
 

@@ -1,4 +1,4 @@
-"""One row: all its tags as rows of one engine, fed as tags send."""
+"""Run a row: all its tags are rows of one engine, which gets their samples in batches."""
 
 import time
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ class Result:
 
 
 def tasks(rows: Sequence[Row], seeds: range) -> list[Task]:
-    """Return the rows in tasks of a few that share their runs, in their order."""
+    """Group consecutive rows that share their runs into tasks, at most ROWS_PER_TASK each."""
     found: list[Task] = []
     for row in rows:
         last = found[-1].rows if found else ()
@@ -47,7 +47,7 @@ def tasks(rows: Sequence[Row], seeds: range) -> list[Task]:
 
 
 def prepare() -> None:
-    """Compile or load the kernels, which is no cost of a row."""
+    """Compile or load the kernels, so that no row includes that time."""
     warm_up(FleetEngine())
 
 
@@ -69,7 +69,7 @@ def run_row(row: Row, runs: Sequence[TagRun]) -> Result:
 
 
 def run_tags(engine: Engine, runs: Sequence[TagRun]) -> tuple[list[Track], float]:
-    """Feed a fresh engine all tags, run i as row i; return their tracks and the processor time of the engine, s."""
+    """Run a fresh engine on all tags, run i as row i. Return their tracks and the engine's processor time, s."""
     engine.set_anchors(np.concatenate([run.anchors for run in runs]))
     for row, run in enumerate(runs):
         engine.configure(row, run.settings)
@@ -87,7 +87,7 @@ def _track(poses: Array) -> Track:
 
 
 def _together(runs: Sequence[TagRun]) -> SampleBatch:
-    """Return the samples of all tags. Every tag has anchors of its own, so no tag can learn from another."""
+    """Return the samples of all tags. Each tag has its own anchors, so no tag can learn from another."""
     parts, anchors = [], 0
     for row, run in enumerate(runs):
         imu, ranges, headings = (kind.copy() for kind in (run.samples.imu, run.samples.ranges, run.samples.headings))

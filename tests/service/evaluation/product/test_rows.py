@@ -25,7 +25,9 @@ def test_every_row_has_a_name_of_its_own() -> None:
 def test_patterns_select_rows_in_their_order_and_nothing_else() -> None:
     rows = simulated_rows()
     found = selected(rows, ["walk-*/6-axis/*", "S5/scalar/*/known"])
-    assert [row.name for row in found[:3]] == [f"S5/scalar/{told}/known" for told in ("everything", "mount", "nothing")]
+    assert [row.name for row in found[:3]] == [
+        f"S5/scalar/{configured}/known" for configured in ("everything", "mount", "nothing")
+    ]
     assert all(row.sensors == "6-axis" and row.motion.startswith("walk-") for row in found[3:])
     assert selected(rows, []) == rows
 

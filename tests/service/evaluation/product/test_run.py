@@ -19,7 +19,7 @@ from support.recordings import write_square
 SEEDS = range(5000, 5002)
 
 
-def test_a_told_cart_is_followed_and_every_tag_is_scored() -> None:
+def test_a_fully_configured_cart_is_tracked_and_every_tag_is_scored() -> None:
     (result,) = work(Task((Row("C5", "scalar", "everything", "known"),), SEEDS))
     assert [tag.name for tag in result.tags] == ["5000", "5001"]
     assert result.score.rmse[0] < 1.0
@@ -28,7 +28,7 @@ def test_a_told_cart_is_followed_and_every_tag_is_scored() -> None:
     assert 0.0 < result.score.us < 1e5
 
 
-def test_a_tag_does_not_notice_the_others_beside_it() -> None:
+def test_tags_in_one_engine_do_not_affect_each_other() -> None:
     row = Row("C5", "9-axis", "nothing", "known")
     runs = [tag_run(row, one) for one in sources(row, SEEDS)]
     together, _ = run_tags(FleetEngine(), runs)
@@ -38,26 +38,26 @@ def test_a_tag_does_not_notice_the_others_beside_it() -> None:
         assert len(track.poses) > 300
 
 
-def test_rows_differ_by_what_is_sent_and_told() -> None:
+def test_rows_differ_in_their_samples_and_settings() -> None:
     row = Row("C5", "9-axis", "everything", "known")
     (source,) = sources(row, SEEDS[:1])
-    told = tag_run(row, source)
-    untold = tag_run(replace(row, told="nothing", start="unknown"), source)
-    assert np.isfinite(told.settings["mount_angle"])
-    assert told.settings["start_known"]
-    assert np.isnan(untold.settings["mount_angle"])
-    assert not untold.settings["start_known"]
-    assert not untold.no_north
+    configured = tag_run(row, source)
+    unconfigured = tag_run(replace(row, configured="nothing", start="unknown"), source)
+    assert np.isfinite(configured.settings["mount_angle"])
+    assert configured.settings["start_known"]
+    assert np.isnan(unconfigured.settings["mount_angle"])
+    assert not unconfigured.settings["start_known"]
+    assert not unconfigured.no_north
     six = tag_run(replace(row, sensors="6-axis", start="unknown"), source)
-    assert np.isfinite(told.samples.imu["mag"]).all()
+    assert np.isfinite(configured.samples.imu["mag"]).all()
     assert np.isnan(six.samples.imu["mag"]).all()
     assert six.no_north
     scalar = tag_run(replace(row, sensors="scalar"), source)
     assert len(scalar.samples.headings) > 0
-    assert len(told.samples.headings) == 0
+    assert len(configured.samples.headings) == 0
 
 
-def test_a_recording_is_told_no_more_than_its_row_says(tmp_path: Path) -> None:
+def test_a_recording_gets_only_the_settings_of_its_row(tmp_path: Path) -> None:
     (tmp_path / "square").mkdir()
     write_square(tmp_path / "square", range_std_m=0.05)
     rows = recorded_rows(tmp_path)
@@ -96,7 +96,9 @@ def test_the_rows_can_be_listed(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert capsys.readouterr().out.splitlines()[0] == "P/scalar/everything/known"
 
 
-def test_a_wrong_pattern_or_wrong_seeds_say_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_errors_for_a_wrong_pattern_and_wrong_seeds_say_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["evaluate", "product", "--rows", "none/*", "--data", str(tmp_path)]) == 2
     assert "--list prints all rows" in capsys.readouterr().err
     with pytest.raises(argparse.ArgumentTypeError, match="20000 and above"):
@@ -104,7 +106,7 @@ def test_a_wrong_pattern_or_wrong_seeds_say_what_to_do(tmp_path: Path, capsys: p
     assert seed_range("5003") == range(5003, 5004)
 
 
-def test_a_page_without_a_place_for_the_table_is_named_and_left_alone(
+def test_a_page_without_markers_is_an_error_and_stays_unchanged(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page = tmp_path / "other.md"

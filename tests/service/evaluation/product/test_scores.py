@@ -1,4 +1,4 @@
-"""Scores of tracks made by hand."""
+"""Scores of constructed tracks."""
 
 import math
 
@@ -61,13 +61,13 @@ def test_only_poses_in_state_tracking_are_held_to_their_ellipse() -> None:
     assert scored(one).worst_sigma == 0.0
 
 
-def test_a_singular_ellipse_holds_nothing() -> None:
+def test_a_singular_ellipse_contains_nothing() -> None:
     one = scored(track(ARC + 0.1, std=0.0))
     assert one.covered == 0
     assert one.worst_sigma == math.inf
 
 
-def test_the_second_half_forgets_the_first() -> None:
+def test_the_score_of_the_second_half_ignores_the_first() -> None:
     one = scored(track(ARC + np.where(T < 4.9, 8.0, 0.0)[:, None]))
     assert one.second_half == pytest.approx(0.0)
     assert one.rmse > 4.0

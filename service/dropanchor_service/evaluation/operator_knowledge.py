@@ -1,4 +1,4 @@
-"""What the operators of the recordings could have known, and what a prototype reached on them."""
+"""Tag settings that the operators of the recordings could have known, and the results of a prototype."""
 
 import math
 
@@ -19,11 +19,11 @@ PROTOTYPE = {
     "hanyang_losB4": (0.77, 1.32),
     "hanyang_nlosA2": (0.48, 0.50),
 }
-"""RMSE, m, median and worst anchor: a Gaussian-sum filter whose parameters were searched for on these recordings."""
+"""RMSE, m, of the median and the worst anchor: a Gaussian-sum filter with parameters searched on these recordings."""
 
 
-def tell(name: str, settings: Array) -> None:
-    """Put what is known of the recording's tag into TAG_SETTINGS (0-d); nothing for one that is not known here."""
+def apply_operator_knowledge(name: str, settings: Array) -> None:
+    """Set what the operator knows in TAG_SETTINGS (0-d). An unknown recording changes nothing."""
     family = name.split("_")[0].rstrip("0123456789")
     if family in TOP_SPEED_MPS:
         settings["speed_max"] = TOP_SPEED_MPS[family]
