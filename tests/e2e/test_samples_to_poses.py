@@ -16,7 +16,7 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encod
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.service import Running, running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
 
@@ -71,7 +71,7 @@ def samples_of(service: Running, tag: str) -> dict[str, int]:
 def offline(config: Path, tag: str, frame: Frame) -> list[float]:
     """x and y after these samples, by the engine without threads, network and clocks."""
     settings = load_settings(config, environment={})
-    bench = Bench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
+    bench = IngestBench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
     bench.send(tag, frame)
     pose = bench.latest.row(bench.tags.register(tag).row)
     assert pose is not None

@@ -5,7 +5,7 @@ import random
 from collections import Counter
 
 from dropanchor_schemas.wire import Rejection, decode_packed
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.traffic import traffic
 
 FRAMES = int(os.environ.get("DROPANCHOR_MUTATED_FRAMES", "200000"))
@@ -16,7 +16,7 @@ IN_ONE_TURN = 1000
 def test_mutated_frames_raise_nothing_and_the_counts_add_up() -> None:
     seeds = [message.payload for message in traffic(TAGS, 10.0, seed=9, step_s=0.05)]
     dice = random.Random(9)
-    bench = Bench(max_tags=TAGS)
+    bench = IngestBench(max_tags=TAGS)
     refused: Counter[str] = Counter()
     offered = 0
     for start in range(0, FRAMES, IN_ONE_TURN):
@@ -44,7 +44,7 @@ def test_mutated_frames_raise_nothing_and_the_counts_add_up() -> None:
 def test_a_version_to_come_is_refused_by_name() -> None:
     payload = bytearray(traffic(1, 1.0, seed=9)[0].payload)
     payload[0] += 1
-    bench = Bench()
+    bench = IngestBench()
     bench.send("forward", bytes(payload))
     assert bench.rejected() == {"version_unknown": 1}
 

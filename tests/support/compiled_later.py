@@ -12,7 +12,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.engines.warm_up import warm_up, warm_up_answers
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.traffic import Message, traffic
 
 TAGS, DURATION_S = 4, 12.0
@@ -29,29 +29,29 @@ def main() -> None:
         warm_up_answers()
         ready = _signatures()
         _send(before, messages[:half])
-        state, after = before.whole_state(), _bench(Path(folder) / "after")
+        state, after = before.service_state(), _bench(Path(folder) / "after")
         kept = CheckpointFolder(Path(folder) / "checkpoints", state.layout, state.template)
         kept.write(state.snapshot())
         found, _ = kept.newest()
         assert found is not None
-        after.whole_state().restore(found)
+        after.service_state().restore(found)
         _send(after, messages[half:])
         _answer(after)
     compiled = sorted(name for name, count in _signatures().items() if count > ready.get(name, 0))
     json.dump([*compiled, *(name for name in SLOW if name in sys.modules)], sys.stdout)
 
 
-def _bench(folder: Path) -> Bench:
-    return Bench(folder, engine=FleetEngine(), site={"anchors": [{"id": "1"}]})
+def _bench(folder: Path) -> IngestBench:
+    return IngestBench(folder, engine=FleetEngine(), site={"anchors": [{"id": "1"}]})
 
 
-def _send(bench: Bench, messages: list[Message]) -> None:
+def _send(bench: IngestBench, messages: list[Message]) -> None:
     for message in messages:
         bench.put(message.tag, message.payload, at_ns=message.due_ns)
         bench.ingest.turn()
 
 
-def _answer(bench: Bench) -> None:
+def _answer(bench: IngestBench) -> None:
     answers = Answers(bench.site, bench.tags, bench.latest)
     b"".join(answers.pose_list_json())
     answers.pose_of(bench.tags.at(0))

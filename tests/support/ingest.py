@@ -52,7 +52,7 @@ class TransparentEngine:
         return PoseBatch(poses=poses)
 
 
-class Bench:
+class IngestBench:
     """What a service has between Zenoh and the store."""
 
     def __init__(
@@ -73,11 +73,11 @@ class Bench:
         self.pending_tags = PendingTags(settings.max_tags)
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
-        self.estimators = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
+        self.guarded_engine = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
         self.ingest = Ingest(
             self.buffer,
             Admission(settings, self.site, self.tags, self.pending_tags),
-            self.estimators,
+            self.guarded_engine,
             self.site,
             self.tags,
             self.latest,
@@ -85,8 +85,8 @@ class Bench:
             self.clock,
         )
 
-    def whole_state(self) -> ServiceState:
-        return ServiceState(self.site, self.tags, self.latest, self.estimators, self.ingest.reader.publishers)
+    def service_state(self) -> ServiceState:
+        return ServiceState(self.site, self.tags, self.latest, self.guarded_engine, self.ingest.reader.publishers)
 
     def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
         data = encode_packed(payload) if isinstance(payload, Frame) else payload

@@ -19,7 +19,7 @@ from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_poses, tag_name
 from dropanchor_tag_client.simulator.sensors import preset
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.service import Running
 
 
@@ -100,7 +100,7 @@ class LiveTags:
     def expected(self, config: Path) -> dict[str, Any]:
         """POSE by tag, after all that was published, of a run that nothing interrupted."""
         settings = load_settings(config, environment={})
-        bench = Bench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
+        bench = IngestBench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
         for together in batched_by_tag(islice(self._deliveries(), self._sent)):
             for delivery in together:
                 bench.put(tag_name(delivery.tag), Frame(imu=delivery.imu, ranges=delivery.ranges))

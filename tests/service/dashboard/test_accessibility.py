@@ -8,7 +8,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.axe import axe_source, violations
 from support.browser import Scheme, Watched, watched_page
 from support.http_server import running_server
@@ -27,7 +27,7 @@ def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
 def show_every_state(place: Place) -> None:
     names = [state.name.lower() for state in State]
     place.move(*names, x=np.arange(float(len(names))), y=1.0, state=list(State), sigma_pos=0.2, range=5.0)
-    place.house.answers.tags.register("heard")
+    place.bench.answers.tags.register("heard")
 
 
 def is_clean(page: Watched, axe: str) -> None:
@@ -67,10 +67,10 @@ def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_s
 def test_no_violation_after_the_connection_is_lost(
     chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:
-    house = live_house()
+    bench = live_api_bench()
     with ExitStack() as pages:
-        with running_server(house.app(DASHBOARD), house.stopping) as port:
-            place = Place(house, f"http://127.0.0.1:{port}/")
+        with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+            place = Place(bench, f"http://127.0.0.1:{port}/")
             page = pages.enter_context(
                 watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce")
             )

@@ -13,7 +13,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.browser import Scheme, Watched, watched_page
 from support.http_server import running_server
 
@@ -26,14 +26,14 @@ HEADING_SIGMA = 0.2
 
 @pytest.fixture
 def place() -> Iterator[Place]:
-    house = live_house(Site(anchors=[Anchor(id="17"), Anchor(id="18", x=20.0)]))
-    with running_server(house.app(DASHBOARD), house.stopping) as port:
-        yield Place(house, f"http://127.0.0.1:{port}/")
+    bench = live_api_bench(Site(anchors=[Anchor(id="17"), Anchor(id="18", x=20.0)]))
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        yield Place(bench, f"http://127.0.0.1:{port}/")
 
 
 def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
     """A tag that came straight from the east at 1 m/s until now, ranged by both anchors in turn: its INNOVATION."""
-    row = place.house.answers.tags.register(tag).row
+    row = place.bench.answers.tags.register(tag).row
     end_ns = time.time_ns()
     poses, told = np.zeros(COUNT, POSE), np.zeros(COUNT, INNOVATION)
     for i in range(COUNT):
@@ -53,7 +53,7 @@ def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
     told["p_outlier"] = np.nan if hard_gate else ~told["fused"]
     poses["anchor"], poses["range"] = told["anchor"], told["measured"]
     for i in range(COUNT):
-        place.house.answers.latest.write(poses[i : i + 1], np.empty(0, HYPOTHESIS), told[i : i + 1])
+        place.bench.answers.latest.write(poses[i : i + 1], np.empty(0, HYPOTHESIS), told[i : i + 1])
     return told
 
 
@@ -143,7 +143,7 @@ def test_a_tag_whose_engine_tells_no_innovation_has_no_plots(chromium: Browser, 
 
 def test_what_was_used_and_what_not_is_counted_by_reason(chromium: Browser, place: Place) -> None:
     drive(place)
-    tags = place.house.answers.tags
+    tags = place.bench.answers.tags
     row = tags.register("cart").row
     tags.count_samples("range", np.full(1204, row))
     tags.count_samples("imu", np.full(12040, row))

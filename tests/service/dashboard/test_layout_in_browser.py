@@ -9,7 +9,7 @@ from playwright.sync_api import Browser
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.browser import Scheme, Watched, watched_page
 from support.http_server import running_server
 
@@ -143,9 +143,9 @@ def test_a_heading_is_read_clockwise_from_north_and_sent_counter_clockwise_from_
 
 def test_the_heading_of_a_site_that_is_turned_counts_from_true_north(chromium: Browser) -> None:
     turned = Georeference(lat=52.0, lon=13.0, rotation_rad=math.radians(30))
-    house = live_house(Site(anchors=[Anchor(id="17")], georeference=turned))
-    with running_server(house.app(DASHBOARD), house.stopping) as port:
-        place = Place(house, f"http://127.0.0.1:{port}/")
+    bench = live_api_bench(Site(anchors=[Anchor(id="17")], georeference=turned))
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
         place.move("cart", x=1.0, y=1.0, heading=math.radians(20))
         with watched_page(chromium, place.url) as page:
             page.wait_for("document.getElementById('site').textContent")

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.browser import Watched, watched_page
 from support.http_server import running_server
 
@@ -59,12 +59,12 @@ def show_six(place: Place, page: Watched) -> None:
 @contextmanager
 def outage(chromium: Browser) -> Iterator[Outage]:
     """A page that tracked six tags, of which one is selected and announced, and whose service has just gone."""
-    house = live_house()
-    house.answers.tags.register("cart-0")
-    house.answers.tags.set_online("cart-0", True)
+    bench = live_api_bench()
+    bench.answers.tags.register("cart-0")
+    bench.answers.tags.set_online("cart-0", True)
     with ExitStack() as pages:
-        with running_server(house.app(DASHBOARD), house.stopping) as port:
-            place = Place(house, f"http://127.0.0.1:{port}/")
+        with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+            place = Place(bench, f"http://127.0.0.1:{port}/")
             page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
             show_six(place, page)
             page.page.locator("tr[data-tag='cart-0']").click()
@@ -99,8 +99,8 @@ def test_the_map_of_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chrom
 
 def test_the_states_come_back_with_the_connection(chromium: Browser) -> None:
     with outage(chromium) as lost:
-        lost.place.house.stopping = Event()
-        with running_server(lost.place.house.app(DASHBOARD), lost.place.house.stopping, lost.port):
+        lost.place.bench.stopping = Event()
+        with running_server(lost.place.bench.app(DASHBOARD), lost.place.bench.stopping, lost.port):
             lost.page.wait_for("dropanchor.status() === 'live'")
             show_six(lost.place, lost.page)
             lost.page.wait_for("dropanchor.tags().every((tag) => tag.state === 'tracking')")

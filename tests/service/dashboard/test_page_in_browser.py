@@ -11,7 +11,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.browser import Watched, watched_page
 from support.http_server import running_server
 from support.zenoh_router import wait_until
@@ -28,7 +28,7 @@ def colour_at(page: Watched, tag: str) -> tuple[int, ...]:
 
 def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> None:
     """modes: weight, x, y."""
-    row = place.house.answers.tags.register(tag).row
+    row = place.bench.answers.tags.register(tag).row
     pose, hypotheses = np.zeros(1, POSE), np.zeros(len(modes), HYPOTHESIS)
     pose["row"] = hypotheses["row"] = row
     pose["t_ns"], pose["state"], pose["reason"] = time.time_ns(), State.AMBIGUOUS, StateReason.SEVERAL_MODES
@@ -36,7 +36,7 @@ def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> Non
     for name, column in zip(("weight", "x", "y"), zip(*modes, strict=True), strict=True):
         hypotheses[name] = column
     hypotheses["cov"] = np.eye(2) * 0.1
-    place.house.answers.latest.write(pose, hypotheses)
+    place.bench.answers.latest.write(pose, hypotheses)
 
 
 def test_without_a_tag_the_page_tells_how_to_start_one(chromium: Browser, place: Place) -> None:
@@ -105,7 +105,7 @@ def test_an_ambiguous_tag_is_shown_as_every_place_where_it_may_be(chromium: Brow
 
 
 def test_a_tag_without_a_pose_is_listed_as_initialising(chromium: Browser, place: Place) -> None:
-    place.house.answers.tags.register("new")
+    place.bench.answers.tags.register("new")
     with watched_page(chromium, place.url) as page:
         line = page.page.locator("tr[data-tag='new']")
         line.wait_for()
@@ -221,16 +221,16 @@ def test_a_new_anchor_appears_without_a_reload(chromium: Browser, place: Place) 
 
 
 def test_the_page_comes_back_by_itself_after_the_service(chromium: Browser) -> None:
-    house = live_house()
+    bench = live_api_bench()
     with ExitStack() as open_pages:
-        with running_server(house.app(DASHBOARD), house.stopping) as port:
-            place = Place(house, f"http://127.0.0.1:{port}/")
+        with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+            place = Place(bench, f"http://127.0.0.1:{port}/")
             place.move("old", x=1.0, y=1.0)
             page = open_pages.enter_context(watched_page(chromium, place.url))
             page.wait_for("dropanchor.tags().length === 1")
         page.page.locator("#lost").wait_for(state="visible")
-        house.stopping = Event()
-        with running_server(house.app(DASHBOARD), house.stopping, port):
+        bench.stopping = Event()
+        with running_server(bench.app(DASHBOARD), bench.stopping, port):
             page.wait_for("dropanchor.status() === 'live'")
             page.page.locator("#lost").wait_for(state="hidden")
             place.move("new", x=2.0, y=2.0)

@@ -7,7 +7,7 @@ import pytest
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.ingest import thread as ingest_thread
 from dropanchor_service.ingest.thread import IngestThread
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.zenoh_router import wait_until
 
 T = 1_760_000_000_000_000_000
@@ -17,12 +17,12 @@ def frame(value: float) -> Frame:
     return Frame(ranges=[RangeSample(T, 7, value)])
 
 
-def thread_of(bench: Bench) -> IngestThread:
+def thread_of(bench: IngestBench) -> IngestThread:
     return IngestThread(bench.ingest, bench.buffer, bench.metrics, period_s=0.001)
 
 
 def test_messages_become_poses_without_being_asked_for() -> None:
-    bench = Bench()
+    bench = IngestBench()
     thread = thread_of(bench)
     thread.start()
     bench.put("a", frame(4.0))
@@ -33,7 +33,7 @@ def test_messages_become_poses_without_being_asked_for() -> None:
 
 
 def test_an_error_of_ours_is_counted_and_the_thread_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench()
+    bench = IngestBench()
     turn, failures = bench.ingest.turn, 3
 
     def failing(most: int) -> int:
@@ -53,7 +53,7 @@ def test_an_error_of_ours_is_counted_and_the_thread_goes_on(monkeypatch: pytest.
 
 
 def test_a_thread_that_does_not_run_or_is_stuck_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench()
+    bench = IngestBench()
     thread = thread_of(bench)
     assert thread.problem == "the ingest thread does not run"
     release = threading.Event()

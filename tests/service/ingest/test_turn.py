@@ -25,7 +25,7 @@ from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
 from dropanchor_service.store.unknown_anchors import FRESH_NS, MOST_LOGGED
-from support.ingest import Bench
+from support.ingest import IngestBench
 
 T = 1_760_000_000_000_000_000
 S = 1_000_000_000
@@ -38,7 +38,7 @@ def ranges(*values: float, anchor: int = 7, sequence: int | None = None, boot_id
 
 
 def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_come_back_as_poses() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.put("a", ranges(1.0, 2.0))
     bench.put("b", Frame(ranges=[RangeSample(T, 7, 5.0)], imu=[IMU, IMU], headings=[HeadingSample(T, 1.0)]))
     bench.ingest.turn()
@@ -52,7 +52,7 @@ def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_come_back_as_
 
 
 def test_json_and_packed_messages_do_the_same() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.put("a", encode_json(ranges(3.0)), ENCODING_JSON)
     bench.put("b", ranges(3.0))
     bench.ingest.turn()
@@ -60,7 +60,7 @@ def test_json_and_packed_messages_do_the_same() -> None:
 
 
 def test_the_first_anchor_that_is_heard_becomes_the_origin_and_others_are_unknown() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, anchor=7), ranges(2.0, anchor=8), ranges(3.0, anchor=7))
     assert bench.site.site.anchors == [Anchor(id="7")]
     assert bench.engine.anchors is not None
@@ -70,7 +70,7 @@ def test_the_first_anchor_that_is_heard_becomes_the_origin_and_others_are_unknow
 
 
 def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
-    bench = Bench()
+    bench = IngestBench()
     frame = ranges(1.0, anchor=anchor_number("gate"))
     frame.anchor_names = {anchor_number("gate"): "gate"}
     bench.put("a", encode_json(frame), ENCODING_JSON)
@@ -79,13 +79,13 @@ def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
 
 
 def test_a_bad_range_does_not_bind_an_anchor() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(-1.0, anchor=9), ranges(1.0, anchor=7))
     assert [anchor.id for anchor in bench.site.site.anchors] == ["7"]
 
 
 def test_good_samples_of_a_frame_are_kept_beside_bad_ones_which_are_counted_for_their_tag() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, -1.0, float("nan"), 9000.0, 2.0))
     tag = bench.tags.find("a")
     assert tag is not None
@@ -115,7 +115,7 @@ def test_good_samples_of_a_frame_are_kept_beside_bad_ones_which_are_counted_for_
 def test_a_bad_payload_is_counted_for_its_tag_and_its_neighbours_pass(
     payload: bytes, encoding: str, reason: str
 ) -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.put("good", ranges(1.0))
     bench.put("bad", payload, encoding)
     bench.put("good", ranges(2.0))
@@ -131,7 +131,7 @@ def test_a_bad_payload_is_counted_for_its_tag_and_its_neighbours_pass(
     "key", ["dropanchor/@v1/default/tag/%zz/samples", "elsewhere", "dropanchor/@v1/default/tag/a%2d/samples"]
 )
 def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.buffer.append(key, encode_packed(ranges(1.0)), "application/vnd.dropanchor.samples", T)
     bench.ingest.turn()
     assert bench.rejected() == {"key_invalid": 1}
@@ -139,7 +139,7 @@ def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
 
 
 def test_unknown_tags_are_refused_when_the_settings_say_so_and_listed_ones_are_not() -> None:
-    bench = Bench(unknown_tags="refuse", tags={"listed": {}})
+    bench = IngestBench(unknown_tags="refuse", tags={"listed": {}})
     bench.send("listed", ranges(1.0))
     bench.send("stranger", ranges(2.0))
     assert bench.rejected() == {"tag_unknown": 1}
@@ -150,7 +150,7 @@ def test_unknown_tags_are_refused_when_the_settings_say_so_and_listed_ones_are_n
 
 
 def test_no_more_tags_than_max_tags_are_registered() -> None:
-    bench = Bench(max_tags=2)
+    bench = IngestBench(max_tags=2)
     for name in "abcd":
         bench.send(name, ranges(1.0))
     assert [tag.name for tag in bench.tags.all()] == ["a", "b"]
@@ -158,7 +158,7 @@ def test_no_more_tags_than_max_tags_are_registered() -> None:
 
 
 def test_a_message_that_comes_twice_is_fused_once() -> None:
-    bench = Bench()
+    bench = IngestBench()
     first, second = ranges(1.0, sequence=0, boot_id=5), ranges(2.0, sequence=1, boot_id=5)
     bench.send("a", first, second, first)
     bench.send("a", second, first)
@@ -167,7 +167,7 @@ def test_a_message_that_comes_twice_is_fused_once() -> None:
 
 
 def test_a_gap_waits_for_what_came_soon_after_it_however_long_both_have_lain_in_a_backlog() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=1))
     now_ns = bench.clock.now_ns()
     for sequence, ago_ns in ((2, 900_000_000), (1, 800_000_000), (4, 700_000_000)):
@@ -181,7 +181,7 @@ def test_a_gap_waits_for_what_came_soon_after_it_however_long_both_have_lain_in_
 
 
 def test_two_publishers_of_one_tag_and_two_tags_count_on_their_own() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=5), ranges(1.0, sequence=0, boot_id=6))
     bench.send("b", ranges(1.0, sequence=0, boot_id=5))
     assert sum(len(batch.ranges) for batch in bench.engine.batches) == 3
@@ -189,7 +189,7 @@ def test_two_publishers_of_one_tag_and_two_tags_count_on_their_own() -> None:
 
 
 def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
-    bench = Bench()
+    bench = IngestBench()
     second = 1_000_000_000
     for number, tag_s, arrival_s in ((0, 1.0, 101.0), (1, 2.0, 102.5), (2, 3.0, 103.0)):
         frame = Frame(ranges=[RangeSample(int(tag_s * second), 7, 1.0)], boot_clock=True, boot_id=9, sequence=number)
@@ -200,7 +200,7 @@ def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
 
 
 def test_settings_of_a_tag_reach_the_engine_before_it_is_heard_and_when_they_change() -> None:
-    bench = Bench(tags={"a": {"height_m": 1.5}})
+    bench = IngestBench(tags={"a": {"height_m": 1.5}})
     bench.ingest.turn()
     assert list(bench.engine.configured) == [0]
     bench.send("a", ranges(1.0))
@@ -212,7 +212,7 @@ def test_settings_of_a_tag_reach_the_engine_before_it_is_heard_and_when_they_cha
 
 
 def test_a_new_anchor_starts_nothing_afresh_but_one_that_moves_does() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0))
     bench.site.set_anchor(Anchor(id="8", x=5.0))
     bench.ingest.turn()
@@ -232,7 +232,7 @@ def poison_row(row: int) -> Callable[[SampleBatch], bool]:
 
 
 def test_a_row_that_makes_the_engine_fail_stops_nobody_else_and_is_shown_as_lost() -> None:
-    bench = Bench(tags={"2": {"start": StartPose(x=1.0, y=1.0).model_dump()}})
+    bench = IngestBench(tags={"2": {"start": StartPose(x=1.0, y=1.0).model_dump()}})
     names = [str(i) for i in range(8)]
     for name in names:
         bench.send(name, ranges(1.0))
@@ -254,7 +254,7 @@ def test_a_row_that_makes_the_engine_fail_stops_nobody_else_and_is_shown_as_lost
 
 
 def test_a_row_that_fails_again_and_again_is_left_alone_and_counted() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0))
     bench.engine.poisoned = poison_row(0)
     for _ in range(FAULTS_BEFORE_QUARANTINE + 4):
@@ -270,14 +270,14 @@ def test_a_payload_that_the_decoder_fails_on_costs_nothing_but_itself(monkeypatc
         return read_forms(payloads, encodings)
 
     monkeypatch.setattr(prepare, "read_forms", fails)
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0), b"poison", ranges(2.0))
     assert bench.x_of("a") == [2.0]
     assert bench.rejected() == {"payload_empty": 1}
 
 
 def test_a_flood_of_unknown_tags_is_bounded_and_known_tags_are_unharmed() -> None:
-    bench = Bench(max_tags=10)
+    bench = IngestBench(max_tags=10)
     bench.send("known", ranges(1.0))
     for number in range(50_000):
         bench.put(f"stranger{number}", ranges(1.0))
@@ -290,17 +290,17 @@ def test_a_flood_of_unknown_tags_is_bounded_and_known_tags_are_unharmed() -> Non
     assert rejected["shed"] + rejected["tags_full"] == 50_000 - 9
 
 
-def take_turns(bench: Bench) -> None:
+def take_turns(bench: IngestBench) -> None:
     while bench.buffer.depth:
         bench.ingest.turn()
 
 
-def fused(bench: Bench) -> list[float]:
+def fused(bench: IngestBench) -> list[float]:
     return [value for batch in bench.engine.batches for value in batch.ranges["range"].tolist()]
 
 
 def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses_neither() -> None:
-    bench = Bench(unproven_tags=1)
+    bench = IngestBench(unproven_tags=1)
     bench.send("quick", ranges(1.0))
     bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
     bench.ingest.turn()
@@ -315,7 +315,7 @@ def test_where_many_are_new_a_tag_gets_its_row_with_its_second_message_and_loses
 
 
 def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
-    bench = Bench(unproven_tags=0)
+    bench = IngestBench(unproven_tags=0)
     for _ in range(3):
         bench.put("doubled", ranges(1.0), at_ns=T)
     for second in range(3):
@@ -327,7 +327,7 @@ def test_a_message_that_was_doubled_or_cannot_be_read_proves_nothing() -> None:
 
 
 def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
-    bench = Bench(unproven_tags=1)
+    bench = IngestBench(unproven_tags=1)
     bench.put("first", ranges(1.0), at_ns=T)
     bench.put("waits", ranges(2.0), at_ns=T)
     bench.ingest.turn()
@@ -339,7 +339,7 @@ def test_strangers_who_have_proven_themselves_make_room_for_others() -> None:
 
 
 def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_counted() -> None:
-    bench = Bench(max_tags=100, unproven_tags=10)
+    bench = IngestBench(max_tags=100, unproven_tags=10)
     for number in range(5_000):
         bench.put(f"stranger{number}", ranges(1.0))
         if number % 200 == 0:
@@ -352,7 +352,7 @@ def test_strangers_who_send_once_are_forgotten_and_every_message_of_theirs_is_co
 
 
 def test_a_tag_in_quarantine_is_listed_and_comes_in_once_somebody_has_put_its_settings() -> None:
-    bench = Bench(unknown_tags="quarantine", tags={"listed": {}})
+    bench = IngestBench(unknown_tags="quarantine", tags={"listed": {}})
     bench.send("listed", ranges(1.0))
     for value in (2.0, 3.0):
         bench.send("stranger", ranges(value))
@@ -366,7 +366,7 @@ def test_a_tag_in_quarantine_is_listed_and_comes_in_once_somebody_has_put_its_se
 
 
 def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
-    bench = Bench(unproven_tags=0)
+    bench = IngestBench(unproven_tags=0)
     bench.put("a", ranges(1.0), at_ns=T)
     bench.ingest.turn()
     bench.tags.register("a")  # as REST does
@@ -376,7 +376,7 @@ def test_what_waited_of_a_tag_that_somebody_lets_in_meanwhile_is_used() -> None:
 
 def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
     names = [f"listed-{number}" for number in range(UNREGISTERED_PER_TURN + 500)]
-    bench = Bench(tags={name: {} for name in names})
+    bench = IngestBench(tags={name: {} for name in names})
     bench.ingest.turn()
     for name in names:
         bench.put(name, ranges(1.0))
@@ -387,7 +387,7 @@ def test_tags_that_are_known_do_not_wait_among_strangers() -> None:
 
 
 def test_shed_messages_are_counted_for_their_tag() -> None:
-    bench = Bench(capacity=100_000)
+    bench = IngestBench(capacity=100_000)
     bench.send("busy", ranges(1.0))
     bench.send("quiet", ranges(1.0))
     bench.put("quiet", ranges(2.0))
@@ -404,7 +404,7 @@ def test_shed_messages_are_counted_for_their_tag() -> None:
 
 
 def test_a_listed_tag_has_a_row_before_it_is_heard_and_an_announced_one_too(tmp_path: Path) -> None:
-    bench = Bench(tmp_path, tags={"listed": {}})
+    bench = IngestBench(tmp_path, tags={"listed": {}})
     bench.ingest.announce("alive")
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]
@@ -413,7 +413,7 @@ def test_a_listed_tag_has_a_row_before_it_is_heard_and_an_announced_one_too(tmp_
 def test_anchors_that_the_site_lacks_are_logged_once_each_and_no_more_than_a_bounded_number(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    bench = Bench(site={"anchors": [{"id": "1"}]})
+    bench = IngestBench(site={"anchors": [{"id": "1"}]})
     for anchor in range(2, 1000):
         bench.send("a", ranges(1.0, anchor=anchor), ranges(1.0, anchor=anchor))
     lines = [record.message for record in caplog.records if "unknown_anchors" in record.name]
@@ -426,7 +426,7 @@ def test_anchors_that_the_site_lacks_are_logged_once_each_and_no_more_than_a_bou
 
 
 def test_a_replay_is_as_old_as_its_silence_and_a_live_tag_as_its_measurement() -> None:
-    bench = Bench()
+    bench = IngestBench()
     answers = Answers(bench.site, bench.tags, bench.latest, bench.clock.now_ns)
 
     def state_of(name: str, later_s: float = 0.0) -> tuple[str, float]:
