@@ -10,7 +10,7 @@ from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_api_bench
 from support.axe import axe_source, violations
-from support.browser import Scheme, Watched, watched_page
+from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -30,7 +30,7 @@ def show_every_state(place: Place) -> None:
     place.bench.answers.tags.register("heard")
 
 
-def is_clean(page: Watched, axe: str) -> None:
+def is_clean(page: WatchedPage, axe: str) -> None:
     assert violations(page.page, axe) == []
 
 

@@ -14,7 +14,7 @@ from dropanchor_schemas.wire import Reason
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
 from service.dashboard.place import Place, live_api_bench
-from support.browser import Scheme, Watched, watched_page
+from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -57,12 +57,12 @@ def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
     return told
 
 
-def select(page: Watched, tag: str = "cart") -> None:
+def select(page: WatchedPage, tag: str = "cart") -> None:
     page.page.locator(f"tr[data-tag='{tag}']").click()
     page.page.locator("[data-part='plots']").wait_for(state="visible")
 
 
-def marks(page: Watched, plot: str, name: str) -> list[tuple[float, float]]:
+def marks(page: WatchedPage, plot: str, name: str) -> list[tuple[float, float]]:
     """Where the marks of a path stand, in pixels of the plot."""
     d = page.page.locator(f"[data-plot='{plot}'] path.{name}").first.get_attribute("d") or ""
     return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", d)]
@@ -82,7 +82,7 @@ def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, pl
             assert len(marks(page, plot, "refused")) == len(REFUSED)
         assert page.page.locator("[data-text='innovation']").inner_text() == "97 % in the band, 2 of 60 refused"
         assert page.page.locator("[data-plot='range'] path.expected").count() == 2
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_the_ranges_alone_prove_a_speed_beside_the_estimate(chromium: Browser, place: Place) -> None:
@@ -117,7 +117,7 @@ def test_the_map_shows_the_rings_of_all_anchors_and_how_well_the_heading_is_know
         assert sector(page, 2.5 * HEADING_SIGMA) == empty[1]
 
 
-def sector(page: Watched, off_rad: float) -> tuple[int, ...]:
+def sector(page: WatchedPage, off_rad: float) -> tuple[int, ...]:
     """The colour of the map 40 pixels from the dot, so far off its heading, which is west."""
     x, y = page.tags()["cart"]["pixel"]
     return page.pixel(x - 40 * math.cos(off_rad), y - 40 * math.sin(off_rad) - 2)
@@ -128,7 +128,7 @@ def test_an_engine_with_a_hard_gate_is_explained_too(chromium: Browser, place: P
         drive(place, hard_gate=True)
         select(page)
         assert len(marks(page, "range", "refused")) == len(REFUSED)
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_a_tag_whose_engine_tells_no_innovation_has_no_plots(chromium: Browser, place: Place) -> None:
@@ -138,7 +138,7 @@ def test_a_tag_whose_engine_tells_no_innovation_has_no_plots(chromium: Browser, 
         page.wait_for("document.querySelector('[data-part=\"v-x\"]').textContent === '2.00 m'")
         page.page.wait_for_timeout(700)
         assert page.page.locator("[data-part='plots']").is_hidden()
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_what_was_used_and_what_not_is_counted_by_reason(chromium: Browser, place: Place) -> None:

@@ -10,7 +10,7 @@ from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_api_bench
-from support.browser import Scheme, Watched, watched_page
+from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -78,7 +78,7 @@ def overlap(a: list[float], b: list[float]) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def misplaced(page: Watched) -> list[list[float]]:
+def misplaced(page: WatchedPage) -> list[list[float]]:
     """Boxes of dots and labels that reach beyond the map or under something that lies on it."""
     boxes = page.page.evaluate(BOXES)
     left, top, right, bottom = boxes["map"]
@@ -124,7 +124,7 @@ def test_the_label_of_a_selected_tag_at_the_edge_stays_on_the_map(chromium: Brow
         assert misplaced(page) == []
 
 
-def heading_of(page: Watched, tag: str) -> str:
+def heading_of(page: WatchedPage, tag: str) -> str:
     page.page.locator(f"tr[data-tag='{tag}']").click()
     page.wait_for("document.querySelector('[data-part=\"v-heading\"]').textContent !== '–'")
     return page.page.locator("[data-part='v-heading']").inner_text()

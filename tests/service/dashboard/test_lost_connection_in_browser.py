@@ -13,7 +13,7 @@ from playwright.sync_api import Browser
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_api_bench
-from support.browser import Watched, watched_page
+from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -39,7 +39,7 @@ BLUE_PIXELS = """() => {
 }"""
 
 
-def claims(page: Watched) -> list[str]:
+def claims(page: WatchedPage) -> list[str]:
     """The texts, also those that are only heard or shown on hover, that speak of poses as they are now."""
     return [text for text in page.page.evaluate(EVERY_TEXT) if CLAIM.search(text)]
 
@@ -47,11 +47,11 @@ def claims(page: Watched) -> list[str]:
 @dataclass
 class Outage:
     place: Place
-    page: Watched
+    page: WatchedPage
     port: int
 
 
-def show_six(place: Place, page: Watched) -> None:
+def show_six(place: Place, page: WatchedPage) -> None:
     place.move(*(f"cart-{i}" for i in range(6)), x=np.arange(6.0), y=1.0, cov=np.eye(3) * 1e-6)
     page.wait_for_map(6)
 

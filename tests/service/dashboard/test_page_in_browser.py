@@ -12,7 +12,7 @@ from playwright.sync_api import Browser
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from service.dashboard.place import Place, live_api_bench
-from support.browser import Watched, watched_page
+from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 from support.zenoh_router import wait_until
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.browser
 TRACKING_BLUE = (0, 103, 184)
 
 
-def colour_at(page: Watched, tag: str) -> tuple[int, ...]:
+def colour_at(page: WatchedPage, tag: str) -> tuple[int, ...]:
     x, y = page.tags()[tag]["pixel"]
     return page.pixel(x, y)[:3]
 
@@ -61,7 +61,7 @@ def test_a_pose_is_a_dot_and_a_line_in_the_table_and_both_follow_the_tag(chromiu
         place.move("cart", x=1.5, y=2.0)
         page.wait_for(f"dropanchor.tags()[0].x === 1.5 && dropanchor.tags()[0].pixel[0] > {before[0]} + 10")
         page.page.locator("tr[data-tag='cart'] td.c-x", has_text="1.50").wait_for()
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place) -> None:
@@ -112,7 +112,7 @@ def test_a_tag_without_a_pose_is_listed_as_initialising(chromium: Browser, place
         assert line.inner_text().split()[:4] == ["new", "Initialising", "–", "–"]
         line.click()
         assert page.page.locator("#detail").is_visible()
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place) -> None:
@@ -205,7 +205,7 @@ def test_names_from_tags_are_text_never_markup(chromium: Browser, place: Place) 
         cell.click()
         assert page.page.locator("#detail [data-part='name']").inner_text() == name
         page.wait_for("document.querySelector('[data-part=\"v-turn\"]').textContent !== '–'")
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_a_new_anchor_appears_without_a_reload(chromium: Browser, place: Place) -> None:
@@ -245,7 +245,7 @@ def test_ten_thousand_tags_are_drawn_as_density_with_few_lines_in_the_document(c
         page.wait_for("dropanchor.drawing().visible > 5000 && dropanchor.drawing().density")
         page.page.locator("#crowd").wait_for()
         assert page.page.locator("tbody tr").count() < 60
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_a_negative_speed_can_be_read_in_the_table(chromium: Browser, place: Place) -> None:
