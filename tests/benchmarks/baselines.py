@@ -74,7 +74,7 @@ def _ekf(track: Track) -> Any:
 
 
 def _fuse(ekf: Any, frame: Frame) -> None:
-    """Fuse a message. The IMU samples between two ranges make one prediction from their mean yaw rate and acceleration."""
+    """Fuse a message, with one prediction per range from the mean yaw rate and acceleration of the IMU samples."""
     half = len(frame.imu) // len(frame.ranges)
     for index, sample in enumerate(frame.ranges):
         inertial = frame.imu[index * half : (index + 1) * half]

@@ -41,7 +41,7 @@ def test_the_cost_of_a_hundred_thousand_tags_of_which_one_in_a_hundred_moves(
     cpu = (after.cpu_s - registered.cpu_s) / MOVING_S
     report.record(
         "idle",
-        f"{TAGS - MOVING:,} tags sent two messages and {MOVING:,} are in the settings: {registered_tags:,} have a row of "
+        f"{TAGS - MOVING:,} tags sent two messages and {MOVING:,} have settings: {registered_tags:,} have a row of "
         f"{per_tag / 1e3:.1f} kB, {pending} are pending, and {registered.shed:.0f} messages were shed. While "
         f"{MOVING:,} move: {cpu:.2f} CPU-seconds per second, {lost(moved['messages'], registered, after)} samples "
         "lost.",

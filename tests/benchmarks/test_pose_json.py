@@ -152,7 +152,7 @@ def hypotheses(poses: Array, answers: Answers) -> list[list[Hypothesis]]:
 
 
 def costs_ms(ways: dict[str, Callable[[], bytes]]) -> dict[str, float]:
-    """The fastest round of each way, the ways in turns."""
+    """Return the CPU time of the fastest round of each way in ms. The ways take turns."""
     best = dict.fromkeys(ways, float("inf"))
     for _ in range(ROUNDS):
         for name, way in ways.items():

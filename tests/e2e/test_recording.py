@@ -37,7 +37,7 @@ def test_a_replayed_recording_gives_the_live_poses_even_after_a_kill(
         live = service.get("/api/v1/poses")["poses"]
         httpx.put(f"{service.url}/api/v1/tags/a/settings", json={}).raise_for_status()
         wait_until(lambda: service.metric("dropanchor_recording_messages_total") >= 400)
-        time.sleep(1.5)  # the recorder writes a chunk at least once a second
+        time.sleep(1.5)  # until the last chunk is on the disk
         service.process.kill()
         service.process.wait(60.0)
     assert main(["replay", str(tmp_path / "recordings"), "--out", str(tmp_path / "poses.csv")]) == 0

@@ -1,4 +1,4 @@
-"""A browser, and a service to look at."""
+"""A browser, and a page whose store the test fills."""
 
 from collections.abc import Iterator
 

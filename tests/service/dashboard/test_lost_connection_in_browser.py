@@ -1,4 +1,4 @@
-"""Once the connection is lost, nothing on the page says that a pose holds now."""
+"""After the connection is lost, nothing on the page claims that a pose is current."""
 
 import re
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
 
-CLAIM = re.compile(r"tracking|believed|\blive\b", re.IGNORECASE)
+CLAIM = re.compile(r"tracking|trusted|\blive\b", re.IGNORECASE)
 EVERY_TEXT = """() => {
     const texts = [document.title];
     for (const element of document.body.querySelectorAll("*")) {
@@ -40,12 +40,14 @@ BLUE_PIXELS = """() => {
 
 
 def claims(page: WatchedPage) -> list[str]:
-    """The texts, also those that are only heard or shown on hover, that speak of poses as they are now."""
+    """Return the texts that claim current poses, including those for screen readers and tooltips."""
     return [text for text in page.page.evaluate(EVERY_TEXT) if CLAIM.search(text)]
 
 
 @dataclass
 class Outage:
+    """A page whose service has stopped."""
+
     place: Place
     page: WatchedPage
     port: int
@@ -58,7 +60,7 @@ def show_six(place: Place, page: WatchedPage) -> None:
 
 @contextmanager
 def outage(chromium: Browser) -> Iterator[Outage]:
-    """A page that tracked six tags, of which one is selected and announced, and whose service has just gone."""
+    """Show six tracked tags with one of them selected, then stop the service."""
     bench = live_api_bench()
     bench.answers.tags.register("cart-0")
     bench.answers.tags.set_online("cart-0", True)
@@ -75,7 +77,7 @@ def outage(chromium: Browser) -> Iterator[Outage]:
         yield Outage(place, page, port)
 
 
-def test_no_text_of_a_lost_connection_says_tracking_or_that_a_pose_can_be_believed(chromium: Browser) -> None:
+def test_no_text_after_a_lost_connection_claims_that_a_tag_is_tracked(chromium: Browser) -> None:
     with outage(chromium) as lost:
         page = lost.page.page
         assert claims(lost.page) == []
@@ -91,7 +93,7 @@ def test_no_text_of_a_lost_connection_says_tracking_or_that_a_pose_can_be_believ
         assert {tag["state"] for tag in lost.page.tags().values()} == {"outdated"}
 
 
-def test_the_map_of_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chromium: Browser) -> None:
+def test_the_map_after_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chromium: Browser) -> None:
     with outage(chromium) as lost:
         lost.page.wait_for("dropanchor.drawing().still")
         assert lost.page.page.evaluate(BLUE_PIXELS) == 0

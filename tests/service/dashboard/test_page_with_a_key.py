@@ -1,4 +1,4 @@
-"""The page of a service that wants to know who asks."""
+"""The page of a service that requires an API key."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from support.http_server import running_server
 pytestmark = pytest.mark.browser
 
 
-def test_the_page_asks_for_a_key_keeps_it_and_shows_the_tags(tmp_path: Path) -> None:
+def test_the_page_asks_for_a_key_stores_it_and_shows_the_tags(tmp_path: Path) -> None:
     now_s = 0.0
     keys = ApiKeys(tmp_path, lambda: now_s)
     secret = keys.add("dashboard", Scope.READ)
