@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from dropanchor_service.estimation.batch import POSE, Array, PoseBatch, SampleBatch
+from dropanchor_service.estimation.columns import POSE, Array, PoseBatch, SampleBatch
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 
 
