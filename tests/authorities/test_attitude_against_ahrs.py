@@ -1,7 +1,8 @@
-"""Our attitude filter against an independent implementation of the same article: AQUA of PyPI's ahrs.
+"""Our attitude filter against an independent implementation of the same article: AQUA of the package ahrs.
 
-ahrs gives body_from_world of a world whose x axis points to magnetic north (z up); ours is world_from_body in ENU.
-ahrs integrates the gyroscope to first order (42) and has no bias; ours is exact: small steps keep the two together.
+AQUA returns body_from_world, where the x axis of the world points to magnetic north and z up. Our filter returns
+world_from_body in ENU. AQUA integrates the gyroscope to first order (equation 42) and estimates no bias, while our
+integration is exact. With small time steps the two agree.
 """
 
 import math
@@ -16,11 +17,11 @@ from dropanchor_service.estimation.paper.attitude import AttitudeFilter, Attitud
 
 DT = 0.01
 GAIN = 0.02
-EAST_FROM_NORTH = attitude.about_up(math.pi / 2)  # a vector in (north, west, up) becomes one in (east, north, up)
+EAST_FROM_NORTH = attitude.about_up(math.pi / 2)  # turns (north, west, up) into (east, north, up)
 
 
 def motion(n: int, spin: float) -> tuple[Array, Array, Array]:
-    """acc, gyro, mag, each (n, 3), of a body that sways while it turns several times about up."""
+    """Return acc, gyro and mag, each (n, 3), of a body that sways while it turns about the vertical at `spin` rad/s."""
     rng = np.random.default_rng(11)
     q: Quaternion = attitude.IDENTITY
     acc, gyro, mag = np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3))
@@ -34,12 +35,13 @@ def motion(n: int, spin: float) -> tuple[Array, Array, Array]:
 
 
 def enu_from_body(q: Array) -> Quaternion:
+    """Convert an attitude of AQUA to ours."""
     w, x, y, z = q.tolist()
     return attitude.multiply(EAST_FROM_NORTH, (w, -x, -y, -z))
 
 
 @pytest.mark.parametrize("spin", [0.5, -0.9], ids=["left", "right"])
-def test_the_9_axis_attitude_stays_with_that_of_ahrs_through_many_turns(spin: float) -> None:
+def test_the_9_axis_attitude_agrees_with_ahrs_over_many_turns(spin: float) -> None:
     acc, gyro, mag = motion(4000, spin)
     theirs = AQUA(frequency=1 / DT, alpha=GAIN, beta=GAIN)
     q = theirs.estimate(acc[0], mag[0])
@@ -53,7 +55,7 @@ def test_the_9_axis_attitude_stays_with_that_of_ahrs_through_many_turns(spin: fl
     assert max(apart) < 1e-3
 
 
-def test_the_6_axis_attitude_stays_with_that_of_ahrs_across_pi() -> None:
+def test_the_6_axis_attitude_agrees_with_ahrs_across_pi() -> None:
     acc, gyro, _ = motion(2000, 0.8)
     theirs = AQUA(frequency=1 / DT, alpha=GAIN)
     ours = AttitudeFilter(AttitudeParameters(tilt_time=DT / GAIN, bias_time=math.inf))
@@ -69,6 +71,7 @@ def test_the_6_axis_attitude_stays_with_that_of_ahrs_across_pi() -> None:
 
 
 def _angle(ours: AttitudeFilter, theirs: Array) -> float:
+    """Return the angle between the two attitudes in rad."""
     assert ours.q is not None
     w, x, y, z = enu_from_body(theirs)
     dw, dx, dy, dz = attitude.multiply((w, -x, -y, -z), ours.q)

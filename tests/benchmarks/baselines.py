@@ -1,5 +1,5 @@
-"""The same messages without I/O: the bare engines, and the loop that everybody writes first. CPU-seconds per million
-samples, in this process."""
+"""What the same messages cost without I/O, in CPU-seconds per million samples: the bare engines, and a simple loop
+with one filterpy EKF per tag."""
 
 import time
 from typing import Any
@@ -20,7 +20,7 @@ WARM_UP = 15  # messages of each tag before the measurement
 
 
 def engine_cost(name: str, tags: int, messages: int) -> float:
-    """Decoded columns go into `process`; nothing else is counted."""
+    """Return the cost of `process` alone, with columns that are already decoded."""
     engine = create_engine(load_settings(options={"engine": name}, environment={}))
     motions = tracks((WARM_UP + messages + 1) * MESSAGE_S)
     engine.set_anchors(np.zeros(1, ANCHOR))
@@ -38,13 +38,13 @@ def engine_cost(name: str, tags: int, messages: int) -> float:
 
 
 def filterpy_cost(tags: int, messages: int) -> float:
-    """One filterpy EKF per tag: each message decoded by itself, one prediction and one update per range."""
+    """Return the cost of a loop that decodes each message and makes one prediction and one update per range."""
     motions = tracks((messages + 1) * MESSAGE_S)
     filters = [_ekf(motions[tag % len(motions)]) for tag in range(tags)]
     payloads = [[_payload(motions, tag, sequence) for tag in range(tags)] for sequence in range(messages)]
     started_s = time.process_time()
-    for of_round in payloads:
-        for ekf, payload in zip(filters, of_round, strict=True):
+    for round_payloads in payloads:
+        for ekf, payload in zip(filters, round_payloads, strict=True):
             frame = decode_packed(payload)
             assert isinstance(frame, Frame)
             _fuse(ekf, frame)
@@ -64,7 +64,7 @@ def _columns(motions: list[Track], tags: int, sequence: int) -> SampleBatch:
 
 
 def _ekf(track: Track) -> Any:
-    """State (x, y, heading, speed)."""
+    """Return a filter with the state (x, y, heading, speed)."""
     from filterpy.kalman import ExtendedKalmanFilter
 
     ekf = ExtendedKalmanFilter(dim_x=4, dim_z=1)
@@ -74,7 +74,7 @@ def _ekf(track: Track) -> Any:
 
 
 def _fuse(ekf: Any, frame: Frame) -> None:
-    """The inertial samples between two ranges as one step: the mean rate of turn and the mean forward acceleration."""
+    """Fuse a message, with one prediction per range from the mean yaw rate and acceleration of the IMU samples."""
     half = len(frame.imu) // len(frame.ranges)
     for index, sample in enumerate(frame.ranges):
         inertial = frame.imu[index * half : (index + 1) * half]

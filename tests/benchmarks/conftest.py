@@ -1,4 +1,4 @@
-"""Nothing is measured while kernels are compiled."""
+"""Compile the kernels before anything is measured."""
 
 import pytest
 

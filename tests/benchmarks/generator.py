@@ -1,8 +1,10 @@
-"""A program: a fleet that sends over real Zenoh sessions. It says "ready" when the service listens to each of them,
-reads when to start (UTC, ns), sends, and reports.
+"""A program that sends the messages of a fleet over real Zenoh sessions.
 
-Arguments: endpoint, first tag, number of tags, sessions, seconds, "block" or "drop" where the network is congested,
-and of how many tags two messages each are to be sent first, slowly.
+It prints "ready" once the service has subscribed to each session. Then it reads the start time (UTC in ns) from stdin,
+sends, and prints a report after the next line on stdin.
+
+Arguments: endpoint, first tag, number of tags, number of sessions, seconds, congestion control ("block" or "drop"),
+and the number of tags to register before, slowly and with two messages each.
 """
 
 import json
@@ -19,10 +21,10 @@ from dropanchor_schemas.keys import all_tags, samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED
 from support.zenoh_router import connected_session, wait_until
 
-SLOTS = 40  # a message period is sent in so many bursts, 5 ms apart
+SLOTS = 40  # bursts per message period, 5 ms apart
 REGISTERED_PER_S = 4000  # messages
 REGISTERED_AT_ONCE = 1000  # tags, whose second messages follow their first ones
-REGISTERING = 2  # messages that make a tag known
+REGISTERING = 2  # messages that register a tag
 Put = Callable[[int, bytes], None]
 
 
@@ -47,19 +49,19 @@ def main(endpoint: str, first: int, tags: int, sessions: int, duration_s: float,
 
 
 def wait_for_listener(session: zenoh.Session) -> None:
-    """What is put before the subscription has reached the session is lost."""
+    """Wait for a subscriber to the samples. Messages that are put earlier are lost."""
     publisher = session.declare_publisher(all_tags("default", "samples"))
 
-    def is_heard() -> bool:
+    def is_matching() -> bool:
         status = publisher.matching_status
         return bool(getattr(status, "matching", status))
 
-    wait_until(is_heard, 60.0)
+    wait_until(is_matching, 60.0)
     publisher.undeclare()
 
 
 def register_all(put: Put, motions: list[list[bytes]], first: int, count: int) -> int:
-    """Returns how many messages each of them has sent."""
+    """Send the first messages of `count` tags. Return the number of messages per tag."""
     for start in range(0, count, REGISTERED_AT_ONCE):
         for sequence in range(REGISTERING):
             for tag in range(start, min(start + REGISTERED_AT_ONCE, count)):
@@ -73,7 +75,7 @@ def register_all(put: Put, motions: list[list[bytes]], first: int, count: int) -
 def send(
     put: Put, motions: list[list[bytes]], first: int, tags: int, start_ns: int, rounds: int, registered: int
 ) -> dict[str, float]:
-    """A message of every tag in every round, spread over it. registered: so many have been sent before."""
+    """Send one message per tag and round, spread over the round. registered: number of messages per tag sent before."""
     edges = np.linspace(0, tags, SLOTS + 1).astype(int).tolist()
     late_ms = []
     for number in range(rounds):

@@ -1,4 +1,4 @@
-"""Packed messages of simulated tags, made before the clock starts: 5 a second, each 20 IMU samples and 2 ranges."""
+"""Packed messages of simulated tags, made in advance: 5 per second, each with 20 IMU samples and 2 ranges."""
 
 from dataclasses import dataclass
 
@@ -22,19 +22,20 @@ _PACKED_RANGE = np.dtype([("dt_us", "<u4"), ("anchor", "<u4"), ("value", "<f4"),
 
 @dataclass(frozen=True)
 class Track:
-    """What one tag sends after the header, message by message, and where it starts: x, y m, heading rad."""
+    """start: x and y in m, heading in rad. bodies: the messages of a tag without their headers."""
 
     start: tuple[float, float, float]
     bodies: list[bytes]
 
 
 def tracks(duration_s: float, count: int = TRACKS) -> list[Track]:
+    """Return `count` simulated tracks with 10 Hz ranges and 100 Hz raw IMU samples."""
     sensors = preset("calibrated", 10.0, 100.0)
     return [_track(simulation(YARD, 0, index, sensors, duration_s)) for index in range(count)]
 
 
 def message(body: bytes, sequence: int, boot_id: int, newest_ns: int) -> bytes:
-    """The payload whose last IMU sample and last range are of `newest_ns`."""
+    """Return a payload whose last IMU sample and last range are of `newest_ns`."""
     t0_ns = newest_ns - STEP_NS
     return HEADER.pack(VERSION, 0, IMU_PER_MESSAGE, RANGES_PER_MESSAGE, 0, sequence, boot_id, t0_ns, 0, 0, 0) + body
 
@@ -47,7 +48,7 @@ def _track(run: Simulation) -> Track:
 
 
 def _body(run: Simulation, index: int) -> bytes:
-    """Samples of (index, index + 1] · 0.2 s, so that the newest of both kinds is of the end."""
+    """Return the samples of (index, index + 1] · 0.2 s. The newest of both kinds is of the end."""
     imu = np.zeros(IMU_PER_MESSAGE, _PACKED_IMU)
     chosen = slice(index * IMU_PER_MESSAGE + 1, (index + 1) * IMU_PER_MESSAGE + 1)
     imu["dt_us"] = np.arange(1, IMU_PER_MESSAGE + 1) * 10_000

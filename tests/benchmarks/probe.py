@@ -1,4 +1,4 @@
-"""How old a pose is when somebody who asks over Zenoh gets it."""
+"""Measure how old a pose is when a Zenoh query returns it."""
 
 import json
 import time
@@ -16,8 +16,10 @@ GIVE_UP_MS = 2000.0
 
 
 def latencies_ms(endpoint: str, tags: int, start_ns: int, duration_s: float) -> list[float]:
-    """One burst after another: the pose of one of its tags is asked for until it is that of the burst's newest sample;
-    then the time of arrival minus the time of that sample."""
+    """Return, for one burst after another, the time from its newest sample to a reply with the pose of that sample.
+
+    One tag of the burst is queried until its pose has the time of the newest sample.
+    """
     found: list[float] = []
     rng = np.random.default_rng(0)
     end_s = time.monotonic() + duration_s
@@ -35,7 +37,7 @@ def latencies_ms(endpoint: str, tags: int, start_ns: int, duration_s: float) -> 
 
 
 def age_ms(session: zenoh.Session, tag: int) -> float:
-    """Of its pose; without a limit before the first one."""
+    """Return the age of the pose of a tag, counted from 1970 before its first pose."""
     t_ns = _pose_time(session, pose_key("default", f"sim-{tag}"))
     return (time.time_ns() - t_ns) * 1e-6
 

@@ -1,4 +1,4 @@
-"""What the kernel says about a process."""
+"""Read the CPU time and memory of a process from the kernel, and throttle a process."""
 
 import os
 import signal
@@ -7,28 +7,29 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
-_PERIOD_S = 0.02  # of stopping and going on
+_PERIOD_S = 0.02  # of one stop and one continuation
 _TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 
 
 def cpu_s(pid: int) -> float:
-    """User and system time of all its threads so far."""
+    """Return the user and system time of all threads of a process so far, in s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) * _TICK_S
 
 
 def resident_bytes(pid: int) -> int:
+    """Return the resident memory of a process."""
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def load() -> float:
-    """Processes that ran or waited to run, over the last minute."""
+    """Return the load average of the last minute."""
     return os.getloadavg()[0]
 
 
 @contextmanager
 def throttled(pid: int, share: float) -> Iterator[None]:
-    """It runs for this share of the time only, as on a slower machine: it is stopped for the rest of each period."""
+    """Let a process run for a share of the time only, as on a slower machine, until the block ends."""
     ended = Event()
 
     def alternate() -> None:

@@ -1,4 +1,4 @@
-"""The processes of a measurement: router, generator, receiver. Each is ended with the block that started it."""
+"""The processes of a measurement: router, generator and receiver."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ SESSIONS = 24
 
 
 class Program:
-    """One of this folder, once it has said that it is ready."""
+    """A program of this folder that has printed "ready"."""
 
     def __init__(self, name: str, *arguments: object) -> None:
         self.process = subprocess.Popen(
@@ -27,13 +27,15 @@ class Program:
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == "ready\n", f"{name} did not start"
 
-    def tell(self, line: object) -> None:
+    def send_line(self, line: object) -> None:
+        """Write a line to the stdin of the program."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
-    def ask(self, line: object) -> str:
-        self.tell(line)
+    def request(self, line: object) -> str:
+        """Write a line to the program and return its next line."""
+        self.send_line(line)
         assert self.process.stdout is not None
         return self.process.stdout.readline()
 
@@ -42,6 +44,7 @@ class Program:
 
 
 def end(process: subprocess.Popen[str]) -> None:
+    """Kill a process and close its pipes."""
     process.kill()
     process.wait()
     for pipe in (process.stdin, process.stdout):
@@ -51,6 +54,7 @@ def end(process: subprocess.Popen[str]) -> None:
 
 @contextmanager
 def running(name: str, *arguments: object) -> Iterator[Program]:
+    """Run a program of this folder until the block ends."""
     program = Program(name, *arguments)
     try:
         yield program
@@ -61,11 +65,13 @@ def running(name: str, *arguments: object) -> Iterator[Program]:
 def generator(
     endpoint: str, tags: int, duration_s: float, first: int = 0, control: str = "block", register: int = 0
 ) -> Program:
+    """Start a load generator. The caller ends it. register: number of tags to register before."""
     return Program("generator", endpoint, first, tags, SESSIONS, duration_s, control, register)
 
 
 @contextmanager
 def router(endpoint: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a Zenoh router until the block ends."""
     process = start_router_process(endpoint)
     try:
         yield process

@@ -1,5 +1,7 @@
-"""A program: what Zenoh alone costs. Receives every message of the fleet as the service does, out of a channel, copies
-key and payload, and drops them."""
+"""A program that measures what Zenoh alone costs.
+
+It takes every message of the fleet out of a channel, as the service does, copies key and payload, and drops them.
+"""
 
 import sys
 import threading

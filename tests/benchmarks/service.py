@@ -1,4 +1,4 @@
-"""The service under measurement, and its counters."""
+"""Read the counters of the measured service, and write its settings."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +14,7 @@ MAX_TAGS = 200_000
 
 @dataclass(frozen=True)
 class Counters:
-    """What the service has counted so far. delays: upper bound of a bucket, s → how many batches were not slower."""
+    """The counts of the service so far. delays: upper bound of a bucket in s → number of batches up to this delay."""
 
     fused: float  # samples
     shed: float  # messages
@@ -25,6 +25,7 @@ class Counters:
 
 
 def counters(service: Running) -> Counters:
+    """Read the counters of the service."""
     values = _values(httpx.get(f"{service.url}/metrics", timeout=30.0).text)
     bucket = 'dropanchor_pose_delay_seconds_bucket{le="'
     delays = {float(name[len(bucket) : -2]): value for name, value in values.items() if name.startswith(bucket)}
@@ -39,6 +40,7 @@ def counters(service: Running) -> Counters:
 
 
 def rejected(service: Running) -> dict[str, float]:
+    """Return the rejections by metric, without zeros."""
     values = _values(httpx.get(f"{service.url}/metrics", timeout=30.0).text)
     return {name: value for name, value in values.items() if name.startswith("dropanchor_rejected_total") and value}
 
@@ -49,12 +51,12 @@ def _values(text: str) -> dict[str, float]:
 
 
 def lost(sent_messages: int, since: Counters, until: Counters) -> int:
-    """Samples that were sent and not handed to the estimators."""
+    """Return how many samples were sent but did not reach the estimators."""
     return sent_messages * SAMPLES_PER_MESSAGE - int(until.fused - since.fused)
 
 
 def settings_file(tags: int, folder: Path) -> Path:
-    """The anchor at the origin, and where every tag starts."""
+    """Write settings with an anchor at the origin and the start of every tag."""
     starts = [track.start for track in tracks(1.0)]
     tables = [
         f"[tags.sim-{i}.start]\nx = {x!r}\ny = {y!r}\nheading_rad = {heading!r}"

@@ -1,4 +1,4 @@
-"""One size of the fleet, end to end: router, generator and service, each a process of its own."""
+"""Measure one fleet size end to end, with a process each for router, generator and service."""
 
 import json
 import subprocess
@@ -19,13 +19,16 @@ from support.service import running_service
 from support.zenoh_router import free_endpoint, wait_until
 
 WARM_UP_S, MEASURE_S = 4.0, 6.0
-QUIET_S = 0.5  # without a new sample everything has arrived
+QUIET_S = 0.5  # after so long without a new sample, all samples have arrived
 
 
 @dataclass
 class Figures:
-    """cpu: of the service, seconds per second. latency_ms: newest sample of a message → its pose in a query's reply.
-    store_ms: arrival → store, the bounds that hold p50 and p99. late_p99_ms: of the generator's bursts."""
+    """The figures of one fleet size.
+
+    cpu: CPU-seconds of the service per second. latency_ms: from the newest sample of a message to its pose in a reply.
+    store_ms: from arrival to the store, upper bounds of p50 and p99. late_p99_ms: delay of the generator's bursts.
+    """
 
     tags: int
     cpu: float
@@ -43,7 +46,7 @@ class Figures:
 
 
 def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = False, share: float = 1.0) -> Figures:
-    """embedded: the service is the router. share: of the time, in which the service runs."""
+    """Measure a fleet of `tags` tags. embedded: the service is the router. share: of the time that the service runs."""
     endpoint = free_endpoint()
     link = "--zenoh-listen" if embedded else "--zenoh-connect"
     with ExitStack() as stack:
@@ -55,13 +58,13 @@ def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = Fa
         stack.enter_context(proc.throttled(service.process.pid, share))
         start_ns = (time.time_ns() + 300_000_000) // 1000 * 1000
         at_first = counters(service)
-        fleet.tell(start_ns)
+        fleet.send_line(start_ns)
         time.sleep(WARM_UP_S + 0.3)
         before, router_before, began_s = counters(service), _cpu(routing), time.monotonic()
         latency_ms = latencies_ms(endpoint, tags, start_ns, MEASURE_S)
         after, router_after, spent_s = counters(service), _cpu(routing), time.monotonic() - began_s
         load = proc.load()
-        report = json.loads(fleet.ask("end"))
+        report = json.loads(fleet.request("end"))
         at_last = when_quiet(lambda: counters(service))
         return Figures(
             tags,
@@ -78,22 +81,22 @@ def run_step(tags: int, folder: Path, engine: str = "fleet", embedded: bool = Fa
 
 
 def run_receiver(tags: int, duration_s: float = 6.0) -> float:
-    """CPU-seconds per million samples that Zenoh alone costs a Python process behind a router."""
+    """Return what Zenoh alone costs a Python process behind a router, in CPU-seconds per million samples."""
     endpoint = free_endpoint()
     with router(endpoint), running("receiver", endpoint) as receiver:
         fleet = generator(endpoint, tags, duration_s)
         try:
             before = proc.cpu_s(receiver.process.pid)
-            fleet.tell(time.time_ns() + 300_000_000)
-            fleet.ask("end")
-            messages, _ = receiver.ask("end").split()
+            fleet.send_line(time.time_ns() + 300_000_000)
+            fleet.request("end")
+            messages, _ = receiver.request("end").split()
         finally:
             fleet.end()
         return (proc.cpu_s(receiver.process.pid) - before) / (int(messages) * SAMPLES_PER_MESSAGE * 1e-6)
 
 
 def when_quiet(read: Callable[[], Counters], timeout_s: float = 60.0, quiet_s: float = QUIET_S) -> Counters:
-    """The counters once no sample has been fused for a while."""
+    """Return the counters once no sample has been fused for `quiet_s`."""
     last = read()
 
     def unchanged() -> bool:
@@ -111,8 +114,8 @@ def _cpu(process: subprocess.Popen[str] | None) -> float:
 
 
 def _quantiles_ms(before: dict[float, float], after: dict[float, float]) -> tuple[float, float]:
-    """The bucket bounds that hold p50 and p99 of what came between: from arrival to the store."""
+    """Return the upper bounds in ms of the buckets that contain p50 and p99 of the delays between two readings."""
     counts = {bound: after[bound] - before[bound] for bound in after}
     total = counts[float("inf")]
-    at_most = [min((b for b, n in counts.items() if n >= q * total), default=float("inf")) for q in (0.5, 0.99)]
-    return at_most[0] * 1e3, at_most[1] * 1e3
+    bounds_s = [min((b for b, n in counts.items() if n >= q * total), default=float("inf")) for q in (0.5, 0.99)]
+    return bounds_s[0] * 1e3, bounds_s[1] * 1e3

@@ -1,4 +1,4 @@
-"""A program: tags that each have a Zenoh session of their own, with a liveliness token, and send once a second."""
+"""A program that runs tags with a Zenoh session and a liveliness token each, which send once a second."""
 
 import sys
 import threading

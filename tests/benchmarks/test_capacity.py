@@ -1,4 +1,4 @@
-"""How many live tags one process carries, and what that costs beside what cannot be avoided and what others do."""
+"""Measure how many live tags one process carries, and compare the cost with the unavoidable part and a simple loop."""
 
 from pathlib import Path
 
@@ -18,22 +18,22 @@ def breaks(figures: Figures) -> bool:
     return figures.lost > 0 or not figures.percentile(99) < BROKEN_MS
 
 
-def test_the_fleet_is_stepped_up_until_latency_or_loss_breaks(tmp_path: Path) -> None:
-    lines, held = [report.HEAD], list[Figures]()
+def test_the_fleet_grows_until_the_latency_is_too_long_or_samples_are_lost(tmp_path: Path) -> None:
+    lines, carried = [report.HEAD], list[Figures]()
 
-    def holds(tags: int) -> bool:
+    def is_carried(tags: int) -> bool:
         figures = run_step(tags, tmp_path)
         broken = breaks(figures)
         lines.append(report.row(figures, " (broken)" if broken else ""))
         print(lines[-1], flush=True)
-        held.extend([] if broken else [figures])
+        carried.extend([] if broken else [figures])
         return not broken
 
-    broken = next((tags for tags in STEPS if not holds(tags)), None)
-    assert held, f"not even {STEPS[0]} tags are carried\n" + "\n".join(lines)
+    broken = next((tags for tags in STEPS if not is_carried(tags)), None)
+    assert carried, f"not even {STEPS[0]} tags are carried\n" + "\n".join(lines)
     if broken is not None:
-        holds((held[-1].tags + broken) // 2)
-    best = held[-1]
+        is_carried((carried[-1].tags + broken) // 2)
+    best = carried[-1]
     half = run_step(best.tags // 2, tmp_path)
     lines += [report.row(half, " (half)"), report.row(run_step(best.tags // 2, tmp_path, embedded=True), " (embedded)")]
     costs = {
@@ -44,10 +44,10 @@ def test_the_fleet_is_stepped_up_until_latency_or_loss_breaks(tmp_path: Path) ->
     }
     loop = costs["one filterpy EKF per tag, no I/O"] / best.cpu_s_per_million
     unavoidable = sum(list(costs.values())[:2]) / best.cpu_s_per_million
-    said = [
+    summary = [
         f"**{best.tags} tags are carried** with nothing lost, {best.tags / best.cpu:.0f} per core in use.",
         f"One filterpy EKF per tag, without any I/O, costs {loop:.0f} times as much as the service end to end.",
         f"{unavoidable:.0%} of the service's time is what cannot be avoided: receiving, and the bare engine.",
         f"p99 of the latency at half of the tags: {half.percentile(99):.0f} ms.",
     ]
-    report.record("capacity", "\n".join([*said, "", *lines, "", report.ratios(best.cpu_s_per_million, costs)]))
+    report.record("capacity", "\n".join([*summary, "", *lines, "", report.ratios(best.cpu_s_per_million, costs)]))

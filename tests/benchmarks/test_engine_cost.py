@@ -1,7 +1,7 @@
-"""What estimation costs: the engines and a plain filterpy EKF per tag, in one run, without input and output.
+"""Measure what estimation costs without I/O: the engines and a plain filterpy EKF per tag, in one run.
 
-A tag sends 100 Hz of raw 9-axis IMU and 10 Hz of ranges in 5 messages a second, and starts at a known place. The plain
-filter is the least that one could do: one prediction, one heading and one range per range, and no attitude at all.
+A tag sends 100 Hz of raw 9-axis IMU samples and 10 Hz of ranges in 5 messages per second, and its start is known. The
+plain filter does the minimum: for each range one prediction, one heading and one range update, and no attitude.
 """
 
 import math
@@ -53,13 +53,13 @@ def ranges_of(run: Simulation, row: int) -> Array:
 
 
 def messages(columns: list[Array], k: int) -> Array:
-    """Message k of every tag, one tag after the other."""
+    """Return the samples of message k of every tag, one tag after the other."""
     start, end = round(k * MESSAGE_S * 1e9), round((k + 1) * MESSAGE_S * 1e9)
     return np.concatenate([c[(c["t_ns"] >= start) & (c["t_ns"] < end)] for c in columns])
 
 
 def batches(runs: list[Simulation], copies: int) -> Iterator[SampleBatch]:
-    """One message of every tag after the other; tag k makes run k % len(runs)."""
+    """Yield batches with one message of every tag. Tag k moves as in run k % len(runs)."""
     tags = [(run, copy * len(runs) + k) for copy in range(copies) for k, run in enumerate(runs)]
     imu, ranges = [imu_of(*tag) for tag in tags], [ranges_of(*tag) for tag in tags]
     for k in range(round(END_S / MESSAGE_S)):
@@ -76,7 +76,7 @@ def settings_of(run: Simulation) -> Array:
 
 
 def cost_of(engine: Engine, runs: list[Simulation], copies: int) -> tuple[float, float]:
-    """Microseconds of processor time per tag and second once settled, and the share of poses that are tracking."""
+    """Return the CPU time per tag and second in µs once settled, and the share of poses that are tracking."""
     engine.set_anchors(np.zeros(1, ANCHOR))
     for row in range(copies * len(runs)):
         engine.configure(row, settings_of(runs[row % len(runs)]))
@@ -93,7 +93,7 @@ def cost_of(engine: Engine, runs: list[Simulation], copies: int) -> tuple[float,
 
 
 def cost_of_plain_filters(runs: list[Simulation]) -> float:
-    """The same for one filterpy EKF per tag with the heading of the simulated scalar sensor."""
+    """Return the CPU time per tag and second in µs of a filterpy EKF per tag, which gets a simulated heading."""
     costs = []
     for run in runs:
         start = np.array([run.truth.x[0], run.truth.y[0], run.truth.course[0], 0.0, 0.0])
@@ -116,7 +116,7 @@ def bytes_per_tag(engine: FleetEngine, tags: int) -> float:
 
 
 def idle_figures() -> tuple[float, float]:
-    """Microseconds to configure a tag, and bytes of one that has sent nothing."""
+    """Return the CPU time to configure a tag in µs, and the bytes of a tag that has sent nothing."""
     fleet, settings = FleetEngine(), default_settings()
     began = time.process_time()
     for row in range(IDLE):

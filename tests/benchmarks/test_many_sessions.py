@@ -1,4 +1,4 @@
-"""A thousand tags with a session each, and the router that they have lost."""
+"""Measure how long a thousand tags with a session each take to reconnect to a restarted router."""
 
 import time
 
@@ -27,17 +27,17 @@ def test_all_sessions_are_back_after_the_router_restarts() -> None:
             service.process.wait()
             with running_service("--engine", "fleet", endpoint=endpoint) as again:
                 back_s = _back_after(again)
-            tags.tell("end")
+            tags.send_line("end")
     report.record(
         "sessions",
         f"{SESSIONS} sessions to the service's own router: {resident / 1e3:.0f} kB each in the service. After "
         f"`kill -9` and a new start all tokens are back {back_s[0]:.1f} s after the service is ready, and all tags "
-        f"have been heard after {back_s[1]:.1f} s.",
+        f"have sent a message after {back_s[1]:.1f} s.",
     )
 
 
 def _back_after(service: Running) -> tuple[float, float]:
-    """Seconds since the service is ready until all tokens are there, and until every tag has been heard."""
+    """Return the seconds from a ready service until all tokens exist, and until every tag has sent a message."""
     began_s = time.monotonic()
     wait_until(lambda: service.metric(ONLINE) == SESSIONS, 60.0)
     online_s = time.monotonic() - began_s

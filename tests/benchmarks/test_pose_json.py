@@ -1,4 +1,4 @@
-"""What JSON of many poses costs: our forms with holes against libraries that write an object per pose."""
+"""Measure the JSON of many poses: our templates against libraries that write an object per pose."""
 
 import json
 import time
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.benchmark
 
 T_NS = 1_800_000_000_000_000_000
 MANY, ROUNDS = 10_000, 15
-AMBIGUOUS, MODES = 0.05, 4  # share of the tags, and places of each
+AMBIGUOUS, MODES = 0.05, 4  # share of ambiguous tags, and hypotheses of each
 
 
 class Ellipse(msgspec.Struct):
@@ -76,20 +76,20 @@ def test_a_pose_list_from_rows_to_bytes() -> None:
     for count in (1, MANY):
         answers = answers_of(count)
         ways: dict[str, Callable[[], bytes]] = {
-            "ours": partial(of_forms, answers),
-            "msgspec": partial(of_msgspec, answers),
-            "orjson": partial(of_orjson, answers),
+            "ours": partial(encode_with_templates, answers),
+            "msgspec": partial(encode_with_msgspec, answers),
+            "orjson": partial(encode_with_orjson, answers),
         }
         ours, *others = (json.loads(way()) for way in ways.values())
         assert all(is_same(ours, other) for other in others)
         cost = costs_ms(ways)
-        said = ", ".join(f"{name} {ms:.3f} ms ({ms / cost['ours']:.2f} times ours)" for name, ms in cost.items())
-        lines.append(f"Processor time from the rows of {count:,} poses to JSON: {said}.")
+        costs = ", ".join(f"{name} {ms:.3f} ms ({ms / cost['ours']:.2f} times ours)" for name, ms in cost.items())
+        lines.append(f"Processor time from the rows of {count:,} poses to JSON: {costs}.")
     report.record("pose-json", "\n".join(lines))
 
 
 def answers_of(count: int) -> Answers:
-    """Tags in all states, a few of them in several places."""
+    """Return answers for tags in all states, some of them ambiguous."""
     answers = Answers(SiteStore(Site(anchors=[Anchor(id="17")]), {}), TagTable(), LatestPoses(), now_ns=lambda: T_NS)
     rng = np.random.default_rng(1)
     poses = np.zeros(count, POSE)
@@ -109,22 +109,22 @@ def answers_of(count: int) -> Answers:
     return answers
 
 
-def of_forms(answers: Answers) -> bytes:
+def encode_with_templates(answers: Answers) -> bytes:
     return b"".join(answers.pose_list_json())
 
 
-def of_orjson(answers: Answers) -> bytes:
+def encode_with_orjson(answers: Answers) -> bytes:
     return to_json(answers.pose_list())
 
 
-def of_msgspec(answers: Answers) -> bytes:
+def encode_with_msgspec(answers: Answers) -> bytes:
     columns = columns_of(answers.rows(), answers.site, answers.tags, T_NS)
     every = PoseList(T_NS, [Pose(*values) for values in zip(*fields(columns, answers), strict=True)])
     return msgspec.json.encode(every)
 
 
 def fields(columns: PoseColumns, answers: Answers) -> Iterator[Any]:
-    """A sequence for each field of `Pose`."""
+    """Yield the values of each field of `Pose`."""
     poses, nowhere = columns.poses, [None] * len(columns.poses)
     yield from (columns.tags, poses["t_ns"].tolist(), columns.age_s.tolist())
     yield from (columns.states, columns.reasons, columns.hints)
@@ -142,7 +142,7 @@ def ellipses(axes: Array) -> list[Ellipse]:
 
 
 def hypotheses(poses: Array, answers: Answers) -> list[list[Hypothesis]]:
-    """Of each pose; all of them are read at once."""
+    """Return the hypotheses of each pose, which are read together."""
     ambiguous = poses["state"] == State.AMBIGUOUS
     modes, counts = answers.latest.hypotheses_of(poses["row"][ambiguous])
     numbers = (modes[name].tolist() for name in ("weight", "x", "y", "heading", "speed"))
@@ -152,7 +152,7 @@ def hypotheses(poses: Array, answers: Answers) -> list[list[Hypothesis]]:
 
 
 def costs_ms(ways: dict[str, Callable[[], bytes]]) -> dict[str, float]:
-    """The fastest round of each way, the ways in turns."""
+    """Return the CPU time of the fastest round of each way in ms. The ways take turns."""
     best = dict.fromkeys(ways, float("inf"))
     for _ in range(ROUNDS):
         for name, way in ways.items():
@@ -163,7 +163,7 @@ def costs_ms(ways: dict[str, Callable[[], bytes]]) -> dict[str, float]:
 
 
 def is_same(one: Any, other: Any) -> bool:
-    """Whether two documents differ by nothing but the digits that ours leaves out."""
+    """Return whether two documents are equal apart from the digits that our templates leave out."""
     match one:
         case dict():
             return one.keys() == other.keys() and all(is_same(one[name], other[name]) for name in one)

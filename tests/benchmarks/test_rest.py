@@ -1,4 +1,4 @@
-"""What an answer over HTTP costs the service."""
+"""Measure what an HTTP response costs the service."""
 
 import time
 from statistics import median
@@ -18,7 +18,7 @@ TAGS = 10_000
 ONE, BARE, ALL = "/api/v1/tags/sim-5/pose", "/api/v1/health/live", "/api/v1/poses"
 
 
-def test_one_pose_costs_little_more_than_a_bare_answer_and_all_of_them_a_few_ms(
+def test_the_cost_of_one_pose_and_of_all_poses_beside_an_empty_response(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:
     endpoint = free_endpoint()
@@ -42,8 +42,10 @@ def test_one_pose_costs_little_more_than_a_bare_answer_and_all_of_them_a_few_ms(
 
 
 def costs_ms(service: Running, requests: dict[str, int]) -> dict[str, float]:
-    """Median of ten rounds, in each of which every path is asked for in turn: whatever else the machine does meets all
-    of them alike."""
+    """Return the median cost of a request to each path over ten rounds.
+
+    Each round requests every path, so that other load on the machine affects all of them alike.
+    """
     costs: dict[str, list[float]] = {path: [] for path in requests}
     with httpx.Client(base_url=service.url, timeout=30.0) as client:
         for _ in range(10):

@@ -1,4 +1,4 @@
-"""What a tag client costs: time to import, memory, bytes on the wire, publishing rate. Printed and recorded."""
+"""Measure what a tag client costs: import time, memory, bytes on the wire, and publishing rate."""
 
 import json
 import statistics
@@ -29,7 +29,7 @@ def publish(tag, samples):
 
 with TagClient("a", connect=sys.argv[1], encoding=sys.argv[2], batch_samples=20) as tag:
     open_mb = resident_mb()
-    for message in range(700):  # the cache of 600 messages fills
+    for message in range(700):  # fills the cache of 600 messages
         publish(tag, 20)
         time.sleep(0.003)
     publishing_mb = resident_mb()

@@ -1,4 +1,4 @@
-"""The operator's page, step by step: what it and the compose file say makes a secured site with two tags."""
+"""The steps of the operator's page and the commands of the compose file make a secured site with two tags."""
 
 import shlex
 from collections.abc import Iterator
@@ -18,16 +18,17 @@ TAGS = ("forklift-1", "forklift-2")
 
 
 def steps() -> list[list[str]]:
-    """What the page tells to run in the container `admin`, in order."""
+    """Return the commands that the page runs in the container `admin`, in order."""
     lines = (DEPLOY / "README.md").read_text().splitlines()
     prefix = "docker compose run --rm "
     words = [
         shlex.split(line.partition(prefix)[2].partition(">")[0].partition("|")[0]) for line in lines if prefix in line
     ]
-    return [of_one[of_one.index("admin") + 1 :] for of_one in words]
+    return [line[line.index("admin") + 1 :] for line in words]
 
 
 def compose_command(service: str, replaced: dict[str, str]) -> list[str]:
+    """Return the command of a service in the compose file, with its paths and addresses replaced."""
     words: list[str] = yaml.safe_load((DEPLOY / "compose.yaml").read_text())["services"][service]["command"]
     for old, new in replaced.items():
         words = [word.replace(old, new) for word in words]
@@ -36,7 +37,10 @@ def compose_command(service: str, replaced: dict[str, str]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, Path, dict[str, str]]]:
-    """A router and a service as the compose file starts them, on the loopback; the folder, and the keys by name."""
+    """Start a router and a service as the compose file does, on loopback.
+
+    Yield the service, the folder of the credentials, and the API keys by name.
+    """
     folder = tmp_path_factory.mktemp("site")
     keys = {}
     for words in steps():
@@ -52,10 +56,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, Pa
         "0.0.0.0": "127.0.0.1",
         "/var/lib/dropanchor": str(folder / "data"),
     }
-    _, *of_router = compose_command("router", replaced)
+    _, *router_options = compose_command("router", replaced)
     subcommand, *options = compose_command("service", replaced)
     with (
-        running_router(*of_router, "--zenoh-listen", f"tls/127.0.0.1:{port}"),
+        running_router(*router_options, "--zenoh-listen", f"tls/127.0.0.1:{port}"),
         running_service(*options, subcommand=subcommand, ca=folder / "security" / "ca.pem") as service,
     ):
         service.zenoh = f"tls/localhost:{port}"
@@ -63,13 +67,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, Pa
 
 
 def test_the_page_makes_two_tags_and_keys_for_the_map_and_prometheus() -> None:
-    said = steps()
-    assert said[0][:2] == ["security", "init"]
-    assert [words[2:] for words in said if words[:2] == ["tag", "add"]] == [list(TAGS)]
-    assert [words[2] for words in said if words[:2] == ["key", "add"]] == ["dashboard", "prometheus"]
+    commands = steps()
+    assert commands[0][:2] == ["security", "init"]
+    assert [words[2:] for words in commands if words[:2] == ["tag", "add"]] == [list(TAGS)]
+    assert [words[2] for words in commands if words[:2] == ["key", "add"]] == ["dashboard", "prometheus"]
 
 
-def test_two_tags_publish_and_whoever_has_the_key_sees_them(site: tuple[Running, Path, dict[str, str]]) -> None:
+def test_two_tags_publish_and_only_a_client_with_the_key_sees_them(site: tuple[Running, Path, dict[str, str]]) -> None:
     service, security, keys = site
     for index, tag in enumerate(TAGS):
         published = python(
@@ -78,11 +82,11 @@ def test_two_tags_publish_and_whoever_has_the_key_sees_them(site: tuple[Running,
             text_input="".join(f'{{"anchor": 1, "range_m": {12.0 + index}}}\n' for _ in range(20)),
         )
         assert published.returncode == 0, published.stderr
-    wait_until(lambda: tags_heard(service, keys["dashboard"]) == set(TAGS))
+    wait_until(lambda: tags_with_ranges(service, keys["dashboard"]) == set(TAGS))
     assert ask(service, "/api/v1/poses").status_code == 401
 
 
-def test_prometheus_may_read_metrics_with_its_key_and_nobody_without(
+def test_prometheus_reads_the_metrics_with_its_key_and_no_client_reads_them_without(
     site: tuple[Running, Path, dict[str, str]],
 ) -> None:
     service, _, keys = site
@@ -93,7 +97,7 @@ def test_prometheus_may_read_metrics_with_its_key_and_nobody_without(
     assert ask(service, path).status_code == 401
 
 
-def tags_heard(service: Running, key: str) -> set[str]:
+def tags_with_ranges(service: Running, key: str) -> set[str]:
     listed: Any = ask(service, "/api/v1/tags", key).json()
     return {tag["tag"] for tag in listed["tags"] if tag["samples"].get("range")}
 

@@ -1,4 +1,4 @@
-"""The board and the alert rules ask for what the service really exposes."""
+"""The Grafana board and the alert rules query only metrics and labels that the service exposes."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def expressions() -> list[str]:
 
 @pytest.fixture(scope="module")
 def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set[str]]]:
-    """Of a running service: metric → label → the values seen."""
+    """Return what a running service exposes: metric → label → values."""
     folder = tmp_path_factory.mktemp("data")
     with running_service("--engine", "paper", "--data-dir", str(folder)) as service:
         text = httpx.get(f"{service.url}/metrics").text
@@ -44,13 +44,15 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
             labels = found.setdefault(sample.name, {})
             for label, value in sample.labels.items():
                 labels.setdefault(label, set()).add(value)
-        # A counter whose labels come with the first count shows none before.
+        # A counter with labels has no sample before its first count.
         found.setdefault(f"{family.name}_total" if family.type == "counter" else family.name, {})
     return found
 
 
 @pytest.mark.parametrize("expression", expressions())
-def test_what_is_asked_for_exists(expression: str, exposed: dict[str, dict[str, set[str]]]) -> None:
+def test_every_metric_and_label_in_an_expression_exists(
+    expression: str, exposed: dict[str, dict[str, set[str]]]
+) -> None:
     for selector in selectors(promql.parse(expression)):
         if selector.name in MADE_BY_PROMETHEUS:
             continue
@@ -64,11 +66,11 @@ def test_what_is_asked_for_exists(expression: str, exposed: dict[str, dict[str, 
         assert label in known_labels(expression, exposed)
 
 
-def test_the_check_notices_a_metric_that_does_not_exist(exposed: dict[str, dict[str, set[str]]]) -> None:
+def test_the_check_fails_for_a_metric_that_does_not_exist(exposed: dict[str, dict[str, set[str]]]) -> None:
     with pytest.raises(AssertionError):
-        test_what_is_asked_for_exists("rate(dropanchor_wishes_total[1m])", exposed)
+        test_every_metric_and_label_in_an_expression_exists("rate(dropanchor_wishes_total[1m])", exposed)
     with pytest.raises(AssertionError):
-        test_what_is_asked_for_exists('dropanchor_tags{state="asleep"}', exposed)
+        test_every_metric_and_label_in_an_expression_exists('dropanchor_tags{state="asleep"}', exposed)
 
 
 def test_every_alert_says_what_happened_and_what_to_do() -> None:
@@ -80,7 +82,7 @@ def test_every_alert_says_what_happened_and_what_to_do() -> None:
         assert rule["annotations"]["action"]
 
 
-def test_no_two_panels_lie_on_each_other_and_all_have_a_title() -> None:
+def test_no_two_panels_overlap_and_all_have_a_title() -> None:
     taken: set[tuple[int, int]] = set()
     for panel in board()["panels"]:
         assert panel["title"]
@@ -92,7 +94,7 @@ def test_no_two_panels_lie_on_each_other_and_all_have_a_title() -> None:
     assert len({panel["id"] for panel in board()["panels"]}) == len(board()["panels"])
 
 
-def test_grafana_finds_board_and_source_where_compose_puts_them() -> None:
+def test_grafana_finds_the_board_and_the_data_source_where_compose_mounts_them() -> None:
     compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
     mounts = dict(volume.split(":")[:2][::-1] for volume in compose["services"]["grafana"]["volumes"])
     provider = yaml.safe_load((DEPLOY / "grafana/provisioning/dashboards/dropanchor.yaml").read_text())["providers"][0]
@@ -102,14 +104,14 @@ def test_grafana_finds_board_and_source_where_compose_puts_them() -> None:
 
 
 def known_labels(expression: str, exposed: dict[str, dict[str, set[str]]]) -> set[str]:
-    """Those of the metrics in the expression; of a counter without counts as the source declares them."""
+    """Return the labels of the metrics in an expression, also of counters that have not counted yet."""
     declared = {"dropanchor_faults_total": {"where"}}
     names = [selector.name for selector in selectors(promql.parse(expression))]
     return {label for name in names for label in (*exposed.get(name, ()), *declared.get(name, ()))}
 
 
 def selectors(node: Any) -> Iterator[Any]:
-    """Every vector selector below a node of a parsed expression."""
+    """Yield every vector selector below a node of a parsed expression."""
     match type(node).__name__:
         case "VectorSelector":
             yield node

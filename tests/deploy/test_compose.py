@@ -1,4 +1,4 @@
-"""The compose file is one, and what it mounts is there."""
+"""The compose file is valid, and the files that it mounts exist."""
 
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ def services() -> dict[str, Any]:
     return found
 
 
-def test_it_follows_the_compose_specification(tmp_path: Path) -> None:
+def test_the_file_follows_the_compose_specification(tmp_path: Path) -> None:
     checked = python("-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec", str(COMPOSE))
     assert checked.returncode == 0, checked.stdout
     wrong = tmp_path / "compose.yaml"
@@ -26,20 +26,20 @@ def test_it_follows_the_compose_specification(tmp_path: Path) -> None:
     assert python("-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec", str(wrong)).returncode == 1
 
 
-def test_every_mounted_file_is_there_or_made_by_the_operator() -> None:
+def test_every_mounted_file_exists_or_is_made_by_the_operator() -> None:
     for service in services().values():
         for source in (volume.split(":")[0] for volume in service.get("volumes", [])):
             if source.startswith("./") and not source.startswith(MADE_BY_THE_OPERATOR):
                 assert (DEPLOY / source).exists(), source
 
 
-def test_the_compiled_estimator_lies_where_the_service_can_write() -> None:
+def test_the_kernel_cache_lies_where_the_service_can_write() -> None:
     mounted = {volume.split(":")[1] for volume in services()["service"]["volumes"]}
     assert "XDG_CACHE_HOME=/var/cache " in (DEPLOY / "Dockerfile").read_text()
     assert {"/var/cache/dropanchor", "/var/lib/dropanchor"} <= mounted
 
 
-def test_our_containers_cannot_write_gain_rights_or_run_as_root() -> None:
+def test_our_containers_are_read_only_and_cannot_gain_privileges() -> None:
     for name in ("router", "service"):
         service = services()[name]
         assert service["read_only"]

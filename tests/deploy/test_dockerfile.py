@@ -1,4 +1,4 @@
-"""The steps of the image, run as a script in an empty folder: what they need is there, and the result runs."""
+"""The build steps of the image run in an empty folder and give a program that starts."""
 
 import json
 import os
@@ -16,9 +16,10 @@ PLACES = ("/src", "/opt/dropanchor", "/var/cache", "/var/lib/dropanchor")
 
 
 @pytest.mark.skipif(
-    "DROPANCHOR_IMAGE" not in os.environ, reason="installs and compiles everything anew: DROPANCHOR_IMAGE=1 runs it"
+    "DROPANCHOR_IMAGE" not in os.environ,
+    reason="installs and compiles everything from scratch: set DROPANCHOR_IMAGE=1 to run it",
 )
-def test_the_steps_of_the_build_give_a_program_that_runs(tmp_path: Path) -> None:
+def test_the_build_steps_give_a_program_that_runs(tmp_path: Path) -> None:
     build, final = stages()
     folder = tmp_path / "src"
     for instruction, words in build:
@@ -38,14 +39,14 @@ def test_the_steps_of_the_build_give_a_program_that_runs(tmp_path: Path) -> None
 
 def test_the_image_does_not_run_as_root_and_starts_the_service_by_default() -> None:
     _, final = stages()
-    of = dict(final)
-    assert of["USER"] == "dropanchor"
-    assert [json.loads(of["ENTRYPOINT"]), json.loads(of["CMD"])] == [["dropanchor"], ["serve"]]
-    assert of["STOPSIGNAL"] == "SIGTERM"
+    instruction = dict(final)
+    assert instruction["USER"] == "dropanchor"
+    assert [json.loads(instruction["ENTRYPOINT"]), json.loads(instruction["CMD"])] == [["dropanchor"], ["serve"]]
+    assert instruction["STOPSIGNAL"] == "SIGTERM"
 
 
 def stages() -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    """The instructions of the two stages, with what they say."""
+    """Return the instructions of the two stages, each with its arguments."""
     found: list[list[tuple[str, str]]] = []
     for instruction, words in instructions():
         if instruction == "FROM":
@@ -63,13 +64,14 @@ def instructions() -> Iterator[tuple[str, str]]:
 
 
 def inside(text: str, folder: Path) -> str:
+    """Move the absolute paths in a text below the folder."""
     for place in PLACES:
         text = text.replace(place, f"{folder}{place}")
     return text
 
 
 def copy(source: Path, target: Path) -> None:
-    """Of what git knows: a build context has no caches of ours, nor has an empty machine."""
+    """Copy the files that git tracks, since a build context has no caches either."""
     listed = subprocess.run(["git", "ls-files", "-z", source], cwd=ROOT, capture_output=True, text=True, check=True)
     for name in listed.stdout.split("\0")[:-1]:
         place = target / (ROOT / name).relative_to(source) if source.is_dir() else target / Path(name).name
@@ -78,7 +80,7 @@ def copy(source: Path, target: Path) -> None:
 
 
 def run(words: str, folder: Path, home: Path) -> str:
-    """As in an empty environment, but for where packages come from."""
+    """Run a shell command with an empty environment but for pip and network settings. Return its output."""
     kept = {name: value for name, value in os.environ.items() if name.startswith(("PIP_", "SSL_", "HTTP"))}
     clean = {"PATH": os.environ["PATH"], "HOME": str(home), **kept}
     done = subprocess.run(["sh", "-ec", words], cwd=folder, env=clean, capture_output=True, text=True, check=False)

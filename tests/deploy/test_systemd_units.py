@@ -1,4 +1,4 @@
-"""The units are what systemd understands, and start what there is."""
+"""The units are valid and start programs with options that exist."""
 
 import os
 import shlex
@@ -24,7 +24,7 @@ def unit(path: Path) -> ConfigParser:
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not installed")
-def test_systemd_has_nothing_to_object(tmp_path: Path) -> None:
+def test_systemd_accepts_the_units(tmp_path: Path) -> None:
     program = tmp_path / "dropanchor"
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)
@@ -43,14 +43,14 @@ def test_systemd_has_nothing_to_object(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", UNITS, ids=lambda path: path.name)
-def test_the_program_has_every_option_that_a_unit_gives_it(path: Path) -> None:
+def test_the_program_has_every_option_that_a_unit_passes(path: Path) -> None:
     program, command, *options = shlex.split(unit(path)["Service"]["ExecStart"])
     assert program == INSTALLED
     text = python("-m", "dropanchor_service", command, "--help").stdout
     assert not [option for option in options if option.startswith("--") and option not in text]
 
 
-def test_the_service_is_stopped_only_after_it_had_its_time_and_is_started_again_whatever_happens() -> None:
+def test_the_service_gets_time_to_stop_and_is_always_restarted() -> None:
     service = unit(ROOT / "deploy" / "systemd" / "dropanchor.service")["Service"]
     assert int(service["TimeoutStopSec"]) > 3
     assert service["Restart"] == "always"

@@ -1,4 +1,4 @@
-"""Services here are started with a limit on the time they may take, which leaves none for compiling the estimator."""
+"""The services in these tests must start within a time limit, so the kernels are compiled before."""
 
 import pytest
 

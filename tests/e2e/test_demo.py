@@ -1,4 +1,4 @@
-"""The demo: moving tags within seconds, and nothing left behind when it is stopped."""
+"""The demo shows moving tags within seconds and leaves no process behind when it stops."""
 
 import os
 import re
@@ -20,7 +20,7 @@ from support.zenoh_router import free_endpoint, wait_until
 
 @contextmanager
 def running_demo(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The demo in a process group of its own, and the address of its page."""
+    """Run the demo in a process group of its own. Yield the process and the address of the page."""
     process = subprocess.Popen(
         command("demo", "--port", "0", "--zenoh-listen", free_endpoint(), *arguments),
         stdout=subprocess.PIPE,
@@ -43,6 +43,7 @@ def running_demo(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], str]]
 
 
 def children(pid: int) -> list[int]:
+    """Return the ids of the child processes."""
     path = Path(f"/proc/{pid}/task/{pid}/children")
     return [int(child) for child in path.read_text().split()] if path.exists() else []
 
@@ -51,7 +52,7 @@ def poses(url: str) -> dict[str, dict[str, Any]]:
     return {pose["tag"]: pose for pose in httpx.get(f"{url}/api/v1/poses", timeout=60.0).json()["poses"]}
 
 
-def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_of_it_at_once() -> None:
+def test_the_demo_shows_moving_tags_and_ctrl_c_ends_all_its_processes() -> None:
     with running_demo("--tags", "3") as (process, url):
         wait_until(lambda: len(poses(url)) == 3)
         before = poses(url)
@@ -81,23 +82,23 @@ def test_the_demo_ends_with_a_sentence_when_its_tags_die() -> None:
         assert "the simulated tags or the service ended by themselves" in process.stderr.read()
 
 
-def test_a_recording_is_played_as_a_live_tag_and_the_page_stays_at_its_end(tmp_path: Path) -> None:
+def test_a_recording_is_replayed_as_a_live_tag_and_the_page_remains_after_its_end(tmp_path: Path) -> None:
     write_square(tmp_path)
-    for name in ("range", "heading"):  # its first 3 s
+    for name in ("range", "heading"):  # keep the first 3 s
         path = tmp_path / f"{name}.csv"
         lines = path.read_text().splitlines()
         path.write_text("\n".join([lines[0], *(line for line in lines[1:] if float(line.split(",")[0]) < 3.0)]) + "\n")
     with running_demo("--recording", str(tmp_path), "--engine", "fleet") as (process, url):
         wait_until(lambda: tmp_path.name in poses(url) and poses(url)[tmp_path.name]["y"] > 2.0, 60.0)
         assert poses(url)[tmp_path.name]["x"] == pytest.approx(10.0, abs=0.5)
-        time.sleep(1.5)
+        wait_until(lambda: poses(url)[tmp_path.name]["age_s"] > 1.5, 60.0)
         assert process.poll() is None
         assert httpx.get(url, timeout=60.0).status_code == 200
         os.killpg(process.pid, signal.SIGINT)
         assert process.wait(60.0) == 0
 
 
-def test_a_recording_that_is_not_there_is_said() -> None:
+def test_a_missing_recording_is_reported() -> None:
     found = subprocess.run(
         command("demo", "--recording", "nowhere"), capture_output=True, text=True, env=environment(), timeout=120
     )
@@ -105,9 +106,9 @@ def test_a_recording_that_is_not_there_is_said() -> None:
     assert "nowhere is not a folder" in found.stderr
 
 
-def test_tags_of_which_no_start_is_known_are_found_and_nothing_is_claimed_before() -> None:
+def test_tags_with_an_unknown_start_are_ambiguous_at_first() -> None:
     with running_demo("--tags", "2", "--unknown-start") as (_, url):
         wait_until(lambda: any(pose["hypotheses"] for pose in poses(url).values()), 60.0)
-        shown = next(pose for pose in poses(url).values() if pose["hypotheses"])
-        assert shown["state"] == "ambiguous"
-        assert sum(mode["weight"] for mode in shown["hypotheses"]) <= 1.0 + 1e-9
+        pose = next(pose for pose in poses(url).values() if pose["hypotheses"])
+        assert pose["state"] == "ambiguous"
+        assert sum(mode["weight"] for mode in pose["hypotheses"]) <= 1.0 + 1e-9

@@ -1,4 +1,4 @@
-"""What somebody new does in the first ten minutes, word for word as the README and the page say it."""
+"""The first ten minutes of a new user, with the very commands of the README and the page."""
 
 import json
 import re
@@ -17,6 +17,7 @@ TAG_README = (ROOT / "tag_client" / "README.md").read_text()
 
 
 def snippet(text: str, endpoint: str) -> str:
+    """Return the only Python program in a Markdown text, with its client connected to the endpoint."""
     (program, *_) = re.findall(r"^```python\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     connected = re.sub(r'TagClient\(("[^"]+").*?\)', rf'TagClient(\1, connect="{endpoint}")', program, count=1)
     assert connected != program
@@ -24,7 +25,7 @@ def snippet(text: str, endpoint: str) -> str:
 
 
 def shell(line: str, **options: Any) -> None:
-    """As pasted into a terminal that knows nothing of the environment of the service."""
+    """Run a command line as in a new terminal, without the environment of the service."""
     bare = {"PATH": "/usr/bin:/bin", "PYTHONPATH": environment()["PYTHONPATH"]}
     subprocess.run(["sh", "-c", line], check=True, timeout=120, env=bare, capture_output=True, **options)
 
@@ -33,7 +34,7 @@ def tags(service: Running) -> dict[str, dict[str, Any]]:
     return {tag["tag"]: tag for tag in service.get("/api/v1/tags")["tags"]}
 
 
-def test_every_way_to_start_a_tag_speaks_of_the_same_anchor(tmp_path: Path) -> None:
+def test_every_documented_way_to_start_a_tag_uses_the_same_anchor(tmp_path: Path) -> None:
     with running_service() as service:
         for text in (README, TAG_README):
             subprocess.run(
@@ -52,7 +53,7 @@ def test_every_way_to_start_a_tag_speaks_of_the_same_anchor(tmp_path: Path) -> N
         assert [anchor["id"] for anchor in service.get("/api/v1/site")["anchors"]] == ["1"]
 
 
-def test_the_command_of_the_page_fits_a_site_with_another_name_and_another_anchor(tmp_path: Path) -> None:
+def test_the_command_on_the_page_names_the_site_and_the_anchor_of_the_service(tmp_path: Path) -> None:
     config = tmp_path / "yard.toml"
     config.write_text('[site]\nid = "west yard"\n[[site.anchors]]\nid = "gate 3"\n')
     with running_service("--config", str(config)) as service:
@@ -60,13 +61,14 @@ def test_the_command_of_the_page_fits_a_site_with_another_name_and_another_ancho
         wait_until(lambda: tags(service).get("sim-1", {}).get("samples", {}).get("range", 0) > 5)
 
 
-def test_an_anchor_that_the_site_lacks_is_told_to_everybody_who_looks_and_once_in_the_log() -> None:
+def test_an_anchor_that_the_site_lacks_is_reported_in_every_answer_and_once_in_the_log() -> None:
     with running_service() as service, TagClient("cart", connect=service.zenoh) as cart:
         cart.publish_range(1, 5.0)
         cart.flush()
         wait_until(lambda: service.get("/api/v1/site")["anchors"])
 
-        def hears(tag: TagClient) -> str:
+        def hint_after_a_range(tag: TagClient) -> str:
+            """Publish a range to the missing anchor. Return the hint of the tag."""
             if tag is cart:
                 tag.publish_heading(1.0)
             tag.publish_range(7, 4.0)
@@ -74,23 +76,28 @@ def test_an_anchor_that_the_site_lacks_is_told_to_everybody_who_looks_and_once_i
             return str(tags(service).get(tag.tag, {}).get("hint", ""))
 
         with TagClient("stray", connect=service.zenoh) as stray:
-            wait_until(lambda: "hears anchor 7, which this site does not have" in hears(stray).lower())
+            wait_until(lambda: "hears anchor 7, which this site does not have" in hint_after_a_range(stray).lower())
             answer = service.ask("GET", "/api/v1/tags/stray/pose")
             assert answer.status_code == 404
             assert "Hears anchor 7" in answer.json()["detail"]
-        wait_until(lambda: "Hears anchor 7" in hears(cart))
-        wait_until(lambda: "Hears anchor 7" in hears(cart) and "Hears" in service.get("/api/v1/tags/cart/pose")["hint"])
+        wait_until(lambda: "Hears anchor 7" in hint_after_a_range(cart))
+        wait_until(
+            lambda: (
+                "Hears anchor 7" in hint_after_a_range(cart)
+                and "Hears" in service.get("/api/v1/tags/cart/pose")["hint"]
+            )
+        )
         pose = service.get("/api/v1/tags/cart/pose")
         (listed,) = service.get("/api/v1/poses?tags=cart")["poses"]
         assert listed["hint"] == pose["hint"]
         service.put("/api/v1/anchors/7", {"id": "7", "x": 3.0})
-        wait_until(lambda: hears(cart) == "")
+        wait_until(lambda: hint_after_a_range(cart) == "")
         lines = [line for line in service.log if "hears anchor 7, which this site does not have" in line]
         assert len(lines) == 1
         assert "PUT /api/v1/anchors/7" in lines[0]
 
 
-def test_a_recording_replayed_ten_times_as_fast_is_tracked_and_old_once_it_has_ended(tmp_path: Path) -> None:
+def test_a_recording_replayed_at_ten_times_the_speed_is_tracked_and_ages_after_its_end(tmp_path: Path) -> None:
     recording = write_square(tmp_path)
     config = tmp_path / "service.toml"
     start = "{ x = 10, y = 0, heading_rad = 1.5708 }"
@@ -111,19 +118,19 @@ def test_a_recording_replayed_ten_times_as_fast_is_tracked_and_old_once_it_has_e
         assert "lost" not in {pose["state"] for pose in placed}
         assert sum(pose["state"] == "tracking" for pose in placed) > 0.8 * len(placed) > 9
         assert max(abs(pose["age_s"]) for pose in placed) < 5.0
-        assert placed[-1]["t_ns"] - placed[0]["t_ns"] > 40e9  # its own time goes on undivided
+        assert placed[-1]["t_ns"] - placed[0]["t_ns"] > 40e9  # the times of the poses are those of the recording
         wait_until(lambda: service.get("/api/v1/tags/cart/pose")["state"] in ("coasting", "lost"))
 
 
-def test_the_page_of_a_secured_site_names_the_credentials(tmp_path: Path) -> None:
+def test_the_page_of_a_secured_site_says_that_tags_need_credentials(tmp_path: Path) -> None:
     folder = tmp_path / "credentials of the yard"
-    made = [sys.executable, "-m", "dropanchor_service"]
+    command = [sys.executable, "-m", "dropanchor_service"]
     subprocess.run(
-        [*made, "security", "init", "--security", str(folder), "--host", "localhost"], check=True, env=environment()
+        [*command, "security", "init", "--security", str(folder), "--host", "localhost"], check=True, env=environment()
     )
-    subprocess.run([*made, "tag", "add", "sim-1", "--security", str(folder)], check=True, env=environment())
+    subprocess.run([*command, "tag", "add", "sim-1", "--security", str(folder)], check=True, env=environment())
     key = subprocess.run(
-        [*made, "key", "add", "page", "--scope", "read", "--security", str(folder)],
+        [*command, "key", "add", "page", "--scope", "read", "--security", str(folder)],
         check=True,
         env=environment(),
         capture_output=True,

@@ -1,4 +1,4 @@
-"""A router that is killed and comes back costs no sample of a tag whose cache covers the gap."""
+"""A router that is killed and restarted costs no sample of a tag whose cache covers the outage."""
 
 import time
 
@@ -7,7 +7,7 @@ from support.service import running_service
 from support.zenoh_router import free_endpoint, start_router_process, wait_until
 
 
-def test_nothing_is_lost_or_doubled_while_the_router_is_away() -> None:
+def test_no_sample_is_lost_or_duplicated_while_the_router_is_down() -> None:
     endpoint = free_endpoint()
     router = start_router_process(endpoint)
     try:

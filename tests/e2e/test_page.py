@@ -1,4 +1,4 @@
-"""The whole path: tags publish over Zenoh, the service tracks them, and a real browser shows them move."""
+"""The whole path: tags publish over Zenoh, the service tracks them, and a real browser shows their motion."""
 
 import math
 import time
@@ -11,13 +11,13 @@ import pytest
 from playwright.sync_api import Browser
 
 from dropanchor_tag_client import TagClient
-from support.browser import Watched, running_chromium, watched_page
+from support.browser import WatchedPage, running_chromium, watched_page
 from support.service import running_service
 from support.zenoh_router import free_endpoint, free_port
 
 pytestmark = pytest.mark.browser
 
-# Both tags drive round the same circle, which the anchor at the origin lies outside of; one says where it starts.
+# Both tags drive round the same circle; the anchor at the origin lies outside. The start of one tag is known.
 CENTRE_M, RADIUS_M, SPEED_MPS = (5.0, 1.0), 2.5, 1.0
 CONFIG = """
 [[site.anchors]]
@@ -36,7 +36,7 @@ def chromium() -> Iterator[Browser]:
 
 @contextmanager
 def driving_tag(name: str, endpoint: str) -> Iterator[None]:
-    """A tag with a platform heading and ten ranges a second, until the end."""
+    """Run a tag with a platform heading and ten ranges a second until the block ends."""
     stop = Event()
     with TagClient(name, connect=endpoint, connect_timeout_s=20) as client:
         thread = Thread(target=_drive, args=(client, stop))
@@ -57,14 +57,14 @@ def _drive(client: TagClient, stop: Event) -> None:
         client.publish_range("7", math.hypot(x, y), std_m=0.1)
 
 
-def wait_until_moved(page: Watched, tag: str, pixels: float) -> None:
-    """Until the dot of a tag has come so far on the screen."""
+def wait_until_moved(page: WatchedPage, tag: str, pixels: float) -> None:
+    """Wait until the dot of a tag has moved by `pixels` on the screen."""
     x, y = page.tags()[tag]["pixel"]
     place = f"dropanchor.tags().find((tag) => tag.tag === '{tag}').pixel"
     page.wait_for(f"Math.hypot({place}[0] - {x}, {place}[1] - {y}) > {pixels}")
 
 
-def test_dots_move_in_light_and_dark_and_nothing_is_asked_from_elsewhere(chromium: Browser, tmp_path: Path) -> None:
+def test_dots_move_in_light_and_dark_and_all_requests_go_to_the_service(chromium: Browser, tmp_path: Path) -> None:
     config, endpoint = tmp_path / "yard.toml", free_endpoint()
     config.write_text(CONFIG)
     with ExitStack() as stack:
@@ -85,11 +85,11 @@ def test_dots_move_in_light_and_dark_and_nothing_is_asked_from_elsewhere(chromiu
         assert dark.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(13, 18, 23)"
         dark.page.screenshot(path=tmp_path / "dark.png")
         for watched in (page, dark):
-            assert watched.complaints == []
+            assert watched.errors == []
             assert watched.origins == {url.rstrip("/")}
 
 
-def test_the_page_says_that_all_is_out_of_date_until_the_service_comes_back(chromium: Browser, tmp_path: Path) -> None:
+def test_the_page_marks_every_pose_as_out_of_date_until_the_service_is_back(chromium: Browser, tmp_path: Path) -> None:
     config, endpoint, port = tmp_path / "yard.toml", free_endpoint(), free_port()
     config.write_text(CONFIG)
     with ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""A service that records; its files replayed give what it gave."""
+"""A replay of the files that a service records gives the poses that the service gave."""
 
 import csv
 import time
@@ -19,15 +19,15 @@ S = 1_000_000_000
 
 
 @pytest.mark.parametrize("engine", ["paper", "fleet"])
-def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
+def test_a_replayed_recording_gives_the_live_poses_even_after_a_kill(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], engine: str
 ) -> None:
     config = settings_file(
         tmp_path, ["a", "b"], f'engine = "{engine}"\n[recording]\nenabled = true\npose_period_s = 0.01'
     )
     options = ["--config", str(config), "--data-dir", str(tmp_path)]
-    create_engine(load_settings(config, environment={}))  # what has to be compiled is, before the service must answer
-    end_ns = time.time_ns() - 20 * S  # a clock ahead of ours would be mapped
+    create_engine(load_settings(config, environment={}))  # compiles the kernels before the service starts
+    end_ns = time.time_ns() - 20 * S  # times of a clock that is ahead would be mapped
     with running_service(*options) as service, connected_session(service.zenoh) as session:
         for step in range(10):
             frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
@@ -37,13 +37,13 @@ def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
         live = service.get("/api/v1/poses")["poses"]
         httpx.put(f"{service.url}/api/v1/tags/a/settings", json={}).raise_for_status()
         wait_until(lambda: service.metric("dropanchor_recording_messages_total") >= 400)
-        time.sleep(1.5)  # the chunk is on its way to the disk
+        time.sleep(1.5)  # until the last chunk is on the disk
         service.process.kill()
         service.process.wait(60.0)
     assert main(["replay", str(tmp_path / "recordings"), "--out", str(tmp_path / "poses.csv")]) == 0
-    said = capsys.readouterr()
-    assert "is truncated" in said.err
-    words = said.out.split("recorded poses: ")[1].split()
+    output = capsys.readouterr()
+    assert "is truncated" in output.err
+    words = output.out.split("recorded poses: ")[1].split()
     assert words[0] == words[2]
     assert int(words[0]) >= 380
     with (tmp_path / "poses.csv").open(newline="") as file:
@@ -55,7 +55,7 @@ def test_a_recording_replayed_gives_the_poses_that_were_live_even_after_a_kill(
             assert (float(row["x"]), float(row["y"])) == pytest.approx((pose["x"], pose["y"]), abs=1e-6)
 
 
-def test_a_recording_begun_while_tags_were_running_is_compared_where_both_have_a_position(
+def test_a_recording_that_starts_midway_is_compared_where_both_runs_have_a_position(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     config = settings_file(tmp_path, [], "[recording]\npose_period_s = 0.01")
@@ -77,12 +77,12 @@ def test_a_recording_begun_while_tags_were_running_is_compared_where_both_have_a
             send(step)
         assert service.stop() == 0
     assert main(["replay", str(tmp_path / "recordings")]) == 0
-    said = capsys.readouterr().out
-    assert "inf" not in said.replace("information", "")
-    assert "not compared, for their position is known either in the recording or in this replay only" in said
+    output = capsys.readouterr().out
+    assert "inf" not in output.replace("information", "")
+    assert "not compared, for their position is known either in the recording or in this replay only" in output
 
 
-def test_what_an_mcap_recording_knows_by_itself_cannot_be_given(
+def test_options_that_an_mcap_recording_contains_itself_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "x.mcap").write_bytes(b"no recording")

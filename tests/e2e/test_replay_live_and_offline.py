@@ -23,25 +23,30 @@ from support.zenoh_router import connected_session, wait_until
 T0_NS = 1_760_000_000_000_000_000
 
 
-def configured(folder: Path, engine: str, recording: Path, start: StartPose) -> Path:
+def write_settings(folder: Path, engine: str, recording: Path, start: StartPose) -> Path:
+    """Write the settings of a service with the anchors of the recording and the start of its tag."""
     anchors = [{"id": a.id, "x": a.x, "y": a.y, "z": a.z} for a in read_recording(recording).anchors]
     lines = [f"[[site.anchors]]\nid = {json.dumps(a['id'])}\nx = {a['x']}\ny = {a['y']}\nz = {a['z']}" for a in anchors]
-    given = f"{{ x = {start.x}, y = {start.y}, heading_rad = {start.heading_rad} }}"
+    pose = f"{{ x = {start.x}, y = {start.y}, heading_rad = {start.heading_rad} }}"
     file = folder / "service.toml"
-    file.write_text(f'engine = "{engine}"\n' + "\n".join(lines) + f"\n[tags.cart]\nstart = {given}\n")
+    file.write_text(f'engine = "{engine}"\n' + "\n".join(lines) + f"\n[tags.cart]\nstart = {pose}\n")
     return file
 
 
 def offline(recording: Path, anchor: str, start: StartPose, config: Path) -> Track:
-    read = read_recording(recording)
+    """Return the track of an offline replay."""
+    contents = read_recording(recording)
     settings = tag_columns(TagSettings(start=start), 0.0)
     engine = create_engine(load_settings(config, environment={}))
-    samples = as_on_the_wire(samples_of(read, [anchor]))
-    return track_of([poses for _, poses in replay(engine, anchors_of(read), settings, samples)])
+    samples = as_on_the_wire(samples_of(contents, [anchor]))
+    return track_of([poses for _, poses in replay(engine, anchors_of(contents), settings, samples)])
 
 
 def as_on_the_wire(samples: Samples) -> Samples:
-    """Single precision, and microseconds: a mixture that drops its lightest hypotheses magnifies the last digits."""
+    """Round values to single precision and times to microseconds, as messages do.
+
+    A mixture drops its lightest hypotheses, so that a difference in the last digits would grow.
+    """
     for columns in (samples.batch.imu, samples.batch.ranges, samples.batch.headings):
         columns["t_ns"] = np.round(columns["t_ns"] / 1000) * 1000
         for name in set(columns.dtype.names or ()) - {"row", "t_ns", "anchor"}:
@@ -50,16 +55,16 @@ def as_on_the_wire(samples: Samples) -> Samples:
 
 
 def live(recording: Path, anchor: str, config: Path, last_ns: int) -> dict[int, tuple[float, float]]:
-    """x and y by time, of every pose that a subscriber saw while the recording was published at 50 times its speed."""
+    """Publish the recording at 50 times its speed. Return x and y of every pose that a subscriber received, by time."""
     seen: dict[int, tuple[float, float]] = {}
 
-    def take(message: zenoh.Sample) -> None:
+    def on_message(message: zenoh.Sample) -> None:
         pose = json.loads(message.payload.to_string())
         if pose["x"] is not None:
             seen[pose["t_ns"]] = (pose["x"], pose["y"])
 
     with running_service("--config", str(config)) as service, connected_session(service.zenoh) as session:
-        session.declare_subscriber(keys.pose_key("default", "cart"), take)
+        session.declare_subscriber(keys.pose_key("default", "cart"), on_message)
         arguments = ["replay", str(recording), "--tag", "cart", "--anchor", anchor, "--speed", "50"]
         arguments += ["--t0-ns", str(T0_NS), "--connect", service.zenoh]
         tag = [sys.executable, "-m", "dropanchor_tag_client", *arguments]
@@ -76,11 +81,11 @@ def test_live_and_offline_poses_are_the_same(tmp_path: Path, name: str, engine: 
     start = StartPose(x=10, y=0, heading_rad=1.5708)
     if name == "tiers_B":
         start = StartPose(x=1.3836, y=1.3673, heading_rad=-2.2287)
-    config = configured(tmp_path, engine, recording, start)
+    config = write_settings(tmp_path, engine, recording, start)
     track = offline(recording, anchor, start, config)
     expected = {T0_NS + int(p["t_ns"]): (float(p["x"]), float(p["y"])) for p in track.poses}
     seen = live(recording, anchor, config, T0_NS + int(track.poses["t_ns"][-1]))
     assert len(seen) > 20
     assert set(seen) <= set(expected)
-    # what is published has six decimals
+    # published poses have six decimals
     np.testing.assert_allclose([seen[t] for t in seen], [expected[t] for t in seen], rtol=0, atol=0.51e-6)

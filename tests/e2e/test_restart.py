@@ -1,4 +1,4 @@
-"""A service that was killed goes on where it was."""
+"""A killed service continues from its last checkpoint."""
 
 import hashlib
 import signal
@@ -11,6 +11,7 @@ from support.zenoh_router import wait_until
 
 
 def send(service: Running, tag: str, count: int, t_ns: int | None = None) -> None:
+    """Publish samples of a tag, and wait until the service has used them."""
     frame = straight_north(count, t_ns)
     with TagClient(tag, connect=service.zenoh) as client:
         for imu, heading, distance in zip(frame.imu, frame.headings, frame.ranges, strict=True):
@@ -22,12 +23,12 @@ def send(service: Running, tag: str, count: int, t_ns: int | None = None) -> Non
 
 
 def wait_for_checkpoint(service: Running) -> None:
-    """Until a checkpoint holds all that has come in so far."""
+    """Wait until a checkpoint holds all samples that have arrived so far."""
     now_s = time.monotonic()
     wait_until(lambda: time.monotonic() - service.metric("dropanchor_checkpoint_age_seconds") > now_s + 0.1)
 
 
-def test_a_killed_service_comes_back_with_its_poses_and_none_of_them_looks_live(tmp_path: Path) -> None:
+def test_a_killed_service_restores_its_poses_and_none_of_them_is_tracking(tmp_path: Path) -> None:
     config = settings_file(tmp_path, ["a"], 'engine = "fleet"')
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"))
     with running_service(*options) as service:
@@ -47,7 +48,7 @@ def test_a_killed_service_comes_back_with_its_poses_and_none_of_them_looks_live(
     assert status["samples"] == {"imu": 50, "heading": 50, "range": 50}
 
 
-def test_a_checkpoint_of_another_layout_is_refused_by_name_and_all_start_afresh(tmp_path: Path) -> None:
+def test_a_checkpoint_of_another_layout_is_refused_by_name_and_all_tags_start_afresh(tmp_path: Path) -> None:
     config = settings_file(tmp_path, ["a"], 'engine = "fleet"')
     options = ("--config", str(config), "--data-dir", str(tmp_path))
     with running_service(*options) as service:
@@ -66,6 +67,6 @@ def test_a_checkpoint_of_another_layout_is_refused_by_name_and_all_start_afresh(
 
 
 def with_another_layout(checkpoint: bytes) -> bytes:
-    """As an earlier version of the service could have left it: whole, with a layout that it named otherwise."""
+    """Return the checkpoint as another version could have written it: complete, but with another name of its layout."""
     content = checkpoint[:-32].replace(b'{"layout":"', b'{"layout":"0', 1)
     return content + hashlib.blake2b(content, digest_size=32).digest()

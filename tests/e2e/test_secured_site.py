@@ -1,4 +1,4 @@
-"""A site with credentials from the first command to the pose: certificates, access control, keys, HTTPS."""
+"""A secured site, from the first command to a pose: certificates, access control, API keys, HTTPS."""
 
 import subprocess
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from support.zenoh_router import free_port, wait_until
 
 
 class Site:
-    """Made as an operator does it, by commands."""
+    """A site whose credentials are made by the commands of an operator."""
 
     def __init__(self, path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         self.path = path
@@ -25,6 +25,7 @@ class Site:
         self.endpoint = f"tls/localhost:{self.port}"
 
     def run(self, *words: str) -> str:
+        """Run a subcommand of `dropanchor`. Return its output."""
         self._capsys.readouterr()
         assert main([*words, "--security", str(self.path)]) == 0
         return self._capsys.readouterr().out.strip()
@@ -34,8 +35,10 @@ class Site:
 
     @contextmanager
     def tag(self, name: str) -> Iterator[TagClient]:
-        mine = read_credentials(self.path / "tags" / name)
-        with TagClient(mine.tag, site=mine.site, connect=mine.session, connect_timeout_s=20) as client:
+        credentials = read_credentials(self.path / "tags" / name)
+        with TagClient(
+            credentials.tag, site=credentials.site, connect=credentials.session, connect_timeout_s=20
+        ) as client:
             yield client
 
 
@@ -50,7 +53,7 @@ def send(client: TagClient) -> None:
     client.flush()
 
 
-def test_from_the_first_command_to_a_pose_and_out_again(site: Site) -> None:
+def test_keys_and_certificates_give_access_until_they_are_revoked(site: Site) -> None:
     site.run("tag", "add", "cart")
     reading, writing = (f"Bearer {site.run('key', 'add', scope, '--scope', scope)}" for scope in ("read", "write"))
     with site.router():
@@ -81,7 +84,7 @@ def test_from_the_first_command_to_a_pose_and_out_again(site: Site) -> None:
         assert secret.split("_", 2)[2] not in log  # the last part may hold an underscore of its own
 
 
-def test_a_service_that_is_its_own_router_admits_tags_that_were_added_and_no_others(site: Site) -> None:
+def test_a_service_with_its_own_router_admits_only_tags_with_valid_credentials(site: Site) -> None:
     site.run("tag", "add", "known", "revoked")
     site.run("tag", "revoke", "revoked")
     key = {"authorization": f"Bearer {site.run('key', 'add', 'all', '--scope', 'admin')}"}
@@ -92,17 +95,17 @@ def test_a_service_that_is_its_own_router_admits_tags_that_were_added_and_no_oth
         site.tag("known") as known,
     ):
 
-        def heard() -> list[str]:
+        def admitted() -> list[str]:
             send(revoked)
             send(known)
             tags = service.ask("GET", "/api/v1/tags", headers=key).json()["tags"]
             return [tag["tag"] for tag in tags if tag["messages"] > 3]
 
-        wait_until(heard)
-        assert heard() == ["known"]
+        wait_until(admitted)
+        assert admitted() == ["known"]
 
 
-def test_a_certificate_that_cannot_be_used_is_told_in_one_sentence(site: Site) -> None:
+def test_an_invalid_certificate_is_reported_in_one_sentence(site: Site) -> None:
     (site.path / "service.key").write_text("no key")
     words = command("serve", "--port", "0", "--security", str(site.path), "--zenoh-connect", site.endpoint)
     result = subprocess.run(words, capture_output=True, text=True, env=environment(), timeout=60, check=False)

@@ -1,4 +1,4 @@
-"""The program: starts with a sentence where it cannot, stops within three seconds, exit code 0."""
+"""The program says in one sentence why it cannot start, and stops soon after a signal with exit code 0."""
 
 import signal
 import socket
@@ -19,9 +19,9 @@ from support.zenoh_router import (
 )
 
 
-def run(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
+def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        command(*arguments), capture_output=True, text=True, env=environment(**more), timeout=120.0, check=False
+        command(*arguments), capture_output=True, text=True, env=environment(**variables), timeout=120.0, check=False
     )
 
 
@@ -35,7 +35,7 @@ def test_a_signal_ends_the_service_at_once_even_with_a_stream_open(how: signal.S
     assert "Traceback" not in "".join(service.log)
 
 
-def test_a_taken_http_port_is_told_in_one_sentence() -> None:
+def test_a_taken_http_port_is_reported_in_one_sentence() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         result = run("serve", "--port", str(port), "--zenoh-listen", free_endpoint())
@@ -45,7 +45,7 @@ def test_a_taken_http_port_is_told_in_one_sentence() -> None:
 
 
 @pytest.mark.parametrize("subcommand", ["serve", "router"])
-def test_a_taken_zenoh_port_is_told_in_one_sentence(subcommand: str) -> None:
+def test_a_taken_zenoh_port_is_reported_in_one_sentence(subcommand: str) -> None:
     endpoint = free_endpoint()
     with running_router(endpoint):
         result = run(subcommand, *(("--port", "0") if subcommand == "serve" else ()), "--zenoh-listen", endpoint)
@@ -56,7 +56,7 @@ def test_a_taken_zenoh_port_is_told_in_one_sentence(subcommand: str) -> None:
     ]
 
 
-def test_bad_settings_are_told_with_file_and_key(tmp_path: Path) -> None:
+def test_bad_settings_are_reported_with_file_and_key(tmp_path: Path) -> None:
     file = tmp_path / "yard.toml"
     file.write_text("[http]\nprot = 80\n")
     result = run("serve", "--config", str(file), DROPANCHOR_MAX_TAGS="none")
@@ -65,14 +65,14 @@ def test_bad_settings_are_told_with_file_and_key(tmp_path: Path) -> None:
     assert "the environment: max_tags" in result.stderr
 
 
-def test_a_kept_site_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+def test_a_stored_site_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
     (tmp_path / "site.json").write_text("{")
     result = run("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(tmp_path))
     assert result.returncode == 2
     assert f"the site stored in {tmp_path} cannot be read" in result.stderr
 
 
-def test_what_was_set_over_rest_is_there_after_a_restart(tmp_path: Path) -> None:
+def test_a_change_over_rest_survives_a_restart(tmp_path: Path) -> None:
     for _ in range(2):
         with running_service("--data-dir", str(tmp_path)) as service:
             anchors = service.get("/api/v1/anchors")["anchors"]
@@ -118,7 +118,7 @@ def test_the_router_command_routes_between_a_service_and_its_tags_and_stops_on_a
             router.kill()
 
 
-def test_help_teaches_with_examples() -> None:
+def test_the_help_contains_examples() -> None:
     for arguments in ((), ("serve",)):
         result = run(*arguments, "--help")
         assert result.returncode == 0

@@ -1,4 +1,4 @@
-"""A service whose thread dies ends with an error, and one that is supervised says what it does."""
+"""The service exits with an error when a thread dies, and reports its state to systemd."""
 
 import signal
 import socket
@@ -16,44 +16,38 @@ from dropanchor_service.runtime.systemd import Systemd
 from support.service import environment
 from support.zenoh_router import free_endpoint
 
-DIES = """
+WITH_A_DYING_THREAD = """
 import sys, threading
 from dropanchor_service import cli
-from dropanchor_service.{module} import {kind}
 
-def dying(self, *_):
-    raise RuntimeError("injected")
+run = threading.Thread.run
 
-{kind}.{method} = dying
+def run_or_die(thread):
+    if thread.name == "{name}":
+        raise RuntimeError("injected by the test")
+    run(thread)
+
+threading.Thread.run = run_or_die
 sys.exit(cli.main(sys.argv[1:]))
 """
 
 
 @contextmanager
-def service(*arguments: str, program: str | None = None, **more: str) -> Iterator["subprocess.Popen[str]"]:
+def service(*arguments: str, program: str | None = None, **variables: str) -> Iterator["subprocess.Popen[str]"]:
+    """Run `dropanchor serve`, or a `program` that does so, with these environment variables. Kill it at the end."""
     start = ["-m", "dropanchor_service"] if program is None else ["-c", program]
     ports = ["--port", "0", "--zenoh-listen", free_endpoint()]
     command = [sys.executable, *start, "serve", *ports, *arguments]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment(**more)) as process:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment(**variables)) as process:
         try:
             yield process
         finally:
             process.kill()
 
 
-@pytest.mark.parametrize(
-    ("thread", "module", "kind", "method"),
-    [
-        ("ingest", "ingest_thread", "IngestThread", "_turn"),
-        ("checkpoints", "checkpointer", "CheckpointThread", "_write"),
-        ("poses", "zenoh_poses", "ZenohPoses", "_run"),
-        ("http", "api.server", "Server", "main_loop"),
-    ],
-)
-def test_a_thread_that_dies_is_named_and_ends_the_process_with_an_error(
-    tmp_path: Path, thread: str, module: str, kind: str, method: str
-) -> None:
-    program = DIES.format(module=module, kind=kind, method=method)
+@pytest.mark.parametrize("thread", ["ingest", "checkpoints", "poses", "http"])
+def test_a_thread_that_dies_is_named_and_the_process_exits_with_an_error(tmp_path: Path, thread: str) -> None:
+    program = WITH_A_DYING_THREAD.format(name=thread)
     with service("--engine", "fleet", "--data-dir", str(tmp_path), program=program) as process:
         _, log = process.communicate(timeout=300.0)
     assert process.returncode == 1
@@ -61,7 +55,7 @@ def test_a_thread_that_dies_is_named_and_ends_the_process_with_an_error(
     assert "injected" in log
 
 
-def test_systemd_is_told_of_the_start_of_progress_and_of_the_end(tmp_path: Path) -> None:
+def test_systemd_is_notified_of_the_start_of_progress_and_of_the_stop(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         manager.settimeout(300.0)
@@ -69,15 +63,15 @@ def test_systemd_is_told_of_the_start_of_progress_and_of_the_end(tmp_path: Path)
             assert manager.recv(100) == b"READY=1"
             assert [manager.recv(100) for _ in range(3)] == 3 * [b"WATCHDOG=1"]
             process.send_signal(signal.SIGTERM)
-            heard = manager.recv(100)
-            while heard == b"WATCHDOG=1":
-                heard = manager.recv(100)
-            assert heard == b"STOPPING=1"
+            notification = manager.recv(100)
+            while notification == b"WATCHDOG=1":
+                notification = manager.recv(100)
+            assert notification == b"STOPPING=1"
             process.communicate(timeout=30.0)
         assert process.returncode == 0
 
 
-def test_systemd_hears_of_no_progress_while_samples_are_not_fused(tmp_path: Path) -> None:
+def test_the_watchdog_is_not_fed_while_no_samples_are_fused(tmp_path: Path) -> None:
     class Stuck:
         makes_progress = False
         has_died = False

@@ -1,4 +1,4 @@
-"""A tag on another host, behind a link that is cut and that loses packets: no sample is lost."""
+"""No sample of a tag on another host is lost, although its link is cut and loses packets."""
 
 import subprocess
 import sys
@@ -15,14 +15,14 @@ CUT_S = 8.0
 LOSSY_S = 5.0
 LOSS = 0.2
 
-# A sample in a message of its own, twenty times a second, until it is told to stop; then it stays for what was missed.
+# Publishes one sample per message until a line arrives on stdin. Then it stays, so that its cache can be read.
 TAG = f"""
 import sys, threading, time
 from dropanchor_tag_client import TagClient
-told = threading.Event()
-threading.Thread(target=lambda: (sys.stdin.readline(), told.set()), daemon=True).start()
+stop = threading.Event()
+threading.Thread(target=lambda: (sys.stdin.readline(), stop.set()), daemon=True).start()
 with TagClient("far", connect=sys.argv[1], batch_samples=1) as tag:
-    while not told.wait(1 / {HZ}):
+    while not stop.wait(1 / {HZ}):
         tag.publish_range(7, 10.0 + 0.001 * tag.sent.samples)
     print(tag.sent.samples, flush=True)
     sys.stdin.readline()
@@ -30,19 +30,19 @@ with TagClient("far", connect=sys.argv[1], batch_samples=1) as tag:
 
 
 def used(service: Running) -> int:
-    """Samples of the tag that reached its estimator."""
+    """Return how many samples of the tag reached its estimator."""
     found = [tag for tag in service.get("/api/v1/tags")["tags"] if tag["tag"] == "far"]
     return int(found[0]["samples"].get("range", 0)) if found else 0
 
 
-def tell_to_stop(tag: subprocess.Popen[str]) -> None:
+def stop_publishing(tag: subprocess.Popen[str]) -> None:
     assert tag.stdin is not None
     tag.stdin.write("\n")
     tag.stdin.flush()
 
 
-def bad_times(service: Running, link: LossyLink) -> None:
-    """A cut, and then a link that loses a fifth of its packets."""
+def disturb(service: Running, link: LossyLink) -> None:
+    """Cut the link for CUT_S, then lose a share LOSS of its packets for LOSSY_S."""
     before = used(service)
     link.loss = 1.0
     time.sleep(CUT_S)
@@ -51,7 +51,7 @@ def bad_times(service: Running, link: LossyLink) -> None:
     time.sleep(LOSSY_S)
 
 
-def test_a_cut_of_eight_seconds_and_a_fifth_of_the_packets_lost_lose_no_sample() -> None:
+def test_a_cut_link_and_a_link_that_drops_every_fifth_packet_lose_no_sample() -> None:
     with ExitStack() as opened:
         link = opened.enter_context(lossy_link())
         endpoint = f"tcp/{link.here}:{free_port()}"
@@ -62,8 +62,8 @@ def test_a_cut_of_eight_seconds_and_a_fifth_of_the_packets_lost_lose_no_sample()
         ) as tag:
             try:
                 wait_until(lambda: used(service) > HZ, 60.0)
-                bad_times(service, link)
-                tell_to_stop(tag)
+                disturb(service, link)
+                stop_publishing(tag)
                 assert tag.stdout is not None
                 sent = int(tag.stdout.readline())
                 wait_until(lambda: used(service) >= sent, 90.0)

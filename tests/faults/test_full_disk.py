@@ -1,4 +1,4 @@
-"""A disk that takes nothing any more stops neither the poses nor the service, and is told."""
+"""A full disk stops neither the poses nor the service, and the service reports it."""
 
 import resource
 import signal
@@ -14,19 +14,20 @@ TAGS, SEED = 2, 5
 
 
 def impaired(service: Running) -> str:
+    """Return what a service that is ready reports as impaired."""
     answer = httpx.get(f"{service.url}/api/v1/health/ready")
     assert answer.status_code == 200
     return "; ".join(answer.json()["impaired"])
 
 
 def set_file_limit(service: Running, size: int) -> None:
-    """What the service writes beyond it fails, as on a disk without room (setrlimit(2), EFBIG)."""
+    """Make writes beyond `size` bytes of a file fail, as on a full disk (EFBIG, see setrlimit(2))."""
     pid = service.process.pid
     _, hard = resource.prlimit(pid, resource.RLIMIT_FSIZE)
     resource.prlimit(pid, resource.RLIMIT_FSIZE, (size, hard))
 
 
-def test_without_room_on_the_disk_poses_go_on_and_the_last_good_checkpoint_is_used(tmp_path: Path) -> None:
+def test_on_a_full_disk_poses_continue_and_the_last_complete_checkpoint_is_used(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     tags = LiveTags(endpoint, TAGS, SEED, cache_messages=6000)
     config = tags.write_settings(tmp_path)

@@ -1,5 +1,7 @@
-"""Clients that connect and say nothing harm nobody: a real service, sockets on the loopback. What nobody reads of a
-stream is tried in `tests/service/api/test_server.py`."""
+"""Clients that connect and send nothing harm no other client of a real service.
+
+Streams that a client does not read are tested in `tests/service/api/http/test_server.py`.
+"""
 
 import os
 import resource
@@ -21,16 +23,17 @@ HTTP_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_HTTP", "200"))
 ZENOH_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_ZENOH", "100"))
 """1,000 and 300 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 @contextmanager
-def half_open(port: int, count: int, *said: bytes) -> Iterator[list[socket.socket]]:
+def half_open(port: int, count: int, *payloads: bytes) -> Iterator[list[socket.socket]]:
+    """Open `count` connections and send one of the payloads, in turn, on each."""
     with ExitStack() as opened:
         clients = []
-        for _, words in zip(range(count), cycle(said), strict=False):
-            clients.append(opened.enter_context(socket.create_connection(("127.0.0.1", port), PATIENCE_S)))
-            clients[-1].sendall(words)
+        for _, payload in zip(range(count), cycle(payloads), strict=False):
+            clients.append(opened.enter_context(socket.create_connection(("127.0.0.1", port), TIMEOUT_S)))
+            clients[-1].sendall(payload)
         yield clients
 
 
@@ -39,39 +42,39 @@ def http_port(service: Running) -> int:
 
 
 def timed_requests(service: Running, count: int) -> list[float]:
-    """How long each took, s; every one was answered."""
-    took = []
-    with httpx.Client(base_url=service.url, timeout=PATIENCE_S, trust_env=False) as client:
+    """Return the response time of each request in s. All of them must succeed."""
+    durations_s = []
+    with httpx.Client(base_url=service.url, timeout=TIMEOUT_S, trust_env=False) as client:
         for _ in range(count):
             begun = time.monotonic()
             assert client.get("/api/v1/poses").status_code == 200
-            took.append(time.monotonic() - begun)
-    return took
+            durations_s.append(time.monotonic() - begun)
+    return durations_s
 
 
 def print_times(name: str, seconds: list[float]) -> None:
     ordered = sorted(seconds)
     p99 = ordered[int(0.99 * (len(ordered) - 1))]
-    words = f"median {statistics.median(ordered):.4f} s, p99 {p99:.4f} s, worst {ordered[-1]:.4f} s"
-    print(f"{name}: {words}")  # noqa: T201
+    times = f"median {statistics.median(ordered):.4f} s, p99 {p99:.4f} s, worst {ordered[-1]:.4f} s"
+    print(f"{name}: {times}")  # noqa: T201
 
 
-def are_cut(clients: list[socket.socket]) -> bool:
+def are_closed(clients: list[socket.socket]) -> bool:
     try:
         return all(client.recv(65536) == b"" for client in clients)
     except ConnectionResetError:
         return True
 
 
-def test_silent_http_sockets_keep_nobody_out_and_are_cut() -> None:
-    said = (b"", b"G", b"GET /api/v1/poses HTTP/1.1\r\nhost:")
-    with running_service() as service, half_open(http_port(service), HTTP_SOCKETS, *said) as clients:
+def test_silent_http_connections_block_no_other_client_and_are_closed() -> None:
+    payloads = (b"", b"G", b"GET /api/v1/poses HTTP/1.1\r\nhost:")
+    with running_service() as service, half_open(http_port(service), HTTP_SOCKETS, *payloads) as clients:
         print_times(f"REST beside {HTTP_SOCKETS} silent sockets", timed_requests(service, 300))
-        assert are_cut(clients)
+        assert are_closed(clients)
         assert service.stop() == 0
 
 
-def test_sockets_that_never_begin_tls_keep_nobody_out_and_are_cut(tmp_path: Path) -> None:
+def test_connections_without_a_tls_handshake_block_no_other_client_and_are_closed(tmp_path: Path) -> None:
     site = secured_site(tmp_path / "security")
     arguments = ("--security", str(site.folder.path), "--zenoh-connect", site.endpoint)
     with (
@@ -80,10 +83,10 @@ def test_sockets_that_never_begin_tls_keep_nobody_out_and_are_cut(tmp_path: Path
     ):
         for _ in range(20):
             assert service.ask("GET", "/api/v1/health/live").status_code == 200
-        assert are_cut(clients)
+        assert are_closed(clients)
 
 
-def test_silent_zenoh_sockets_keep_no_tag_out() -> None:
+def test_silent_zenoh_connections_block_no_tag() -> None:
     with running_service() as service:
         with half_open(int(service.zenoh.rpartition(":")[2]), ZENOH_SOCKETS, b"", b"\x00"):
             opened = []
@@ -96,7 +99,7 @@ def test_silent_zenoh_sockets_keep_no_tag_out() -> None:
         assert service.stop() == 0
 
 
-def test_the_service_opens_as_many_sockets_as_the_system_allows_whatever_the_shell_says() -> None:
+def test_the_service_raises_its_limit_of_open_files_to_the_hard_limit() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(1024, hard), hard))
     try:

@@ -1,8 +1,7 @@
-"""A service that is killed again and again while its tags publish loses nothing, and ends where an uninterrupted one
-would.
+"""A service that is killed repeatedly while tags publish loses no sample and reaches the poses of an uninterrupted one.
 
-DROPANCHOR_KILLS, _KILLED_TAGS and _KILLED_STEP_S (from one message of a tag to the next) make more of it,
-DROPANCHOR_KILL_SEED another one.
+DROPANCHOR_KILLS, DROPANCHOR_KILLED_TAGS and DROPANCHOR_KILLED_STEP_S (time between two messages of a tag) scale the
+test. DROPANCHOR_KILL_SEED varies it.
 """
 
 import logging
@@ -25,9 +24,9 @@ KILLS = int(os.environ.get("DROPANCHOR_KILLS", "2"))
 TAGS = int(os.environ.get("DROPANCHOR_KILLED_TAGS", "3"))
 SEED = int(os.environ.get("DROPANCHOR_KILL_SEED", "1"))
 DOWN_S = 2.0
-UP_S = 3.0  # at most, from being current to the next kill
+MAX_UP_S = 3.0  # from current poses to the next kill
 STEP_S = float(os.environ.get("DROPANCHOR_KILLED_STEP_S", "0.1"))
-LATE_NS = 250_000_000  # of times on a boot clock, at most: the service cannot know the delay of a message
+MAX_LATE_NS = 250_000_000  # of times from a boot clock: the service cannot know the delay of a message
 
 _log = logging.getLogger(__name__)
 
@@ -35,10 +34,10 @@ _log = logging.getLogger(__name__)
 @pytest.mark.parametrize(
     ("router", "clock"), [("outside", "utc"), ("inside", "utc"), ("outside", "boot"), ("inside", "boot")]
 )
-def test_a_service_that_is_killed_loses_nothing_and_ends_where_an_uninterrupted_one_would(
+def test_a_killed_service_loses_no_sample_and_reaches_the_poses_of_an_uninterrupted_one(
     tmp_path: Path, router: str, clock: str
 ) -> None:
-    endpoint, took_s = free_endpoint(), []
+    endpoint, durations_s = free_endpoint(), []
     with ExitStack() as opened:
         if router == "outside":
             opened.enter_context(router_process(endpoint))
@@ -51,15 +50,15 @@ def test_a_service_that_is_killed_loses_nothing_and_ends_where_an_uninterrupted_
             with running_service(*options) as service:
                 if life == 0:
                     opened.enter_context(tags)
-                took_s.append(until_current(service))
-                time.sleep(dice.uniform(0.0, UP_S))
+                durations_s.append(wait_until_current(service))
+                time.sleep(dice.uniform(0.0, MAX_UP_S))
                 assert lost(service) == {}, f"in life {life}"
                 service.stop(signal.SIGKILL)
             time.sleep(DOWN_S)
         with running_service(*options) as service:
-            took_s.append(until_current(service))
+            durations_s.append(wait_until_current(service))
             tags.finish()
-            with suppress(AssertionError):  # the next line says which are missing
+            with suppress(AssertionError):  # the next assertions name what is missing
                 wait_until(lambda: samples_of(service) == tags.samples)
             assert lost(service) == {}
             assert samples_of(service) == tags.samples
@@ -67,24 +66,32 @@ def test_a_service_that_is_killed_loses_nothing_and_ends_where_an_uninterrupted_
     expected = tags.expected(config)
     assert expected.keys() == answers.keys()
     apart = {tag: distance(pose, answers[tag]) for tag, pose in expected.items()}
-    _log.info("samples %s, apart %.2g m at most", sum(map(Counter.total, tags.samples.values())), max(apart.values()))
-    _log.info("current %.2f s after the start, %.2f s at most", statistics.median(took_s[1:]), max(took_s[1:]))
+    _log.info(
+        "%s samples, poses at most %.2g m apart.", sum(map(Counter.total, tags.samples.values())), max(apart.values())
+    )
+    _log.info(
+        "Poses were current %.2f s after a start (median), %.2f s at most.",
+        statistics.median(durations_s[1:]),
+        max(durations_s[1:]),
+    )
     late_ns = [answers[tag]["t_ns"] - int(pose["t_ns"]) for tag, pose in expected.items()]
-    _log.info("late %.3g to %.3g ms", min(late_ns) * 1e-6, max(late_ns) * 1e-6)
-    assert 0 <= min(late_ns) <= max(late_ns) <= (LATE_NS if clock == "boot" else 0)
+    _log.info("Pose times are late by %.3g to %.3g ms.", min(late_ns) * 1e-6, max(late_ns) * 1e-6)
+    assert 0 <= min(late_ns) <= max(late_ns) <= (MAX_LATE_NS if clock == "boot" else 0)
     assert max(apart.values()) < 1e-3
 
 
 def lost(service: Running) -> dict[str, float]:
-    """What this process has counted that is not zero. What came twice, recovered by Zenoh and told by a cache, is no
-    loss; that it was used once the samples tell."""
+    """Return the loss counters of this process that are not zero.
+
+    Duplicates, which Zenoh and a cache both deliver, are no loss. The numbers of samples show that each was used once.
+    """
     by_reason = (f'dropanchor_rejected_total{{reason="{reason}"}}' for reason in ("late", "shed"))
     names = (*by_reason, "dropanchor_given_up_messages_total", "dropanchor_missed_messages_total")
     counted = {name: service.metric(name) for name in names}
     return {name: value for name, value in counted.items() if value}
 
 
-def until_current(service: Running) -> float:
-    """s, from the start of its process."""
+def wait_until_current(service: Running) -> float:
+    """Wait until the poses are current. Return the time since the start of the process in s."""
     wait_until(lambda: is_current(service, TAGS), 60.0)
     return time.monotonic() - service.began_s

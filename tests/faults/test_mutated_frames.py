@@ -1,11 +1,11 @@
-"""Bad input is counted by cause: mutated frames raise nothing, and every frame and every sample is accounted for."""
+"""Bad input is counted by reason: mutated frames raise no error, and every frame and sample is accounted for."""
 
 import os
 import random
 from collections import Counter
 
 from dropanchor_schemas.wire import Rejection, decode_packed
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.traffic import traffic
 
 FRAMES = int(os.environ.get("DROPANCHOR_MUTATED_FRAMES", "200000"))
@@ -13,10 +13,10 @@ TAGS = 20
 IN_ONE_TURN = 1000
 
 
-def test_mutated_frames_raise_nothing_and_the_counts_add_up() -> None:
+def test_mutated_frames_raise_no_error_and_the_counts_add_up() -> None:
     seeds = [message.payload for message in traffic(TAGS, 10.0, seed=9, step_s=0.05)]
     dice = random.Random(9)
-    bench = Bench(max_tags=TAGS)
+    bench = IngestBench(max_tags=TAGS)
     refused: Counter[str] = Counter()
     offered = 0
     for start in range(0, FRAMES, IN_ONE_TURN):
@@ -41,16 +41,16 @@ def test_mutated_frames_raise_nothing_and_the_counts_add_up() -> None:
     assert bench.total(bench.metrics.faults) == 0
 
 
-def test_a_version_to_come_is_refused_by_name() -> None:
+def test_a_frame_of_a_future_version_is_rejected_by_reason() -> None:
     payload = bytearray(traffic(1, 1.0, seed=9)[0].payload)
     payload[0] += 1
-    bench = Bench()
+    bench = IngestBench()
     bench.send("forward", bytes(payload))
     assert bench.rejected() == {"version_unknown": 1}
 
 
 def mutated(dice: random.Random, seeds: list[bytes]) -> bytes:
-    """A real payload, most often with a few other bytes; its boot id is 0, so that none is taken for a duplicate."""
+    """Return a valid payload with up to three changed bytes, sometimes cut off. Boot id 0 avoids duplicates."""
     payload = bytearray(dice.choice(seeds))
     payload[12:16] = bytes(4)
     for _ in range(dice.randrange(4)):

@@ -1,4 +1,4 @@
-"""What networks do to the order of messages changes no pose, as long as it stays inside the window."""
+"""Messages that arrive out of order change no pose, as long as they are not later than the reorder window."""
 
 import random
 from collections import Counter
@@ -15,10 +15,11 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_service.estimation.columns import POSE, Array, Engine, PoseBatch, SampleBatch
+from dropanchor_service.estimation.columns import POSE, Array, Engine
 from dropanchor_service.estimation.fleet.engine import FleetEngine
-from dropanchor_service.runtime.clock import UtcClock
-from support.ingest import Bench
+from support.ingest import IngestBench
+from support.manual_clock import ManualClock
+from support.recording_engine import RecordingEngine
 from support.traffic import T0_NS, Message, traffic
 
 MS = 1_000_000
@@ -26,39 +27,16 @@ TAGS, SECONDS = 3, 20.0
 SHUFFLE_NS, WINDOW_NS = 200 * MS, 250 * MS
 
 
-class Recorded(FleetEngine):
-    """Keeps the poses that it gave."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.given: list[Array] = [np.zeros(0, POSE)]
-
-    def process(self, samples: SampleBatch) -> PoseBatch:
-        batch = super().process(samples)
-        self.given.append(batch.poses.copy())
-        return batch
-
-    def poses(self) -> Array:
-        """Of all rows, by row and time."""
-        poses = np.concatenate(self.given)
-        return poses[np.lexsort((poses["t_ns"], poses["row"]))]
+def sorted_poses(engine: RecordingEngine) -> Array:
+    """Return the poses that the engine returned, sorted by row and time."""
+    poses = engine.poses()
+    return poses[np.lexsort((poses["t_ns"], poses["row"]))]
 
 
-class SetClock(UtcClock):
-    """Shows what it is set to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.t_ns = T0_NS
-
-    def now_ns(self) -> int:
-        return self.t_ns
-
-
-def deliver(engine: Engine, messages: Iterable[Message]) -> Bench:
-    """Each message at its time, a turn after every message, and turns until nothing waits any more."""
-    clock = SetClock()
-    bench = Bench(engine=engine, clock=clock)
+def deliver(engine: Engine, messages: Iterable[Message]) -> IngestBench:
+    """Fuse each message when it is due, then end the reorder window, so that no message is pending."""
+    clock = ManualClock()
+    bench = IngestBench(engine=engine, clock=clock)
     for index in range(TAGS):
         bench.ingest.announce(f"sim-{index + 1}")
     for message in messages:
@@ -73,7 +51,7 @@ def deliver(engine: Engine, messages: Iterable[Message]) -> Bench:
 
 
 def shuffled(messages: Iterable[Message], copies: int = 2) -> list[Message]:
-    """Every copy of a message is late by anything up to SHUFFLE_NS."""
+    """Delay each of the `copies` of every message by a random time up to SHUFFLE_NS."""
     dice = random.Random(11)
     late = [
         message._replace(due_ns=message.due_ns + dice.randrange(SHUFFLE_NS))
@@ -91,38 +69,38 @@ def assert_the_same(one: Array, other: Array) -> None:
 
 def test_shuffled_and_doubled_messages_give_the_poses_of_the_clean_run() -> None:
     messages = traffic(TAGS, SECONDS, seed=8, step_s=0.05)
-    clean, harmed = Recorded(), Recorded()
+    clean, disturbed = RecordingEngine(), RecordingEngine()
     assert deliver(clean, messages).rejected() == {}
-    bench = deliver(harmed, shuffled(messages))
-    assert_the_same(clean.poses(), harmed.poses())
+    bench = deliver(disturbed, shuffled(messages))
+    assert_the_same(sorted_poses(clean), sorted_poses(disturbed))
     assert bench.rejected() == {"duplicate": len(messages)}
     assert bench.total(bench.metrics.given_up) == 0
 
 
-def test_json_is_put_in_order_as_well() -> None:
+def test_json_messages_are_reordered_as_well() -> None:
     def as_json(message: Message) -> Message:
         frame = decode_packed(message.payload)
         assert isinstance(frame, Frame)
         return message._replace(payload=encode_json(frame))
 
     messages = traffic(TAGS, SECONDS, seed=8, step_s=0.2)
-    clean, harmed = Recorded(), Recorded()
+    clean, disturbed = RecordingEngine(), RecordingEngine()
     deliver(clean, messages)
-    deliver(harmed, [as_json(m) if i % 3 else m for i, m in enumerate(shuffled(messages))])
-    assert_the_same(clean.poses(), harmed.poses())
+    deliver(disturbed, [as_json(m) if i % 3 else m for i, m in enumerate(shuffled(messages))])
+    assert_the_same(sorted_poses(clean), sorted_poses(disturbed))
 
 
-def test_publishers_of_one_tag_that_are_shuffled_each_for_itself_lose_no_range() -> None:
+def test_two_publishers_of_one_tag_whose_messages_are_shuffled_lose_no_range() -> None:
     messages = traffic(TAGS, SECONDS, seed=9, step_s=0.05)
     split = by_two_publishers(messages)
-    clean, harmed = Recorded(), Recorded()
+    clean, disturbed = RecordingEngine(), RecordingEngine()
     assert deliver(clean, split).rejected() == {}
-    assert deliver(harmed, shuffled(split, copies=1)).rejected() == {}
-    assert len(clean.poses()) == len(harmed.poses())
+    assert deliver(disturbed, shuffled(split, copies=1)).rejected() == {}
+    assert len(sorted_poses(clean)) == len(sorted_poses(disturbed))
 
 
 def by_two_publishers(messages: Iterable[Message]) -> list[Message]:
-    """The inertial samples and the ranges of each tag apart; each publisher numbers its own messages."""
+    """Split each message into inertial samples and ranges, from two publishers that number their own messages."""
     numbers: Counter[int] = Counter()
     split: list[Message] = []
     for message in messages:
@@ -138,18 +116,18 @@ def by_two_publishers(messages: Iterable[Message]) -> list[Message]:
     return split
 
 
-def test_a_message_in_order_waits_for_nothing_and_one_that_never_comes_delays_by_no_more_than_the_window() -> None:
-    clock = SetClock()
-    bench = Bench(clock=clock)
-    for number, seen in ((0, 0.0), (1, 1.0)):
+def test_a_message_in_order_is_fused_at_once_and_a_missing_one_delays_the_next_by_the_window_only() -> None:
+    clock = ManualClock()
+    bench = IngestBench(clock=clock)
+    for number, x in ((0, 0.0), (1, 1.0)):
         bench.put("a", ranged(number), at_ns=clock.t_ns)
         bench.ingest.turn()
-        assert bench.x_of("a") == [seen]
+        assert bench.x_of("a") == [x]
     bench.put("a", ranged(3), at_ns=clock.t_ns)
-    for later_ns, seen in ((0, 1.0), (WINDOW_NS - 1, 1.0), (WINDOW_NS, 3.0)):
+    for later_ns, x in ((0, 1.0), (WINDOW_NS - 1, 1.0), (WINDOW_NS, 3.0)):
         clock.t_ns = T0_NS + later_ns
         bench.ingest.turn()
-        assert bench.x_of("a") == [seen]
+        assert bench.x_of("a") == [x]
     assert bench.total(bench.metrics.given_up) == 1
 
 
@@ -164,9 +142,9 @@ def ranged(number: int) -> Frame:
     )
 
 
-def test_what_comes_later_than_the_window_is_late_and_counted() -> None:
-    clock, engine = SetClock(), Recorded()
-    bench = Bench(engine=engine, clock=clock)
+def test_a_message_later_than_the_window_is_rejected_as_late() -> None:
+    clock = ManualClock()
+    bench = IngestBench(engine=FleetEngine(), clock=clock)
     for number in (0, 1, 3, 4):
         bench.put("a", ranged(number), at_ns=clock.t_ns)
     bench.ingest.turn()

@@ -1,7 +1,7 @@
-"""Tags that vanish without a word, as when their Wi-Fi or their power fails, keep no other tag waiting.
+"""Tags that vanish silently, as when their Wi-Fi or power fails, delay no other tag.
 
-Half of the tags are on another host, behind a link that ends to carry anything. They never acknowledge what the router
-sends them, if only to keep the connection alive, and a router with too few receive threads waits for them.
+Half of the tags are on another host, and its link stops forwarding packets. These tags no longer acknowledge what the
+router sends, such as keep-alive messages. A router with too few receive threads would wait for them.
 """
 
 import os
@@ -28,21 +28,21 @@ HERE = [f"here-{number}" for number in range(int(os.environ.get("DROPANCHOR_STAY
 """60 and 40 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
 
 HZ = 10
-MOST_S = 1.0
-AFTER_S = 2.0  # beyond the end of the last connection that the router gives up
+MAX_SILENCE_S = 1.0
+AFTER_S = 2.0  # the observation continues so long after the router has closed the last connection
 
-# Tags with a connection each, until the process is killed. They connect with the credentials in a folder, or to an
-# endpoint.
+# Runs tags with a connection each until the process is killed. The first argument is an endpoint, or a folder with
+# their credentials.
 TAGS = f"""
 import sys, time
 from contextlib import AbstractContextManager, ExitStack
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.credentials import read_credentials
-where, *names = sys.argv[1:]
+target, *names = sys.argv[1:]
 with ExitStack() as opened:
     tags = []
     for name in names:
-        connect = where if where.startswith("tcp/") else read_credentials(f"{{where}}/{{name}}").session
+        connect = target if target.startswith("tcp/") else read_credentials(f"{{target}}/{{name}}").session
         tags.append(opened.enter_context(TagClient(name, connect=connect, batch_samples=1, batch_s=None)))
     while True:
         for tag in tags:
@@ -51,47 +51,47 @@ with ExitStack() as opened:
 """
 
 
-class Heard:
-    """alive: tags whose token the router holds. longest_s: the longest time that each tag was not heard for."""
+class TagActivity:
+    """alive: tags whose liveliness token exists. longest_s: the longest time between two messages of each tag."""
 
     def __init__(self, session: zenoh.Session, site: str = "default") -> None:
         self.alive: set[str] = set()
         self.longest_s: dict[str, float] = {}
         self._last_s: dict[str, float] = {}
         self._lock = Lock()
-        self._kept = (
-            session.declare_subscriber(all_tags(site, "samples"), self._sample),
-            session.liveliness().declare_subscriber(all_tags(site, "alive"), self._token, history=True),
+        self._subscribers = (
+            session.declare_subscriber(all_tags(site, "samples"), self._on_sample),
+            session.liveliness().declare_subscriber(all_tags(site, "alive"), self._on_token, history=True),
         )
 
-    def begin(self) -> None:
-        """Forget the silences so far."""
+    def reset(self) -> None:
+        """Discard the silences so far."""
         with self._lock:
             self.longest_s.clear()
 
     def longest_of(self, tags: Sequence[str]) -> float:
-        """The longest silence of any of these tags, the one that lasts included."""
+        """Return the longest silence of any of these tags in s, including the current one."""
         now_s = time.monotonic()
         with self._lock:
             return max(max(self.longest_s.get(tag, 0.0), now_s - self._last_s[tag]) for tag in tags)
 
-    def _sample(self, message: zenoh.Sample) -> None:
+    def _on_sample(self, message: zenoh.Sample) -> None:
         tag, now_s = tag_from_key(str(message.key_expr)), time.monotonic()
         with self._lock:
             silent_s = now_s - self._last_s.get(tag, now_s)
             self.longest_s[tag] = max(self.longest_s.get(tag, 0.0), silent_s)
             self._last_s[tag] = now_s
 
-    def _token(self, message: zenoh.Sample) -> None:
+    def _on_token(self, message: zenoh.Sample) -> None:
         tag = tag_from_key(str(message.key_expr))
         (self.alive.add if message.kind == zenoh.SampleKind.PUT else self.alive.discard)(tag)
 
 
 @contextmanager
-def publishing(where: str, tags: Sequence[str], link: LossyLink | None = None) -> Iterator[None]:
-    """The tags in a process of their own, on the other host if there is a link to it."""
-    words = [sys.executable, "-c", TAGS, where, *tags]
-    with subprocess.Popen(link.elsewhere(*words) if link else words, env=environment()) as process:
+def publishing(target: str, tags: Sequence[str], link: LossyLink | None = None) -> Iterator[None]:
+    """Run the tags in a process of their own. With a link, the process runs on the host at its other end."""
+    command = [sys.executable, "-c", TAGS, target, *tags]
+    with subprocess.Popen(link.elsewhere(*command) if link else command, env=environment()) as process:
         try:
             yield
         finally:
@@ -99,13 +99,13 @@ def publishing(where: str, tags: Sequence[str], link: LossyLink | None = None) -
 
 
 def router_of(kind: str, *options: str, ca: Path | None = None) -> AbstractContextManager[object]:
-    """A process of its own, or the one of a service."""
+    """Run a router of its own, or the one inside a service."""
     return running_router(*options) if kind == "router" else running_service(*options, ca=ca)
 
 
 @contextmanager
 def plain_router(kind: str, link: LossyLink) -> Iterator[tuple[zenoh.Session, str]]:
-    """A session with it, and where tags connect."""
+    """Run a router without security. Yield a session with it, and the endpoint for the tags."""
     endpoint = f"tcp/{link.here}:{free_port()}"
     options = ("--insecure", "--zenoh-listen", endpoint)
     with router_of(kind, *options), connected_session(endpoint) as session:
@@ -114,7 +114,7 @@ def plain_router(kind: str, link: LossyLink) -> Iterator[tuple[zenoh.Session, st
 
 @contextmanager
 def tls_router(kind: str, link: LossyLink, folder: Path) -> Iterator[tuple[zenoh.Session, str]]:
-    """A session with it, and the folder of the tags' credentials."""
+    """Run a router with TLS. Yield a session with it, and the folder with the credentials of the tags."""
     site = secured_site(folder, *GONE, *HERE, host=link.here, address=link.here)
     options = ("--security", str(folder), "--zenoh-listen", site.folder.table.listen[0])
     with router_of(kind, *options, ca=folder / "ca.pem"), site.session("service") as session:
@@ -123,19 +123,19 @@ def tls_router(kind: str, link: LossyLink, folder: Path) -> Iterator[tuple[zenoh
 
 @pytest.mark.parametrize("security", ["plain", "tls"])
 @pytest.mark.parametrize("kind", ["router", "serve"])
-def test_no_tag_waits_for_others_that_vanish_all_at_once(kind: str, security: str, tmp_path: Path) -> None:
+def test_tags_that_vanish_all_at_once_delay_no_other_tag(kind: str, security: str, tmp_path: Path) -> None:
     with ExitStack() as opened:
         link = opened.enter_context(lossy_link())
         router = plain_router(kind, link) if security == "plain" else tls_router(kind, link, tmp_path / "security")
-        session, where = opened.enter_context(router)
-        heard = Heard(session)
-        opened.enter_context(publishing(where, GONE, link))
-        opened.enter_context(publishing(where, HERE))
-        wait_until(lambda: heard.alive >= {*GONE, *HERE} <= heard.longest_s.keys(), 120.0)
-        heard.begin()
+        session, target = opened.enter_context(router)
+        activity = TagActivity(session)
+        opened.enter_context(publishing(target, GONE, link))
+        opened.enter_context(publishing(target, HERE))
+        wait_until(lambda: activity.alive >= {*GONE, *HERE} <= activity.longest_s.keys(), 120.0)
+        activity.reset()
         link.loss = 1.0
-        wait_until(lambda: not heard.alive & set(GONE), 240.0)
+        wait_until(lambda: not activity.alive & set(GONE), 240.0)
         time.sleep(AFTER_S)
-        longest_s = heard.longest_of(HERE)
+        longest_s = activity.longest_of(HERE)
     print(f"{len(GONE)} of {len(GONE + HERE)} tags vanished, {kind}, {security}: others silent for {longest_s:.2f} s")  # noqa: T201
-    assert longest_s < MOST_S
+    assert longest_s < MAX_SILENCE_S

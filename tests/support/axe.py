@@ -1,4 +1,4 @@
-"""axe-core, the accessibility checker, from npm: it is asked for once per run and kept outside the repository."""
+"""The accessibility checker axe-core. It is downloaded from npm once per run and never stored in the repository."""
 
 import shutil
 import subprocess
@@ -12,13 +12,13 @@ _PACKAGE = "axe-core@4.10.3"
 
 
 def axe_source(folder: Path) -> str:
-    """The script, downloaded into a folder. Skips the test where npm is missing or its registry cannot be reached."""
+    """Download the script into a folder and return its text. Skip the test where npm or its registry is missing."""
     npm = shutil.which("npm")
     if npm is None:
         pytest.skip("npm is not installed: the accessibility tests fetch axe-core with it")
-    asked = [npm, "pack", _PACKAGE, "--silent", "--pack-destination", str(folder)]
+    command = [npm, "pack", _PACKAGE, "--silent", "--pack-destination", str(folder)]
     try:
-        done = subprocess.run(asked, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     except subprocess.TimeoutExpired:
         pytest.skip("npm did not deliver axe-core within 120 s: the accessibility tests need it")
     packed = list(folder.glob("axe-core-*.tgz"))
@@ -31,7 +31,7 @@ def axe_source(folder: Path) -> str:
 
 
 def violations(page: Page, axe: str) -> list[str]:
-    """What axe-core finds wrong on a page: rule, element and reason."""
+    """Return the violations that axe-core finds on a page, each with its rule, element and reason."""
     page.evaluate(axe)
     found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
     return [

@@ -1,4 +1,4 @@
-"""A real Chromium, and a page that keeps account of what it asked for and complained about."""
+"""A real Chromium, and pages that record their requests and their errors."""
 
 import shutil
 import time
@@ -16,7 +16,7 @@ Scheme = Literal["light", "dark"]
 
 @contextmanager
 def running_chromium() -> Iterator[Browser]:
-    """Debian's Chromium, driven by Playwright. An event loop runs in this thread as long as it is open."""
+    """Run Debian's Chromium, driven by Playwright. An event loop runs in this thread until the block ends."""
     executable = shutil.which("chromium") or shutil.which("chromium-browser")
     if executable is None:
         pytest.skip("Chromium is not installed: the browser tests need it")
@@ -27,32 +27,35 @@ def running_chromium() -> Iterator[Browser]:
 
 
 @dataclass
-class Watched:
-    """A page, the hosts that it asked, and what went wrong in it."""
+class WatchedPage:
+    """A page, the origins that it sent requests to, and the errors and warnings that it logged."""
 
     page: Page
     origins: set[str] = field(default_factory=set)
-    complaints: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
 
     def tags(self) -> dict[str, dict[str, Any]]:
-        """What the page knows about each tag."""
+        """Return what the page knows about each tag, by name."""
         tags: list[dict[str, Any]] = self.page.evaluate("dropanchor.tags()")
         return {tag["tag"]: tag for tag in tags}
 
     def wait_for(self, condition: str, timeout_s: float = 40) -> None:
-        """Until a JavaScript expression is true. Asked from outside: the page's own policy forbids evaluation in it."""
+        """Wait until a JavaScript expression is true.
+
+        The expression is evaluated from outside, since the content security policy forbids it inside the page.
+        """
         end_s = time.monotonic() + timeout_s
         while not self.page.evaluate(condition):
             assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}"
             self.page.wait_for_timeout(50)
 
     def wait_for_map(self, visible: int) -> None:
-        """Until the site has arrived, so many tags are on the map, and the map has come to rest around them."""
+        """Wait until the site is loaded, `visible` tags are on the map, and the map has stopped moving."""
         site = "document.getElementById('site').textContent"
         self.wait_for(f"{site} && dropanchor.drawing().still && dropanchor.drawing().visible === {visible}")
 
     def pixel(self, x: float, y: float) -> tuple[int, ...]:
-        """Red, green, blue and opacity of the map at a place in CSS pixels."""
+        """Return red, green, blue and opacity of the map at a place in CSS pixels."""
         script = """([x, y]) => {
             const ratio = devicePixelRatio;
             const pen = document.getElementById("map").getContext("2d");
@@ -68,15 +71,16 @@ def watched_page(
     scheme: Scheme = "light",
     size: tuple[int, int] = (1280, 800),
     reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
-) -> Iterator[Watched]:
+) -> Iterator[WatchedPage]:
+    """Open the page, wait until its stream is live, and close it at the end. size: CSS pixels."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion=reduced_motion
     )
-    watched = Watched(context.new_page())
+    watched = WatchedPage(context.new_page())
     page = watched.page
     page.on("request", lambda request: watched.origins.add("/".join(request.url.split("/", 3)[:3])))
-    page.on("pageerror", lambda error: watched.complaints.append(str(error)))
-    page.on("console", lambda said: watched.complaints.append(said.text) if said.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: watched.errors.append(str(error)))
+    page.on("console", lambda line: watched.errors.append(line.text) if line.type in ("error", "warning") else None)
     page.goto(url)
     watched.wait_for("window.dropanchor?.status() === 'live'")
     yield watched

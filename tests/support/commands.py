@@ -1,4 +1,4 @@
-"""Programs of ours in processes of their own."""
+"""Run Python programs of this repository in processes of their own."""
 
 import os
 import subprocess
@@ -10,14 +10,14 @@ _PACKAGES = os.pathsep.join(str(_ROOT / name) for name in ("schemas", "tag_clien
 
 
 def environment() -> dict[str, str]:
-    """The environment of this process, with our packages importable from the checkout."""
+    """Return the environment of this process, with the packages of the checkout on the import path."""
     return os.environ | {"PYTHONPATH": _PACKAGES}
 
 
 def python(
     *arguments: str, text_input: str | None = None, timeout_s: float = 240.0
 ) -> subprocess.CompletedProcess[str]:
-    """Runs `python ARGUMENTS` to its end."""
+    """Run `python ARGUMENTS` until it exits."""
     return subprocess.run(
         [sys.executable, *arguments],
         input=text_input,
@@ -30,7 +30,7 @@ def python(
 
 
 def start_python(*arguments: str) -> subprocess.Popen[str]:
-    """Starts `python ARGUMENTS`; the caller ends it."""
+    """Start `python ARGUMENTS`. The caller ends it."""
     return subprocess.Popen(
         [sys.executable, *arguments],
         stdin=subprocess.PIPE,

@@ -15,13 +15,13 @@ START_NS = 1_700_000_000_000_000_000
 
 
 def nanoseconds(t: Array) -> Array:
-    """s since START_NS to ns."""
+    """Convert s since START_NS to ns."""
     return START_NS + np.round(t * 1e9).astype(np.int64)
 
 
 @njit
 def drive(f: Any, t: Array, acc: Array, gyro: Array, mag: Array, ends: Array, nodes: Array) -> None:
-    """Samples up to each end, then a node; the samples after the last end are fed too."""
+    """Feed the samples up to each end and close a node there. Then feed the samples after the last end."""
     k = 0
     for e in range(len(ends)):
         while k < len(t) and t[k] <= ends[e]:
@@ -34,14 +34,14 @@ def drive(f: Any, t: Array, acc: Array, gyro: Array, mag: Array, ends: Array, no
 
 
 def new_frontend(hard_iron: float = 1.0, declination: float = 0.0) -> Array:
-    """One row."""
+    """Return a front-end with one row."""
     rows = np.zeros(1, FRONTEND)
     start_frontend(rows[0], hard_iron, declination)
     return rows
 
 
 def run(rows: Array, m: Motion, ends: Array) -> Array:
-    """NODE at ends (s)."""
+    """Feed a motion to the front-end and return its nodes at the times `ends` (n,) in s; (n,) NODE."""
     nodes = np.zeros(len(ends), NODE)
     columns = [np.ascontiguousarray(c) for c in (m.acc, m.gyro, m.mag)]
     drive(rows[0], nanoseconds(m.t), *columns, nanoseconds(ends), nodes)

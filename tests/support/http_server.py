@@ -1,4 +1,4 @@
-"""The real HTTP server on loopback, in a thread."""
+"""Run the real HTTP server on loopback, in a thread."""
 
 import asyncio
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from dropanchor_service.api.http.server import build_server, listen
 
 @contextmanager
 def running_server(app: ASGIApp, stopping: Event, port: int = 0) -> Iterator[int]:
-    """The port at which the app answers."""
+    """Serve the app on loopback until the block ends. Yield the port."""
     socket = listen("127.0.0.1", port)
     server = build_server(app, stopping)
     thread = Thread(target=lambda: asyncio.run(server.serve(sockets=[socket])))

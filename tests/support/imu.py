@@ -1,16 +1,16 @@
-"""IMU samples of a known motion, and of the recordings with ground truth, for tests of the estimation."""
+"""IMU samples of a known motion and of recordings with ground truth, for tests of the estimators."""
 
 import gzip
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
+
+from support.recordings import recording_or_skip
 
 Array = NDArray[Any]
 G0 = 9.80665
@@ -18,7 +18,7 @@ G0 = 9.80665
 
 @dataclass
 class Motion:
-    """Samples (n, 3) at t (n,) s in body axes, and the body -> ENU attitude they belong to."""
+    """Samples (n, 3) in body axes at the times t (n,) in s, and the true attitudes (ENU from body)."""
 
     t: Array
     acc: Array
@@ -27,13 +27,13 @@ class Motion:
     attitude: Rotation
 
     def at(self, index: Array) -> "Motion":
-        """Some of the samples: a mask or indices."""
+        """Return the samples that a mask or an array of indices selects."""
         columns = self.t[index], self.acc[index], self.gyro[index], self.mag[index]
         return Motion(*columns, attitude=self.attitude[index])
 
     @property
     def yaw(self) -> Array:
-        """(n,) rad, azimuth of the body x axis."""
+        """Azimuth of the body x axis, (n,) rad."""
         x = self.attitude.apply([1.0, 0.0, 0.0])
         return np.asarray(np.arctan2(x[:, 1], x[:, 0]))
 
@@ -44,7 +44,11 @@ def synthesise(
     acceleration: Callable[[Array], Array] | None = None,
     field: tuple[float, float, float] = (0.0, 0.4, -0.9),
 ) -> Motion:
-    """Perfect samples of yaw, pitch, roll = angles(t) (n, 3) rad and an ENU acceleration (n, 3) m/s²."""
+    """Return noise-free samples of a motion.
+
+    angles: yaw, pitch and roll at the times (n, 3), rad. acceleration: in ENU (n, 3), m/s²; None: at rest or constant
+    speed. field: the magnetic field in ENU, in any unit.
+    """
 
     def attitude(at: Array) -> Rotation:
         return Rotation.from_euler("ZYX", angles(at))
@@ -59,28 +63,28 @@ def synthesise(
 
 
 def turning(t: Array, rate: float = 0.6, tilt: float = 0.15) -> Array:
-    """Yaw, pitch, roll of a body that circles and sways."""
+    """Return yaw, pitch and roll (n, 3) in rad of a body that circles at `rate` rad/s and sways by `tilt` rad."""
     return np.stack([rate * t, tilt * np.sin(1.3 * t), 0.7 * tilt * np.sin(0.9 * t + 1)], axis=1)
 
 
 def wrapped(angle: Array) -> Array:
-    """In [-pi, pi)."""
+    """Return the angle in [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 @dataclass
 class Recording:
-    """imu (n, 10): t_s, acc, gyro, mag (NaN: none); truth columns by name."""
+    """imu: time in s, acc, gyro and mag (n, 10), NaN without a magnetometer. truth: columns by name."""
 
     imu: Array
     truth: dict[str, Array]
 
     def yaw_at(self, t: Array) -> Array:
-        """rad, interpolated without a jump at pi."""
+        """Return the true yaw in rad, interpolated without a jump at pi."""
         return np.interp(t, self.truth["t_s"], np.unwrap(self.truth["yaw_rad"]))
 
     def speed_at(self, t: Array) -> Array:
-        """m/s over 0.4 s."""
+        """Return the true speed in m/s, from the distance covered within 0.4 s around each time."""
         moved = [
             np.interp(t + 0.2, self.truth["t_s"], self.truth[c]) - np.interp(t - 0.2, self.truth["t_s"], self.truth[c])
             for c in "xy"
@@ -89,7 +93,7 @@ class Recording:
 
 
 def read_columns(path: Path) -> dict[str, Array]:
-    """A gzipped CSV of numbers by column."""
+    """Read a gzipped CSV file of numbers into columns by name."""
     with gzip.open(path, "rt") as lines:
         names = lines.readline().strip().split(",")
         table = np.loadtxt(lines, delimiter=",")
@@ -97,11 +101,8 @@ def read_columns(path: Path) -> dict[str, Array]:
 
 
 def recording(name: str) -> Recording:
-    """The recording, or a skip that says where it was looked for."""
-    default = Path(__file__).parents[3] / "shared" / "data"
-    folder = Path(os.environ.get("DROPANCHOR_DATA", default)) / name
-    if not (folder / "imu.csv.gz").exists():
-        pytest.skip(f"no recording {name} in {folder.parent}")
+    """Read the IMU samples and the ground truth of a recording. Skip the test where it is missing."""
+    folder = recording_or_skip(name)
     columns = read_columns(folder / "imu.csv.gz")
     nothing = np.full(len(columns["t_s"]), np.nan)
     names = ["t_s", "ax", "ay", "az", "gx", "gy", "gz", "mx", "my", "mz"]

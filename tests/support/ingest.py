@@ -1,4 +1,4 @@
-"""An ingest without threads and network, around an engine whose poses are easy to foresee."""
+"""The ingest without threads or network, around an engine whose poses are easy to predict."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTab
 
 @dataclass
 class TransparentEngine:
-    """A pose per range: x is the range. Fails for the rows that a test poisons."""
+    """Return one pose per range, whose x is the range. Raise an error for the samples that `poisoned` selects."""
 
     name: str = "transparent"
     anchors: Array | None = None
@@ -43,7 +43,7 @@ class TransparentEngine:
 
     def process(self, samples: SampleBatch) -> PoseBatch:
         if self.poisoned(samples):
-            raise FloatingPointError("poison")
+            raise FloatingPointError("injected by the test")
         assert {*samples.ranges["row"].tolist(), *samples.imu["row"].tolist()} <= set(self.configured)
         self.batches.append(samples)
         poses = np.zeros(len(samples.ranges), POSE)
@@ -53,8 +53,11 @@ class TransparentEngine:
         return PoseBatch(poses=poses)
 
 
-class Bench:
-    """What a service has between Zenoh and the store."""
+class IngestBench:
+    """The part of a service between Zenoh and the store.
+
+    engine: used in place of the `TransparentEngine` in `self.engine`. options: settings by key.
+    """
 
     def __init__(
         self,
@@ -74,12 +77,12 @@ class Bench:
         self.pending_tags = PendingTags(settings.max_tags)
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
-        self.estimators = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
+        self.guarded_engine = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
         self.publishers = Publishers()
         self.ingest = Ingest(
             self.buffer,
             Admission(settings, self.site, self.tags, self.pending_tags),
-            self.estimators,
+            self.guarded_engine,
             self.publishers,
             self.site,
             self.tags,
@@ -88,20 +91,23 @@ class Bench:
             self.clock,
         )
 
-    def whole_state(self) -> ServiceState:
-        return ServiceState(self.site, self.tags, self.latest, self.estimators, self.publishers)
+    def service_state(self) -> ServiceState:
+        """Return what a checkpoint of this service holds."""
+        return ServiceState(self.site, self.tags, self.latest, self.guarded_engine, self.publishers)
 
     def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
+        """Append a message to the buffer. at_ns: when it arrived, UTC; 0: now."""
         data = encode_packed(payload) if isinstance(payload, Frame) else payload
         self.buffer.append(samples_key("default", tag), data, encoding, at_ns or self.clock.now_ns())
 
     def send(self, tag: str, *payloads: bytes | Frame) -> None:
+        """Append messages of a tag and run one turn."""
         for payload in payloads:
             self.put(tag, payload)
         self.ingest.turn()
 
     def rejected(self) -> dict[str, float]:
-        """All counters of rejections that are not zero."""
+        """Return the rejections by reason, without zeros."""
         return {s.labels["reason"]: s.value for s in _totals(self.metrics.rejected) if s.value}
 
     def total(self, counter: Counter, **labels: str) -> float:
@@ -109,6 +115,7 @@ class Bench:
         return sum(s.value for s in _totals(counter) if labels.items() <= s.labels.items())
 
     def x_of(self, tags: Sequence[str]) -> list[float | None]:
+        """Return x of the latest pose of each tag; None for a tag without a pose."""
         rows = [self.tags.find(tag) for tag in tags]
         poses = [None if tag is None else self.latest.row(tag.row) for tag in rows]
         return [None if pose is None else float(pose["x"]) for pose in poses]

@@ -1,7 +1,7 @@
-"""A compile cache that knows all sources.
+"""A numba cache that depends on all sources.
 
-numba looks only at the file of the outermost kernel: after a change in a file that kernel calls into, it would go on
-running the old code. So the cache's place is named after the sources. Takes effect before numba is imported.
+numba checks only the file of the outermost kernel. After a change in a file that the kernel calls, numba would still
+run the old code. So the folder of the cache is named after a digest of the sources. Set it before numba is imported.
 """
 
 import fcntl
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def use_cache_of_these_sources() -> None:
-    """Set NUMBA_CACHE_DIR, for this process and its children, unless somebody has."""
+    """Set NUMBA_CACHE_DIR for this process and its children, unless it is set already."""
     package = ROOT / "service" / "dropanchor_service"
     sources = [
         source
@@ -33,8 +33,7 @@ def use_cache_of_these_sources() -> None:
 
 @functools.cache
 def compile_once() -> None:
-    """Fill the cache, for services that are started with a limit on the time they may take. Of several processes one
-    does it, and the others wait."""
+    """Fill the cache, so that a service can start within a time limit. One process compiles while the others wait."""
     folder = Path(os.environ["NUMBA_CACHE_DIR"])
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "lock").open("w") as lock:

@@ -1,4 +1,4 @@
-"""What a subscriber hears of the samples of a site."""
+"""Subscribers to the samples of a site."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,14 +11,14 @@ from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed, paylo
 from support.zenoh_router import connected_session
 
 
-class Heard:
-    """The frames that a subscriber receives."""
+class ReceivedFrames:
+    """The frames that a subscriber received, and the key of each."""
 
     def __init__(self) -> None:
         self.frames: list[Frame] = []
         self.keys: list[str] = []
 
-    def take(self, message: zenoh.Sample) -> None:
+    def on_message(self, message: zenoh.Sample) -> None:
         packed = payload_encoding(str(message.encoding)) == ENCODING_PACKED
         frame = (decode_packed if packed else decode_json)(bytes(message.payload))
         assert isinstance(frame, Frame), frame
@@ -26,28 +26,29 @@ class Heard:
         self.keys.append(str(message.key_expr))
 
     def ranges(self) -> list[float]:
+        """Return all received ranges in m."""
         return [sample.range_m for frame in self.frames for sample in frame.ranges]
 
 
 @contextmanager
-def listening(endpoint: str, site: str = "default") -> Iterator[Heard]:
-    """A plain subscriber to all tags of the site."""
-    heard = Heard()
+def listening(endpoint: str, site: str = "default") -> Iterator[ReceivedFrames]:
+    """Subscribe to the samples of all tags of the site."""
+    received = ReceivedFrames()
     everything = keys.all_tags(site, "samples")
-    with connected_session(endpoint) as session, session.declare_subscriber(everything, heard.take):
-        list(session.get("nobody/answers", timeout=1.0))  # a round trip: the router knows of the subscription
-        yield heard
+    with connected_session(endpoint) as session, session.declare_subscriber(everything, received.on_message):
+        list(session.get("nobody/answers", timeout=1.0))  # after this round trip the router knows the subscription
+        yield received
 
 
 @contextmanager
-def listening_with_recovery(endpoint: str, site: str = "default") -> Iterator[Heard]:
-    """A subscriber that asks the tags for what it missed."""
-    heard = Heard()
+def listening_with_recovery(endpoint: str, site: str = "default") -> Iterator[ReceivedFrames]:
+    """Subscribe to the samples of all tags of the site, and recover missed messages from the caches of the tags."""
+    received = ReceivedFrames()
     recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
     everything = keys.all_tags(site, "samples")
     with (
         connected_session(endpoint) as session,
-        zenoh.ext.declare_advanced_subscriber(session, everything, heard.take, recovery=recovery),
+        zenoh.ext.declare_advanced_subscriber(session, everything, received.on_message, recovery=recovery),
     ):
         list(session.get("nobody/answers", timeout=1.0))
-        yield heard
+        yield received

@@ -1,4 +1,4 @@
-"""Simulated tags that publish in real time, whatever happens to whom they publish to, and what should come of it."""
+"""Simulated tags that publish in real time while their router or service fails, and the poses to expect of them."""
 
 import json
 import time
@@ -19,15 +19,15 @@ from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_poses, tag_name
 from dropanchor_tag_client.simulator.sensors import preset
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.service import Running
 
 
 class LiveTags:
-    """Tags of the yard with known starts, published from when it is opened until `finish`.
+    """Tags of the scenario "yard" with known starts that publish from `start` until `finish`.
 
-    boot_clock: their clocks count from half an hour earlier.
-    samples: published so far, by tag and kind.
+    boot_clock: their clocks count from half an hour before the start.
+    samples: number of samples published so far, by tag and kind.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class LiveTags:
         self.samples: dict[str, Counter[str]] = defaultdict(Counter)
 
     def write_settings(self, folder: Path, *more: str) -> Path:
-        """A settings file that knows the anchor and where each tag starts; more: lines at its top."""
+        """Write a settings file with the anchor and the start of each tag. more: further lines at its top."""
         lines = ['engine = "fleet"', *more, "[[site.anchors]]", 'id = "1"']
         for index, pose in enumerate(start_poses(self._tags, self._seed)):
             start = f"{{ x = {pose.x}, y = {pose.y}, heading_rad = {pose.heading_rad} }}"
@@ -66,6 +66,7 @@ class LiveTags:
         return self
 
     def start(self) -> None:
+        """Open a client per tag, and begin to publish 0.2 s from now."""
         self._opened = [
             self._clients.enter_context(
                 TagClient(
@@ -93,14 +94,14 @@ class LiveTags:
         self._clients.close()
 
     def finish(self) -> None:
-        """No more samples; the tags stay there."""
+        """Stop publishing. The clients and their caches stay open."""
         self._stop.set()
         self._thread.join()
 
     def expected(self, config: Path) -> dict[str, Any]:
-        """POSE by tag, after all that was published, of a run that nothing interrupted."""
+        """Return the last pose by tag (POSE) of an uninterrupted service that received all published samples."""
         settings = load_settings(config, environment={})
-        bench = Bench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
+        bench = IngestBench(engine=create_engine(settings), site=settings.site, tags=settings.tags)
         for together in batched_by_tag(islice(self._deliveries(), self._sent)):
             for delivery in together:
                 bench.put(tag_name(delivery.tag), Frame(imu=delivery.imu, ranges=delivery.ranges))
@@ -114,7 +115,7 @@ class LiveTags:
     def _run(self) -> None:
         every = self._deliveries()
         while not self._stop.is_set():
-            delivery = next(every)  # one message each
+            delivery = next(every)  # one message
             self._stop.wait(max(0.0, self._t0_ns * 1e-9 + delivery.due_s - time.time()))
             self._publish(delivery)
 
@@ -122,15 +123,15 @@ class LiveTags:
         client = self._opened[delivery.tag]
         for imu in delivery.imu:
             client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns - self._booted_ns)
-        for heard in delivery.ranges:
-            client.publish_range(heard.anchor, heard.range_m, t_ns=heard.t_ns - self._booted_ns, std_m=heard.std_m)
+        for sample in delivery.ranges:
+            client.publish_range(sample.anchor, sample.range_m, t_ns=sample.t_ns - self._booted_ns, std_m=sample.std_m)
         client.flush()
         self._sent += 1
         self.samples[tag_name(delivery.tag)].update(imu=len(delivery.imu), range=len(delivery.ranges))
 
 
 def batched_by_tag(every: Iterable[Delivery]) -> Iterator[list[Delivery]]:
-    """Side by side as long as no tag comes twice."""
+    """Group consecutive deliveries, so that no group has two of one tag."""
     together: dict[int, Delivery] = {}
     for delivery in every:
         if delivery.tag in together:
@@ -141,17 +142,17 @@ def batched_by_tag(every: Iterable[Delivery]) -> Iterator[list[Delivery]]:
 
 
 def distance(pose: Any, answer: dict[str, Any]) -> float:
-    """m, between POSE (0-d) and a pose as REST gives it."""
+    """Return the distance in m between a pose (one POSE) and a pose of the REST API."""
     return float(np.hypot(pose["x"] - answer["x"], pose["y"] - answer["y"]))
 
 
 def samples_of(service: Running) -> dict[str, dict[str, int]]:
-    """Samples that reached the estimators, by tag and kind."""
+    """Return the number of samples that reached the estimators, by tag and kind."""
     return {status["tag"]: status["samples"] for status in service.get("/api/v1/tags")["tags"]}
 
 
 def is_current(service: Running, tags: int) -> bool:
-    """Whether so many tags have a pose, and none that is older than half a second."""
-    time.sleep(0.05)  # asking is work too
+    """Return whether `tags` tags have a pose, all of them younger than 0.5 s."""
+    time.sleep(0.05)  # limits the load that polling puts on the service
     poses = service.get("/api/v1/poses")["poses"]
     return len(poses) == tags and max(pose["age_s"] for pose in poses) < 0.5

@@ -1,6 +1,6 @@
-"""Two hosts on this machine, a network namespace beside our own, and a link between them that loses packets.
+"""A second host as a network namespace on this machine, and a link to it that loses packets.
 
-The link is this process: it carries the packets of two TUN devices, or does not. Kernels without `netem` can do it.
+This process is the link: it forwards or drops the packets between two TUN devices. It works without `netem`.
 """
 
 import fcntl
@@ -16,15 +16,15 @@ from threading import Event, Thread
 
 import pytest
 
-_NETWORK = IPv4Address("198.18.0.0")  # for tests between devices, RFC 2544: 2**17 addresses
+_NETWORK = IPv4Address("198.18.0.0")  # reserved for tests between devices (RFC 2544): 2**17 addresses
 _TUNSETIFF = 0x400454CA
 _TUN_WITHOUT_HEADER = 0x1001
 _MTU = 1500
 
 
 class LossyLink:
-    """here, there: the addresses of the two hosts, of this process alone. loss: the share of packets that are lost from
-    now on, each way. carried, lost: packets so far."""
+    """here, there: addresses of the two hosts; each process has its own pair. loss: share of packets to drop from now
+    on, in each direction. carried, lost: number of packets so far."""
 
     def __init__(self, namespace: str) -> None:
         self.namespace = namespace
@@ -34,10 +34,11 @@ class LossyLink:
         self.carried = self.lost = 0
 
     def elsewhere(self, *command: str) -> list[str]:
-        """The command, for the other host."""
+        """Return the command line that runs the command on the other host."""
         return ["ip", "netns", "exec", self.namespace, *command]
 
     def forward(self, devices: tuple[int, int], stop: Event) -> None:
+        """Forward packets between the two devices until `stop` is set."""
         chance = random.Random(15)
         here, there = devices
         while not stop.is_set():
@@ -52,9 +53,9 @@ class LossyLink:
 
 @contextmanager
 def lossy_link() -> Iterator[LossyLink]:
-    """Skips the test where no namespace can be made."""
+    """Make the second host and the link to it, and remove both at the end. Skip the test where that is not possible."""
     if os.geteuid() != 0:
-        pytest.skip("network namespaces need root")
+        pytest.skip("this test makes a network namespace and must run as root")
     name = f"dropanchor-{os.getpid()}"
     with ExitStack() as made:
         try:
@@ -62,7 +63,7 @@ def lossy_link() -> Iterator[LossyLink]:
             made.callback(_ip, "netns", "del", name)
             devices = _device(f"da{os.getpid()}"), _device(f"db{os.getpid()}")
         except (OSError, subprocess.CalledProcessError) as error:
-            pytest.skip(f"no network namespace or TUN device can be made here: {error}")
+            pytest.skip(f"this system does not allow a network namespace or a TUN device: {error}")
         for device in devices:
             made.callback(os.close, device)
         link, stop = LossyLink(name), Event()

@@ -1,4 +1,4 @@
-"""Strategies for real frames, their payloads, and payloads gone wrong."""
+"""Hypothesis strategies for valid frames, their payloads, and damaged payloads."""
 
 import math
 
@@ -28,7 +28,7 @@ anchors = st.one_of(u32, names.map(anchor_number))
 
 @st.composite
 def frames(draw: st.DrawFn) -> Frame:
-    """A frame with at least one sample, as a tag would make it."""
+    """Draw a frame with at least one sample, as a tag would send it."""
     frame = Frame(
         imu=draw(st.lists(st.builds(ImuSample, times, vectors, vectors, st.one_of(st.none(), vectors)), max_size=4)),
         ranges=draw(st.lists(st.builds(RangeSample, times, anchors, values, stds), max_size=4)),
@@ -49,7 +49,7 @@ payloads = st.one_of(frames().map(encode_packed), frames().map(encode_json))
 
 @st.composite
 def mutated_payloads(draw: st.DrawFn) -> bytes:
-    """A real payload with flipped bits, cut off, or with a piece of another one put in."""
+    """Draw a valid payload and flip bits, cut off its end, splice in a piece of another one, or repeat it."""
     payload = bytearray(draw(payloads))
     match draw(st.sampled_from(["flip", "cut", "splice", "repeat"])):
         case "flip":

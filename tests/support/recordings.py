@@ -1,4 +1,4 @@
-"""Where the recordings with ground truth are, and a small recording of our own."""
+"""Find the recordings with ground truth, and write a small synthetic one."""
 
 import math
 import os
@@ -10,15 +10,24 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def recording_or_skip(name: str) -> Path:
-    """The folder of a recording; the test is skipped, with the reason printed, where it is missing."""
+    """Return the folder of a recording with ground truth. Skip the test where it is missing.
+
+    The recordings lie in the folder DROPANCHOR_DATA, or in `../shared/data` beside the checkout.
+    """
     folder = Path(os.environ.get("DROPANCHOR_DATA", ROOT / ".." / "shared" / "data")) / name
     if not folder.is_dir():
-        pytest.skip(f"the recording {name} is not here; put it there or set DROPANCHOR_DATA")
+        pytest.skip(
+            f"{folder} does not exist: put the recording {name} there, or set DROPANCHOR_DATA to the folder that has it"
+        )
     return folder
 
 
 def write_square(folder: Path, range_std_m: float = 0.0) -> Path:
-    """A tag drives 1 m/s round a square beside anchor A at (2, -3): 10 Hz ranges, 20 Hz headings, the truth."""
+    """Write the recording of a tag that drives round a square beside anchor A at (2, -3), and return its folder.
+
+    It lasts 60 s and has 10 Hz ranges, 20 Hz headings and the ground truth; the speed is 1 m/s.
+    range_std_m: noise of the ranges.
+    """
     ranges, headings, truth = ["t_s,anchor_id,range_m"], ["t_s,yaw_rad"], ["t_s,x,y,z,yaw_rad"]
     x, y, yaw = 10.0, 0.0, math.pi / 2
     for step in range(1200):

@@ -1,4 +1,4 @@
-"""Credentials of a site, a router that asks for them, and sessions that have some."""
+"""A secured site: its credentials, a router that demands them, and sessions that have them."""
 
 import json
 from collections.abc import Iterator
@@ -14,13 +14,14 @@ from support.zenoh_router import free_port
 
 @dataclass
 class SecuredSite:
-    """What `dropanchor security init` and `dropanchor tag add` made."""
+    """The folder that `dropanchor security init` and `dropanchor tag add` make, and the endpoint of its router."""
 
     folder: SecurityFolder
     endpoint: str
 
     @contextmanager
     def router(self, access_control: bool = True) -> Iterator[None]:
+        """Run the router of the site until the block ends."""
         configuration = self.folder.router_configuration()
         if not access_control:
             del configuration["access_control"]
@@ -28,12 +29,12 @@ class SecuredSite:
             yield
 
     @contextmanager
-    def session(self, who: str) -> Iterator[zenoh.Session]:
-        """As `service`, `reader`, or the tag of that name."""
+    def session(self, name: str) -> Iterator[zenoh.Session]:
+        """Open a session as `service`, as `reader`, or as the tag of that name."""
         path = self.folder.path
-        is_tag = who in self.folder.table.tags
+        is_tag = name in self.folder.table.tags
         cert, key = (
-            self.folder.bundle(who) / f"tag.{end}" if is_tag else path / f"{who}.{end}" for end in ("pem", "key")
+            self.folder.bundle(name) / f"tag.{end}" if is_tag else path / f"{name}.{end}" for end in ("pem", "key")
         )
         tls = {
             "root_ca_certificate": str(path / "ca.pem"),
@@ -54,6 +55,10 @@ class SecuredSite:
 def secured_site(
     path: Path, *tags: str, site: str = "default", host: str = "localhost", address: str = "127.0.0.1"
 ) -> SecuredSite:
+    """Make the credentials of a site with these tags.
+
+    host: name in the certificates. address: where the router listens.
+    """
     port = free_port()
     table = Table(site=site, hosts=(host, "127.0.0.1"), listen=(f"tls/{address}:{port}",))
     folder = SecurityFolder.make(path, table, days=30)

@@ -1,4 +1,4 @@
-"""The service in a process of its own, found by what it logs."""
+"""Run the service in a process of its own. Its address is read from its log."""
 
 import json
 import os
@@ -27,8 +27,11 @@ S = 1_000_000_000
 
 @dataclass
 class Running:
-    """A service that runs, since `began_s` (monotonic). log: its lines on stderr so far. ca: of whoever signed its
-    certificate."""
+    """A running service.
+
+    zenoh: its Zenoh endpoint. log: lines on stderr so far. began_s: start of the process, monotonic.
+    ca: certificate of the authority that signed its own.
+    """
 
     process: subprocess.Popen[str]
     zenoh: str
@@ -49,12 +52,13 @@ class Running:
         httpx.put(f"{self.url}{path}", json=body, timeout=60.0).raise_for_status()
 
     def metric(self, sample: str) -> float:
-        """The value of one sample, such as `dropanchor_samples_total{kind="imu"}`."""
+        """Return the value of a metric, such as `dropanchor_samples_total{kind="imu"}`; 0 if it is missing."""
         text = httpx.get(f"{self.url}/metrics", timeout=60.0).text
         found = re.search(rf"^{re.escape(sample)} (\S+)$", text, re.MULTILINE)
         return float(found[1]) if found else 0.0
 
     def stop(self, how: signal.Signals = signal.SIGTERM, timeout_s: float = 60.0) -> int:
+        """Send a signal, wait until the process ends, and return its exit code."""
         self.process.send_signal(how)
         return self.process.wait(timeout_s)
 
@@ -64,7 +68,7 @@ def command(*arguments: str) -> list[str]:
 
 
 def environment(**more: str) -> dict[str, str]:
-    """Ours alone: no setting of whoever runs the tests gets in."""
+    """Return this process's environment without its Dropanchor settings, with our packages and these variables."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("DROPANCHOR_")}
     packages = os.pathsep.join(str(ROOT / name) for name in ("schemas", "tag_client", "service"))
     return clean | {"PYTHONPATH": packages} | more
@@ -78,7 +82,7 @@ def running_service(
     subcommand: str = "serve",
     ca: Path | None = None,
 ) -> Iterator[Running]:
-    """`dropanchor serve` on free ports, ended at the end. ready: wait until it can do its work."""
+    """Run `dropanchor serve` on free ports until the block ends. ready: wait until it reports that it is ready."""
     compile_once()
     zenoh = endpoint or free_endpoint()
     listening = () if any("--zenoh" in argument for argument in arguments) else ("--zenoh-listen", zenoh)
@@ -90,7 +94,7 @@ def running_service(
     reader = Thread(target=_read, args=(running,), daemon=True)
     reader.start()
     try:
-        wait_until(lambda: running.url or process.poll() is not None, 240.0)  # the first start of the fleet compiles it
+        wait_until(lambda: running.url or process.poll() is not None, 240.0)  # the first start compiles the engine
         assert running.url, "".join(running.log)
         if ready:
             wait_until(lambda: running.ask("GET", "/api/v1/health/ready").status_code == 200)
@@ -106,7 +110,7 @@ def running_service(
 
 @contextmanager
 def running_router(*arguments: str) -> Iterator[None]:
-    """`dropanchor router`, ended at the end."""
+    """Run `dropanchor router` until the block ends."""
     words = command("router", *arguments)
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment()) as process:
         try:
@@ -128,7 +132,10 @@ def _read(running: Running) -> None:
 
 
 def settings_file(folder: Path, tags: Sequence[str], text: str = "") -> Path:
-    """A site with anchor 7 at the origin, and tags that start at (10, -20) and look north."""
+    """Write settings with anchor 7 at the origin, and with tags that start at (10, -20) and head north.
+
+    text: further settings for the top of the file.
+    """
     start = "start = { x = 10.0, y = -20.0, heading_rad = 1.5707963 }"
     tables = "\n".join(f"[tags.{json.dumps(tag)}]\n{start}" for tag in tags)
     file = folder / "dropanchor.toml"
@@ -137,8 +144,10 @@ def settings_file(folder: Path, tags: Sequence[str], text: str = "") -> Path:
 
 
 def straight_north(count: int, t_ns: int | None = None, speed_mps: float = 1.0) -> Frame:
-    """Perfect samples of a tag that goes north from (10, -20): a range every 0.1 s with a heading and an IMU sample.
-    The last one is of now, or of `t_ns`."""
+    """Return noise-free samples of a tag that goes north from (10, -20).
+
+    There are `count` ranges, 0.1 s apart, each with a heading and an IMU sample. The last one is of `t_ns`, or of now.
+    """
     end_ns = time.time_ns() if t_ns is None else t_ns
     times = [end_ns - (count - 1 - i) * S // 10 for i in range(count)]
     distances = [(100.0 + (speed_mps * 0.1 * i - 20.0) ** 2) ** 0.5 for i in range(count)]

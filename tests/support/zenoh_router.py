@@ -1,4 +1,4 @@
-"""Real Zenoh routers on loopback, for tests."""
+"""Run real Zenoh routers on loopback, and wait for conditions."""
 
 import functools
 import itertools
@@ -25,16 +25,16 @@ with zenoh.open(zenoh.Config.from_json5(sys.argv[1])):
 
 @functools.cache
 def _ports() -> Iterator[int]:
-    """Of this process alone: below those that the kernel gives to whoever asks for any, and shared out by worker."""
+    """Yield candidate ports. They lie below the kernel's ephemeral ports, and each test worker has its own."""
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
     ports = range(10_000, 32_000)[worker::workers]
-    begin = random.randrange(len(ports))  # another run on this machine begins elsewhere
+    begin = random.randrange(len(ports))  # so that two test runs on one machine rarely collide
     return itertools.cycle((*ports[begin:], *ports[:begin]))
 
 
 def free_port() -> int:
-    """A port on loopback that nobody uses, and that nobody else is given before it is used."""
+    """Return a free port on loopback that no other caller in this test run gets."""
     return next(port for port in _ports() if _is_free(port))
 
 
@@ -50,7 +50,7 @@ def free_endpoint() -> str:
 
 
 def configuration(mode: str, endpoints: list[str], extra: dict[str, Any] | None = None) -> str:
-    """JSON5 of a router that listens at the endpoints, or of a client that connects to one of them."""
+    """Return the JSON5 of a router that listens at the endpoints, or of a client that connects to one of them."""
     retry = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
     connect = {"endpoints": endpoints, "timeout_ms": 5000, "exit_on_failure": True, "retry": retry}
     role = {"listen": {"endpoints": endpoints}} if mode == "router" else {"connect": connect}
@@ -62,7 +62,7 @@ def configuration(mode: str, endpoints: list[str], extra: dict[str, Any] | None 
 
 @contextmanager
 def running_router(endpoints: str | list[str], extra: dict[str, Any] | None = None) -> Iterator[zenoh.Session]:
-    """A router inside this process, closed at the end. `extra` goes into its transport section."""
+    """Run a router inside this process until the block ends. extra: for the transport section of its configuration."""
     listed = [endpoints] if isinstance(endpoints, str) else endpoints
     with zenoh.open(zenoh.Config.from_json5(configuration("router", listed, extra))) as session:
         yield session
@@ -70,13 +70,13 @@ def running_router(endpoints: str | list[str], extra: dict[str, Any] | None = No
 
 @contextmanager
 def connected_session(endpoint: str) -> Iterator[zenoh.Session]:
-    """A client session, closed at the end."""
+    """Open a client session until the block ends."""
     with zenoh.open(zenoh.Config.from_json5(configuration("client", [endpoint]))) as session:
         yield session
 
 
 def start_router_process(endpoint: str) -> subprocess.Popen[str]:
-    """A router in a process of its own, so that it can be killed. The caller ends it."""
+    """Start a router in a process of its own, which a test can kill. The caller ends it."""
     command = [sys.executable, "-c", _ROUTER_PROGRAM, configuration("router", [endpoint])]
     process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -86,7 +86,7 @@ def start_router_process(endpoint: str) -> subprocess.Popen[str]:
 
 @contextmanager
 def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
-    """A router in a process of its own, ended at the end."""
+    """Run a router in a process of its own until the block ends."""
     router = start_router_process(endpoint)
     try:
         yield router
@@ -96,7 +96,7 @@ def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
 
 
 def wait_until(condition: Callable[[], object], timeout_s: float = 40.0) -> None:
-    """Returns when the condition has_pending; fails the test when it does not come true in time."""
+    """Wait until the condition is true. Fail the test when it is still false after `timeout_s`."""
     deadline = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < deadline, f"not within {timeout_s} s"

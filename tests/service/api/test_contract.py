@@ -16,12 +16,12 @@ from schemathesis.core.result import Ok
 from schemathesis.schemas import APIOperation
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
-from api_house import make_house
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.wire import ENCODING_PACKED
 from dropanchor_service.history.tracks import Retention
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
+from support.api import make_api_bench
 
 Operation = APIOperation[Any, Any, Any, Any]
 
@@ -44,12 +44,12 @@ FOLDER = TemporaryDirectory(prefix="dropanchor-contract-")  # deleted together w
 
 def operations() -> Iterator[Operation]:
     site, folder = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4)), Path(FOLDER.name)
-    house = make_house(site, folder, Retention(1, 0.0, 0, 10**18, 2**40))
+    house = make_api_bench(site, folder, Retention(1, 0.0, 0, 10**18, 2**40))
     limits = Limits(2**30, 10**18, 1000, 10**18, 2**40)
     house.recorder = Recorder(folder, limits, 1, house.answers.tags, house.answers.site, house.answers.now_ns, {})
     house.recorder.start()
     house.move("tag-1", "a")
-    house.keep()
+    house.write_history()
     house.recorder.record_messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
     house.recorder.writer.flush()
     house.stopping.set()  # a stream ends after its first event

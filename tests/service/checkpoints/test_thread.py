@@ -15,7 +15,7 @@ from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.ingest.thread import IngestThread
-from support.ingest import Bench, TransparentEngine
+from support.ingest import IngestBench, TransparentEngine
 from support.zenoh_router import wait_until
 
 T = 1_760_000_000_000_000_000
@@ -40,9 +40,9 @@ class CheckpointBench:
 
     def __init__(self, folder: Path) -> None:
         self.engine = RestorableEngine()
-        self.bench = Bench(engine=self.engine, folder=folder)
-        self.bench.estimators.follow_site()
-        state = self.bench.whole_state()
+        self.bench = IngestBench(engine=self.engine, folder=folder)
+        self.bench.guarded_engine.follow_site()
+        state = self.bench.service_state()
         checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
         self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, period_s=0.01)
         self.thread = IngestThread(

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from api_house import House, make_house
 from dropanchor_schemas.wire import ENCODING_PACKED
 from dropanchor_service.cli import main
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
+from support.api import ApiBench, make_api_bench
 from support.http_server import running_server
 from support.zenoh_router import free_port, wait_until
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> House:
-    house = make_house()
+def house(tmp_path: Path) -> ApiBench:
+    house = make_api_bench()
     answers = house.answers
     answers.tags.register("a")
     limits = Limits(2**30, 10**18, 1000, 10**18, 2**40)
@@ -26,7 +26,7 @@ def house(tmp_path: Path) -> House:
 
 
 @pytest.fixture
-def url(house: House) -> Iterator[str]:
+def url(house: ApiBench) -> Iterator[str]:
     with running_server(house.app(), house.stopping) as port:
         wait_until(lambda: _listens(port))
         yield f"http://127.0.0.1:{port}"
@@ -38,7 +38,7 @@ def _listens(port: int) -> bool:
 
 
 def test_a_recording_is_started_stopped_listed_and_fetched(
-    house: House, url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    house: ApiBench, url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recorder = house.recorder
     assert recorder is not None

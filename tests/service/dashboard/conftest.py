@@ -1,4 +1,4 @@
-"""A browser, and a service to look at."""
+"""A browser, and a page whose store the test fills."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.browser import running_chromium
 from support.http_server import running_server
 
@@ -19,6 +19,6 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture
 def place() -> Iterator[Place]:
-    house = live_house()
-    with running_server(house.app(DASHBOARD, endpoints=("tcp/127.0.0.1:19747",)), house.stopping) as port:
-        yield Place(house, f"http://127.0.0.1:{port}/")
+    bench = live_api_bench()
+    with running_server(bench.app(DASHBOARD, endpoints=("tcp/127.0.0.1:19747",)), bench.stopping) as port:
+        yield Place(bench, f"http://127.0.0.1:{port}/")

@@ -6,14 +6,14 @@ import { EventParser, eventsOf } from "../../../service/dropanchor_service/dashb
 const TEXT = 'event: snapshot\ndata: {"tags":["ü"]}\n\n: alive\n\nevent: poses\ndata: {}\n\n';
 const EVENTS = [{ name: "snapshot", data: '{"tags":["ü"]}' }, { name: "poses", data: "{}" }];
 
-test("events are whole wherever the text is cut", () => {
+test("events are complete wherever the text is split", () => {
   for (let cut = 0; cut <= TEXT.length; cut++) {
     const parser = new EventParser();
     assert.deepEqual([...parser.take(TEXT.slice(0, cut)), ...parser.take(TEXT.slice(cut))], EVENTS);
   }
 });
 
-test("letters are whole wherever the bytes are cut", async () => {
+test("characters are complete wherever the bytes are split", async () => {
   const bytes = new TextEncoder().encode(TEXT);
   const body = new ReadableStream({
     start(controller) {

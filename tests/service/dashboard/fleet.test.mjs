@@ -17,7 +17,7 @@ function sorted(fleet, column, descending = false) {
   return new Order().rows(fleet, () => true, { column, descending }, 0).map((row) => fleet.names[row]);
 }
 
-test("a tag that is new has a row, and nothing about it is known", () => {
+test("a new tag has a row of unknown values", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["a"], {}), 0);
   const row = fleet.row("a");
@@ -35,7 +35,7 @@ test("a frame changes only the tags that it names", () => {
   assert.equal(fleet.online[fleet.row("b")], 0);
 });
 
-test("null in a column means not known any more", () => {
+test("null in a column makes a value unknown again", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["a"], { x: [1] }), 0);
   fleet.apply(frame(["a"], { x: [null] }), 1);
@@ -52,7 +52,7 @@ test("a thousand tags keep their own values while the store grows", () => {
   }
 });
 
-test("a snapshot forgets the tags that it does not name", () => {
+test("a snapshot removes the tags that it does not name", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["a", "b", "c"], { x: [1, 2, 3] }), 0);
   fleet.replace(frame(["c", "d"], { x: [3, 4] }), 0);
@@ -61,13 +61,13 @@ test("a snapshot forgets the tags that it does not name", () => {
   assert.equal(fleet.number.x[fleet.row("d")], 4);
 });
 
-test("the age goes on while nothing comes in", () => {
+test("the age grows while no frames arrive", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["a"], { age_s: [0.5] }), 1000);
   assert.equal(fleet.age(0, 3000), 2.5);
 });
 
-test("a state that the page does not know is not believed", () => {
+test("an unknown state is not trusted", () => {
   assert.equal(STATES[stateNumber("splendid")].trusted, false);
 });
 
@@ -77,11 +77,11 @@ test("only a fresh pose in tracking is a full dot", () => {
   for (const age_s of [2.5, 60, NaN]) assert.equal(isFilled(stateNumber("tracking"), staleness(age_s)), false);
 });
 
-test("every state has a shape of its own", () => {
+test("every state has its own shape", () => {
   assert.equal(new Set(STATES.map(({ shape }) => shape)).size, STATES.length);
 });
 
-test("tags are sorted as people count, and unknown values come last in both directions", () => {
+test("names are sorted by their numbers, and unknown values come last in both directions", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["tag-10", "tag-9", "Tag-1"], { x: [3, null, -4] }), 0);
   assert.deepEqual(sorted(fleet, "tag"), ["Tag-1", "tag-9", "tag-10"]);
@@ -89,7 +89,7 @@ test("tags are sorted as people count, and unknown values come last in both dire
   assert.deepEqual(sorted(fleet, "x", true), ["tag-10", "Tag-1", "tag-9"]);
 });
 
-test("the filter takes names and states", () => {
+test("tags are filtered by name and state", () => {
   const fleet = new Fleet();
   const choice = new Choice();
   fleet.apply(frame(["Forklift-1", "cart-1"], { state: ["tracking", "lost"] }), 0);
@@ -99,10 +99,10 @@ test("the filter takes names and states", () => {
   choice.toggleState(stateNumber("tracking"));
   assert.deepEqual([choice.shows(fleet, 0), choice.shows(fleet, 1)], [false, true]);
   choice.showAll();
-  assert.ok(choice.shows(fleet, 0) && !choice.narrows);
+  assert.ok(choice.shows(fleet, 0) && !choice.isFiltered);
 });
 
-test("nothing can be followed while nothing is selected", () => {
+test("the map follows no tag while none is selected", () => {
   const choice = new Choice();
   choice.follow = true;
   assert.equal(choice.follow, false);
@@ -124,7 +124,7 @@ test("dots glide to a near pose and jump to a far one", () => {
   assert.equal(fleet.drawnX[0], 9);
 });
 
-test("with reduced motion the dots are where the poses are", () => {
+test("with reduced motion the dots jump to the poses", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["a"], { x: [0], y: [0] }), 0);
   follow(fleet, 16, false);
@@ -133,7 +133,7 @@ test("with reduced motion the dots are where the poses are", () => {
   assert.equal(fleet.drawnX[0], 0.5);
 });
 
-test("a trail holds placed poses, breaks where the place was not known, and does not grow for ever", () => {
+test("a trail holds known positions, breaks at unknown ones, and has a limited length", () => {
   const [fleet, trails] = [new Fleet(), new Trails()];
   for (let i = 0; i < 1000; i++) {
     const state = i === 990 ? "ambiguous" : i > 995 ? "degraded" : "tracking";

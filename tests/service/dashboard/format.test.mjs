@@ -10,7 +10,7 @@ function gives(format, cases) {
   for (const [value, text] of cases) assert.equal(format(value), text);
 }
 
-test("what is not known is a dash, whatever it is", () => {
+test("every unknown value is a dash", () => {
   for (const format of [age, compass, coordinate, metres, percent, sigma, turnRate]) {
     gives(format, [[NaN, "–"], [null, "–"], [undefined, "–"], [Infinity, "–"]]);
   }
@@ -25,7 +25,7 @@ test("coordinates lose decimals with distance", () => {
   gives(coordinate, [[-3.14159, "−3.14"], [123.456, "123.5"], [-9876.5, "−9877"]]);
 });
 
-test("people read a heading clockwise from north, with the compass point of the same direction", () => {
+test("a heading is shown clockwise from north, with its compass point", () => {
   gives(compass, [[0, "90° E"], [Math.PI / 2, "0° N"], [-Math.PI / 2, "180° S"], [Math.PI, "270° W"]]);
   gives(compass, [[(113 * Math.PI) / 180, "337° NNW"], [-Math.PI / 4, "135° SE"], [7 * Math.PI, "270° W"]]);
   gives(compass, [[Math.PI / 2 + 0.001, "0° N"], [Math.PI / 2 - 0.001, "0° N"], [Math.PI / 2 + 0.02, "359° N"]]);
@@ -35,11 +35,11 @@ test("a turn is to the left or to the right", () => {
   gives(turnRate, [[0.5, "29 °/s left"], [-0.5, "29 °/s right"], [0.001, "0 °/s"], [-0.001, "0 °/s"]]);
 });
 
-test("a share is never rounded up to certainty", () => {
+test("a share below one is never rounded up to 100 %", () => {
   gives(percent, [[0.624, "62 %"], [0.9996, "99.9 %"], [1, "100 %"], [0, "0 %"]]);
 });
 
-test("ages are told in the unit that a person would choose", () => {
+test("ages are shown in a suitable unit", () => {
   gives(age, [[-0.2, "0.0 s"], [0.34, "0.3 s"], [12.4, "12 s"], [120, "2 min"], [7200, "2 h"], [3 * 86400, "3 d"]]);
 });
 
@@ -47,7 +47,7 @@ test("ring distances have no needless digits", () => {
   gives(distance, [[0.05, "5 cm"], [0.30000000000000004, "0.3 m"], [20, "20 m"], [2000, "2 km"], [1500, "1.5 km"]]);
 });
 
-test("one tag is not tags", () => {
+test("a count of one has a singular noun", () => {
   assert.equal(counted(1, "tag"), "1 tag");
   assert.equal(counted(12000, "tag"), "12,000 tags");
   assert.equal(words("several_modes"), "several modes");

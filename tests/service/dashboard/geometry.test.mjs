@@ -5,7 +5,7 @@ import { distancesTo, horizontal } from "../../../service/dropanchor_service/das
 
 const square = { left: 0, right: 4, bottom: 0, top: 3 };
 
-test("the distances from inside a rectangle begin at zero", () => {
+test("inside a rectangle the smallest distance is zero", () => {
   assert.deepEqual(distancesTo(0, 0, square), [0, 5]);
 });
 
@@ -14,11 +14,11 @@ test("the distances from outside a rectangle are to its edge and to its far corn
   assert.deepEqual(distancesTo(2, -5, square), [5, Math.hypot(2, 8)]);
 });
 
-test("a slant range is longer than the distance on the map", () => {
+test("a slant range is longer than the horizontal distance", () => {
   assert.equal(horizontal(5, 3), 4);
   assert.equal(horizontal(5, -3), 4);
 });
 
-test("a range shorter than the height is straight below", () => {
+test("a range shorter than the height gives distance zero", () => {
   assert.equal(horizontal(2, 3), 0);
 });

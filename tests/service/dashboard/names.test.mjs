@@ -6,18 +6,18 @@ import { shortened } from "../../../service/dropanchor_service/dashboard/data/na
 /** Every letter is one wide. @param {string} name @param {number} room */
 const within = (name, room) => shortened(name, room, (text) => [...text].length);
 
-test("a name that has room stays as it is", () => {
+test("a name that fits is not changed", () => {
   assert.equal(within("forklift-7", 10), "forklift-7");
 });
 
-test("a name without room keeps its begin and more of its end", () => {
+test("a long name keeps its start and more of its end", () => {
   assert.equal(within("warehouse-forklift-north-17", 11), "war…orth-17");
 });
 
-test("the least that is left of a name is its last letter", () => {
+test("the shortest form of a name keeps its last letter", () => {
   assert.equal(within("forklift-7", 0), "…7");
 });
 
-test("letters of two code units are not cut in two", () => {
+test("characters of two code units are not split", () => {
   assert.equal(within("🚜🚜🚜🚜🚜🚜", 3), "…🚜🚜");
 });

@@ -1,23 +1,27 @@
-"""The real interface with the page, over a store that a test fills."""
+"""The real REST API and page over a store that the test fills."""
 
 import time
 from dataclasses import dataclass
 from typing import Any
 
-from api_house import House, make_house
 from dropanchor_schemas.site import Site
+from support.api import ApiBench, make_api_bench
 
 
 @dataclass
 class Place:
-    house: House
+    """A served page: its address, and the bench behind it."""
+
+    bench: ApiBench
     url: str
 
     def move(self, *names: str, **fields: Any) -> None:
-        self.house.move(*names, **({"t_ns": time.time_ns()} | fields))
+        """Give each named tag a new pose of now, with the given fields of POSE."""
+        self.bench.move(*names, **({"t_ns": time.time_ns()} | fields))
 
 
-def live_house(site: Site | None = None) -> House:
-    house = make_house(site)
-    house.answers.now_ns = time.time_ns
-    return house
+def live_api_bench(site: Site | None = None) -> ApiBench:
+    """Return a bench on the clock of the host."""
+    bench = make_api_bench(site)
+    bench.answers.now_ns = time.time_ns
+    return bench

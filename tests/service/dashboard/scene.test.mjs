@@ -21,7 +21,7 @@ function fleetAt(places, states = places.map(() => "tracking")) {
 /** @param {Fleet} fleet @param {number} [now_ms] @returns {any} */
 const scene = (fleet, now_ms = 0) => ({ fleet, view, rows: rowsInView(fleet, view, () => true), now_ms });
 
-test("only dots in the view are drawn, and none without a place", () => {
+test("only dots in the view are drawn, and none with an unknown position", () => {
   const fleet = fleetAt([[0, 0], [100, 0], [NaN, 0], [-19, 19]]);
   assert.deepEqual([...rowsInView(fleet, view, () => true)], [0, 3]);
   assert.deepEqual([...rowsInView(fleet, view, (row) => row !== 0)], [3]);
@@ -35,22 +35,22 @@ test("a click finds the nearest dot within reach", () => {
   assert.equal(nearest(fleet, view, rows, 300, 300, 18), -1);
 });
 
-test("dots of one state and staleness are drawn together", () => {
+test("dots are grouped by state and staleness", () => {
   const groups = alike(scene(fleetAt([[0, 0], [1, 0], [2, 0]], ["tracking", "lost", "tracking"])));
   assert.deepEqual(groups.map(({ rows }) => rows), [[0, 2], [1]]);
   assert.deepEqual(alike(scene(fleetAt([[0, 0]]), 3000)).map(({ stale }) => stale), [1]);
 });
 
-test("every tag in view is in one cell, doubtful ones apart", () => {
+test("every visible tag counts in one cell, and doubtful ones count separately", () => {
   const places = Array.from({ length: 600 }, (_, i) => [(i % 30) - 15, Math.floor(i / 30) - 10]);
   const cells = countCells(scene(fleetAt(places, places.map((_, i) => (i % 3 ? "tracking" : "degraded")))));
   const sum = (/** @type {Uint16Array} */ column) => column.reduce((total, count) => total + count, 0);
   assert.equal(sum(cells.total), 600);
   assert.equal(sum(cells.doubtful), 200);
-  assert.equal(cells.most, Math.max(...cells.total));
+  assert.equal(cells.max, Math.max(...cells.total));
 });
 
-test("a pose that has grown old is doubtful", () => {
+test("an old pose is doubtful", () => {
   const cells = countCells(scene(fleetAt([[0, 0]]), 60_000));
   assert.deepEqual([...cells.doubtful].filter(Boolean), [1]);
 });

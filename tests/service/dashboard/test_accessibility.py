@@ -1,4 +1,4 @@
-"""What axe-core, an accessibility checker, says of every view of the page."""
+"""The accessibility checker axe-core finds no violation in any view of the page."""
 
 from contextlib import ExitStack
 
@@ -8,9 +8,9 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
-from service.dashboard.place import Place, live_house
+from service.dashboard.place import Place, live_api_bench
 from support.axe import axe_source, violations
-from support.browser import Scheme, Watched, watched_page
+from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -27,10 +27,10 @@ def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
 def show_every_state(place: Place) -> None:
     names = [state.name.lower() for state in State]
     place.move(*names, x=np.arange(float(len(names))), y=1.0, state=list(State), sigma_pos=0.2, range=5.0)
-    place.house.answers.tags.register("heard")
+    place.bench.answers.tags.register("poseless")
 
 
-def is_clean(page: Watched, axe: str) -> None:
+def assert_no_violation(page: WatchedPage, axe: str) -> None:
     assert violations(page.page, axe) == []
 
 
@@ -41,7 +41,7 @@ def test_no_violation_without_a_tag(
 ) -> None:
     with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
         page.page.locator("#empty").wait_for(state="visible")
-        is_clean(page, axe)
+        assert_no_violation(page, axe)
 
 
 @light_and_dark
@@ -52,14 +52,14 @@ def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_s
     with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
         show_every_state(place)
         page.page.locator("tr[data-tag='lost']").wait_for()
-        is_clean(page, axe)
+        assert_no_violation(page, axe)
         for state in ("ambiguous", "lost", "degraded", "tracking"):
             show_every_state(place)
             page.page.locator(f"tr[data-tag='{state}']").click()
-            is_clean(page, axe)
+            assert_no_violation(page, axe)
         page.page.locator(".chip[data-state='lost']").click()
         page.page.locator("tr[data-stale='2']").first.wait_for()
-        is_clean(page, axe)
+        assert_no_violation(page, axe)
 
 
 @light_and_dark
@@ -67,14 +67,14 @@ def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_s
 def test_no_violation_after_the_connection_is_lost(
     chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:
-    house = live_house()
+    bench = live_api_bench()
     with ExitStack() as pages:
-        with running_server(house.app(DASHBOARD), house.stopping) as port:
-            place = Place(house, f"http://127.0.0.1:{port}/")
+        with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+            place = Place(bench, f"http://127.0.0.1:{port}/")
             page = pages.enter_context(
                 watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce")
             )
             show_every_state(place)
             page.page.locator("tr[data-tag='tracking']").click()
         page.page.locator("#lost").wait_for(state="visible")
-        is_clean(page, axe)
+        assert_no_violation(page, axe)

@@ -1,3 +1,5 @@
+"""Run the unit tests of the page's modules with node."""
+
 import shutil
 import subprocess
 from pathlib import Path
@@ -8,7 +10,7 @@ HERE = Path(__file__).parent
 
 
 @pytest.mark.parametrize("file", sorted(HERE.glob("*.test.mjs")), ids=lambda file: file.name.removesuffix(".test.mjs"))
-def test_the_pure_modules_of_the_page_do_what_they_say(file: Path) -> None:
+def test_the_unit_tests_of_a_module_pass(file: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: the unit tests of the page's modules need it (the page itself does not)")

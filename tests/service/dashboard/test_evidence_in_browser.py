@@ -1,4 +1,4 @@
-"""A selected tag: its measurements beside what was expected of them, on the map and in small plots."""
+"""The measurements of a selected tag are shown beside the expected ones, on the map and in small plots."""
 
 import math
 import re
@@ -13,8 +13,8 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, Array, State, StateReason
-from service.dashboard.place import Place, live_house
-from support.browser import Scheme, Watched, watched_page
+from service.dashboard.place import Place, live_api_bench
+from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -26,54 +26,54 @@ HEADING_SIGMA = 0.2
 
 @pytest.fixture
 def place() -> Iterator[Place]:
-    house = live_house(Site(anchors=[Anchor(id="17"), Anchor(id="18", x=20.0)]))
-    with running_server(house.app(DASHBOARD), house.stopping) as port:
-        yield Place(house, f"http://127.0.0.1:{port}/")
+    bench = live_api_bench(Site(anchors=[Anchor(id="17"), Anchor(id="18", x=20.0)]))
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        yield Place(bench, f"http://127.0.0.1:{port}/")
 
 
 def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
-    """A tag that came straight from the east at 1 m/s until now, ranged by both anchors in turn: its INNOVATION."""
-    row = place.house.answers.tags.register(tag).row
+    """Make a tag come straight from the east at 1 m/s, with ranges to both anchors in turn. Return its INNOVATION."""
+    row = place.bench.answers.tags.register(tag).row
     end_ns = time.time_ns()
-    poses, told = np.zeros(COUNT, POSE), np.zeros(COUNT, INNOVATION)
+    poses, innovations = np.zeros(COUNT, POSE), np.zeros(COUNT, INNOVATION)
     for i in range(COUNT):
         age_s = (COUNT - 1 - i) * STEP_S
         x = 5.0 + SPEED * age_s
-        poses[i]["t_ns"] = told[i]["t_ns"] = end_ns - round(age_s * 1e9)
+        poses[i]["t_ns"] = innovations[i]["t_ns"] = end_ns - round(age_s * 1e9)
         poses[i]["x"], poses[i]["y"], poses[i]["heading"], poses[i]["speed"] = x, 0.0, math.pi, SPEED
-        told[i]["anchor"] = i % 2
-        told[i]["predicted"] = x if i % 2 == 0 else 20.0 - x
-        told[i]["innovation"] = 0.9 if i in REFUSED else 0.05 * (-1) ** (i // 2)
-    poses["row"] = told["row"] = row
+        innovations[i]["anchor"] = i % 2
+        innovations[i]["predicted"] = x if i % 2 == 0 else 20.0 - x
+        innovations[i]["innovation"] = 0.9 if i in REFUSED else 0.05 * (-1) ** (i // 2)
+    poses["row"] = innovations["row"] = row
     poses["state"], poses["reason"], poses["p_mode"] = State.TRACKING, StateReason.RESOLVED, 1.0
     poses["cov"], poses["sigma_pos"] = np.diag([0.04, 0.01, HEADING_SIGMA**2]), 0.22
-    told["measured"] = told["predicted"] + told["innovation"]
-    told["S"] = 0.1**2
-    told["fused"] = [i not in REFUSED for i in range(COUNT)]
-    told["p_outlier"] = np.nan if hard_gate else ~told["fused"]
-    poses["anchor"], poses["range"] = told["anchor"], told["measured"]
+    innovations["measured"] = innovations["predicted"] + innovations["innovation"]
+    innovations["S"] = 0.1**2
+    innovations["fused"] = [i not in REFUSED for i in range(COUNT)]
+    innovations["p_outlier"] = np.nan if hard_gate else ~innovations["fused"]
+    poses["anchor"], poses["range"] = innovations["anchor"], innovations["measured"]
     for i in range(COUNT):
-        place.house.answers.latest.write(poses[i : i + 1], np.empty(0, HYPOTHESIS), told[i : i + 1])
-    return told
+        place.bench.answers.latest.write(poses[i : i + 1], np.empty(0, HYPOTHESIS), innovations[i : i + 1])
+    return innovations
 
 
-def select(page: Watched, tag: str = "cart") -> None:
+def select(page: WatchedPage, tag: str = "cart") -> None:
     page.page.locator(f"tr[data-tag='{tag}']").click()
     page.page.locator("[data-part='plots']").wait_for(state="visible")
 
 
-def marks(page: Watched, plot: str, name: str) -> list[tuple[float, float]]:
-    """Where the marks of a path stand, in pixels of the plot."""
+def marks(page: WatchedPage, plot: str, name: str) -> list[tuple[float, float]]:
+    """Return the positions of the marks of a path in pixels of the plot."""
     d = page.page.locator(f"[data-plot='{plot}'] path.{name}").first.get_attribute("d") or ""
     return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", d)]
 
 
 def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
-        told = drive(place)
+        innovations = drive(place)
         select(page)
-        used = told[told["fused"]]
-        seconds = (used["t_ns"] - told["t_ns"][-1]) * 1e-9
+        used = innovations[innovations["fused"]]
+        seconds = (used["t_ns"] - innovations["t_ns"][-1]) * 1e-9
         for plot, values in (("range", used["measured"]), ("innovation", used["innovation"] / 0.1)):
             x, y = np.array(marks(page, plot, "measured")).T
             assert len(x) == len(used) == COUNT - len(REFUSED)
@@ -82,10 +82,10 @@ def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, pl
             assert len(marks(page, plot, "refused")) == len(REFUSED)
         assert page.page.locator("[data-text='innovation']").inner_text() == "97 % in the band, 2 of 60 refused"
         assert page.page.locator("[data-plot='range'] path.expected").count() == 2
-        assert page.complaints == []
+        assert page.errors == []
 
 
-def test_the_ranges_alone_prove_a_speed_beside_the_estimate(chromium: Browser, place: Place) -> None:
+def test_the_minimum_speed_from_the_ranges_is_shown_beside_the_estimate(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         drive(place)
         select(page)
@@ -94,17 +94,15 @@ def test_the_ranges_alone_prove_a_speed_beside_the_estimate(chromium: Browser, p
         assert rate is not None
         assert float(rate[1]) == pytest.approx(SPEED, abs=0.1)
         estimate = marks(page, "speed", "estimate")
-        proven = marks(page, "speed", "least")
+        minimum = marks(page, "speed", "least")
         assert len(estimate) >= 5
-        half = len(proven) // 2  # its upper edge; the lower one lies on zero
-        assert np.median([y for _, y in proven[:half]]) == pytest.approx(estimate[0][1], abs=6.0)
-        assert {y for _, y in proven[half:]} == {max(y for _, y in proven)}
+        half = len(minimum) // 2  # the upper edge; the lower one lies on zero
+        assert np.median([y for _, y in minimum[:half]]) == pytest.approx(estimate[0][1], abs=6.0)
+        assert {y for _, y in minimum[half:]} == {max(y for _, y in minimum)}
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_map_shows_the_rings_of_all_anchors_and_how_well_the_heading_is_known(
-    chromium: Browser, place: Place, scheme: Scheme
-) -> None:
+def test_the_map_shows_the_uncertainty_of_the_heading(chromium: Browser, place: Place, scheme: Scheme) -> None:
     with watched_page(chromium, place.url, scheme, reduced_motion="reduce") as page:
         drive(place)
         page.wait_for_map(1)
@@ -117,33 +115,34 @@ def test_the_map_shows_the_rings_of_all_anchors_and_how_well_the_heading_is_know
         assert sector(page, 2.5 * HEADING_SIGMA) == empty[1]
 
 
-def sector(page: Watched, off_rad: float) -> tuple[int, ...]:
-    """The colour of the map 40 pixels from the dot, so far off its heading, which is west."""
+def sector(page: WatchedPage, off_rad: float) -> tuple[int, ...]:
+    """Return the colour of the map 40 pixels from the dot, at an angle off its heading, which is west."""
     x, y = page.tags()["cart"]["pixel"]
     return page.pixel(x - 40 * math.cos(off_rad), y - 40 * math.sin(off_rad) - 2)
 
 
-def test_an_engine_with_a_hard_gate_is_explained_too(chromium: Browser, place: Place) -> None:
+def test_the_innovations_of_an_engine_with_a_hard_gate_are_shown_too(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         drive(place, hard_gate=True)
         select(page)
         assert len(marks(page, "range", "refused")) == len(REFUSED)
-        assert page.complaints == []
+        assert page.errors == []
 
 
-def test_a_tag_whose_engine_tells_no_innovation_has_no_plots(chromium: Browser, place: Place) -> None:
+def test_a_tag_without_innovations_has_no_plots(chromium: Browser, place: Place) -> None:
     place.move("cart", x=2.0, y=1.0)
     with watched_page(chromium, place.url) as page:
-        page.page.locator("tr[data-tag='cart']").click()
-        page.wait_for("document.querySelector('[data-part=\"v-x\"]').textContent === '2.00 m'")
-        page.page.wait_for_timeout(700)
+        with page.page.expect_response(lambda response: "/explain" in response.url):
+            page.page.locator("tr[data-tag='cart']").click()
+        with page.page.expect_response(lambda response: "/explain" in response.url):
+            page.wait_for("document.querySelector('[data-part=\"v-x\"]').textContent === '2.00 m'")
         assert page.page.locator("[data-part='plots']").is_hidden()
-        assert page.complaints == []
+        assert page.errors == []
 
 
-def test_what_was_used_and_what_not_is_counted_by_reason(chromium: Browser, place: Place) -> None:
+def test_used_samples_are_counted_by_kind_and_rejected_ones_by_reason(chromium: Browser, place: Place) -> None:
     drive(place)
-    tags = place.house.answers.tags
+    tags = place.bench.answers.tags
     row = tags.register("cart").row
     tags.count_samples("range", np.full(1204, row))
     tags.count_samples("imu", np.full(12040, row))
@@ -157,7 +156,7 @@ def test_what_was_used_and_what_not_is_counted_by_reason(chromium: Browser, plac
         assert refused == ["Not used", "late 3", "range absurd 1"]
 
 
-def test_the_panel_is_reached_and_scrolled_with_the_keyboard(chromium: Browser, place: Place) -> None:
+def test_the_panel_can_be_focused_and_scrolled_with_the_keyboard(chromium: Browser, place: Place) -> None:
     drive(place)
     with watched_page(chromium, place.url, size=(1280, 600), reduced_motion="reduce") as page:
         select(page)

@@ -1,4 +1,4 @@
-"""What a person has to read is there to be read, on every size of screen."""
+"""Every text on the page is readable on every size of screen."""
 
 import math
 
@@ -9,8 +9,8 @@ from playwright.sync_api import Browser
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
-from service.dashboard.place import Place, live_house
-from support.browser import Scheme, Watched, watched_page
+from service.dashboard.place import Place, live_api_bench
+from support.browser import Scheme, WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -48,7 +48,7 @@ def test_no_number_is_cut_off(chromium: Browser, place: Place, size: tuple[int, 
     place.move("e", state=State.INITIALISING, x=np.nan, y=np.nan)
     with watched_page(chromium, place.url, scheme=scheme, size=size) as page:
         page.page.locator("tr[data-tag='e']").wait_for()
-        for column in ("x", "age"):  # the arrow of the order needs room as well
+        for column in ("x", "age"):  # the arrow of the sort direction needs space as well
             if page.page.locator(f"th.c-{column}").is_visible():
                 page.page.locator(f"th.c-{column} button").click()
             assert page.page.evaluate(CUT_OFF) == []
@@ -78,8 +78,8 @@ def overlap(a: list[float], b: list[float]) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def misplaced(page: Watched) -> list[list[float]]:
-    """Boxes of dots and labels that reach beyond the map or under something that lies on it."""
+def misplaced(page: WatchedPage) -> list[list[float]]:
+    """Return the boxes of dots and labels that reach beyond the map or below an element on it."""
     boxes = page.page.evaluate(BOXES)
     left, top, right, bottom = boxes["map"]
     assert boxes["covering"]
@@ -92,7 +92,7 @@ def misplaced(page: Watched) -> list[list[float]]:
 
 
 @every_size
-def test_show_all_brings_every_tag_and_its_label_clear_of_the_edge_and_of_the_buttons(
+def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(
     chromium: Browser, place: Place, size: tuple[int, int]
 ) -> None:
     corners = [(-9.0, -6.0), (9.0, -6.0), (9.0, 6.0), (-9.0, 6.0), (9.0, 0.0), (0.0, 6.0)]
@@ -107,7 +107,7 @@ def test_show_all_brings_every_tag_and_its_label_clear_of_the_edge_and_of_the_bu
         page.wait_for_map(len(corners))
         assert len(page.page.evaluate("dropanchor.drawing().labels")) >= 4
         assert misplaced(page) == []
-        for step in range(1, 20):  # and it stays so while the tags spread
+        for step in range(1, 20):  # also while the tags spread
             wider = [at * (1 + step / 40) for at in x]
             place.move(*names, x=wider, y=y)
             page.wait_for(f"dropanchor.tags()[1].x === Math.fround({wider[1]}) && dropanchor.drawing().still")
@@ -124,13 +124,13 @@ def test_the_label_of_a_selected_tag_at_the_edge_stays_on_the_map(chromium: Brow
         assert misplaced(page) == []
 
 
-def heading_of(page: Watched, tag: str) -> str:
+def heading_of(page: WatchedPage, tag: str) -> str:
     page.page.locator(f"tr[data-tag='{tag}']").click()
     page.wait_for("document.querySelector('[data-part=\"v-heading\"]').textContent !== '–'")
     return page.page.locator("[data-part='v-heading']").inner_text()
 
 
-def test_a_heading_is_read_clockwise_from_north_and_sent_counter_clockwise_from_east(
+def test_a_heading_is_shown_clockwise_from_north_and_sent_counter_clockwise_from_east(
     chromium: Browser, place: Place
 ) -> None:
     place.move("cart", x=1.0, y=1.0, heading=math.radians(113), yaw_rate=-0.5)
@@ -141,11 +141,11 @@ def test_a_heading_is_read_clockwise_from_north_and_sent_counter_clockwise_from_
         assert sent["heading_rad"] == pytest.approx(math.radians(113), abs=1e-4)
 
 
-def test_the_heading_of_a_site_that_is_turned_counts_from_true_north(chromium: Browser) -> None:
+def test_the_heading_on_a_rotated_site_counts_from_true_north(chromium: Browser) -> None:
     turned = Georeference(lat=52.0, lon=13.0, rotation_rad=math.radians(30))
-    house = live_house(Site(anchors=[Anchor(id="17")], georeference=turned))
-    with running_server(house.app(DASHBOARD), house.stopping) as port:
-        place = Place(house, f"http://127.0.0.1:{port}/")
+    bench = live_api_bench(Site(anchors=[Anchor(id="17")], georeference=turned))
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
         place.move("cart", x=1.0, y=1.0, heading=math.radians(20))
         with watched_page(chromium, place.url) as page:
             page.wait_for("document.getElementById('site').textContent")

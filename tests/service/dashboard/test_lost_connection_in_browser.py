@@ -1,4 +1,4 @@
-"""Once the connection is lost, nothing on the page says that a pose holds now."""
+"""After the connection is lost, nothing on the page claims that a pose is current."""
 
 import re
 from collections.abc import Iterator
@@ -12,13 +12,13 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
-from service.dashboard.place import Place, live_house
-from support.browser import Watched, watched_page
+from service.dashboard.place import Place, live_api_bench
+from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
 
-CLAIM = re.compile(r"tracking|believed|\blive\b", re.IGNORECASE)
+CLAIM = re.compile(r"tracking|trusted|\blive\b", re.IGNORECASE)
 EVERY_TEXT = """() => {
     const texts = [document.title];
     for (const element of document.body.querySelectorAll("*")) {
@@ -39,32 +39,34 @@ BLUE_PIXELS = """() => {
 }"""
 
 
-def claims(page: Watched) -> list[str]:
-    """The texts, also those that are only heard or shown on hover, that speak of poses as they are now."""
+def claims(page: WatchedPage) -> list[str]:
+    """Return the texts that claim current poses, including those for screen readers and tooltips."""
     return [text for text in page.page.evaluate(EVERY_TEXT) if CLAIM.search(text)]
 
 
 @dataclass
 class Outage:
+    """A page whose service has stopped."""
+
     place: Place
-    page: Watched
+    page: WatchedPage
     port: int
 
 
-def show_six(place: Place, page: Watched) -> None:
+def show_six(place: Place, page: WatchedPage) -> None:
     place.move(*(f"cart-{i}" for i in range(6)), x=np.arange(6.0), y=1.0, cov=np.eye(3) * 1e-6)
     page.wait_for_map(6)
 
 
 @contextmanager
 def outage(chromium: Browser) -> Iterator[Outage]:
-    """A page that tracked six tags, of which one is selected and announced, and whose service has just gone."""
-    house = live_house()
-    house.answers.tags.register("cart-0")
-    house.answers.tags.set_online("cart-0", True)
+    """Show six tracked tags with one of them selected, then stop the service."""
+    bench = live_api_bench()
+    bench.answers.tags.register("cart-0")
+    bench.answers.tags.set_online("cart-0", True)
     with ExitStack() as pages:
-        with running_server(house.app(DASHBOARD), house.stopping) as port:
-            place = Place(house, f"http://127.0.0.1:{port}/")
+        with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+            place = Place(bench, f"http://127.0.0.1:{port}/")
             page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
             show_six(place, page)
             page.page.locator("tr[data-tag='cart-0']").click()
@@ -75,7 +77,7 @@ def outage(chromium: Browser) -> Iterator[Outage]:
         yield Outage(place, page, port)
 
 
-def test_no_text_of_a_lost_connection_says_tracking_or_that_a_pose_can_be_believed(chromium: Browser) -> None:
+def test_no_text_after_a_lost_connection_claims_that_a_tag_is_tracked(chromium: Browser) -> None:
     with outage(chromium) as lost:
         page = lost.page.page
         assert claims(lost.page) == []
@@ -91,7 +93,7 @@ def test_no_text_of_a_lost_connection_says_tracking_or_that_a_pose_can_be_believ
         assert {tag["state"] for tag in lost.page.tags().values()} == {"outdated"}
 
 
-def test_the_map_of_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chromium: Browser) -> None:
+def test_the_map_after_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chromium: Browser) -> None:
     with outage(chromium) as lost:
         lost.page.wait_for("dropanchor.drawing().still")
         assert lost.page.page.evaluate(BLUE_PIXELS) == 0
@@ -99,8 +101,8 @@ def test_the_map_of_a_lost_connection_has_no_dot_in_the_colour_of_tracking(chrom
 
 def test_the_states_come_back_with_the_connection(chromium: Browser) -> None:
     with outage(chromium) as lost:
-        lost.place.house.stopping = Event()
-        with running_server(lost.place.house.app(DASHBOARD), lost.place.house.stopping, lost.port):
+        lost.place.bench.stopping = Event()
+        with running_server(lost.place.bench.app(DASHBOARD), lost.place.bench.stopping, lost.port):
             lost.page.wait_for("dropanchor.status() === 'live'")
             show_six(lost.place, lost.page)
             lost.page.wait_for("dropanchor.tags().every((tag) => tag.state === 'tracking')")

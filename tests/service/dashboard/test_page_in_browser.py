@@ -1,4 +1,4 @@
-"""The page in a real browser on the real interface, over a store that the tests fill."""
+"""The page in a real browser with the real REST API, over a store that the tests fill."""
 
 import sysconfig
 import time
@@ -11,8 +11,8 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
-from service.dashboard.place import Place, live_house
-from support.browser import Watched, watched_page
+from service.dashboard.place import Place, live_api_bench
+from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 from support.zenoh_router import wait_until
 
@@ -21,14 +21,14 @@ pytestmark = pytest.mark.browser
 TRACKING_BLUE = (0, 103, 184)
 
 
-def colour_at(page: Watched, tag: str) -> tuple[int, ...]:
+def colour_at(page: WatchedPage, tag: str) -> tuple[int, ...]:
     x, y = page.tags()[tag]["pixel"]
     return page.pixel(x, y)[:3]
 
 
 def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> None:
-    """modes: weight, x, y."""
-    row = place.house.answers.tags.register(tag).row
+    """Give a tag an ambiguous pose. modes: weight, x and y of each hypothesis."""
+    row = place.bench.answers.tags.register(tag).row
     pose, hypotheses = np.zeros(1, POSE), np.zeros(len(modes), HYPOTHESIS)
     pose["row"] = hypotheses["row"] = row
     pose["t_ns"], pose["state"], pose["reason"] = time.time_ns(), State.AMBIGUOUS, StateReason.SEVERAL_MODES
@@ -36,10 +36,10 @@ def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> Non
     for name, column in zip(("weight", "x", "y"), zip(*modes, strict=True), strict=True):
         hypotheses[name] = column
     hypotheses["cov"] = np.eye(2) * 0.1
-    place.house.answers.latest.write(pose, hypotheses)
+    place.bench.answers.latest.write(pose, hypotheses)
 
 
-def test_without_a_tag_the_page_tells_how_to_start_one(chromium: Browser, place: Place) -> None:
+def test_without_a_tag_the_page_shows_how_to_start_one(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url) as page:
         page.page.locator("#empty").wait_for(state="visible")
         page.page.wait_for_function("document.querySelector('#command').textContent.includes('--connect')")
@@ -51,7 +51,7 @@ def test_without_a_tag_the_page_tells_how_to_start_one(chromium: Browser, place:
         page.page.locator("#empty").wait_for(state="hidden")
 
 
-def test_a_pose_is_a_dot_and_a_line_in_the_table_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
+def test_a_pose_is_a_dot_and_a_table_row_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         place.move("cart", x=1.0, y=2.0, speed=0.5)
         line = page.page.locator("tr[data-tag='cart']")
@@ -61,7 +61,7 @@ def test_a_pose_is_a_dot_and_a_line_in_the_table_and_both_follow_the_tag(chromiu
         place.move("cart", x=1.5, y=2.0)
         page.wait_for(f"dropanchor.tags()[0].x === 1.5 && dropanchor.tags()[0].pixel[0] > {before[0]} + 10")
         page.page.locator("tr[data-tag='cart'] td.c-x", has_text="1.50").wait_for()
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place) -> None:
@@ -73,13 +73,13 @@ def test_only_a_fresh_tracked_pose_is_a_full_dot(chromium: Browser, place: Place
 
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         seen = [full()]
-        # on a slow machine the poses may be stale before their colours are read
+        # On a slow machine the poses may become stale before their colours are read.
         while not seen[-1] and len(seen) < 20:
             seen.append(full())
         assert seen[-1] == {"TRACKING"}
 
 
-def test_a_pose_that_grows_old_is_no_full_dot_any_more(chromium: Browser, place: Place) -> None:
+def test_an_old_pose_is_no_longer_a_full_dot(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         for _ in range(20):
             place.move("cart", x=2.0, y=1.0, heading=np.nan, cov=np.eye(3) * 1e-6)
@@ -93,7 +93,7 @@ def test_a_pose_that_grows_old_is_no_full_dot_any_more(chromium: Browser, place:
         assert colour_at(page, "cart") != TRACKING_BLUE
 
 
-def test_an_ambiguous_tag_is_shown_as_every_place_where_it_may_be(chromium: Browser, place: Place) -> None:
+def test_an_ambiguous_tag_is_shown_at_all_its_possible_positions(chromium: Browser, place: Place) -> None:
     ambiguous(place, "cart", (0.6, 3.0, 4.0), (0.4, 3.0, -4.0))
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.page.locator("tr[data-tag='cart']").click()
@@ -105,14 +105,14 @@ def test_an_ambiguous_tag_is_shown_as_every_place_where_it_may_be(chromium: Brow
 
 
 def test_a_tag_without_a_pose_is_listed_as_initialising(chromium: Browser, place: Place) -> None:
-    place.house.answers.tags.register("new")
+    place.bench.answers.tags.register("new")
     with watched_page(chromium, place.url) as page:
         line = page.page.locator("tr[data-tag='new']")
         line.wait_for()
         assert line.inner_text().split()[:4] == ["new", "Initialising", "–", "–"]
         line.click()
         assert page.page.locator("#detail").is_visible()
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place) -> None:
@@ -129,7 +129,7 @@ def test_selection_works_with_the_keyboard_alone(chromium: Browser, place: Place
         assert page.page.locator("#detail").is_hidden()
 
 
-def test_a_click_on_a_dot_selects_it_and_a_click_on_the_ground_ends_that(chromium: Browser, place: Place) -> None:
+def test_a_click_on_a_dot_selects_it_and_a_click_beside_it_deselects_it(chromium: Browser, place: Place) -> None:
     place.move("cart", x=2.0, y=1.0)
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.wait_for_map(1)
@@ -140,11 +140,11 @@ def test_a_click_on_a_dot_selects_it_and_a_click_on_the_ground_ends_that(chromiu
         assert page.page.locator("#detail").is_hidden()
 
 
-def test_the_map_moves_by_mouse_and_keys_and_comes_back_with_fit(chromium: Browser, place: Place) -> None:
+def test_the_map_moves_by_mouse_and_keys_and_returns_with_show_all(chromium: Browser, place: Place) -> None:
     place.move("cart", x=2.0, y=1.0)
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.wait_for_map(1)
-        page.page.locator("#fit").click()  # it was around the anchor alone where that came first
+        page.page.locator("#fit").click()  # the map may have fitted the anchor alone, if that arrived first
         page.wait_for_map(1)
         fitted = page.tags()["cart"]["pixel"]
         page.page.locator("#map").focus()
@@ -164,7 +164,7 @@ def test_the_map_moves_by_mouse_and_keys_and_comes_back_with_fit(chromium: Brows
             page.page.locator("#fit").click()
             return bool(page.page.evaluate(f"Math.abs(dropanchor.tags()[0].pixel[0] - {fitted[0]}) < 1"))
 
-        wait_until(fits)  # again where a later part of the wheel's turn, of which nobody tells, has undone it
+        wait_until(fits)  # repeated, since a late wheel event may zoom again
 
 
 def test_names_and_states_filter_table_and_map(chromium: Browser, place: Place) -> None:
@@ -205,7 +205,7 @@ def test_names_from_tags_are_text_never_markup(chromium: Browser, place: Place) 
         cell.click()
         assert page.page.locator("#detail [data-part='name']").inner_text() == name
         page.wait_for("document.querySelector('[data-part=\"v-turn\"]').textContent !== '–'")
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_a_new_anchor_appears_without_a_reload(chromium: Browser, place: Place) -> None:
@@ -220,24 +220,24 @@ def test_a_new_anchor_appears_without_a_reload(chromium: Browser, place: Place) 
         page.wait_for(f"dropanchor.tags()[0].pixel[0] < {narrow} - 100")
 
 
-def test_the_page_comes_back_by_itself_after_the_service(chromium: Browser) -> None:
-    house = live_house()
+def test_the_page_reconnects_by_itself_after_a_restart_of_the_service(chromium: Browser) -> None:
+    bench = live_api_bench()
     with ExitStack() as open_pages:
-        with running_server(house.app(DASHBOARD), house.stopping) as port:
-            place = Place(house, f"http://127.0.0.1:{port}/")
+        with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+            place = Place(bench, f"http://127.0.0.1:{port}/")
             place.move("old", x=1.0, y=1.0)
             page = open_pages.enter_context(watched_page(chromium, place.url))
             page.wait_for("dropanchor.tags().length === 1")
         page.page.locator("#lost").wait_for(state="visible")
-        house.stopping = Event()
-        with running_server(house.app(DASHBOARD), house.stopping, port):
+        bench.stopping = Event()
+        with running_server(bench.app(DASHBOARD), bench.stopping, port):
             page.wait_for("dropanchor.status() === 'live'")
             page.page.locator("#lost").wait_for(state="hidden")
             place.move("new", x=2.0, y=2.0)
             page.wait_for("dropanchor.tags().length === 2")
 
 
-def test_ten_thousand_tags_are_drawn_as_density_with_few_lines_in_the_document(chromium: Browser, place: Place) -> None:
+def test_ten_thousand_tags_are_drawn_as_density_with_few_table_rows(chromium: Browser, place: Place) -> None:
     count = 10_000
     random = np.random.default_rng(1)
     with watched_page(chromium, place.url) as page:
@@ -245,7 +245,7 @@ def test_ten_thousand_tags_are_drawn_as_density_with_few_lines_in_the_document(c
         page.wait_for("dropanchor.drawing().visible > 5000 && dropanchor.drawing().density")
         page.page.locator("#crowd").wait_for()
         assert page.page.locator("tbody tr").count() < 60
-        assert page.complaints == []
+        assert page.errors == []
 
 
 def test_a_negative_speed_can_be_read_in_the_table(chromium: Browser, place: Place) -> None:

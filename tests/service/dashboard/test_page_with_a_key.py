@@ -1,27 +1,27 @@
-"""The page of a service that wants to know who asks."""
+"""The page of a service that requires an API key."""
 
 from pathlib import Path
 
 import pytest
 
-from api_house import make_house
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
+from support.api import make_api_bench
 from support.browser import running_chromium
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
 
 
-def test_the_page_asks_for_a_key_keeps_it_and_shows_the_tags(tmp_path: Path) -> None:
+def test_the_page_asks_for_a_key_stores_it_and_shows_the_tags(tmp_path: Path) -> None:
     now_s = 0.0
     keys = ApiKeys(tmp_path, lambda: now_s)
     secret = keys.add("dashboard", Scope.READ)
-    house = make_house()
-    house.move("cart")
-    app = house.app(DASHBOARD, authenticator=Authenticator({SOURCE: keys}))
-    with running_server(app, house.stopping) as port, running_chromium() as browser:
+    bench = make_api_bench()
+    bench.move("cart")
+    app = bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: keys}))
+    with running_server(app, bench.stopping) as port, running_chromium() as browser:
         page = browser.new_page()
         page.goto(f"http://127.0.0.1:{port}/")
         page.locator("#locked").wait_for()

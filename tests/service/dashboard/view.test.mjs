@@ -13,7 +13,7 @@ test("north is up and east is right", () => {
   assert.ok(seen.screenY(1) < seen.screenY(0));
 });
 
-test("a place on the screen and back is the same place", () => {
+test("converting to the screen and back gives the same point", () => {
   const seen = view();
   assert.ok(Math.abs(seen.worldX(seen.screenX(7.25)) - 7.25) < 1e-12);
   assert.ok(Math.abs(seen.worldY(seen.screenY(-4.5)) + 4.5) < 1e-12);
@@ -28,7 +28,7 @@ test("zooming keeps the point under the pointer", () => {
   assert.ok(Math.abs(seen.worldY(480) - y) < 1e-12);
 });
 
-test("zooming ends at a limit, and the view does not drift there", () => {
+test("zooming stops at a limit without a drift of the view", () => {
   const seen = view();
   seen.zoomAt(1e9, 400, 300);
   assert.equal(seen.scale, MAX_SCALE);
@@ -43,7 +43,7 @@ test("panning moves the world with the pointer", () => {
   assert.ok(Math.abs(seen.worldY(80) - y) < 1e-12);
 });
 
-test("what is fitted lies within the padding", () => {
+test("a fitted view keeps its padding", () => {
   const seen = view();
   Object.assign(seen, seen.fitted({ left: -10, right: 30, bottom: 5, top: 9 }, 60));
   assert.ok(Math.abs(seen.screenX(-10) - 60) < 1e-9);
@@ -51,7 +51,7 @@ test("what is fitted lies within the padding", () => {
   assert.ok(seen.screenY(9) >= 60 && seen.screenY(5) <= 540);
 });
 
-test("what is fitted lies beside the buttons", () => {
+test("a fitted view leaves the buttons free", () => {
   const seen = Object.assign(view(), { covered: 100 });
   Object.assign(seen, seen.fitted({ left: -10, right: 30, bottom: 5, top: 9 }, 60));
   assert.ok(Math.abs(seen.screenX(-10) - 60) < 1e-9);
@@ -59,7 +59,7 @@ test("what is fitted lies beside the buttons", () => {
   assert.ok(Math.abs(seen.screenX(seen.free(60).right) - 640) < 1e-9);
 });
 
-test("bounds leave unknown places out and are never too small", () => {
+test("bounds ignore unknown positions and have a minimum size", () => {
   assert.equal(boundsAround([[NaN, NaN]], 4), null);
   assert.deepEqual(boundsAround([[1, 1], [NaN, 90]], 4), { left: -1, right: 3, bottom: -1, top: 3 });
   assert.deepEqual(boundsAround([[0, 0], [10, 1]], 4), { left: 0, right: 10, bottom: -1.5, top: 2.5 });

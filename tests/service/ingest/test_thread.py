@@ -7,7 +7,7 @@ import pytest
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.ingest import thread as ingest_thread
 from dropanchor_service.ingest.thread import IngestThread
-from support.ingest import Bench
+from support.ingest import IngestBench
 from support.zenoh_router import wait_until
 
 T = 1_760_000_000_000_000_000
@@ -17,12 +17,12 @@ def frame(value: float) -> Frame:
     return Frame(ranges=[RangeSample(T, 7, value)])
 
 
-def thread_of(bench: Bench) -> IngestThread:
+def thread_of(bench: IngestBench) -> IngestThread:
     return IngestThread(bench.ingest, bench.buffer, bench.metrics, period_s=0.001)
 
 
 def test_messages_become_poses() -> None:
-    bench = Bench()
+    bench = IngestBench()
     thread = thread_of(bench)
     thread.start()
     bench.put("a", frame(4.0))
@@ -33,7 +33,7 @@ def test_messages_become_poses() -> None:
 
 
 def test_an_unexpected_error_is_counted_and_the_thread_continues(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench()
+    bench = IngestBench()
     turn, failures = bench.ingest.turn, 3
 
     def failing(limit: int) -> int:
@@ -53,7 +53,7 @@ def test_an_unexpected_error_is_counted_and_the_thread_continues(monkeypatch: py
 
 
 def test_a_thread_that_is_not_running_or_stuck_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench()
+    bench = IngestBench()
     thread = thread_of(bench)
     assert thread.problem == "the ingest thread is not running"
     release = threading.Event()

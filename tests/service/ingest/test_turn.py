@@ -25,7 +25,7 @@ from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
 from dropanchor_service.store.unknown_anchors import FRESH_NS, MAX_LOGGED
-from support.ingest import Bench
+from support.ingest import IngestBench
 
 T = 1_760_000_000_000_000_000
 S = 1_000_000_000
@@ -38,7 +38,7 @@ def ranges(*values: float, anchor: int = 7, sequence: int | None = None, boot_id
 
 
 def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_become_poses() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.put("a", ranges(1.0, 2.0))
     bench.put("b", Frame(ranges=[RangeSample(T, 7, 5.0)], imu=[IMU, IMU], headings=[HeadingSample(T, 1.0)]))
     bench.ingest.turn()
@@ -52,7 +52,7 @@ def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_become_poses(
 
 
 def test_json_and_packed_messages_give_the_same_poses() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.put("a", encode_json(ranges(3.0)), ENCODING_JSON)
     bench.put("b", ranges(3.0))
     bench.ingest.turn()
@@ -60,7 +60,7 @@ def test_json_and_packed_messages_give_the_same_poses() -> None:
 
 
 def test_the_first_anchor_becomes_the_origin_and_others_are_unknown() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, anchor=7), ranges(2.0, anchor=8), ranges(3.0, anchor=7))
     assert bench.site.site.anchors == [Anchor(id="7")]
     assert bench.engine.anchors is not None
@@ -70,7 +70,7 @@ def test_the_first_anchor_becomes_the_origin_and_others_are_unknown() -> None:
 
 
 def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
-    bench = Bench()
+    bench = IngestBench()
     frame = ranges(1.0, anchor=anchor_number("gate"))
     frame.anchor_names = {anchor_number("gate"): "gate"}
     bench.put("a", encode_json(frame), ENCODING_JSON)
@@ -79,13 +79,13 @@ def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
 
 
 def test_a_bad_range_does_not_bind_an_anchor() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(-1.0, anchor=9), ranges(1.0, anchor=7))
     assert [anchor.id for anchor in bench.site.site.anchors] == ["7"]
 
 
 def test_bad_samples_of_a_frame_are_counted_for_their_tag_and_good_ones_are_kept() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, -1.0, float("nan"), 9000.0, 2.0))
     tag = bench.tags.find("a")
     assert tag is not None
@@ -113,7 +113,7 @@ def test_bad_samples_of_a_frame_are_counted_for_their_tag_and_good_ones_are_kept
     ],
 )
 def test_a_bad_payload_is_counted_for_its_tag_and_others_pass(payload: bytes, encoding: str, reason: str) -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.put("good", ranges(1.0))
     bench.put("bad", payload, encoding)
     bench.put("good", ranges(2.0))
@@ -129,7 +129,7 @@ def test_a_bad_payload_is_counted_for_its_tag_and_others_pass(payload: bytes, en
     "key", ["dropanchor/@v1/default/tag/%zz/samples", "elsewhere", "dropanchor/@v1/default/tag/a%2d/samples"]
 )
 def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.buffer.append(key, encode_packed(ranges(1.0)), "application/vnd.dropanchor.samples", T)
     bench.ingest.turn()
     assert bench.rejected() == {"key_invalid": 1}
@@ -137,7 +137,7 @@ def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
 
 
 def test_unknown_tags_are_rejected_if_the_settings_say_so_and_listed_ones_are_not() -> None:
-    bench = Bench(unknown_tags="refuse", tags={"listed": {}})
+    bench = IngestBench(unknown_tags="refuse", tags={"listed": {}})
     bench.send("listed", ranges(1.0))
     bench.send("unlisted", ranges(2.0))
     assert bench.rejected() == {"tag_unknown": 1}
@@ -148,7 +148,7 @@ def test_unknown_tags_are_rejected_if_the_settings_say_so_and_listed_ones_are_no
 
 
 def test_no_more_tags_than_max_tags_are_registered() -> None:
-    bench = Bench(max_tags=2)
+    bench = IngestBench(max_tags=2)
     for name in "abcd":
         bench.send(name, ranges(1.0))
     assert [tag.name for tag in bench.tags.all()] == ["a", "b"]
@@ -156,7 +156,7 @@ def test_no_more_tags_than_max_tags_are_registered() -> None:
 
 
 def test_a_message_that_arrives_twice_is_fused_once() -> None:
-    bench = Bench()
+    bench = IngestBench()
     first, second = ranges(1.0, sequence=0, boot_id=5), ranges(2.0, sequence=1, boot_id=5)
     bench.send("a", first, second, first)
     bench.send("a", second, first)
@@ -165,7 +165,7 @@ def test_a_message_that_arrives_twice_is_fused_once() -> None:
 
 
 def test_a_gap_is_filled_from_a_backlog_however_old_it_is() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=1))
     now_ns = bench.clock.now_ns()
     for sequence, ago_ns in ((2, 900_000_000), (1, 800_000_000), (4, 700_000_000)):
@@ -179,7 +179,7 @@ def test_a_gap_is_filled_from_a_backlog_however_old_it_is() -> None:
 
 
 def test_each_publisher_and_each_tag_has_its_own_sequence() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0, sequence=0, boot_id=5), ranges(1.0, sequence=0, boot_id=6))
     bench.send("b", ranges(1.0, sequence=0, boot_id=5))
     assert sum(len(batch.ranges) for batch in bench.engine.batches) == 3
@@ -187,7 +187,7 @@ def test_each_publisher_and_each_tag_has_its_own_sequence() -> None:
 
 
 def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
-    bench = Bench()
+    bench = IngestBench()
     second = 1_000_000_000
     for number, tag_s, arrival_s in ((0, 1.0, 101.0), (1, 2.0, 102.5), (2, 3.0, 103.0)):
         frame = Frame(ranges=[RangeSample(int(tag_s * second), 7, 1.0)], boot_clock=True, boot_id=9, sequence=number)
@@ -198,7 +198,7 @@ def test_times_of_a_tag_that_counts_from_its_start_become_utc() -> None:
 
 
 def test_settings_of_a_tag_reach_the_engine_before_its_first_message_and_when_they_change() -> None:
-    bench = Bench(tags={"a": {"height_m": 1.5}})
+    bench = IngestBench(tags={"a": {"height_m": 1.5}})
     bench.ingest.turn()
     assert list(bench.engine.configured) == [0]
     bench.send("a", ranges(1.0))
@@ -210,7 +210,7 @@ def test_settings_of_a_tag_reach_the_engine_before_its_first_message_and_when_th
 
 
 def test_tracks_start_afresh_when_an_anchor_moves_but_not_when_one_is_added() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0))
     bench.site.set_anchor(Anchor(id="8", x=5.0))
     bench.ingest.turn()
@@ -230,7 +230,7 @@ def poison_row(row: int) -> Callable[[SampleBatch], bool]:
 
 
 def test_a_row_that_makes_the_engine_fail_is_lost_and_stops_no_other_row() -> None:
-    bench = Bench(tags={"2": {"start": StartPose(x=1.0, y=1.0).model_dump()}})
+    bench = IngestBench(tags={"2": {"start": StartPose(x=1.0, y=1.0).model_dump()}})
     names = [str(i) for i in range(8)]
     for name in names:
         bench.send(name, ranges(1.0))
@@ -252,7 +252,7 @@ def test_a_row_that_makes_the_engine_fail_is_lost_and_stops_no_other_row() -> No
 
 
 def test_a_row_that_fails_repeatedly_is_quarantined_and_its_samples_are_counted() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0))
     bench.engine.poisoned = poison_row(0)
     for _ in range(FAULTS_BEFORE_QUARANTINE + 4):
@@ -268,14 +268,14 @@ def test_a_payload_that_makes_the_decoder_fail_harms_no_other_payload(monkeypatc
         return read_forms(payloads, encodings)
 
     monkeypatch.setattr(sample_reader, "read_forms", fails)
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", ranges(1.0), b"poison", ranges(2.0))
     assert bench.x_of("a") == [2.0]
     assert bench.rejected() == {"payload_empty": 1}
 
 
 def test_a_flood_of_unknown_tags_is_bounded_and_does_not_harm_registered_tags() -> None:
-    bench = Bench(max_tags=10)
+    bench = IngestBench(max_tags=10)
     bench.send("known", ranges(1.0))
     for number in range(50_000):
         bench.put(f"unlisted{number}", ranges(1.0))
@@ -288,17 +288,17 @@ def test_a_flood_of_unknown_tags_is_bounded_and_does_not_harm_registered_tags() 
     assert rejected["shed"] + rejected["tags_full"] == 50_000 - 9
 
 
-def take_turns(bench: Bench) -> None:
+def take_turns(bench: IngestBench) -> None:
     while bench.buffer.depth:
         bench.ingest.turn()
 
 
-def fused(bench: Bench) -> list[float]:
+def fused(bench: IngestBench) -> list[float]:
     return [value for batch in bench.engine.batches for value in batch.ranges["range"].tolist()]
 
 
 def test_a_tag_gets_its_row_with_its_second_message_if_many_are_new_and_loses_none() -> None:
-    bench = Bench(unproven_tags=1)
+    bench = IngestBench(unproven_tags=1)
     bench.send("quick", ranges(1.0))
     bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
     bench.ingest.turn()
@@ -313,7 +313,7 @@ def test_a_tag_gets_its_row_with_its_second_message_if_many_are_new_and_loses_no
 
 
 def test_a_duplicated_or_unreadable_message_does_not_confirm_a_tag() -> None:
-    bench = Bench(unproven_tags=0)
+    bench = IngestBench(unproven_tags=0)
     for _ in range(3):
         bench.put("doubled", ranges(1.0), at_ns=T)
     for second in range(3):
@@ -325,7 +325,7 @@ def test_a_duplicated_or_unreadable_message_does_not_confirm_a_tag() -> None:
 
 
 def test_confirmed_tags_make_room_for_other_unlisted_ones() -> None:
-    bench = Bench(unproven_tags=1)
+    bench = IngestBench(unproven_tags=1)
     bench.put("first", ranges(1.0), at_ns=T)
     bench.put("waits", ranges(2.0), at_ns=T)
     bench.ingest.turn()
@@ -337,7 +337,7 @@ def test_confirmed_tags_make_room_for_other_unlisted_ones() -> None:
 
 
 def test_tags_that_send_once_are_dropped_and_all_of_their_messages_are_counted() -> None:
-    bench = Bench(max_tags=100, unproven_tags=10)
+    bench = IngestBench(max_tags=100, unproven_tags=10)
     for number in range(5_000):
         bench.put(f"unlisted{number}", ranges(1.0))
         if number % 200 == 0:
@@ -350,7 +350,7 @@ def test_tags_that_send_once_are_dropped_and_all_of_their_messages_are_counted()
 
 
 def test_a_quarantined_tag_is_pending_until_its_settings_are_put() -> None:
-    bench = Bench(unknown_tags="quarantine", tags={"listed": {}})
+    bench = IngestBench(unknown_tags="quarantine", tags={"listed": {}})
     bench.send("listed", ranges(1.0))
     for value in (2.0, 3.0):
         bench.send("unlisted", ranges(value))
@@ -364,7 +364,7 @@ def test_a_quarantined_tag_is_pending_until_its_settings_are_put() -> None:
 
 
 def test_messages_kept_for_a_tag_are_used_when_rest_registers_it() -> None:
-    bench = Bench(unproven_tags=0)
+    bench = IngestBench(unproven_tags=0)
     bench.put("a", ranges(1.0), at_ns=T)
     bench.ingest.turn()
     bench.tags.register("a")  # as REST does
@@ -374,7 +374,7 @@ def test_messages_kept_for_a_tag_are_used_when_rest_registers_it() -> None:
 
 def test_messages_of_listed_tags_do_not_wait_among_those_of_unregistered_ones() -> None:
     names = [f"listed-{number}" for number in range(UNREGISTERED_PER_TURN + 500)]
-    bench = Bench(tags={name: {} for name in names})
+    bench = IngestBench(tags={name: {} for name in names})
     bench.ingest.turn()
     for name in names:
         bench.put(name, ranges(1.0))
@@ -385,7 +385,7 @@ def test_messages_of_listed_tags_do_not_wait_among_those_of_unregistered_ones() 
 
 
 def test_shed_messages_are_counted_for_their_tag() -> None:
-    bench = Bench(capacity=100_000)
+    bench = IngestBench(capacity=100_000)
     bench.send("busy", ranges(1.0))
     bench.send("quiet", ranges(1.0))
     bench.put("quiet", ranges(2.0))
@@ -402,7 +402,7 @@ def test_shed_messages_are_counted_for_their_tag() -> None:
 
 
 def test_listed_and_announced_tags_have_a_row_before_their_first_message(tmp_path: Path) -> None:
-    bench = Bench(tmp_path, tags={"listed": {}})
+    bench = IngestBench(tmp_path, tags={"listed": {}})
     bench.ingest.announce("alive")
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]
@@ -411,7 +411,7 @@ def test_listed_and_announced_tags_have_a_row_before_their_first_message(tmp_pat
 def test_unknown_anchors_are_logged_once_each_up_to_a_limit(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    bench = Bench(site={"anchors": [{"id": "1"}]})
+    bench = IngestBench(site={"anchors": [{"id": "1"}]})
     for anchor in range(2, 1000):
         bench.send("a", ranges(1.0, anchor=anchor), ranges(1.0, anchor=anchor))
     lines = [record.message for record in caplog.records if "unknown_anchors" in record.name]
@@ -424,7 +424,7 @@ def test_unknown_anchors_are_logged_once_each_up_to_a_limit(
 
 
 def test_the_age_of_a_replay_counts_from_its_arrival_and_that_of_a_live_tag_from_its_samples() -> None:
-    bench = Bench()
+    bench = IngestBench()
     answers = Answers(bench.site, bench.tags, bench.latest, bench.clock.now_ns)
 
     def state_of(name: str, later_s: float = 0.0) -> tuple[str, float]:

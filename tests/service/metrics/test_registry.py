@@ -7,7 +7,7 @@ from dropanchor_schemas.wire import Frame, RangeSample, Reason
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.store import LatestPoses, PendingTags, TagTable
-from support.ingest import Bench
+from support.ingest import IngestBench
 
 S = 1_000_000_000
 
@@ -18,7 +18,7 @@ def lines(metrics: Metrics) -> dict[str, float]:
 
 
 def test_samples_rejections_and_times_are_counted() -> None:
-    bench = Bench()
+    bench = IngestBench()
     bench.send("a", Frame(ranges=[RangeSample(S, 7, 1.0), RangeSample(S, 7, -1.0)]))
     found = lines(bench.metrics)
     assert found['dropanchor_samples_total{kind="range"}'] == 1

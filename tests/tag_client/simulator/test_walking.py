@@ -1,8 +1,6 @@
 """Simulated walks are reproducible and self-consistent, and shake the device like recorded walks."""
 
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +11,9 @@ from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges
 from dropanchor_tag_client.simulator.sensors import noiseless
 from dropanchor_tag_client.simulator.trajectory import Segment, Start, drive
 from dropanchor_tag_client.simulator.walking import CARRIES, Carry, behind_the_walker, simulate_walk, walking_sensors
+from support.recordings import recording_or_skip
 
 Array = NDArray[np.float64]
-DATA = Path(os.environ.get("DROPANCHOR_DATA", Path(__file__).parents[3] / "../shared/data"))
 BANDS = ((0.7, 1.3), (1.7, 2.3), (2.3, 3.3))  # of the step frequency
 
 
@@ -55,9 +53,7 @@ def test_the_hand_shakes_as_in_recorded_walks() -> None:
 
 
 def test_the_recorded_walks_shake_the_hand_as_the_simulated_ones_do() -> None:
-    folders = sorted(DATA.glob("phones/ms*_front"))
-    if not folders:
-        pytest.skip(f"{DATA}/phones is missing: set DROPANCHOR_DATA to the folder of the recordings")
+    folders = sorted(recording_or_skip("phones").glob("ms*_front"))
     axes = [read_recording(folder).imu for folder in folders]
     acc = [np.column_stack([np.asarray(imu[name]) for name in ("ax", "ay", "az")]) for imu in axes]
     np.testing.assert_allclose(simulated(), np.median([measured(one, 50.0) for one in acc], axis=0), rtol=0.2)

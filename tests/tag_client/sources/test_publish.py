@@ -9,13 +9,13 @@ from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.sources.publish import publish_lines
 from support.commands import python, start_python
-from support.listening import Heard, listening
+from support.listening import ReceivedFrames, listening
 from support.zenoh_router import wait_until
 
 T = 1_760_000_000_000_000_000
 
 
-def published(endpoint: str, lines: bytes, expected: int) -> tuple[Heard, int, list[str], TagClient]:
+def published(endpoint: str, lines: bytes, expected: int) -> tuple[ReceivedFrames, int, list[str], TagClient]:
     """What is heard, the number of bad lines, and what was said of them."""
     errors = io.StringIO()
     with listening(endpoint) as heard:

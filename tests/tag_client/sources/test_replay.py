@@ -8,7 +8,7 @@ import pytest
 
 from dropanchor_schemas.wire import Frame, anchor_number
 from dropanchor_tag_client.cli import main
-from support.listening import Heard, listening, listening_with_recovery
+from support.listening import ReceivedFrames, listening, listening_with_recovery
 from support.zenoh_router import wait_until
 
 T0 = 1_760_000_000_000_000_000
@@ -31,7 +31,7 @@ def times(frames: list[Frame]) -> list[int]:
     return sorted(t_ns for frame in frames for t_ns in frame.times())
 
 
-def samples(heard: Heard) -> int:
+def samples(heard: ReceivedFrames) -> int:
     return sum(len(frame) for frame in heard.frames)
 
 

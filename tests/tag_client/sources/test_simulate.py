@@ -14,13 +14,13 @@ from dropanchor_tag_client.cli import main
 from dropanchor_tag_client.recording import read_recording
 from dropanchor_tag_client.simulator.live import start_poses
 from support.commands import python, start_python
-from support.listening import Heard, listening
+from support.listening import ReceivedFrames, listening
 from support.zenoh_router import free_endpoint, running_router, wait_until
 
 COMMAND = ("-m", "dropanchor_tag_client", "simulate")
 
 
-def tags_of(heard: Heard) -> Counter[str]:
+def tags_of(heard: ReceivedFrames) -> Counter[str]:
     return Counter(map(tag_from_key, heard.keys))
 
 

@@ -1,23 +1,23 @@
-/** Asks the service, with a key where it wants one. The key is kept by this tab alone, until the tab is closed. */
+/** Requests to the service, with a key where it requires one. The key lives in this browser tab until the tab closes. */
 
-const KEPT = "dropanchor.key";
+const STORAGE_KEY = "dropanchor.key";
 
-export class KeyWantedError extends Error {}
+export class KeyRequiredError extends Error {}
 
-export const hasKey = () => sessionStorage.getItem(KEPT) !== null;
+export const hasKey = () => sessionStorage.getItem(STORAGE_KEY) !== null;
 
 /** @param {string} key */
-export const keepKey = (key) => sessionStorage.setItem(KEPT, key);
+export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
 
 /**
- * An answer that is a good one; throws otherwise.
+ * Return a successful response. Throws KeyRequiredError without a valid key, and Error for any other failure.
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
-export async function ask(url, options) {
-  const key = sessionStorage.getItem(KEPT);
+export async function request(url, options) {
+  const key = sessionStorage.getItem(STORAGE_KEY);
   const headers = key === null ? {} : { authorization: `Bearer ${key}` };
-  const answer = await fetch(url, { ...options, headers, cache: "no-store" });
-  if (answer.status === 401 || answer.status === 403) throw new KeyWantedError(`${url.pathname} wants another key`);
-  if (!answer.ok) throw new Error(`${url.pathname} answered ${answer.status}`);
-  return answer;
+  const response = await fetch(url, { ...options, headers, cache: "no-store" });
+  if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
+  if (!response.ok) throw new Error(`${url.pathname} returned status ${response.status}`);
+  return response;
 }

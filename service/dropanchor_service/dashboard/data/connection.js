@@ -1,34 +1,34 @@
-/** The service: the stream of poses, and the site. Comes back by itself when the service does. */
+/** The connection to the service: the stream of poses, and the site. It reconnects by itself. */
 
-import { ask, KeyWantedError } from "./access.js";
+import { request, KeyRequiredError } from "./access.js";
 import { eventsOf } from "./events.js";
 
-/** Frames a second; fewer where each is large. */
+/** Frames per second; fewer for a large fleet, whose frames are large. */
 const HZ = 10;
-const HZ_OF_MANY = 4;
-const MANY = 2000;
+const HZ_OF_LARGE_FLEET = 4;
+const LARGE_FLEET = 2000;
 const RETRY_MS = [500, 1000, 2000, 3000];
 const PROBE_MS = 3000;
 const PROBE_TIMEOUT_MS = 4000;
 
-/** Below the root of the service, wherever that is mounted. @param {string} path */
+/** Return the URL of a path below the root of the service, wherever that is mounted. @param {string} path */
 export const api = (path) => new URL(`api/v1/${path}`, document.baseURI);
 
 /** @param {URL} url @returns {Promise<any>} */
 export async function getJson(url) {
-  return (await ask(url, { signal: AbortSignal.timeout(PROBE_TIMEOUT_MS) })).json();
+  return (await request(url, { signal: AbortSignal.timeout(PROBE_TIMEOUT_MS) })).json();
 }
 
 /**
  * Events: "snapshot" and "change" (detail: Frame), "site" (detail: Site), "status" (see `status`).
- * The site is asked for every few seconds: its anchors may have been moved, and a silent stream may be a dead one.
+ * The site is requested every few seconds, since its anchors may have moved and a silent stream may be dead.
  */
 export class Connection extends EventTarget {
-  /** "locked": the service wants a key, or another one. @type {"connecting" | "live" | "lost" | "locked"} */
+  /** "locked": the service requires a key, or another one. @type {"connecting" | "live" | "lost" | "locked"} */
   status = "connecting";
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;
-  /** For tests and the curious: frames so far, and what the last one cost. */
+  /** For tests and the console: number of frames so far, and the time that the last one took. */
   stats = { frames: 0, ms: 0 };
   #stream = new AbortController();
   #attempt = 0;
@@ -49,7 +49,7 @@ export class Connection extends EventTarget {
 
   /** @param {number} tags */
   slowDownFor(tags) {
-    const max_hz = tags > MANY ? HZ_OF_MANY : HZ;
+    const max_hz = tags > LARGE_FLEET ? HZ_OF_LARGE_FLEET : HZ;
     if (max_hz === this.#max_hz) return;
     this.#max_hz = max_hz;
     this.#open();
@@ -65,9 +65,9 @@ export class Connection extends EventTarget {
   /** @param {AbortSignal} signal */
   async #follow(signal) {
     try {
-      const answer = await ask(api(`stream?max_hz=${this.#max_hz}`), { signal });
+      const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal });
       this.#opened();
-      for await (const { name, data } of eventsOf(answer)) {
+      for await (const { name, data } of eventsOf(response)) {
         this.#received(name === "snapshot" ? "snapshot" : "change", data);
       }
       this.#failed();
@@ -92,7 +92,7 @@ export class Connection extends EventTarget {
   #failed(why) {
     this.#stream.abort();
     clearTimeout(this.#timer);
-    const locked = why instanceof KeyWantedError;
+    const locked = why instanceof KeyRequiredError;
     this.#become(locked ? "locked" : "lost");
     if (locked) return;
     this.#timer = setTimeout(() => this.#open(), RETRY_MS[Math.min(this.#attempt++, RETRY_MS.length - 1)]);

@@ -1,8 +1,8 @@
-/** Server-sent events of an answer. The browser's own EventSource cannot send a key. */
+/** Read the server-sent events of a response. The browser's own EventSource cannot send a key. */
 
 /** @typedef {{name: string, data: string}} ServerEvent */
 
-/** Takes text in pieces of any length, gives whole events. Comments are left out. */
+/** Collect text in pieces of any length and return complete events without comments. */
 export class EventParser {
   #rest = "";
 
@@ -24,9 +24,9 @@ function eventOf(block) {
   return event;
 }
 
-/** Until the service ends the stream, or throws. @param {Response} answer @returns {AsyncGenerator<ServerEvent>} */
-export async function* eventsOf(answer) {
-  const reader = /** @type {ReadableStream<Uint8Array>} */ (answer.body).getReader();
+/** Yield events until the service ends the stream. Throws when the connection fails. @param {Response} response @returns {AsyncGenerator<ServerEvent>} */
+export async function* eventsOf(response) {
+  const reader = /** @type {ReadableStream<Uint8Array>} */ (response.body).getReader();
   const decoder = new TextDecoder();
   const parser = new EventParser();
   for (;;) {

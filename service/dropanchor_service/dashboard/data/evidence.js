@@ -1,10 +1,10 @@
-/** Why the selected tag is taken to be where it is: what the stream does not carry, asked for as long as it is selected. */
+/** The explanation of the selected tag's pose. The stream does not carry it, so it is requested while the tag is selected. */
 
 import { api, getJson } from "./connection.js";
 
-const ASK_MS = 500;
-const LAST = 150;
-const HEARD_S = 5;
+const REQUEST_MS = 500;
+const INNOVATION_COUNT = 150;
+const RECENT_S = 5;
 
 /**
  * @typedef {object} Innovation as in the contract
@@ -29,46 +29,46 @@ const HEARD_S = 5;
 
 export class Evidence extends EventTarget {
   /** @type {Explanation | null} */
-  #found = null;
+  #explanation = null;
   /** @type {string | null} */
   #tag = null;
-  #asked = -Infinity;
-  #waits = false;
+  #requestedAt = -Infinity;
+  #isWaiting = false;
 
   /** @param {string | null} tag @returns {Explanation | null} */
   of(tag) {
-    return tag === this.#tag ? this.#found : null;
+    return tag === this.#tag ? this.#explanation : null;
   }
 
-  /** Ask for a tag unless that was done a moment ago. @param {string} tag */
-  async ask(tag) {
-    if (tag !== this.#tag) [this.#tag, this.#found] = [tag, null];
-    else if (this.#waits || performance.now() - this.#asked < ASK_MS) return;
-    this.#asked = performance.now();
-    this.#waits = true;
-    const found = await getJson(api(`tags/${encodeURIComponent(tag)}/explain?last=${LAST}`)).catch(() => null);
-    this.#waits = false;
+  /** Request the explanation of a tag, unless that was done a moment ago. @param {string} tag */
+  async request(tag) {
+    if (tag !== this.#tag) [this.#tag, this.#explanation] = [tag, null];
+    else if (this.#isWaiting || performance.now() - this.#requestedAt < REQUEST_MS) return;
+    this.#requestedAt = performance.now();
+    this.#isWaiting = true;
+    const explanation = await getJson(api(`tags/${encodeURIComponent(tag)}/explain?last=${INNOVATION_COUNT}`)).catch(() => null);
+    this.#isWaiting = false;
     if (tag !== this.#tag) return;
-    this.#found = found;
+    this.#explanation = explanation;
     this.dispatchEvent(new Event("change"));
   }
 }
 
-/** The last range to each anchor that was heard in the last seconds. @param {Explanation} explanation
+/** Return the last range to each anchor with a range in the last seconds. @param {Explanation} explanation
  * @returns {Map<string, number>} m by anchor */
-export function rangesHeard({ innovations }) {
+export function recentRanges({ innovations }) {
   const newest = innovations.at(-1)?.t_ns ?? 0;
-  const heard = innovations.filter(({ kind, anchor, t_ns }) => kind === "range" && anchor && newest - t_ns < HEARD_S * 1e9);
-  return new Map(heard.map(({ anchor, measured }) => [/** @type {string} */ (anchor), measured]));
+  const recent = innovations.filter(({ kind, anchor, t_ns }) => kind === "range" && anchor && newest - t_ns < RECENT_S * 1e9);
+  return new Map(recent.map(({ anchor, measured }) => [/** @type {string} */ (anchor), measured]));
 }
 
-/** One standard deviation of the heading, rad; NaN while it is not known. @param {Explanation} explanation */
+/** Return one standard deviation of the heading in rad; NaN while it is unknown. @param {Explanation} explanation */
 export const headingSigma = ({ pose }) => Math.sqrt(pose.covariance?.[2]?.[2] ?? NaN);
 
-/** How fast each range changed over the two seconds before it: the tag was at least as fast as that.
+/** Return how fast each range changed over the two seconds before it. The tag was at least that fast.
  * @param {readonly Innovation[]} innovations of ranges to one anchor
  * @returns {{t_ns: number, value: number}[]} m/s, without sign */
-export function leastSpeeds(innovations) {
+export function minimumSpeeds(innovations) {
   let from = 0;
   return innovations.flatMap(({ t_ns }, i) => {
     while (t_ns - innovations[from].t_ns > 2e9) from++;
@@ -77,7 +77,7 @@ export function leastSpeeds(innovations) {
   });
 }
 
-/** Of the line of least squares through the ranges, m/s; NaN for less than a second.
+/** Return the slope of the least-squares line through the ranges in m/s; NaN for less than a second.
  * @param {readonly Innovation[]} ranges */
 function slopeOf(ranges) {
   const last = ranges[ranges.length - 1];

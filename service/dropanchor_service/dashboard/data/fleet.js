@@ -1,4 +1,4 @@
-/** The latest pose of every tag, in columns: one row per tag, rows given in order of appearance. */
+/** The latest pose of every tag in columns, with one row per tag in the order of their first appearance. */
 
 import { OUT_OF_DATE, STATES, staleness, stateNumber } from "./states.js";
 
@@ -8,7 +8,7 @@ const NUMBERS = /** @type {const} */ ([
   "semi_major_m", "semi_minor_m", "angle_rad",
 ]);
 
-/** Columns of values that are kept as they come; unknown is null. */
+/** Columns of values that are stored as received; unknown is null. */
 const VALUES = /** @type {const} */ (["reason", "hint", "anchor", "hypotheses"]);
 
 /**
@@ -22,13 +22,13 @@ const VALUES = /** @type {const} */ (["reason", "hint", "anchor", "hypotheses"])
  */
 
 /**
- * A frame of the stream: `tags` and columns beside it. A column that is left out leaves what was known.
+ * A frame of the stream: `tags` and columns beside it. Values of a missing column stay unchanged.
  * @typedef {{t_ns: number, tags: string[]} & Record<string, any>} Frame
  */
 
 export class Fleet {
   size = 0;
-  /** False once the connection is lost, until everything has been sent again. */
+  /** False from the loss of the connection until the service has sent all poses again. */
   current = true;
   /** Grows whenever tags come or go. */
   membership = 0;
@@ -38,7 +38,7 @@ export class Fleet {
   #rows = new Map();
   state = new Uint8Array(0);
   online = new Uint8Array(0);
-  /** On the clock of the caller: ms at which the pose was valid; NaN before the first pose. */
+  /** Time at which the pose was valid, in ms on the clock of the caller; NaN before the first pose. */
   poseTime = new Float64Array(0);
   /** Where the dot is drawn: follows x, y smoothly (see motion.js). */
   drawnX = new Float32Array(0);
@@ -58,7 +58,7 @@ export class Fleet {
     return (now_ms - this.poseTime[row]) / 1000;
   }
 
-  /** How to speak of a tag. @param {number} row @returns {import("./states.js").StateStyle} */
+  /** Return the label, meaning and shape of a tag's state. @param {number} row @returns {import("./states.js").StateStyle} */
   style(row) {
     return this.current ? STATES[this.state[row]] : OUT_OF_DATE;
   }
@@ -73,7 +73,7 @@ export class Fleet {
     return row >= 0 && !Number.isNaN(this.poseTime[row]);
   }
 
-  /** Take a frame that changes some tags. @param {Frame} frame @param {number} now_ms */
+  /** Apply a frame that changes some tags. @param {Frame} frame @param {number} now_ms */
   apply(frame, now_ms) {
     const rows = this.#rowsOf(frame.tags);
     for (const name of NUMBERS) if (frame[name]) writeNumbers(this.number[name], rows, frame[name]);
@@ -83,7 +83,7 @@ export class Fleet {
     if (frame.age_s) rows.forEach((row, i) => (this.poseTime[row] = now_ms - (frame.age_s[i] ?? NaN) * 1000));
   }
 
-  /** Take a frame that names every tag: those it does not name are gone. @param {Frame} frame @param {number} now_ms */
+  /** Apply a frame that names every tag. Remove all other tags. @param {Frame} frame @param {number} now_ms */
   replace(frame, now_ms) {
     const named = new Set(frame.tags);
     if (this.names.some((name) => !named.has(name))) this.#clear();

@@ -1,4 +1,4 @@
-/** Numbers as people read them. Unknown (NaN, null) is an en dash. */
+/** Format numbers for people. An unknown value (NaN, null) becomes an en dash. */
 
 export const UNKNOWN = "–";
 const MINUS = "−";
@@ -17,7 +17,7 @@ export function fixed(value, decimals) {
   return value < 0 && Number(text) !== 0 ? MINUS + text : text;
 }
 
-/** A coordinate in a narrow column: fewer decimals the farther away. @param {number | null | undefined} value */
+/** Format a coordinate for a narrow column, with fewer decimals the larger it is. @param {number | null | undefined} value */
 export function coordinate(value) {
   return known(value) ? fixed(value, Math.abs(value) < 100 ? 2 : Math.abs(value) < 1000 ? 1 : 0) : UNKNOWN;
 }
@@ -25,7 +25,7 @@ export function coordinate(value) {
 /** @param {number | null | undefined} value */
 export const metres = (value) => (known(value) ? `${fixed(value, 2)} m` : UNKNOWN);
 
-/** Centimetres matter below a metre, not above a hundred. @param {number | null | undefined} value */
+/** Format a standard deviation in metres, with fewer decimals the larger it is. @param {number | null | undefined} value */
 export function sigma(value) {
   if (!known(value)) return UNKNOWN;
   return fixed(value, value < 10 ? 2 : value < 100 ? 1 : 0);
@@ -33,7 +33,7 @@ export function sigma(value) {
 
 const POINTS = ["N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW"];
 
-/** A heading as on a compass: degrees clockwise from north and the nearest of 16 points, such as `337° NNW`.
+/** Format a heading as on a compass: degrees clockwise from north and the nearest of 16 points, such as `337° NNW`.
  * @param {number | null | undefined} rad counter-clockwise from east, as in the interfaces */
 export function compass(rad) {
   if (!known(rad)) return UNKNOWN;
@@ -41,7 +41,7 @@ export function compass(rad) {
   return `${turned}° ${POINTS[Math.round(turned / 22.5) % 16]}`;
 }
 
-/** A turn as people say it. @param {number | null | undefined} radps counter-clockwise */
+/** Format a yaw rate as degrees per second to the left or to the right. @param {number | null | undefined} radps counter-clockwise */
 export function turnRate(radps) {
   if (!known(radps)) return UNKNOWN;
   const turned = Math.round((radps * 180) / Math.PI);
@@ -65,7 +65,7 @@ export function age(seconds) {
   return `${Math.round(seconds / 86400)} d`;
 }
 
-/** A round distance of rings and scale bars: 0.5 m, 20 m, 2 km. @param {number} value_m */
+/** Format the distance of a ring or scale bar, such as 0.5 m, 20 m or 2 km. @param {number} value_m */
 export function distance(value_m) {
   if (value_m >= 1000) return `${Number((value_m / 1000).toPrecision(6))} km`;
   if (value_m < 0.1) return `${Number((value_m * 100).toPrecision(6))} cm`;
@@ -75,5 +75,5 @@ export function distance(value_m) {
 /** @param {number} count @param {string} noun */
 export const counted = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 
-/** A machine word for people: `several_modes` → "several modes". @param {string} word */
+/** Format a machine-readable name for people: `several_modes` → "several modes". @param {string} word */
 export const words = (word) => word.replaceAll("_", " ");

@@ -1,15 +1,15 @@
-/** Drawn positions follow the poses smoothly, so that 10 poses a second look like motion. */
+/** Move the drawn positions smoothly, so that 10 poses per second look like continuous motion. */
 
 const TIME_CONSTANT_MS = 70;
 const SETTLED_M = 0.002;
-/** A move this large is a new place (another mode was chosen), not a motion: it is shown as the jump that it is. */
+/** A larger step is a jump to another hypothesis and no motion. It is drawn as a jump. */
 const JUMP_M = 1.5;
 
 /**
- * Move the drawn positions towards the poses. Returns whether any is still on its way.
+ * Move the drawn positions towards the poses. Return whether any of them is still moving.
  * @param {import("./fleet.js").Fleet} fleet
  * @param {number} elapsed_ms since the last call
- * @param {boolean} smooth false: be there at once
+ * @param {boolean} smooth false: jump to the poses
  */
 export function follow(fleet, elapsed_ms, smooth) {
   const { x, y } = fleet.number;

@@ -1,55 +1,55 @@
-/** Long names in little room: the middle is left out, because names of one fleet mostly differ at the end. */
+/** Shorten long names in the middle, because the names of one fleet mostly differ at the end. */
 
 const HEAD_SHARE = 0.3;
 
 /**
- * The name, or its begin and its end around an ellipsis, as much of it as has room.
- * @param {string} name @param {number} room @param {(text: string) => number} widthOf
+ * Return the name, or as much of its start and end as fits around an ellipsis.
+ * @param {string} name @param {number} room available width @param {(text: string) => number} widthOf
  */
 export function shortened(name, room, widthOf) {
   if (widthOf(name) <= room) return name;
   const letters = [...name];
-  let [least, most] = [1, letters.length - 1];
-  while (least < most) {
-    const middle = Math.ceil((least + most) / 2);
-    if (widthOf(keeping(letters, middle)) <= room) least = middle;
-    else most = middle - 1;
+  let [low, high] = [1, letters.length - 1];
+  while (low < high) {
+    const middle = Math.ceil((low + high) / 2);
+    if (widthOf(withoutMiddle(letters, middle)) <= room) low = middle;
+    else high = middle - 1;
   }
-  return keeping(letters, least);
+  return withoutMiddle(letters, low);
 }
 
-/** @param {string[]} letters @param {number} count */
-function keeping(letters, count) {
+/** Return `count` letters from the start and the end, around an ellipsis. @param {string[]} letters @param {number} count */
+function withoutMiddle(letters, count) {
   const head = Math.floor(count * HEAD_SHARE);
   return `${letters.slice(0, head).join("")}…${letters.slice(letters.length - (count - head)).join("")}`;
 }
 
-/** Shortens names for the lines of one column, and remembers them until its width or its font is another. */
+/** Shorten the names of one table column. Results are cached until its width or font changes. */
 export class NameColumn {
   #pen = /** @type {CanvasRenderingContext2D} */ (document.createElement("canvas").getContext("2d"));
   #room = NaN;
   #font = "";
   /** @type {Map<string, string>} */
-  #known = new Map();
+  #cache = new Map();
 
-  /** @param {HTMLElement} line one of the column @param {number} lines that a name may fill */
+  /** @param {HTMLElement} line a name in the column @param {number} lines number of lines that a name may fill */
   measure(line, lines) {
     const { fontWeight, fontSize, fontFamily } = getComputedStyle(line);
     const font = `${fontWeight} ${fontSize} ${fontFamily}`;
-    // Every line may end a letter early, and the widest ones are wider than the font is high.
+    // Each line may break one letter early. The widest letters are wider than the font size.
     const room = lines * (line.clientWidth - parseFloat(fontSize));
     if (room === this.#room && font === this.#font) return;
     this.#room = room;
     this.#font = this.#pen.font = font;
-    this.#known.clear();
+    this.#cache.clear();
   }
 
   /** @param {string} name */
   of(name) {
-    let short = this.#known.get(name);
+    let short = this.#cache.get(name);
     if (short === undefined) {
       short = shortened(name, this.#room, (text) => this.#pen.measureText(text).width);
-      this.#known.set(name, short);
+      this.#cache.set(name, short);
     }
     return short;
   }

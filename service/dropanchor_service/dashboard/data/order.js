@@ -1,4 +1,4 @@
-/** Which tags the table lists, and in which order. */
+/** Filter and sort the tags for the table. */
 
 import { BEST_FIRST, STATES } from "./states.js";
 
@@ -7,7 +7,7 @@ import { BEST_FIRST, STATES } from "./states.js";
 
 const RANK_OF = STATES.map((_, state) => BEST_FIRST.indexOf(state));
 
-/** `tag-9` before `tag-10`: digits padded. @param {string} name */
+/** Return a sort key that puts `tag-9` before `tag-10`. @param {string} name */
 export const nameKey = (name) => name.toLowerCase().replace(/\d+/g, (digits) => digits.padStart(12, "0"));
 
 export class Order {
@@ -16,11 +16,11 @@ export class Order {
   #keys = [];
 
   /**
-   * The rows that are shown, sorted; unknown values last whatever the direction, equal ones by name.
+   * Return the sorted rows. Unknown values come last in both directions, and equal values are sorted by name.
    * @param {Fleet} fleet @param {(row: number) => boolean} wanted @param {Sort} sort @param {number} now_ms
    */
   rows(fleet, wanted, sort, now_ms) {
-    this.#learnNames(fleet);
+    this.#updateKeys(fleet);
     const rows = Array.from({ length: fleet.size }, (_, row) => row).filter(wanted);
     const sign = sort.descending ? -1 : 1;
     const value = valueOf(fleet, sort.column, now_ms);
@@ -30,7 +30,7 @@ export class Order {
   }
 
   /** @param {Fleet} fleet */
-  #learnNames(fleet) {
+  #updateKeys(fleet) {
     if (fleet.membership === this.#membership) return;
     this.#membership = fleet.membership;
     this.#keys = fleet.names.map(nameKey);

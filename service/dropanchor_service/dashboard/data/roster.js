@@ -1,10 +1,10 @@
-/** All tags that the service has heard, with what it counted: also those that have no pose yet. */
+/** The status of every tag that the service knows, including tags without a pose. */
 
 import { api, getJson } from "./connection.js";
 
-const ASK_MS = 3000;
-/** The answer grows with the fleet, so a large fleet is asked for less often. */
-const ASK_MS_PER_TAG = 5;
+const REQUEST_MS = 3000;
+/** The response grows with the fleet, so the page requests it less often for a large fleet. */
+const REQUEST_MS_PER_TAG = 5;
 
 /**
  * @typedef {object} TagStatus as in the contract, as far as the page needs it
@@ -12,7 +12,7 @@ const ASK_MS_PER_TAG = 5;
  * @property {boolean} online
  * @property {Record<string, number>} samples by kind
  * @property {Record<string, number>} rejected by reason
- * @property {string} hint what a person can do so that more is used; empty when nothing is needed
+ * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
  * @property {{height_m: number}} settings
  */
 
@@ -30,23 +30,23 @@ export class Roster {
     return this.#statuses.get(tag) ?? null;
   }
 
-  /** Height of a tag above the plane of the site, m. @param {string} tag */
+  /** Return the height of a tag above the plane of the site in m. @param {string} tag */
   height(tag) {
     return this.of(tag)?.settings.height_m ?? 0;
   }
 
-  /** Ask now and again and again. */
+  /** Request the statuses now and then periodically. */
   async start() {
     try {
-      this.#take((await getJson(api("tags"))).tags);
+      this.#update((await getJson(api("tags"))).tags);
     } catch {
-      // The connection says so, and the next answer will bring it all.
+      // The connection reports the failure. The next response will contain everything.
     }
-    setTimeout(() => this.start(), ASK_MS + ASK_MS_PER_TAG * this.fleet.size);
+    setTimeout(() => this.start(), REQUEST_MS + REQUEST_MS_PER_TAG * this.fleet.size);
   }
 
   /** @param {TagStatus[]} statuses */
-  #take(statuses) {
+  #update(statuses) {
     this.#statuses = new Map(statuses.map((status) => [status.tag, status]));
     const poseless = statuses.filter(({ tag }) => !this.fleet.hasPose(this.fleet.row(tag)));
     const tags = poseless.map(({ tag }) => tag);

@@ -1,4 +1,4 @@
-/** The tracking states, in the order of the contract, and how far each may be believed. */
+/** The tracking states in the order of the contract, and how far a pose in each can be trusted. */
 
 /**
  * @typedef {object} StateStyle
@@ -6,21 +6,21 @@
  * @property {string} label
  * @property {string} meaning one sentence for people
  * @property {"disc"|"diamond"|"square"|"ring"|"dotted"|"cross"} shape differs per state, so colour is never needed
- * @property {boolean} placed whether x and y may be shown as the place of the tag
+ * @property {boolean} placed whether x and y may be shown as the position of the tag
  * @property {boolean} trusted whether the pose is as good as the service can make it
  */
 
 /** @type {readonly StateStyle[]} */
 export const STATES = Object.freeze([
   { name: "initialising", label: "Initialising", meaning: "Waiting for the first ranges and a heading.", shape: "dotted", placed: false, trusted: false },
-  { name: "ambiguous", label: "Ambiguous", meaning: "More than one place explains the data.", shape: "ring", placed: false, trusted: false },
-  { name: "tracking", label: "Tracking", meaning: "The pose and its ellipse can be believed.", shape: "disc", placed: true, trusted: true },
-  { name: "coasting", label: "Coasting", meaning: "No ranges at the moment: carried on by motion alone.", shape: "diamond", placed: true, trusted: false },
-  { name: "degraded", label: "Degraded", meaning: "Tracked, but with poor data: the place is rough.", shape: "square", placed: true, trusted: false },
-  { name: "lost", label: "Lost", meaning: "The place is not known any more.", shape: "cross", placed: false, trusted: false },
+  { name: "ambiguous", label: "Ambiguous", meaning: "More than one position fits the measurements.", shape: "ring", placed: false, trusted: false },
+  { name: "tracking", label: "Tracking", meaning: "The pose and its ellipse can be trusted.", shape: "disc", placed: true, trusted: true },
+  { name: "coasting", label: "Coasting", meaning: "No ranges at the moment: predicted from motion alone.", shape: "diamond", placed: true, trusted: false },
+  { name: "degraded", label: "Degraded", meaning: "Tracked, but with poor data: the position is rough.", shape: "square", placed: true, trusted: false },
+  { name: "lost", label: "Lost", meaning: "The position is no longer known.", shape: "cross", placed: false, trusted: false },
 ]);
 
-/** How the page speaks of a tag once no newer pose can arrive: whatever its state was, it may be another by now.
+/** The style of every tag while no newer pose can arrive, since its state may have changed.
  * @type {Readonly<StateStyle>} */
 export const OUT_OF_DATE = Object.freeze({
   name: "outdated", label: "Out of date", meaning: "No connection to the service: this is the last pose that arrived.",
@@ -30,19 +30,19 @@ export const OUT_OF_DATE = Object.freeze({
 const NUMBERS = new Map(STATES.map((state, number) => [state.name, number]));
 
 /**
- * The number of a state; a state this page does not know is treated as the most doubtful one.
+ * Return the number of a state. An unknown state counts as the least trusted one.
  * @param {string | null | undefined} name
  */
 export function stateNumber(name) {
   return NUMBERS.get(name ?? "initialising") ?? STATES.length - 1;
 }
 
-/** The states by how much they can be believed. */
+/** The states from the most to the least trusted. */
 export const BEST_FIRST = ["tracking", "coasting", "degraded", "ambiguous", "initialising", "lost"].map(stateNumber);
 
 export const AMBIGUOUS = stateNumber("ambiguous");
 
-/** Seconds after which a pose is drawn hollow and fainter, and after which it is fainter still. */
+/** Seconds after which a pose is drawn hollow and fainter, and after which it is even fainter. */
 export const STALE_S = 2;
 export const OLD_S = 10;
 

@@ -1,4 +1,4 @@
-/** Where each tag has been in the last seconds: a ring of points per tag, only of poses that could be placed. */
+/** The positions of each tag in the last seconds: a ring buffer per tag, without poses whose position is unknown. */
 
 import { STATES } from "./states.js";
 
@@ -10,7 +10,7 @@ class Trail {
   x = new Float32Array(CAPACITY);
   y = new Float32Array(CAPACITY);
   time = new Float64Array(CAPACITY);
-  /** 1: trusted; 0: placed, but doubtful; NaN in x: a gap. */
+  /** 1: trusted; 0: doubtful position. A NaN in x marks a gap. */
   trusted = new Uint8Array(CAPACITY);
   length = 0;
   #next = 0;
@@ -26,7 +26,7 @@ class Trail {
     this.length = Math.min(CAPACITY, this.length + 1);
   }
 
-  /** Position in the arrays of the i-th oldest point. @param {number} i */
+  /** Return the index of the i-th oldest point in the arrays. @param {number} i */
   at(i) {
     return (this.#next - this.length + i + CAPACITY) % CAPACITY;
   }
@@ -50,7 +50,7 @@ export class Trails {
   }
 
   /**
-   * Note where the named tags are now.
+   * Add the current positions of the named tags.
    * @param {import("./fleet.js").Fleet} fleet
    * @param {string[]} names
    * @param {number} now_ms
@@ -65,7 +65,7 @@ export class Trails {
     }
   }
 
-  /** Forget tags that are gone. @param {import("./fleet.js").Fleet} fleet */
+  /** Delete the trails of tags that no longer exist. @param {import("./fleet.js").Fleet} fleet */
   prune(fleet) {
     for (const name of this.#trails.keys()) if (fleet.row(name) < 0) this.#trails.delete(name);
   }

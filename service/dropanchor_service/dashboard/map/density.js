@@ -1,4 +1,4 @@
-/** Too many dots to tell apart: cells that are stronger the more tags they hold. */
+/** Draw very many tags as a grid of cells that are stronger the more tags they hold. */
 
 import { STATES } from "../data/states.js";
 
@@ -10,8 +10,8 @@ const CELL_PX = 8;
  * @property {number} columns
  * @property {number} lines
  * @property {Uint16Array} total tags per cell
- * @property {Uint16Array} doubtful those of them whose pose cannot be trusted
- * @property {number} most the greatest total
+ * @property {Uint16Array} doubtful tags per cell whose pose cannot be trusted
+ * @property {number} max the largest total
  */
 
 /** @param {import("./scene.js").Scene} scene @returns {Cells} */
@@ -20,16 +20,16 @@ export function countCells({ fleet, view, rows, now_ms }) {
   const lines = Math.ceil(view.height / CELL_PX);
   const total = new Uint16Array(columns * lines);
   const doubtful = new Uint16Array(columns * lines);
-  let most = 0;
+  let max = 0;
   for (const row of rows) {
     const column = Math.floor(view.screenX(fleet.drawnX[row]) / CELL_PX);
     const line = Math.floor(view.screenY(fleet.drawnY[row]) / CELL_PX);
     if (column < 0 || line < 0 || column >= columns || line >= lines) continue;
     const cell = line * columns + column;
-    most = Math.max(most, ++total[cell]);
+    max = Math.max(max, ++total[cell]);
     if (!STATES[fleet.state[row]].trusted || fleet.staleness(row, now_ms)) doubtful[cell]++;
   }
-  return { columns, lines, total, doubtful, most };
+  return { columns, lines, total, doubtful, max };
 }
 
 /** @param {import("./scene.js").Scene} scene */
@@ -45,7 +45,7 @@ export function drawDensity(scene) {
     for (let channel = 0; channel < 3; channel++) {
       image.data[4 * cell + channel] = good[channel] + share * (doubtful[channel] - good[channel]);
     }
-    image.data[4 * cell + 3] = 50 + (205 * Math.log1p(total)) / Math.log1p(cells.most);
+    image.data[4 * cell + 3] = 50 + (205 * Math.log1p(total)) / Math.log1p(cells.max);
   });
   pen.putImageData(image, 0, 0);
   scene.ctx.imageSmoothingEnabled = false;

@@ -1,4 +1,4 @@
-/** What is not known: ellipses, hypotheses, rings at the range; and where the tags have been. */
+/** Draw the uncertainty of poses (ellipses, hypotheses, range rings), and the trails. */
 
 import { horizontal } from "./geometry.js";
 import { percent } from "../data/format.js";
@@ -15,7 +15,7 @@ const TRAILS_UP_TO = 300;
 const RINGS_UP_TO = 12;
 const GHOSTS_UP_TO = 300;
 
-/** The 95 % ellipses: solid only around a pose that can be trusted. @param {Scene} scene */
+/** Draw the 95 % ellipses, filled only around a trusted pose. @param {Scene} scene */
 export function drawEllipses(scene) {
   const { ctx, palette } = scene;
   if (scene.rows.length > ELLIPSES_UP_TO) return;
@@ -26,7 +26,7 @@ export function drawEllipses(scene) {
   }
 }
 
-/** A tag whose place is not known has one only while it is selected. @param {Scene} scene @param {number} row */
+/** Return whether a tag has an ellipse. One with an unknown position has it only while it is selected. @param {Scene} scene @param {number} row */
 const hasEllipse = ({ fleet, selected }, row) =>
   STATES[fleet.state[row]].placed || (row === selected && !hasGhosts(fleet, row));
 
@@ -58,7 +58,7 @@ function traceEllipse(ctx, view, x, y, major, minor, angle) {
   ctx.ellipse(px, py, a, b, -angle, 0, 2 * Math.PI);
 }
 
-/** Every place where an ambiguous tag may be, fainter the less likely it is. @param {Scene} scene
+/** Draw every hypothesis of the ambiguous tags, fainter the less likely it is. @param {Scene} scene
  * @param {(row: number) => boolean} wanted */
 export function drawGhosts(scene, wanted) {
   const { fleet, ctx } = scene;
@@ -100,7 +100,7 @@ function labelGhost(ctx, palette, text, x, y) {
   haloText(ctx, palette, text, x, y, palette.state[AMBIGUOUS]);
 }
 
-/** A range says on which ring a tag is: drawn for the selected tag, and for those whose place is not known.
+/** Draw the ring on which a range puts a tag, for the selected tag and for tags with an unknown position.
  * @param {Scene} scene @param {(row: number) => boolean} wanted */
 export function drawRangeRings(scene, wanted) {
   const { fleet } = scene;
@@ -140,7 +140,7 @@ export function drawTrails(scene) {
   scene.ctx.setLineDash([]);
 }
 
-/** In a few pieces that fade with age; dashed where the pose could not be trusted. @param {Scene} scene
+/** Draw a trail in pieces that fade with age, dashed where the pose was not trusted. @param {Scene} scene
  * @param {number} row */
 function drawTrail({ ctx, view, palette, fleet, trails, selected, now_ms }, row) {
   const trail = trails.of(fleet.names[row]);

@@ -1,6 +1,6 @@
-/** Why the selected tag is where it is: rings of all anchors that it heard, and how well its heading is known. */
+/** Draw the evidence for the selected tag: its last range to each anchor, and the uncertainty of its heading. */
 
-import { headingSigma, rangesHeard } from "../data/evidence.js";
+import { headingSigma, recentRanges } from "../data/evidence.js";
 import { horizontal } from "./geometry.js";
 import { metres } from "../data/format.js";
 import { haloText, traceRing } from "./draw_site.js";
@@ -9,19 +9,19 @@ import { hasGhosts } from "./draw_tags.js";
 /** @typedef {import("./scene.js").Scene} Scene @typedef {import("../data/evidence.js").Explanation} Explanation */
 
 const WEDGE_PX = 62;
-const WIDEST = Math.PI / 2; // a heading that is known no better points nowhere
+const MAX_SIGMA = Math.PI / 2; // a heading with a larger uncertainty has no direction
 
 /** @param {Scene} scene @param {Explanation | null} explanation */
 export function drawEvidence(scene, explanation) {
   if (scene.selected < 0 || explanation === null) return;
-  for (const [id, range] of rangesHeard(explanation)) drawHeard(scene, id, range);
+  for (const [id, range] of recentRanges(explanation)) drawRecentRange(scene, id, range);
   drawWedge(scene, headingSigma(explanation));
   scene.ctx.globalAlpha = 1;
 }
 
-/** The ring of an anchor; that of the last range of all is drawn with the tags, as fresh as the stream.
+/** Label the ring of an anchor, and draw it unless it is the newest one, which is drawn from the stream with the tags.
  * @param {Scene} scene @param {string} id @param {number} range */
-function drawHeard({ ctx, view, palette, fleet, roster, anchors, selected }, id, range) {
+function drawRecentRange({ ctx, view, palette, fleet, roster, anchors, selected }, id, range) {
   const anchor = anchors.find((other) => other.id === id);
   if (!anchor) return;
   const radius = horizontal(range, anchor.z - roster.height(fleet.names[selected]));
@@ -43,10 +43,10 @@ function drawHeard({ ctx, view, palette, fleet, roster, anchors, selected }, id,
   haloText(ctx, palette, metres(range), view.screenX(anchor.x), view.screenY(anchor.y + radius) - 3, colour);
 }
 
-/** One standard deviation of the heading to either side. @param {Scene} scene @param {number} sigma rad */
+/** Draw a wedge of one standard deviation to either side of the heading. @param {Scene} scene @param {number} sigma rad */
 function drawWedge({ ctx, view, palette, fleet, selected }, sigma) {
   const heading = fleet.number.heading_rad[selected];
-  if (!(sigma < WIDEST) || Number.isNaN(heading) || hasGhosts(fleet, selected)) return;
+  if (!(sigma < MAX_SIGMA) || Number.isNaN(heading) || hasGhosts(fleet, selected)) return;
   const [x, y] = [view.screenX(fleet.drawnX[selected]), view.screenY(fleet.drawnY[selected])];
   ctx.beginPath();
   ctx.moveTo(x, y);

@@ -1,4 +1,4 @@
-/** What does not move: grid, range rings with their distances, anchors, scale bar. */
+/** Draw what does not move: grid, distance rings with labels, anchors, scale bar. */
 
 import { distancesTo } from "./geometry.js";
 import { distance } from "../data/format.js";
@@ -60,7 +60,7 @@ export function traceRing(ctx, view, x, y, radius_m) {
   ctx.arc(px, py, r, 0, 2 * Math.PI);
 }
 
-/** The label stands on the ring, in the first direction in which that is on the screen.
+/** Label a ring in the first direction in which the label is on the screen.
  * @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette @param {Anchor} anchor
  * @param {number} radius */
 function labelRing(ctx, view, palette, anchor, radius) {

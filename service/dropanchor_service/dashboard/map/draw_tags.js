@@ -1,4 +1,4 @@
-/** Dots, heading ticks and names of the tags. */
+/** Draw the dots, heading ticks and names of the tags. */
 
 import { age } from "../data/format.js";
 import { SCALE_BAR_PX, haloText } from "./draw_site.js";
@@ -28,7 +28,7 @@ export function drawMarkers(scene) {
   scene.ctx.globalAlpha = 1;
 }
 
-/** Whether the tag is drawn as its hypotheses instead of as one dot. @param {import("../data/fleet.js").Fleet} fleet
+/** Return whether the tag is drawn as its hypotheses instead of one dot. @param {import("../data/fleet.js").Fleet} fleet
  * @param {number} row */
 export const hasGhosts = (fleet, row) => fleet.state[row] === AMBIGUOUS && !!fleet.value.hypotheses[row]?.length;
 
@@ -72,8 +72,8 @@ export function traceTick(ctx, x, y, heading, radius) {
   ctx.lineTo(x + length * cos, y + length * sin);
 }
 
-/** Names beside the dots as far as they cover neither each other nor dots; the selected and the hovered one always.
- * Returns their boxes. @param {Scene} scene @returns {number[][]} left, top, right, bottom */
+/** Draw names beside the dots where they cover neither dots nor each other; the selected and the hovered tag always
+ * get one. Return the boxes of the names. @param {Scene} scene @returns {number[][]} left, top, right, bottom */
 export function drawLabels(scene) {
   const { ctx, palette } = scene;
   const first = [scene.selected, scene.hovered].filter((row) => row >= 0);
@@ -91,7 +91,7 @@ export function drawLabels(scene) {
   return taken.slice(dots);
 }
 
-/** The ground that a dot needs for itself. @param {Scene} scene @param {number} row */
+/** Return the box that a dot covers. @param {Scene} scene @param {number} row */
 function dotBox({ view, fleet }, row) {
   const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
   return [x - 7, y - 4, x + 7, y + 4];
@@ -115,7 +115,7 @@ function drawLabel({ ctx, view, palette, fleet, now_ms }, row, important, taken)
   haloText(ctx, palette, text, box[0], box[1] + 8, important ? palette.ink : palette["ink-2"]);
 }
 
-/** The name, and a note of what keeps the dot from being a good one. @param {import("../data/fleet.js").Fleet} fleet
+/** Return the name, and a note about the age or the ambiguity of the pose. @param {import("../data/fleet.js").Fleet} fleet
  * @param {number} row @param {number} now_ms @returns {{name: string, note: string}} */
 function labelOf(fleet, row, now_ms) {
   const name = fleet.names[row];
@@ -123,7 +123,7 @@ function labelOf(fleet, row, now_ms) {
   return { name, note: fleet.state[row] === AMBIGUOUS ? " ?" : "" };
 }
 
-/** The part of the map that neither buttons nor the scale bar need. @param {import("./view.js").View} view */
+/** Return the part of the map that neither the buttons nor the scale bar cover. @param {import("./view.js").View} view */
 const freeBox = ({ width, height, covered }) => [4, 4, width - covered - 4, height - SCALE_BAR_PX];
 
 /** @param {number[]} box @param {number[]} free */

@@ -1,15 +1,15 @@
 /** Distances on the map, in metres. */
 
 /**
- * The distance on the map of a range measured through the air between two heights; 0 where the height explains it all.
- * @param {number} range @param {number} rise
+ * Return the horizontal distance of a slant range; 0 where the difference in height is larger than the range.
+ * @param {number} range @param {number} rise difference in height
  */
 export function horizontal(range, rise) {
   return Math.sqrt(Math.max(0, range * range - rise * rise));
 }
 
 /**
- * The least and the greatest distance from a point to a rectangle.
+ * Return the smallest and the largest distance from a point to a rectangle.
  * @param {number} x @param {number} y
  * @param {import("./view.js").Bounds} bounds
  * @returns {[number, number]}

@@ -1,4 +1,4 @@
-/** Pan and zoom with mouse, touch and keyboard; a click or a tap selects. */
+/** Pan and zoom with mouse, touch and keyboard, and select with a click or a tap. */
 
 const CLICK_PX = 6;
 const PAN_KEY_PX = 60;
@@ -9,14 +9,14 @@ const DOUBLE_TAP_PX = 24;
 /** @typedef {import("./map.js").LiveMap} LiveMap */
 /** @typedef {{x: number, y: number}} Point */
 
-/** @param {LiveMap} map @param {(row: number) => void} pick −1: the empty ground */
+/** @param {LiveMap} map @param {(row: number) => void} pick −1: no tag */
 export function listen(map, pick) {
   const { canvas } = map;
   const pointers = new Pointers(map, pick);
   canvas.addEventListener("pointerdown", (event) => pointers.down(event));
   canvas.addEventListener("pointermove", (event) => pointers.move(event));
   canvas.addEventListener("pointerup", (event) => pointers.up(event));
-  canvas.addEventListener("pointercancel", (event) => pointers.forget(event));
+  canvas.addEventListener("pointercancel", (event) => pointers.remove(event));
   canvas.addEventListener("pointerleave", () => hover(map, -1));
   canvas.addEventListener("wheel", (event) => onWheel(map, event), { passive: false });
   canvas.addEventListener("keydown", (event) => onKey(map, event));
@@ -25,7 +25,7 @@ export function listen(map, pick) {
 class Pointers {
   /** @type {Map<number, Point>} */
   #at = new Map();
-  /** Where a press began that may still be a click. @type {Point | null} */
+  /** Start of a press that may still become a click. @type {Point | null} */
   #pressed = null;
   #lastTap = { x: NaN, y: NaN, time_ms: -Infinity };
 
@@ -59,11 +59,11 @@ class Pointers {
   /** @param {PointerEvent} event */
   up(event) {
     if (this.#pressed) this.#click(event, this.#pressed);
-    this.forget(event);
+    this.remove(event);
   }
 
   /** @param {PointerEvent} event */
-  forget(event) {
+  remove(event) {
     this.#at.delete(event.pointerId);
     this.#pressed = null;
   }
@@ -74,7 +74,7 @@ class Pointers {
     this.map.view.pan(now.x - before.x, now.y - before.y);
   }
 
-  /** @param {Point} before @param {Point} now @param {Point} other the finger that rests */
+  /** @param {Point} before @param {Point} now @param {Point} other the finger that does not move */
   #pinch(before, now, other) {
     this.map.zoom(apart(now, other) / Math.max(1, apart(before, other)), (now.x + other.x) / 2, (now.y + other.y) / 2);
     this.map.view.pan((now.x - before.x) / 2, (now.y - before.y) / 2);

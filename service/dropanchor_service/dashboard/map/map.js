@@ -1,4 +1,4 @@
-/** The live map: one canvas that is drawn again only when something changed. */
+/** The live map: one canvas that is redrawn only when something has changed. */
 
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
 import { drawEvidence } from "./draw_evidence.js";
@@ -11,9 +11,9 @@ import { nearest, rowsInView } from "./scene.js";
 import { View, boundsAround } from "./view.js";
 
 const SMOOTH_UP_TO = 1000;
-const SMALLEST_FIT_M = 6;
+const MIN_FIT_M = 6;
 const FIT_PADDING_PX = 64;
-/** Of the padding: a tag that comes nearer to the edge than this makes the map show all of them again. */
+/** Share of the padding. A tag that comes closer to the edge makes the map fit all tags again. */
 const FIT_AGAIN = 0.75;
 const REACH_PX = 18;
 const GLIDE_MS = 90;
@@ -24,17 +24,17 @@ export class LiveMap extends EventTarget {
   /** @type {readonly import("./draw_site.js").Anchor[]} */
   anchors = [];
   hovered = -1;
-  /** Keep everything in view until somebody moves the map. */
+  /** Keep all tags in view until the user moves the map. */
   autoFit = true;
-  /** For tests and the curious: what the last drawing did. */
+  /** For tests and the console: figures of the last drawing. */
   stats = { drawings: 0, ms: 0, visible: 0, density: false, labels: /** @type {number[][]} */ ([]) };
   #ctx;
   #rows = new Int32Array(0);
-  #asked = false;
+  #isScheduled = false;
   #last = 0;
   /** @type {{x: number, y: number, scale: number} | null} */
   #goal = null;
-  #calm = matchMedia("(prefers-reduced-motion: reduce)");
+  #reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
 
   /** @param {HTMLCanvasElement} canvas @param {HTMLElement} tools buttons on the right of it
    * @param {import("../data/fleet.js").Fleet} fleet
@@ -55,9 +55,9 @@ export class LiveMap extends EventTarget {
     evidence.addEventListener("change", () => this.redraw());
   }
 
-  /** Nothing waits to be drawn or glides: what is on the screen is what is known. */
+  /** Whether the map is up to date: no drawing is scheduled, and the view does not move. */
   get still() {
-    return !this.#asked && this.#goal === null;
+    return !this.#isScheduled && this.#goal === null;
   }
 
   /** @param {readonly import("./draw_site.js").Anchor[]} anchors */
@@ -69,18 +69,18 @@ export class LiveMap extends EventTarget {
   }
 
   redraw() {
-    if (this.#asked) return;
-    this.#asked = true;
+    if (this.#isScheduled) return;
+    this.#isScheduled = true;
     requestAnimationFrame((now_ms) => this.#frame(now_ms));
   }
 
-  /** After the colours of the page have changed. */
+  /** Read the colours of the page again and redraw. */
   recolour() {
     this.palette = readPalette();
     this.redraw();
   }
 
-  /** The user takes over: the map stays where it is put. */
+  /** Stop fitting and following, because the user moves the map. */
   takeOver() {
     this.autoFit = false;
     this.#goal = null;
@@ -106,7 +106,7 @@ export class LiveMap extends EventTarget {
     this.redraw();
   }
 
-  /** Bring a tag into view if it is not. @param {number} row */
+  /** Bring a tag into view. @param {number} row */
   reveal(row) {
     const [x, y] = [this.fleet.number.x[row], this.fleet.number.y[row]];
     const seen = this.view.bounds(-40);
@@ -115,7 +115,7 @@ export class LiveMap extends EventTarget {
     this.redraw();
   }
 
-  /** The row of the tag at a place on the screen, −1: none. @param {number} px @param {number} py */
+  /** Return the row of the tag at a point on the screen; −1: none. @param {number} px @param {number} py */
   tagAt(px, py) {
     return nearest(this.fleet, this.view, this.#rows, px, py, REACH_PX);
   }
@@ -134,10 +134,10 @@ export class LiveMap extends EventTarget {
   /** @param {number} now_ms */
   #frame(now_ms) {
     const begun = performance.now();
-    this.#asked = false;
+    this.#isScheduled = false;
     const elapsed_ms = Math.min(100, now_ms - this.#last);
     this.#last = now_ms;
-    const smooth = !this.#calm.matches && this.fleet.size <= SMOOTH_UP_TO;
+    const smooth = !this.#reducedMotion.matches && this.fleet.size <= SMOOTH_UP_TO;
     const moving = follow(this.fleet, elapsed_ms, smooth);
     const gliding = this.#moveView(elapsed_ms);
     this.#draw(performance.now());
@@ -154,7 +154,7 @@ export class LiveMap extends EventTarget {
       this.#aimAtAll();
     }
     if (!this.#goal) return false;
-    const share = this.#calm.matches ? 1 : 1 - Math.exp(-elapsed_ms / GLIDE_MS);
+    const share = this.#reducedMotion.matches ? 1 : 1 - Math.exp(-elapsed_ms / GLIDE_MS);
     const far = Math.hypot(this.#goal.x - this.view.x, this.#goal.y - this.view.y) * this.view.scale;
     const arrived = share === 1 || (far < 0.5 && Math.abs(Math.log(this.#goal.scale / this.view.scale)) < 0.002);
     const step = arrived ? 1 : share;
@@ -174,7 +174,7 @@ export class LiveMap extends EventTarget {
   }
 
   #aimAtAll() {
-    const bounds = boundsAround(this.#places(), SMALLEST_FIT_M);
+    const bounds = boundsAround(this.#places(), MIN_FIT_M);
     this.#goal = this.view.fitted(bounds ?? { left: -5, right: 5, bottom: -5, top: 5 }, this.#padding);
   }
 
@@ -182,7 +182,7 @@ export class LiveMap extends EventTarget {
     return Math.min(FIT_PADDING_PX, this.view.width / 6, this.view.height / 6);
   }
 
-  /** Where something is drawn: anchors, tags, and every place where an ambiguous tag may be.
+  /** Yield the positions of anchors and tags, and of all hypotheses of ambiguous tags.
    * @returns {Generator<[number, number]>} */
   *#places() {
     for (const anchor of this.anchors) yield [anchor.x, anchor.y];

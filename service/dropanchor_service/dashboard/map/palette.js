@@ -1,4 +1,4 @@
-/** Colours for the canvas, read from the style sheet so that both agree in light and dark. */
+/** Colours for the canvas, read from the style sheet, so that both agree in light and dark. */
 
 import { STATES } from "../data/states.js";
 
@@ -6,7 +6,7 @@ const NAMES = /** @type {const} */ (["map", "grid", "grid-strong", "ink", "ink-2
 
 /** @typedef {Record<typeof NAMES[number], string> & {state: string[], font: string}} Palette */
 
-/** The same without the colours of the states: for what is out of date. @param {Palette} palette @returns {Palette} */
+/** Return the palette without the colours of the states, for poses that are out of date. @param {Palette} palette @returns {Palette} */
 export const withoutStates = (palette) => ({ ...palette, state: palette.state.map(() => palette["ink-3"]) });
 
 /** @returns {Palette} */

@@ -1,4 +1,4 @@
-/** What one drawing of the map shows. */
+/** The contents of one drawing of the map. */
 
 /**
  * @typedef {object} Scene
@@ -9,7 +9,7 @@
  * @property {import("../data/trails.js").Trails} trails
  * @property {readonly import("./draw_site.js").Anchor[]} anchors
  * @property {import("../data/roster.js").Roster} roster
- * @property {Int32Array} rows tags that are to be seen
+ * @property {Int32Array} rows visible tags
  * @property {number} selected row, or −1
  * @property {number} hovered row, or −1
  * @property {number} now_ms
@@ -21,7 +21,7 @@ export const FADE = [1, 0.75, 0.55];
 const MARGIN_PX = 24;
 
 /**
- * The rows whose dots lie in the view.
+ * Return the rows whose dots lie in the view.
  * @param {import("../data/fleet.js").Fleet} fleet
  * @param {import("./view.js").View} view
  * @param {(row: number) => boolean} wanted
@@ -38,7 +38,7 @@ export function rowsInView(fleet, view, wanted) {
 }
 
 /**
- * The rows by state and staleness: what is drawn alike is drawn at once.
+ * Group the rows by state and staleness, since each group is drawn with one path.
  * @param {Scene} scene
  * @returns {{state: number, stale: 0 | 1 | 2, rows: number[]}[]}
  */
@@ -55,7 +55,7 @@ export function alike(scene) {
   return [...groups.values()];
 }
 
-/** The tag that is nearest to a place on the screen and within `reach` pixels of it; −1: none.
+/** Return the tag nearest to a point on the screen and within `reach` pixels of it; −1: none.
  * @param {import("../data/fleet.js").Fleet} fleet @param {import("./view.js").View} view @param {Int32Array} rows
  * @param {number} px @param {number} py @param {number} reach */
 export function nearest(fleet, view, rows, px, py, reach) {

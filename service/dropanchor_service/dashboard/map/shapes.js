@@ -29,11 +29,11 @@ function tracePolygon(ctx, corners) {
   ctx.closePath();
 }
 
-/** How a state's marker is dashed. @param {number} state @returns {number[]} */
+/** Return the dash pattern of a state's marker. @param {number} state @returns {number[]} */
 export function dashOf(state) {
   const shape = STATES[state].shape;
   return shape === "ring" ? [3, 2.5] : shape === "dotted" ? [1, 2.5] : [];
 }
 
-/** Only a fresh pose that can be trusted is a full dot. @param {number} state @param {number} stale */
+/** Return whether the marker is filled: only that of a fresh and trusted pose is. @param {number} state @param {number} stale */
 export const isFilled = (state, stale) => STATES[state].trusted && stale === 0;

@@ -2,7 +2,7 @@
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** The marker of a state. @param {string} state @returns {{svg: SVGSVGElement, use: SVGUseElement}} */
+/** Return the marker of a state as an SVG element. @param {string} state @returns {{svg: SVGSVGElement, use: SVGUseElement}} */
 export function symbol(state) {
   const svg = document.createElementNS(SVG, "svg");
   svg.setAttribute("class", "symbol");

@@ -1,4 +1,4 @@
-/** The part of the plane that is on the screen. World: metres, x east, y north. Screen: CSS pixels, y down. */
+/** The visible part of the plane. World: metres, x east, y north. Screen: CSS pixels, y down. */
 
 /** @typedef {{left: number, bottom: number, right: number, top: number}} Bounds metres */
 
@@ -54,7 +54,7 @@ export class View {
   }
 
   /**
-   * Where the view would be to show all of `bounds` beside the buttons.
+   * Return the view that shows all of `bounds` beside the buttons.
    * @param {Bounds} bounds
    * @param {number} padding pixels on every side
    * @returns {{x: number, y: number, scale: number}}
@@ -67,12 +67,12 @@ export class View {
     return { x, y: (bounds.bottom + bounds.top) / 2, scale };
   }
 
-  /** The part that nothing covers, `margin` pixels from its edge. @param {number} margin @returns {Bounds} */
+  /** Return the part that no button covers, at least `margin` pixels from the edge. @param {number} margin @returns {Bounds} */
   free(margin) {
     return { ...this.bounds(-margin), right: this.worldX(this.width - this.covered - margin) };
   }
 
-  /** What is visible, grown by `margin` pixels. @param {number} margin @returns {Bounds} */
+  /** Return the visible part, extended by `margin` pixels. @param {number} margin @returns {Bounds} */
   bounds(margin = 0) {
     return {
       left: this.worldX(-margin),
@@ -84,8 +84,8 @@ export class View {
 }
 
 /**
- * The bounds around points, at least `smallest` metres wide and high; null without a point.
- * @param {Iterable<readonly [number, number]>} points those with an unknown coordinate are left out
+ * Return the bounds around points, at least `smallest` metres wide and high; null without points.
+ * @param {Iterable<readonly [number, number]>} points with an unknown coordinate are ignored
  * @param {number} smallest
  * @returns {Bounds | null}
  */
@@ -104,16 +104,16 @@ export function boundsAround(points, smallest) {
   return { left: left - growX, right: right + growX, bottom: bottom - growY, top: top + growY };
 }
 
-/** The smallest of 1, 2, 5 × 10ⁿ that is at least `least`. @param {number} least */
-export function roundStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
+/** Return the smallest of 1, 2, 5 × 10ⁿ that is at least `min`. @param {number} min */
+export function roundStep(min) {
+  const power = 10 ** Math.floor(Math.log10(min));
   for (const factor of [1, 2, 5]) {
-    if (factor * power >= least * (1 - 1e-9)) return factor * power;
+    if (factor * power >= min * (1 - 1e-9)) return factor * power;
   }
   return 10 * power;
 }
 
-/** Multiples of `step` within [low, high]. @param {number} low @param {number} high @param {number} step */
+/** Return the multiples of `step` within [low, high]. @param {number} low @param {number} high @param {number} step */
 export function multiples(low, high, step) {
   const first = Math.ceil(low / step - 1e-9);
   const last = Math.floor(high / step + 1e-9);

@@ -1,4 +1,4 @@
-/** What the user has chosen: a tag, whether to follow it, and which tags to see. */
+/** The user's choices: the selected tag, whether the map follows it, and which tags are shown. */
 
 import { STATES } from "../data/states.js";
 
@@ -54,7 +54,7 @@ export class Choice extends EventTarget {
     this.#changed();
   }
 
-  get narrows() {
+  get isFiltered() {
     return this.#text !== "" || this.hiddenStates.size > 0;
   }
 
@@ -69,7 +69,7 @@ export class Choice extends EventTarget {
   }
 }
 
-/** Tags per state. @param {import("../data/fleet.js").Fleet} fleet @returns {number[]} */
+/** Return the number of tags in each state. @param {import("../data/fleet.js").Fleet} fleet @returns {number[]} */
 export function countStates(fleet) {
   const counts = STATES.map(() => 0);
   for (let row = 0; row < fleet.size; row++) counts[fleet.state[row]]++;

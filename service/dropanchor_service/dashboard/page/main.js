@@ -1,4 +1,4 @@
-/** Wiring: the stream fills the fleet; map, table and panel show it. */
+/** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
@@ -42,14 +42,14 @@ function select(tag) {
   announce(tag);
 }
 
-/** The panel has grown by the plots: keep the line of the tag in sight, once. */
-let grownFor = /** @type {string | null} */ (null);
+/** The plots make the panel taller. Scroll the table once, so that the row of the tag stays visible. */
+let revealedFor = /** @type {string | null} */ (null);
 evidence.addEventListener("change", () => {
-  if (choice.selected !== null && choice.selected !== grownFor) table.reveal(choice.selected);
-  grownFor = choice.selected;
+  if (choice.selected !== null && choice.selected !== revealedFor) table.reveal(choice.selected);
+  revealedFor = choice.selected;
 });
 
-/** For those who hear the page. @param {string} tag */
+/** Announce the selection to screen readers. @param {string} tag */
 function announce(tag) {
   const row = fleet.row(tag);
   const { x, y } = fleet.number;
@@ -57,13 +57,13 @@ function announce(tag) {
   byId("spoken").textContent = `${tag} selected: ${fleet.style(row).label}, ${place}`;
 }
 
-/** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} take @returns {(event: Event) => void} */
-function receiver(take) {
+/** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} update @returns {(event: Event) => void} */
+function receiver(update) {
   return (event) => {
     const now_ms = performance.now();
     const frame = /** @type {CustomEvent} */ (event).detail;
     const membership = fleet.membership;
-    take(frame, now_ms);
+    update(frame, now_ms);
     trails.note(fleet, frame.tags, now_ms);
     if (membership === fleet.membership) map.redraw();
     else updatePanels();
@@ -89,7 +89,7 @@ connection.addEventListener("site", (event) => {
   byId("site").textContent = site.name || site.id;
 });
 
-/** The panels need no more than a few updates a second; ages go on while nothing comes in. */
+/** Update the panels. A few times a second is enough, also without new poses, since ages grow. */
 function updatePanels() {
   if (document.hidden) return;
   table.update();
@@ -106,7 +106,7 @@ byId("show-all").addEventListener("click", () => {
   /** @type {HTMLInputElement} */ (filter).value = "";
   choice.showAll();
 });
-choice.addEventListener("change", () => (byId("show-all").hidden = !choice.narrows));
+choice.addEventListener("change", () => (byId("show-all").hidden = !choice.isFiltered));
 byId("zoom-in").addEventListener("click", () => map.zoom(1.6));
 byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.6));
 byId("fit").addEventListener("click", () => map.fitAll());
@@ -127,7 +127,7 @@ setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();
 
-/** Read-only, for tests and the curious. */
+/** Read-only access for tests and for the console. */
 Object.defineProperty(window, "dropanchor", {
   value: Object.freeze({
     status: () => connection.status,

@@ -1,4 +1,4 @@
-/** Light or dark: as the system says until the user chooses. */
+/** Light or dark colours: those of the system until the user chooses others. */
 
 const KEY = "dropanchor-theme";
 

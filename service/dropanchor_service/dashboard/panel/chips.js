@@ -1,4 +1,4 @@
-/** The states as a legend that counts and filters; without a connection one chip that says how old all of it is. */
+/** The states as a legend that counts and filters. Without a connection, one chip says that all poses are out of date. */
 
 import { countStates } from "../page/choice.js";
 import { BEST_FIRST, OUT_OF_DATE, STATES } from "../data/states.js";
@@ -37,7 +37,7 @@ export class StateChips {
     const button = document.createElement("button");
     const { count } = chip(button, state);
     button.type = "button";
-    button.title = `${state.meaning} Press to hide or show.`;
+    button.title = `${state.meaning} Click to hide or show these tags.`;
     button.addEventListener("click", () => this.choice.toggleState(number));
     return { button, count };
   }

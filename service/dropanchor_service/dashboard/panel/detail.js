@@ -1,4 +1,4 @@
-/** Everything about the selected tag. */
+/** The details of the selected tag. */
 
 import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
@@ -41,7 +41,7 @@ export class Detail {
     const row = this.fleet.row(this.choice.selected);
     this.panel.hidden = row < 0;
     if (row < 0) return;
-    if (this.fleet.hasPose(row)) this.evidence.ask(this.fleet.names[row]);
+    if (this.fleet.hasPose(row)) this.evidence.request(this.fleet.names[row]);
     this.#head(row);
     this.#numbers(row);
     this.#hypotheses(row);

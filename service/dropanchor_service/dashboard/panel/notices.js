@@ -1,6 +1,6 @@
-/** What the page says about itself: connecting, connection lost, no tags yet. */
+/** Messages about the page itself: connecting, connection lost, key required, no tags yet. */
 
-import { hasKey, keepKey } from "../data/access.js";
+import { hasKey, storeKey } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
 import { age } from "../data/format.js";
 
@@ -30,18 +30,18 @@ export class Notices {
     byId("locked").hidden = status !== "locked";
     byId("refused").hidden = !hasKey();
     const isEmpty = status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
-    if (isEmpty && byId("empty").hidden) this.#askForCommand();
+    if (isEmpty && byId("empty").hidden) this.#requestCommand();
     byId("empty").hidden = !isEmpty;
   }
 
-  /** The service knows where tags connect. */
-  async #askForCommand() {
+  /** Request the command that starts a simulated tag, since the service knows where tags connect. */
+  async #requestCommand() {
     try {
       const { simulate, credentials } = await getJson(api("connect"));
       write(byId("command"), simulate);
       byId("credentials").hidden = !credentials;
     } catch {
-      // The connection says so; the command is asked for again when it is back.
+      // The connection reports the failure. The command is requested again after it is back.
     }
   }
 
@@ -49,7 +49,7 @@ export class Notices {
   #unlock(event) {
     event.preventDefault();
     const field = /** @type {HTMLInputElement} */ (byId("key"));
-    keepKey(field.value.trim());
+    storeKey(field.value.trim());
     field.value = "";
     this.connection.retry();
   }

@@ -1,4 +1,4 @@
-/** A small plot over time as SVG; its colours come from the style sheet. */
+/** A small plot over time as SVG. Its colours come from the style sheet. */
 
 import { fixed } from "../data/format.js";
 import { multiples, roundStep } from "../map/view.js";
@@ -25,14 +25,14 @@ export class Plot {
     figure.append(this.#svg);
   }
 
-  /** An empty plot of the last `span` seconds and of values that contain these.
-   * @param {number} span @param {number[]} values @param {number} least metres, say, that it shows at least */
-  begin(span, values, least) {
+  /** Draw the empty plot of the last `span` seconds with a scale that contains these values.
+   * @param {number} span @param {number[]} values @param {number} minRange smallest range of the scale */
+  begin(span, values, minRange) {
     this.#width = this.#svg.clientWidth || 500;
     this.#span = span;
     const [low, high] = [Math.min(...values), Math.max(...values)];
-    const margin = Math.max(0.06 * (high - low), (least - (high - low)) / 2, 0);
-    [this.#low, this.#high] = values.length ? [low - margin, high + margin] : [0, least];
+    const margin = Math.max(0.06 * (high - low), (minRange - (high - low)) / 2, 0);
+    [this.#low, this.#high] = values.length ? [low - margin, high + margin] : [0, minRange];
     this.#svg.setAttribute("viewBox", `0 0 ${this.#width} ${HEIGHT}`);
     this.#svg.replaceChildren();
     this.#grid();
@@ -58,7 +58,7 @@ export class Plot {
     this.#path(name, points.map(({ t, value }, i) => `${i ? "L" : "M"}${this.#at(t, value)}`).join(""));
   }
 
-  /** The ground between two lines. @param {string} name @param {readonly Point[]} upper @param {readonly Point[]} lower */
+  /** Fill the area between two lines. @param {string} name @param {readonly Point[]} upper @param {readonly Point[]} lower */
   band(name, upper, lower) {
     const around = [...upper, ...[...lower].reverse()];
     if (around.length) this.#path(name, `M${around.map(({ t, value }) => this.#at(t, value)).join("L")}Z`);
@@ -74,7 +74,7 @@ export class Plot {
     this.#path(name, points.map(({ t, value }) => `M${this.#at(t, value)}m-3-3 6 6m0-6-6 6`).join(""));
   }
 
-  /** Beside a point. @param {string} text @param {Point} point */
+  /** Write a text beside a point. @param {string} text @param {Point} point */
   write(text, { t, value }) {
     this.#text("name", text, this.x(t) - 3, this.y(value) - 5, "end");
   }

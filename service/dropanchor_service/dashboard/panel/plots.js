@@ -1,15 +1,15 @@
-/** What the last measurements say, beside what was expected of them. */
+/** Plots of the last measurements beside the expected ones. */
 
-import { leastSpeeds } from "../data/evidence.js";
+import { minimumSpeeds } from "../data/evidence.js";
 import { UNKNOWN, fixed, metres } from "../data/format.js";
 import { Plot } from "./plot.js";
 
 /** @typedef {import("../data/evidence.js").Explanation} Explanation @typedef {import("../data/evidence.js").Innovation} Innovation
  * @typedef {import("./plot.js").Point} Point */
 
-const FEWEST_S = 5;
-const USUAL = 1.96; // standard deviations: 19 of 20 innovations lie within, where the model is right
-const MOST = 6;
+const MIN_SPAN_S = 5;
+const BAND_SIGMAS = 1.96; // contains 19 of 20 innovations when the model is right
+const MAX_SIGMAS = 6;
 
 export class Plots {
   /** @param {HTMLElement} panel */
@@ -27,7 +27,7 @@ export class Plots {
     if (!explanation || this.panel.hidden) return;
     const { innovations } = explanation;
     const end = innovations[innovations.length - 1].t_ns;
-    const span = Math.max(FEWEST_S, (end - innovations[0].t_ns) / 1e9);
+    const span = Math.max(MIN_SPAN_S, (end - innovations[0].t_ns) / 1e9);
     const before = (/** @type {number} */ t_ns) => (t_ns - end) / 1e9;
     const ranges = innovations.filter(({ kind }) => kind === "range");
     this.#ranges(ranges, span, before);
@@ -48,13 +48,13 @@ export class Plots {
     this.range.label = `Ranges: ${ranges.length}, of which ${refused(ranges)} refused`;
   }
 
-  /** Two standard deviations around what was expected of the ranges to one anchor. @param {Innovation[]} ranges
+  /** Draw the expected ranges to one anchor with their 95 % band. @param {Innovation[]} ranges
    * @param {(t_ns: number) => number} before @param {boolean} named */
   #expected(ranges, before, named) {
     const line = (/** @type {number} */ sigmas) => ranges.map(({ t_ns, predicted, variance }) => (
       { t: before(t_ns), value: predicted + sigmas * Math.sqrt(variance) }
     ));
-    this.range.band("band", line(USUAL), line(-USUAL));
+    this.range.band("band", line(BAND_SIGMAS), line(-BAND_SIGMAS));
     this.range.line("expected", line(0));
     const last = line(0).at(-1);
     if (named && last) this.range.write(ranges[0].anchor ?? "", last);
@@ -63,14 +63,14 @@ export class Plots {
   /** @param {Innovation[]} innovations @param {number} span @param {(t_ns: number) => number} before */
   #innovations(innovations, span, before) {
     const points = innovations.map(({ t_ns, innovation, variance, fused }) => (
-      { t: before(t_ns), value: Math.max(-MOST, Math.min(MOST, innovation / Math.sqrt(variance))), fused }
+      { t: before(t_ns), value: Math.max(-MAX_SIGMAS, Math.min(MAX_SIGMAS, innovation / Math.sqrt(variance))), fused }
     ));
     this.innovation.begin(span, [...points.map(({ value }) => value), -3, 3], 6);
     const edge = (/** @type {number} */ value) => [{ t: -span, value }, { t: 0, value }];
-    this.innovation.band("band", edge(USUAL), edge(-USUAL));
+    this.innovation.band("band", edge(BAND_SIGMAS), edge(-BAND_SIGMAS));
     this.innovation.line("zero", edge(0));
     this.#mark(this.innovation, points);
-    const within = points.filter(({ value }) => Math.abs(value) <= USUAL).length;
+    const within = points.filter(({ value }) => Math.abs(value) <= BAND_SIGMAS).length;
     const share = points.length ? `${Math.round((100 * within) / points.length)} %` : UNKNOWN;
     this.#put("innovation", `${share} in the band, ${refused(innovations)} of ${innovations.length} refused`);
     this.innovation.label = `Normalised innovations: ${share} within 1.96 standard deviations`;
@@ -84,17 +84,17 @@ export class Plots {
       .filter(({ t, value }) => t >= -span && t <= 0 && !Number.isNaN(value));
     const anchor = ranges.at(-1)?.anchor;
     const used = ranges.filter((one) => one.fused && one.anchor === anchor);
-    const least = leastSpeeds(used).map(({ t_ns, value }) => ({ t: before(t_ns), value }));
-    this.speed.begin(span, [0, ...[...speeds, ...least].map(({ value }) => value)], 1);
-    this.speed.band("least", least, least.map(({ t }) => ({ t, value: 0 })));
+    const minimum = minimumSpeeds(used).map(({ t_ns, value }) => ({ t: before(t_ns), value }));
+    this.speed.begin(span, [0, ...[...speeds, ...minimum].map(({ value }) => value)], 1);
+    this.speed.band("least", minimum, minimum.map(({ t }) => ({ t, value: 0 })));
     this.speed.line("estimate", speeds);
     const rate = speed.range_rate_mps;
-    const proof = rate === null ? "" : `, its range changes by ${fixed(rate, 2)} m/s`;
-    this.#put("speed", `${fixed(pose.speed_mps, 2)} m/s${proof}`);
-    this.speed.label = `Speed ${fixed(pose.speed_mps, 2)} m/s${proof}`;
+    const rateText = rate === null ? "" : `, its range changes by ${fixed(rate, 2)} m/s`;
+    this.#put("speed", `${fixed(pose.speed_mps, 2)} m/s${rateText}`);
+    this.speed.label = `Speed ${fixed(pose.speed_mps, 2)} m/s${rateText}`;
   }
 
-  /** Full dots for what was used, crosses for what was refused. @param {Plot} plot
+  /** Mark used measurements with dots and refused ones with crosses. @param {Plot} plot
    * @param {(Point & {fused: boolean})[]} points */
   #mark(plot, points) {
     plot.dots("measured", points.filter(({ fused }) => fused));

@@ -1,4 +1,4 @@
-/** All tags as a table. Only the rows that are on the screen exist in the document, so ten thousand tags are fine. */
+/** The table of all tags. Only visible rows exist in the document, so that ten thousand tags stay fast. */
 
 import { UNKNOWN, age, coordinate, counted, fixed, sigma } from "../data/format.js";
 import { Order } from "../data/order.js";
@@ -41,12 +41,12 @@ export class TagTable {
     choice.addEventListener("change", () => this.update());
   }
 
-  /** Sort and paint with what is known now. */
+  /** Sort and paint the rows with the latest poses. */
   update() {
     const wanted = (/** @type {number} */ row) => this.choice.shows(this.fleet, row);
     this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now());
     const all = counted(this.fleet.size, "tag");
-    this.count.textContent = this.choice.narrows ? `${this.#rows.length.toLocaleString("en")} of ${all}` : all;
+    this.count.textContent = this.choice.isFiltered ? `${this.#rows.length.toLocaleString("en")} of ${all}` : all;
     this.#paint();
   }
 
@@ -174,7 +174,7 @@ export class TagTable {
 /** @param {Line} line */
 const nameOf = ({ cells }) => /** @type {HTMLElement} */ (cells[0].lastElementChild);
 
-/** Write only what differs: most cells stay as they are. @param {DOMStringMap} data @param {string} name
+/** Set a value only if it differs, since most cells do not change. @param {DOMStringMap} data @param {string} name
  * @param {string} value */
 function set(data, name, value) {
   if (data[name] !== value) data[name] = value;

@@ -8,12 +8,12 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from api_house import ask, kind_of, make_house
 from dropanchor_service.api.http.access import OPEN_PATHS
 from dropanchor_service.api.http.rates import MAX_CLIENTS, RateLimiter
 from dropanchor_service.api.routes import examples
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
+from support.api import ask, kind_of, make_api_bench
 from support.http_server import running_server
 
 READ, WRITE, ADMIN = Scope.READ, Scope.WRITE, Scope.ADMIN
@@ -26,7 +26,7 @@ class Guarded:
         self.clock_s = 0.0
         self.keys = ApiKeys(folder, lambda: self.clock_s)
         self.secrets = {scope: self.keys.add(scope.word, scope) for scope in Scope}
-        self.house = make_house()
+        self.house = make_api_bench()
         self.house.move("a")
         self.app: FastAPI = self.house.app(authenticator=Authenticator({SOURCE: self.keys}), rate_limiter=rate_limiter)
 
@@ -42,7 +42,7 @@ def guarded(tmp_path: Path) -> Guarded:
 
 
 def every_operation() -> list[tuple[str, str]]:
-    paths = make_house().app().openapi()["paths"]
+    paths = make_api_bench().app().openapi()["paths"]
     return [(method.upper(), path) for path, operations in paths.items() for method in operations]
 
 
@@ -151,7 +151,7 @@ def test_guessed_keys_are_rate_limited_by_address(tmp_path: Path) -> None:
 
 
 def test_without_credentials_only_loopback_has_no_rate_limit() -> None:
-    app = make_house().app(rate_limiter=RateLimiter(per_s=1.0, burst=2, clock=lambda: 0.0))
+    app = make_api_bench().app(rate_limiter=RateLimiter(per_s=1.0, burst=2, clock=lambda: 0.0))
 
     def statuses(*addresses: str) -> set[int]:
         return {ask(app, "GET", "/api/v1/poses", address).status_code for address in addresses}

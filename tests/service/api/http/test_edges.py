@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from prometheus_client import Counter
 
-from api_house import ask, kind_of, make_house
 from dropanchor_schemas.answers import PoseFrame, TagList
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import PoseList
@@ -14,12 +13,13 @@ from dropanchor_service.api import export
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.errors import Kind
 from dropanchor_service.api.routes import examples
+from support.api import ask, kind_of, make_api_bench
 
 
 @pytest.mark.parametrize("path", ["/api/v1/nothing", "/api/v2/poses", "/nothing", "/api/v1/tags/", "/api/v1/poses/"])
 def test_an_unknown_path_is_a_problem(path: str, tmp_path: Path) -> None:
     for dashboard in (None, tmp_path):
-        response = ask(make_house().app(dashboard), "GET", path)
+        response = ask(make_api_bench().app(dashboard), "GET", path)
         assert kind_of(response) == "not-found"
         assert response.json()["instance"] == path
 
@@ -34,21 +34,21 @@ def test_an_unknown_path_is_a_problem(path: str, tmp_path: Path) -> None:
     ],
 )
 def test_a_method_that_is_not_allowed_is_answered_with_those_that_are(method: str, path: str, allow: str) -> None:
-    response = ask(make_house().app(), method, path)
+    response = ask(make_api_bench().app(), method, path)
     assert kind_of(response) == "method-not-allowed"
     assert response.headers["allow"] == allow
 
 
 def test_the_dashboard_is_read_only(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("<!doctype html>")
-    response = ask(make_house().app(tmp_path), "POST", "/")
+    response = ask(make_api_bench().app(tmp_path), "POST", "/")
     assert kind_of(response) == "method-not-allowed"
     assert response.headers["allow"] == "GET, HEAD"
 
 
 @pytest.mark.parametrize("path", ["tags", "tags/a", "site", "anchors", "anchors/17", "health/live", "health/ready"])
 def test_an_unknown_query_parameter_is_refused(path: str) -> None:
-    house = make_house()
+    house = make_api_bench()
     house.answers.tags.register("a")
     app = house.app()
     assert ask(app, "GET", f"/api/v1/{path}").status_code == 200
@@ -56,7 +56,7 @@ def test_an_unknown_query_parameter_is_refused(path: str) -> None:
 
 
 def test_an_internal_error_is_a_problem_without_details() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a")
     house.answers.now_ns = lambda: int("a secret")
     response = ask(house.app(), "GET", "/api/v1/poses")
@@ -65,7 +65,7 @@ def test_an_internal_error_is_a_problem_without_details() -> None:
 
 
 def test_a_body_that_is_too_large_is_refused_by_its_content_length_and_by_its_size() -> None:
-    app = make_house().app()
+    app = make_api_bench().app()
     headers = {"content-type": "application/json"}
     body = b" " * (MAX_BODY_BYTES - 2) + b"{}"
     assert ask(app, "PUT", "/api/v1/tags/a/settings", content=body, headers=headers).status_code == 200
@@ -79,7 +79,7 @@ def test_a_body_that_is_too_large_is_refused_by_its_content_length_and_by_its_si
 
 
 def test_readiness_gives_the_reasons_when_the_service_is_not_ready() -> None:
-    house = make_house()
+    house = make_api_bench()
     app = house.app()
     assert ask(app, "GET", "/api/v1/health/live").json() == {"status": "live"}
     assert ask(app, "GET", "/api/v1/health/ready").json() == {"status": "ready", "impaired": []}
@@ -91,7 +91,7 @@ def test_readiness_gives_the_reasons_when_the_service_is_not_ready() -> None:
 
 
 def test_metrics_come_from_the_given_registry() -> None:
-    house = make_house()
+    house = make_api_bench()
     Counter("eggs", "Eggs laid", registry=house.registry).inc(3)
     response = ask(house.app(), "GET", "/metrics")
     assert response.headers["content-type"].startswith("text/plain")
@@ -103,7 +103,7 @@ def test_metrics_come_from_the_given_registry() -> None:
 def test_the_dashboard_is_revalidated_and_may_load_nothing_from_other_origins(tmp_path: Path) -> None:
     (tmp_path / "index.html").write_text("<!doctype html>the page")
     (tmp_path / "a.js").write_text("export {};")
-    app = make_house().app(tmp_path)
+    app = make_api_bench().app(tmp_path)
     page = ask(app, "GET", "/")
     assert page.text == "<!doctype html>the page"
     assert page.headers["cache-control"] == "no-cache"
@@ -118,11 +118,11 @@ def test_the_dashboard_is_revalidated_and_may_load_nothing_from_other_origins(tm
 
 def test_the_openapi_document_is_current_and_is_what_the_service_returns() -> None:
     assert export.main(["--check"]) == 0, "run python -m dropanchor_service.api.export"
-    assert ask(make_house().app(), "GET", "/api/v1/openapi.json").json() == make_house().app().openapi()
+    assert ask(make_api_bench().app(), "GET", "/api/v1/openapi.json").json() == make_api_bench().app().openapi()
 
 
 def test_every_operation_has_a_name_a_tag_a_summary_and_its_problems() -> None:
-    paths = make_house().app().openapi()["paths"]
+    paths = make_api_bench().app().openapi()["paths"]
     operations = [operation for path in paths.values() for operation in path.values()]
     names = [operation["operationId"] for operation in operations]
     assert len(set(names)) == len(names) >= 16
@@ -134,7 +134,7 @@ def test_every_operation_has_a_name_a_tag_a_summary_and_its_problems() -> None:
 
 
 def test_every_kind_of_problem_is_documented() -> None:
-    description = make_house().app().openapi()["info"]["description"]
+    description = make_api_bench().app().openapi()["info"]["description"]
     assert all(f"`{kind.type}`" in description for kind in Kind)
 
 

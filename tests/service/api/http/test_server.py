@@ -13,12 +13,12 @@ from typing import Any
 import httpx
 import pytest
 
-from api_house import House, kind_of, make_house
 from dropanchor_schemas.answers import PoseFrame
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import ListenError, build_server, listen
 from dropanchor_service.api.routes import stream
+from support.api import ApiBench, kind_of, make_api_bench
 
 TIMEOUT_S = 10.0
 
@@ -34,7 +34,7 @@ class LongDeadlines(GuardedProtocol):
 
 
 @contextmanager
-def serving(house: House, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
+def serving(house: ApiBench, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
     """Run a server and yield its port. The server and its streams have ended after the block."""
     server = build_server(house.app(), house.stopping, protocol)
     bound = listen("127.0.0.1", 0)
@@ -110,7 +110,7 @@ def _ended(client: socket.socket) -> bool:
 
 
 def test_a_stream_starts_with_all_tags_and_continues_with_changes() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a", "b", x=1.0)
     with serving(house) as port, streaming(port) as events:
         name, frame = next(events)
@@ -124,13 +124,13 @@ def test_a_stream_starts_with_all_tags_and_continues_with_changes() -> None:
 
 
 def test_a_stream_without_poses_starts_with_an_empty_snapshot() -> None:
-    with serving(make_house()) as port, streaming(port) as events:
+    with serving(make_api_bench()) as port, streaming(port) as events:
         name, frame = next(events)
         assert (name, frame["tags"]) == ("snapshot", [])
 
 
 def test_a_stream_of_selected_tags_includes_those_that_appear_later() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a", "b")
     with serving(house) as port, streaming(port, "max_hz=30&tags=b,late") as events:
         assert next(events)[1]["tags"] == ["b"]
@@ -140,7 +140,7 @@ def test_a_stream_of_selected_tags_includes_those_that_appear_later() -> None:
 
 
 def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a", x=0.0)
     with serving(house) as port, streaming(port, "max_hz=5") as events:
         next(events)
@@ -156,7 +156,7 @@ def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
 
 
 def test_a_tag_that_falls_silent_or_goes_offline_is_reported_without_a_new_pose() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a", "b")
     house.answers.tags.set_online("b", True)
     with serving(house) as port, streaming(port) as events:
@@ -170,19 +170,19 @@ def test_a_tag_that_falls_silent_or_goes_offline_is_reported_without_a_new_pose(
 
 def test_a_quiet_stream_sends_heartbeats(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "HEARTBEAT_S", 0.1)
-    with serving(make_house()) as port, streaming(port) as events:
+    with serving(make_api_bench()) as port, streaming(port) as events:
         next(events)
         assert next(events) == ("", ": alive")
 
 
 @pytest.mark.parametrize("query", ["max_hz=nan", "max_hz=inf", "max_hz=0.09", "max_hz=30.1", "max_hz=fast", "hz=1"])
 def test_invalid_stream_parameters_are_a_problem(query: str) -> None:
-    with serving(make_house()) as port:
+    with serving(make_api_bench()) as port:
         assert kind_of(_get(port, f"/api/v1/stream?{query}")) == "invalid-request"
 
 
 def test_streams_end_when_the_server_stops() -> None:
-    house = make_house()
+    house = make_api_bench()
     with serving(house) as port, streaming(port, "max_hz=0.1") as events:
         next(events)
         house.stopping.set()
@@ -192,7 +192,7 @@ def test_streams_end_when_the_server_stops() -> None:
 
 
 def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move(*(f"tag-{number}" for number in range(2000)))
     with serving(house) as port:
         client = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
@@ -205,7 +205,7 @@ def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
 
 
 def test_a_client_that_stops_reading_is_disconnected_and_does_not_delay_others() -> None:
-    house = make_house()
+    house = make_api_bench()
     names = [f"tag-{number}" for number in range(2000)]
     house.move(*names)
     with serving(house, ShortDeadlines) as port, streaming(port) as events:
@@ -234,7 +234,7 @@ def test_a_client_that_stops_reading_is_disconnected_and_does_not_delay_others()
     ],
 )
 def test_an_incomplete_request_is_disconnected(sent: bytes) -> None:
-    with serving(make_house(), ShortDeadlines) as port:
+    with serving(make_api_bench(), ShortDeadlines) as port:
         clients = [_connected(port, sent) for _ in range(50)]
         assert _get(port).status_code == 200
         start_s = time.monotonic()
@@ -246,7 +246,7 @@ def test_an_incomplete_request_is_disconnected(sent: bytes) -> None:
 
 def test_an_incomplete_second_request_is_disconnected_too() -> None:
     with (
-        serving(make_house(), ShortDeadlines) as port,
+        serving(make_api_bench(), ShortDeadlines) as port,
         closing(_connected(port, b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n")) as client,
     ):
         assert _answer(client).startswith(b"HTTP/1.1 200")
@@ -257,7 +257,7 @@ def test_an_incomplete_second_request_is_disconnected_too() -> None:
 
 
 def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
-    house = make_house()
+    house = make_api_bench()
     with serving(house, LongDeadlines) as port, streaming(port) as events:
         next(events)
         request = b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n"
@@ -275,14 +275,14 @@ def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
 
 def test_a_large_body_is_refused_by_its_content_length() -> None:
     head = f"PUT /api/v1/site HTTP/1.1\r\nhost: x\r\ncontent-length: {MAX_BODY_BYTES + 1}\r\n\r\n"
-    with serving(make_house()) as port, closing(_connected(port, head.encode())) as client:
+    with serving(make_api_bench()) as port, closing(_connected(port, head.encode())) as client:
         answer = _answer(client)
         assert answer.startswith(b"HTTP/1.1 413")
         assert b"application/problem+json" in answer
 
 
 def test_the_server_survives_junk_and_endless_headers() -> None:
-    with serving(make_house()) as port:
+    with serving(make_api_bench()) as port:
         for sent in (b"\x16\x03\x01" * 100, b"GET / HTTP/1.1\r\n" + b"x: y\r\n" * 20_000):
             with closing(_connected(port, sent)) as client:
                 assert _ended(client)

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from api_house import ask, make_house
 from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
+from support.api import ask, make_api_bench
 
 SCRIPTS = sysconfig.get_path("scripts")
 
 
 def test_a_browser_on_this_machine_gets_the_path_of_the_program() -> None:
-    app = make_house().app(endpoints=("tcp/0.0.0.0:19747",))
+    app = make_api_bench().app(endpoints=("tcp/0.0.0.0:19747",))
     answer = ask(app, "GET", "/api/v1/connect", headers={"host": "127.0.0.1:8080"}).json()
     assert answer["endpoints"] == ["tcp/127.0.0.1:19747"]
     assert not answer["credentials"]
@@ -35,7 +35,7 @@ def test_a_browser_on_this_machine_gets_the_path_of_the_program() -> None:
     ],
 )
 def test_other_clients_get_no_path_of_this_machine(address: str, headers: dict[str, str]) -> None:
-    app = make_house().app(endpoints=("tcp/0.0.0.0:19747", "tcp/[::]:19748"))
+    app = make_api_bench().app(endpoints=("tcp/0.0.0.0:19747", "tcp/[::]:19748"))
     response = ask(app, "GET", "/api/v1/connect", address, headers=headers)
     assert SCRIPTS not in response.text
     name = headers["host"].partition(":")[0]

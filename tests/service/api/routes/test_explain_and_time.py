@@ -3,29 +3,29 @@
 import numpy as np
 import pytest
 
-from api_house import T_NS, House, ask, kind_of, make_house
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose
 from dropanchor_service.estimation.columns import HYPOTHESIS, INNOVATION, POSE, State
+from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
 
 SECOND = 1_000_000_000
 
 
-def driven(seconds: float = 5.0, speed: float = 2.0) -> House:
+def driven(seconds: float = 5.0, speed: float = 2.0) -> ApiBench:
     """A tag that has driven east until now, with ten poses a second."""
-    house = make_house()
+    house = make_api_bench()
     for i in range(round(seconds * 10) + 1):
         house.now_ns = T_NS - round((seconds - i / 10) * SECOND)
         house.move("a", x=speed * i / 10, speed=speed, sigma_pos=0.2)
     return house
 
 
-def pose_at(house: House, offset_s: float) -> Pose:
+def pose_at(house: ApiBench, offset_s: float) -> Pose:
     path = f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}"
     return Pose.model_validate(ask(house.app(), "GET", path).json())
 
 
-def problem_at(house: House, offset_s: float) -> tuple[str, str]:
+def problem_at(house: ApiBench, offset_s: float) -> tuple[str, str]:
     response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
     return kind_of(response), response.json()["detail"]
 
@@ -86,7 +86,7 @@ def test_an_invalid_time_is_refused(query: str) -> None:
     assert kind_of(ask(driven(0.1).app(), "GET", f"/api/v1/tags/a/pose?{query}")) == "invalid-request"
 
 
-def explained_house() -> House:
+def explained_house() -> ApiBench:
     house = driven()
     records = np.zeros(60, INNOVATION)
     records["t_ns"] = T_NS - np.arange(60)[::-1] * SECOND // 10
@@ -116,7 +116,7 @@ def test_an_explanation_holds_the_last_innovations_and_the_range_rate() -> None:
 
 
 def test_an_innovation_that_was_only_gated_has_no_outlier_probability() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a")
     record = np.zeros(1, INNOVATION)
     record["S"], record["p_outlier"] = 1.0, np.nan
@@ -132,7 +132,7 @@ def test_an_invalid_query_for_an_explanation_is_refused(query: str) -> None:
 
 
 def test_an_unknown_tag_and_a_tag_without_a_pose_cannot_be_explained() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.answers.tags.register("quiet")
     assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/explain")) == "unknown-tag"
     assert kind_of(ask(house.app(), "GET", "/api/v1/tags/quiet/explain")) == "no-pose-yet"

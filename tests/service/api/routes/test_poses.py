@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from api_house import T_NS, ask, kind_of, make_house
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.site import Georeference, Site
+from support.api import T_NS, ask, kind_of, make_api_bench
 
 GEOREFERENCED = Site(georeference=Georeference(lat=52.5, lon=13.4))
 
 
 def test_the_pose_of_a_tag_is_its_latest_one() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a", x=1.0)
     house.move("a", x=2.0, heading=0.5)
     pose = Pose.model_validate(ask(house.app(), "GET", "/api/v1/tags/a/pose").json())
@@ -19,7 +19,7 @@ def test_the_pose_of_a_tag_is_its_latest_one() -> None:
 
 
 def test_an_unknown_tag_and_a_tag_without_a_pose_are_different_problems() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.answers.tags.register("quiet")
     app = house.app()
     assert kind_of(ask(app, "GET", "/api/v1/tags/nobody/pose")) == "unknown-tag"
@@ -27,7 +27,7 @@ def test_an_unknown_tag_and_a_tag_without_a_pose_are_different_problems() -> Non
 
 
 def test_an_id_may_contain_any_printable_character_even_a_slash() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a/pose", x=1.0)
     house.move("Gerät 7%", x=2.0)
     app = house.app()
@@ -38,11 +38,11 @@ def test_an_id_may_contain_any_printable_character_even_a_slash() -> None:
 @pytest.mark.parametrize("chunk", ["%FF", "x" * 65, "%00", "%0A"])
 def test_an_invalid_id_is_a_problem(chunk: str) -> None:
     for path in (f"/api/v1/tags/{chunk}/pose", f"/api/v1/tags/{chunk}", f"/api/v1/anchors/{chunk}"):
-        assert kind_of(ask(make_house().app(), "GET", path)) == "invalid-request"
+        assert kind_of(ask(make_api_bench().app(), "GET", path)) == "invalid-request"
 
 
 def test_a_list_holds_all_poses_or_the_selected_ones() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.move("a", "b", "c")
     app = house.app()
     all_poses = PoseList.model_validate(ask(app, "GET", "/api/v1/poses").json())
@@ -55,15 +55,15 @@ def test_a_list_holds_all_poses_or_the_selected_ones() -> None:
 
 @pytest.mark.parametrize("query", ["tags=", "tags=a,,b", "tag=a", "limit=3", "tags=%00", "tags=" + "x" * 65])
 def test_an_invalid_query_is_a_problem(query: str) -> None:
-    assert kind_of(ask(make_house().app(), "GET", f"/api/v1/poses?{query}")) == "invalid-request"
+    assert kind_of(ask(make_api_bench().app(), "GET", f"/api/v1/poses?{query}")) == "invalid-request"
 
 
 def test_a_single_pose_accepts_only_a_time_as_its_query() -> None:
-    assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/pose?tags=a")) == "invalid-request"
+    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/pose?tags=a")) == "invalid-request"
 
 
 def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_position() -> None:
-    house = make_house(GEOREFERENCED)
+    house = make_api_bench(GEOREFERENCED)
     house.move("a", x=1000.0)
     house.move("b", x=np.nan, y=np.nan)
     response = ask(house.app(), "GET", "/api/v1/poses", headers={"accept": "application/geo+json"})
@@ -79,14 +79,14 @@ def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_position(
 
 
 def test_one_pose_is_a_feature() -> None:
-    house = make_house(GEOREFERENCED)
+    house = make_api_bench(GEOREFERENCED)
     house.move("a")
     feature = ask(house.app(), "GET", "/api/v1/tags/a/pose", headers={"accept": "application/geo+json"}).json()
     assert (feature["type"], feature["geometry"]["coordinates"]) == ("Feature", pytest.approx([13.4, 52.5]))
 
 
 def test_geojson_without_a_georeference_says_what_to_do() -> None:
-    response = ask(make_house().app(), "GET", "/api/v1/poses", headers={"accept": "application/geo+json"})
+    response = ask(make_api_bench().app(), "GET", "/api/v1/poses", headers={"accept": "application/geo+json"})
     assert kind_of(response) == "not-georeferenced"
     assert "georeference" in response.json()["detail"]
 
@@ -104,9 +104,11 @@ def test_geojson_without_a_georeference_says_what_to_do() -> None:
     ],
 )
 def test_the_client_chooses_the_media_type(accept: str, media_type: str) -> None:
-    app = make_house(GEOREFERENCED).app()
+    app = make_api_bench(GEOREFERENCED).app()
     assert ask(app, "GET", "/api/v1/poses", headers={"accept": accept}).headers["content-type"] == media_type
 
 
 def test_a_media_type_that_is_not_offered_is_a_problem() -> None:
-    assert kind_of(ask(make_house().app(), "GET", "/api/v1/poses", headers={"accept": "text/csv"})) == "not-acceptable"
+    assert (
+        kind_of(ask(make_api_bench().app(), "GET", "/api/v1/poses", headers={"accept": "text/csv"})) == "not-acceptable"
+    )

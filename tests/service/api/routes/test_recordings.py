@@ -4,25 +4,25 @@ from pathlib import Path
 
 import pytest
 
-from api_house import T_NS, House, ask, kind_of, make_house
 from dropanchor_schemas.recordings import RecordingList, RecordingState
 from dropanchor_schemas.wire import ENCODING_PACKED
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
+from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
 
 LIMITS = Limits(2**30, 10**18, 1000, 10**18, 2**40)
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> House:
-    house = make_house()
+def house(tmp_path: Path) -> ApiBench:
+    house = make_api_bench()
     answers = house.answers
     answers.tags.register("a")
     house.recorder = Recorder(tmp_path, LIMITS, 1, answers.tags, answers.site, answers.now_ns, {})
     return house
 
 
-def test_a_recording_is_started_stopped_listed_and_downloaded(house: House) -> None:
+def test_a_recording_is_started_stopped_listed_and_downloaded(house: ApiBench) -> None:
     app, recorder = house.app(), house.recorder
     assert recorder is not None
     started = ask(app, "POST", "/api/v1/recordings", json={"tags": ["a"]})
@@ -45,18 +45,18 @@ def test_a_recording_is_started_stopped_listed_and_downloaded(house: House) -> N
 
 
 @pytest.mark.parametrize("name", ["x.mcap", "..%2Fsite.json", "%2Fetc%2Fpasswd", "..", "x"])
-def test_only_recordings_can_be_downloaded(house: House, name: str, tmp_path: Path) -> None:
+def test_only_recordings_can_be_downloaded(house: ApiBench, name: str, tmp_path: Path) -> None:
     (tmp_path / "site.json").write_text("{}")
     assert ask(house.app(), "GET", f"/api/v1/recordings/{name}").status_code == 404
 
 
 def test_recording_needs_a_data_folder() -> None:
-    app = make_house().app()
+    app = make_api_bench().app()
     for method, path in (("GET", ""), ("POST", "/stop"), ("GET", "/x.mcap")):
         assert kind_of(ask(app, method, f"/api/v1/recordings{path}")) == "no-recorder"
     assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "no-recorder"
 
 
-def test_a_folder_that_cannot_be_created_is_reported_at_once(house: House, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_reported_at_once(house: ApiBench, tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("in the way")
     assert kind_of(ask(house.app(), "POST", "/api/v1/recordings", json={})) == "not-saved"

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from api_house import ask, kind_of, make_house
 from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Reason
+from support.api import ask, kind_of, make_api_bench
 
 
 def test_a_tag_shows_its_counts_of_messages_samples_and_rejections() -> None:
-    house = make_house()
+    house = make_api_bench()
     tags = house.answers.tags
     rows = np.array([tags.register("a").row])
     tags.count_messages(rows, 5_000)
@@ -26,7 +26,7 @@ def test_a_tag_shows_its_counts_of_messages_samples_and_rejections() -> None:
 
 
 def test_the_list_of_tags_includes_those_that_have_sent_nothing() -> None:
-    house = make_house()
+    house = make_api_bench()
     house.answers.tags.register("b")
     house.answers.tags.register("a")
     tags = TagList.model_validate(ask(house.app(), "GET", "/api/v1/tags").json()).tags
@@ -34,7 +34,7 @@ def test_the_list_of_tags_includes_those_that_have_sent_nothing() -> None:
 
 
 def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
-    house = make_house()
+    house = make_api_bench()
     for name, t_ns in (("a", 10), ("b", 20), ("a", 30)):
         house.answers.pending_tags.on_message(name, t_ns)
     listed = NewcomerList.model_validate(ask(house.app(), "GET", "/api/v1/newcomers").json()).newcomers
@@ -45,7 +45,7 @@ def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
 
 
 def test_settings_are_stored_and_register_a_new_tag() -> None:
-    house = make_house()
+    house = make_api_bench()
     app = house.app()
     settings = {"height_m": 1.5, "start": {"x": 1, "y": 2}}
     response = ask(app, "PUT", "/api/v1/tags/new%2Ftag/settings", json=settings)
@@ -59,7 +59,7 @@ def test_settings_are_stored_and_register_a_new_tag() -> None:
 
 
 def test_no_more_than_max_tags_are_registered() -> None:
-    house = make_house()
+    house = make_api_bench()
     app = house.app(max_tags=1)
     assert ask(app, "PUT", "/api/v1/tags/a/settings", json={}).status_code == 200
     assert ask(app, "PUT", "/api/v1/tags/a/settings", json={}).status_code == 200
@@ -90,7 +90,7 @@ def test_no_more_than_max_tags_are_registered() -> None:
     ],
 )
 def test_invalid_settings_are_a_problem_that_names_the_field(body: bytes, location: str | None) -> None:
-    house = make_house()
+    house = make_api_bench()
     headers = {"content-type": "application/json"}
     response = ask(house.app(), "PUT", "/api/v1/tags/a/settings", content=body, headers=headers)
     assert kind_of(response) == "invalid-request"
@@ -99,19 +99,19 @@ def test_invalid_settings_are_a_problem_that_names_the_field(body: bytes, locati
 
 
 def test_a_body_without_the_json_media_type_is_a_problem() -> None:
-    app = make_house().app()
+    app = make_api_bench().app()
     response = ask(app, "PUT", "/api/v1/tags/a/settings", content=b"{}", headers={"content-type": "text/plain"})
     assert kind_of(response) == "invalid-request"
 
 
 def test_a_problem_does_not_repeat_the_input() -> None:
-    response = ask(make_house().app(), "PUT", "/api/v1/tags/a/settings", json={"height_m": "a secret"})
+    response = ask(make_api_bench().app(), "PUT", "/api/v1/tags/a/settings", json={"height_m": "a secret"})
     assert kind_of(response) == "invalid-request"
     assert "a secret" not in response.text
 
 
 def test_the_site_is_replaced_as_a_whole() -> None:
-    house = make_house()
+    house = make_api_bench()
     app = house.app()
     site = {"name": "Yard", "georeference": {"lat": 50, "lon": 8}, "anchors": [{"id": "1"}, {"id": "2", "x": 4}]}
     assert ask(app, "PUT", "/api/v1/site", json=site).status_code == 200
@@ -120,7 +120,7 @@ def test_the_site_is_replaced_as_a_whole() -> None:
 
 
 def test_the_id_of_the_site_is_fixed() -> None:
-    house = make_house()
+    house = make_api_bench()
     assert kind_of(ask(house.app(), "PUT", "/api/v1/site", json={"id": "other"})) == "site-id-fixed"
     assert house.answers.site.site.id == "default"
 
@@ -129,11 +129,11 @@ def test_the_id_of_the_site_is_fixed() -> None:
     "anchors", [[{"id": "1"}, {"id": "1"}], [{"id": ""}], [{"id": "a\nb"}], [{"id": "1", "x": "far"}], {}]
 )
 def test_invalid_anchors_are_a_problem(anchors: Any) -> None:
-    assert kind_of(ask(make_house().app(), "PUT", "/api/v1/site", json={"anchors": anchors})) == "invalid-request"
+    assert kind_of(ask(make_api_bench().app(), "PUT", "/api/v1/site", json={"anchors": anchors})) == "invalid-request"
 
 
 def test_an_anchor_is_placed_moved_read_and_removed() -> None:
-    house = make_house()
+    house = make_api_bench()
     app = house.app()
     path = "/api/v1/anchors/gate%2F1"
     assert kind_of(ask(app, "GET", path)) == "unknown-anchor"
@@ -148,13 +148,13 @@ def test_an_anchor_is_placed_moved_read_and_removed() -> None:
 
 
 def test_the_ids_of_an_anchor_in_path_and_body_must_match() -> None:
-    response = ask(make_house().app(), "PUT", "/api/v1/anchors/1", json={"id": "2"})
+    response = ask(make_api_bench().app(), "PUT", "/api/v1/anchors/1", json={"id": "2"})
     assert kind_of(response) == "anchor-id-differs"
 
 
 def test_a_change_that_cannot_be_saved_is_not_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way of the folder")
-    house = make_house(folder=tmp_path / "file")
+    house = make_api_bench(folder=tmp_path / "file")
     app = house.app()
     assert kind_of(ask(app, "PUT", "/api/v1/anchors/1", json={"id": "1"})) == "not-saved"
     assert kind_of(ask(app, "PUT", "/api/v1/site", json={})) == "not-saved"
@@ -165,7 +165,7 @@ def test_a_change_that_cannot_be_saved_is_not_made(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("escaped", ["*", "%2A", "forklift-*"])
 def test_a_pattern_instead_of_a_tag_is_refused_with_an_explanation(escaped: str) -> None:
-    house = make_house()
+    house = make_api_bench()
     response = ask(house.app(), "PUT", f"/api/v1/tags/{escaped}/settings", json={})
     assert kind_of(response) == "invalid-request"
     assert "settings for all tags do not exist" in response.json()["detail"]

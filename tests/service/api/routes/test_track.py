@@ -8,13 +8,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from api_house import T_NS, House, ask, kind_of, make_house
 from dropanchor_schemas.pose import Pose
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.track import Track
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.history.tracks import Retention
 from dropanchor_service.store import LatestPoses
+from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
 
 SECOND = 1_000_000_000
 RETENTION = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
@@ -22,18 +22,18 @@ GEOREFERENCED = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52
 SECONDS = 600
 
 
-def driven(folder: Path, site: Site | None = None) -> House:
+def driven(folder: Path, site: Site | None = None) -> ApiBench:
     """A tag that drove east at 2 m/s for ten minutes. Its poses are only in the stored history."""
-    house = make_house(site, folder, RETENTION)
+    house = make_api_bench(site, folder, RETENTION)
     for second in range(SECONDS + 1):
         house.now_ns = T_NS - (SECONDS - second) * SECOND
         house.move("a", x=2.0 * second, speed=2.0, sigma_pos=0.2, anchor=0)
-    house.keep()
+    house.write_history()
     house.answers.latest = LatestPoses()
     return house
 
 
-def track(house: House, query: str = "") -> Track:
+def track(house: ApiBench, query: str = "") -> Track:
     response = ask(house.app(), "GET", f"/api/v1/tags/a/track?{query}")
     assert response.status_code == 200, response.text
     return Track.model_validate(response.json())
@@ -96,7 +96,7 @@ def test_gpx_leaves_out_ambiguous_poses(tmp_path: Path) -> None:
     house = driven(tmp_path, GEOREFERENCED)
     house.now_ns = T_NS + SECOND
     house.move("a", x=0.0, state=State.AMBIGUOUS)
-    house.keep()
+    house.write_history()
     text = ask(house.app(), "GET", "/api/v1/tags/a/track?format=gpx").text
     assert text.count("<trkpt") == SECONDS + 1
 
@@ -111,13 +111,13 @@ def test_invalid_track_parameters_are_refused(tmp_path: Path, query: str) -> Non
 def test_an_unknown_tag_a_missing_history_and_a_damaged_one_are_different_problems(tmp_path: Path) -> None:
     house = driven(tmp_path)
     assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/track")) == "unknown-tag"
-    assert kind_of(ask(make_house().app(), "GET", "/api/v1/tags/a/track")) == "no-history"
+    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track")) == "no-history"
     for file in tmp_path.glob("history.sqlite*"):
         file.write_bytes(b"torn " * 1000)
     assert kind_of(ask(house.app(), "GET", "/api/v1/tags/a/track")) == "history-unreadable"
 
 
-def pose_at(house: House, offset_s: float) -> Pose:
+def pose_at(house: ApiBench, offset_s: float) -> Pose:
     response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
     assert response.status_code == 200, response.text
     return Pose.model_validate(response.json())
@@ -140,7 +140,7 @@ def test_a_past_pose_is_refused_where_no_stored_pose_is_near(tmp_path: Path) -> 
     house = driven(tmp_path)
     house.now_ns = T_NS + 60 * SECOND
     house.move("a", x=1200.0)
-    house.keep()
+    house.write_history()
     for offset_s in (-SECONDS - 1.0, 30.0):
         response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
         assert kind_of(response) == "no-pose-then", response.text

@@ -13,7 +13,7 @@ from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.cli import main
 from support import module_strings as said
 from support.commands import start_python
-from support.listening import Heard, listening
+from support.listening import ReceivedFrames, listening
 from support.serial_module import Answer, SerialModule, dwm1001_shell, plugged_in, talkative, woken_by
 from support.zenoh_router import wait_until
 
@@ -45,11 +45,11 @@ def serial(endpoint: str, module: SerialModule, *arguments: str) -> Iterator[sub
         process.communicate(timeout=30)
 
 
-def ranges(heard: Heard) -> list[tuple[int, float]]:
+def ranges(heard: ReceivedFrames) -> list[tuple[int, float]]:
     return [(one.anchor, round(one.range_m, 3)) for frame in heard.frames for one in frame.ranges]
 
 
-def hear_more(heard: Heard) -> None:
+def hear_more(heard: ReceivedFrames) -> None:
     before = len(heard.ranges())
     wait_until(lambda: len(heard.ranges()) >= before + 5)
 

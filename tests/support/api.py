@@ -1,4 +1,4 @@
-"""An interface over a store that each test fills, asked without a network."""
+"""The REST API over a store that the test fills, called without a network."""
 
 import asyncio
 from collections.abc import Sequence
@@ -27,8 +27,8 @@ T_NS = 1_800_000_000_000_000_000
 
 
 @dataclass
-class House:
-    """What the interface reads, and what a test changes in it."""
+class ApiBench:
+    """What the API reads. A test changes it and then builds an `app`."""
 
     answers: Answers
     registry: CollectorRegistry = field(default_factory=CollectorRegistry)
@@ -38,6 +38,7 @@ class House:
     recorder: Recorder | None = None
 
     def move(self, *names: str, **fields: Any) -> None:
+        """Give each named tag a new pose: tracked, of the time `now_ns`, with the given fields of POSE."""
         poses = np.zeros(len(names), POSE)
         poses["row"] = [self.answers.tags.register(name).row for name in names]
         poses["t_ns"], poses["state"], poses["reason"] = self.now_ns, State.TRACKING, StateReason.RESOLVED
@@ -48,8 +49,8 @@ class House:
         if self.answers.tracks is not None:
             self.answers.tracks.offer(poses)
 
-    def keep(self) -> None:
-        """Write the history now."""
+    def write_history(self) -> None:
+        """Write the history to disk now."""
         assert self.answers.tracks is not None
         assert self.answers.tracks.writer.flush()
 
@@ -75,29 +76,35 @@ class House:
         )
 
 
-def make_house(site: Site | None = None, folder: Path | None = None, retention: Retention | None = None) -> House:
-    """retention: of a history in the folder, whose thread does not run: `House.keep` writes."""
+def make_api_bench(
+    site: Site | None = None, folder: Path | None = None, retention: Retention | None = None
+) -> ApiBench:
+    """Return a bench around a site, by default with one anchor.
+
+    folder: where the site and the history are stored. retention: with it there is a history, which has no thread:
+    `ApiBench.write_history` writes it.
+    """
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
     tags = TagTable()
-    tracks = Tracks(folder, retention, tags, store, lambda: house.now_ns) if folder and retention else None
-    house = House(Answers(store, tags, LatestPoses(), tracks=tracks, pending_tags=PendingTags(10)))
-    house.answers.now_ns = lambda: house.now_ns
-    return house
+    tracks = Tracks(folder, retention, tags, store, lambda: bench.now_ns) if folder and retention else None
+    bench = ApiBench(Answers(store, tags, LatestPoses(), tracks=tracks, pending_tags=PendingTags(10)))
+    bench.answers.now_ns = lambda: bench.now_ns
+    return bench
 
 
 def ask(app: FastAPI, method: str, path: str, address: str = "127.0.0.1", **options: Any) -> httpx.Response:
-    """address: of whoever asks."""
+    """Return the response of the app to one request. address: the client's IP address."""
 
-    async def asked() -> httpx.Response:
+    async def request() -> httpx.Response:
         transport = httpx.ASGITransport(app, raise_app_exceptions=False, client=(address, 1234))
         async with httpx.AsyncClient(transport=transport, base_url="http://test") as client:
             return await client.request(method, path, **options)
 
-    return asyncio.run(asked())
+    return asyncio.run(request())
 
 
 def kind_of(response: httpx.Response) -> str:
-    """The last part of a problem's type, once it is sure that it is a problem."""
+    """Return the last part of a problem's type, after a check that the response is a problem document."""
     assert response.headers["content-type"] == "application/problem+json"
     problem = Problem.model_validate(response.json())
     assert problem.status == response.status_code
