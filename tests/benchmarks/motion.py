@@ -14,7 +14,7 @@ IMU_PER_MESSAGE, RANGES_PER_MESSAGE = 20, 2
 SAMPLES_PER_MESSAGE = IMU_PER_MESSAGE + RANGES_PER_MESSAGE
 STEP_NS = int(MESSAGE_S * 1e9)
 ANCHOR = 1  # number of the one anchor, as in the settings of the measured service
-TRACKS = 48  # distinct motions; tag i moves like track i % TRACKS, at its own phase
+TRACKS = 48  # distinct motions; tag i moves like track i % TRACKS
 
 _PACKED_IMU = np.dtype([("dt_us", "<u4"), ("values", "<f4", 9)])
 _PACKED_RANGE = np.dtype([("dt_us", "<u4"), ("anchor", "<u4"), ("value", "<f4"), ("std", "<f4")])

@@ -114,7 +114,7 @@ def ordinary(tag: str, seconds: float) -> Iterator[Message]:
     """Yield a message with one plausible range every 0.2 s."""
     for index in range(int(seconds / 0.2)):
         t_ns = T0_NS + index * 200_000_000
-        yield Message(t_ns, tag, encode_packed(Frame(ranges=[RangeSample(t_ns, 1, 5.0)])))
+        yield Message(t_ns, tag, encode_packed(Frame(ranges=[RangeSample(t_ns, 0, 5.0)])))
 
 
 def garbage() -> Iterator[Message]:

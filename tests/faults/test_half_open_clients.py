@@ -21,7 +21,7 @@ from support.zenoh_router import connected_session
 
 HTTP_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_HTTP", "200"))
 ZENOH_SOCKETS = int(os.environ.get("DROPANCHOR_SILENT_ZENOH", "100"))
-"""1,000 and 300 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
+"""The figures in service/docs/results/survives.md are for 1,000 and 300. `pytest -s` prints them."""
 
 TIMEOUT_S = 60.0
 

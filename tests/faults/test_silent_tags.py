@@ -25,7 +25,7 @@ from support.zenoh_router import connected_session, free_port, wait_until
 
 GONE = [f"gone-{number}" for number in range(int(os.environ.get("DROPANCHOR_VANISHING_TAGS", "12")))]
 HERE = [f"here-{number}" for number in range(int(os.environ.get("DROPANCHOR_STAYING_TAGS", "12")))]
-"""60 and 40 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
+"""The figures in service/docs/results/survives.md are for 60 and 40. `pytest -s` prints them."""
 
 HZ = 10
 MAX_SILENCE_S = 1.0

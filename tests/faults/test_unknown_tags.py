@@ -14,7 +14,7 @@ from support.service import Running, running_service, settings_file, straight_no
 from support.zenoh_router import connected_session, wait_until
 
 UNKNOWN = int(os.environ.get("DROPANCHOR_UNKNOWN_TAGS_SENT", "5000"))
-"""100,000 for the figures in service/docs/results/survives.md, which `pytest -s` prints."""
+"""The figures in service/docs/results/survives.md are for 100,000. `pytest -s` prints them."""
 
 NOTHING_LOST: dict[str, Any] = {
     "encoding": ENCODING_PACKED,
