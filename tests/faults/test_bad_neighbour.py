@@ -114,7 +114,7 @@ def ordinary(tag: str, seconds: float) -> Iterator[Message]:
     """Yield a message with one plausible range every 0.2 s."""
     for index in range(int(seconds / 0.2)):
         t_ns = T0_NS + index * 200_000_000
-        yield Message(t_ns, tag, encode_packed(Frame(ranges=[RangeSample(t_ns, 0, 5.0)])))
+        yield Message(t_ns, tag, encode_packed(Frame(ranges=[RangeSample(t_ns, 1, 5.0)])))
 
 
 def garbage() -> Iterator[Message]:
@@ -130,7 +130,7 @@ def garbage() -> Iterator[Message]:
                     t_ns, (value[0], value[1], 9.8), (value[2], value[3], value[4]), (value[5], value[6], value[7])
                 )
             ],
-            ranges=[RangeSample(t_ns, 0, value[8], value[9]), RangeSample(t_ns, 0, 4_000.0), RangeSample(t_ns, 0, 7.0)],
+            ranges=[RangeSample(t_ns, 1, value[8], value[9]), RangeSample(t_ns, 1, 4_000.0), RangeSample(t_ns, 1, 7.0)],
             sequence=dice.randrange(2**32),
             boot_id=dice.randrange(1, 2**32),
         )
