@@ -51,7 +51,7 @@ def test_a_taken_zenoh_port_is_reported_in_one_sentence(subcommand: str) -> None
         result = run(subcommand, *(("--port", "0") if subcommand == "serve" else ()), "--zenoh-listen", endpoint)
     assert result.returncode == 2
     assert [line for line in result.stderr.splitlines() if line.startswith("dropanchor")] == [
-        f"dropanchor {subcommand}: Zenoh cannot listen on {endpoint}: the port is taken. "
+        f"dropanchor {subcommand}: Zenoh cannot listen on {endpoint}: the port is in use. "
         "Choose another one with --zenoh-listen."
     ]
 
