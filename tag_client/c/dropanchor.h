@@ -18,6 +18,8 @@
 
 #define DROPANCHOR_ENCODING "application/vnd.dropanchor.samples"
 #define DROPANCHOR_VERSION 1u
+#define DROPANCHOR_BOOT_CLOCK 1u
+#define DROPANCHOR_REPLAY 2u
 #define DROPANCHOR_MAX_PAYLOAD 65536u
 #define DROPANCHOR_MAX_ID 64u
 /* Enough for any key: two ids, each character of which may take four bytes of three characters. */
@@ -60,9 +62,10 @@ typedef struct {
     float bearing_rad, std_rad;
 } dropanchor_bearing;
 
-/* The samples of one message. Times are UTC, or since the start of the tag with boot_clock. */
+/* The samples of one message. Times are UTC, or since the start of the tag with boot_clock. replay: of a recording, played
+ * now. */
 typedef struct {
-    bool boot_clock;
+    bool boot_clock, replay;
     uint32_t sequence, boot_id;
     const dropanchor_imu *imu;
     const dropanchor_range *ranges;
@@ -73,7 +76,7 @@ typedef struct {
 
 /* What a payload holds. */
 typedef struct {
-    bool boot_clock;
+    bool boot_clock, replay;
     uint32_t sequence, boot_id;
     int64_t t0_ns;
     uint16_t imu_count, range_count, heading_count, bearing_count;
@@ -150,7 +153,7 @@ static inline void dropanchor_put_time_(uint8_t **at, int64_t t_ns, int64_t t0_n
 
 static inline void dropanchor_put_header_(uint8_t **at, const dropanchor_frame *f, int64_t t0_ns) {
     dropanchor_put_(at, DROPANCHOR_VERSION, 1);
-    dropanchor_put_(at, f->boot_clock ? 1 : 0, 1);
+    dropanchor_put_(at, (f->boot_clock ? DROPANCHOR_BOOT_CLOCK : 0u) | (f->replay ? DROPANCHOR_REPLAY : 0u), 1);
     dropanchor_put_(at, f->imu_count, 2);
     dropanchor_put_(at, f->range_count, 2);
     dropanchor_put_(at, f->heading_count, 2);
@@ -211,7 +214,8 @@ static inline dropanchor_reason dropanchor_read(const uint8_t *payload, size_t s
     if (size > DROPANCHOR_MAX_PAYLOAD) return DROPANCHOR_PAYLOAD_TOO_LARGE;
     if (payload[0] != DROPANCHOR_VERSION) return DROPANCHOR_VERSION_UNKNOWN;
     if (size < DROPANCHOR_HEADER_SIZE) return DROPANCHOR_HEADER_TRUNCATED;
-    header->boot_clock = payload[1] == 1;
+    header->boot_clock = (payload[1] & DROPANCHOR_BOOT_CLOCK) != 0;
+    header->replay = (payload[1] & DROPANCHOR_REPLAY) != 0;
     header->imu_count = (uint16_t)dropanchor_get_(payload + 2, 2);
     header->range_count = (uint16_t)dropanchor_get_(payload + 4, 2);
     header->heading_count = (uint16_t)dropanchor_get_(payload + 6, 2);
@@ -220,7 +224,7 @@ static inline dropanchor_reason dropanchor_read(const uint8_t *payload, size_t s
     const uint64_t t0_ns = dropanchor_get_(payload + 16, 8);
     header->t0_ns = (int64_t)(t0_ns & (uint64_t)INT64_MAX);
     header->bearing_count = (uint16_t)dropanchor_get_(payload + 24, 2);
-    if ((payload[1] & ~1u) != 0) return DROPANCHOR_FLAGS_UNKNOWN;
+    if ((payload[1] & ~(DROPANCHOR_BOOT_CLOCK | DROPANCHOR_REPLAY)) != 0) return DROPANCHOR_FLAGS_UNKNOWN;
     if (!dropanchor_is_zero_(payload + 26, 6)) return DROPANCHOR_RESERVED_NOT_ZERO;
     const dropanchor_header *h = header;
     if (size != DROPANCHOR_SIZE(h->imu_count, h->range_count, h->heading_count, h->bearing_count))

@@ -42,6 +42,7 @@ FRAMES = {
         boot_id=2**32 - 1,
         boot_clock=True,
     ),
+    "of a recording": Frame(ranges=[RangeSample(T, 7, 1.5)], sequence=3, boot_id=4, replay=True),
     "longest span": Frame(
         headings=[HeadingSample(0, 0.1), HeadingSample(4_294_967_295_000, 0.2)], sequence=7, boot_id=9
     ),
@@ -57,7 +58,7 @@ def refused() -> dict[str, bytes]:
         "empty": b"",
         "another version": b"\x02" + whole[1:],
         "truncated": whole[:31],
-        "unknown flag": whole[:1] + b"\x02" + whole[2:],
+        "unknown flag": whole[:1] + b"\x04" + whole[2:],
         "reserved bytes": whole[:31] + b"\x01" + whole[32:],
         "a byte too few": whole[:-1],
         "a byte too many": whole + b"\x00",
@@ -70,6 +71,7 @@ def refused() -> dict[str, bytes]:
 def described(frame: Frame) -> dict[str, Any]:
     return {
         "boot_clock": frame.boot_clock,
+        "replay": frame.replay,
         "sequence": frame.sequence or 0,
         "boot_id": frame.boot_id or 0,
         "imu": [_described(sample) for sample in frame.imu],

@@ -4,6 +4,8 @@ export const ENCODING_PACKED = "application/vnd.dropanchor.samples";
 export const MAX_PAYLOAD_BYTES = 65_536;
 
 const VERSION = 1;
+const BOOT_CLOCK = 1;
+const REPLAY = 2;
 const HEADER_SIZE = 32;
 const IMU_SIZE = 40;
 const RANGE_SIZE = 16;
@@ -45,9 +47,10 @@ export interface BearingSample {
   stdRad: number | null;
 }
 
-/** The samples of one message. Times are UTC, or since the start of the tag with bootClock. */
+/** The samples of one message. Times are UTC, or since the start of the tag with bootClock. replay: of a recording. */
 export interface Frame {
   bootClock: boolean;
+  replay?: boolean;
   sequence: number;
   bootId: number;
   imu: readonly ImuSample[];
@@ -105,7 +108,8 @@ export function decodePacked(payload: Uint8Array): Frame | Rejection {
   const many = <Sample>(count: number, one: () => Sample): Sample[] => Array.from({ length: count }, one);
   const [imu, ranges, headings, bearings] = counts(viewOf(payload));
   return {
-    bootClock: payload[1] === 1,
+    bootClock: (viewOf(payload).getUint8(1) & BOOT_CLOCK) !== 0,
+    replay: (viewOf(payload).getUint8(1) & REPLAY) !== 0,
     sequence: viewOf(payload).getUint32(8, true),
     bootId: viewOf(payload).getUint32(12, true),
     imu: many(imu, () => reader.imu()),
@@ -154,7 +158,7 @@ function refusal(payload: Uint8Array): Reason | null {
   const view = viewOf(payload);
   if (view.getUint8(0) !== VERSION) return "version_unknown";
   if (payload.length < HEADER_SIZE) return "header_truncated";
-  if (view.getUint8(1) > 1) return "flags_unknown";
+  if ((view.getUint8(1) & ~(BOOT_CLOCK | REPLAY)) !== 0) return "flags_unknown";
   if (view.getUint16(26, true) !== 0 || view.getUint32(28, true) !== 0) return "reserved_not_zero";
   if (payload.length !== packedSize(...counts(view))) return "length_mismatch";
   if (payload.length === HEADER_SIZE) return "no_samples";
@@ -173,7 +177,7 @@ class Writer {
 
   header(frame: Frame): void {
     this.view.setUint8(0, VERSION);
-    this.view.setUint8(1, frame.bootClock ? 1 : 0);
+    this.view.setUint8(1, (frame.bootClock ? BOOT_CLOCK : 0) | (frame.replay ? REPLAY : 0));
     this.view.setUint16(2, frame.imu.length, true);
     this.view.setUint16(4, frame.ranges.length, true);
     this.view.setUint16(6, frame.headings.length, true);

@@ -11,6 +11,7 @@ type Golden = {
 };
 type GoldenFrame = {
   boot_clock: boolean;
+  replay: boolean;
   sequence: number;
   boot_id: number;
   imu: { t_ns: string; acc: Vector; gyro: Vector; mag: Vector | null }[];
@@ -26,6 +27,7 @@ const golden = JSON.parse(readFileSync(FILE, "utf8")) as Golden;
 function frameOf(described: GoldenFrame): Frame {
   return {
     bootClock: described.boot_clock,
+    replay: described.replay,
     sequence: described.sequence,
     bootId: described.boot_id,
     imu: described.imu.map((s): ImuSample => ({ ...s, tNs: BigInt(s.t_ns) })),
@@ -56,6 +58,7 @@ for (const [name, { frame, packed }] of Object.entries(golden.frames)) {
     assert.equal(decoded.sequence, frame.sequence);
     assert.equal(decoded.bootId, frame.boot_id);
     assert.equal(decoded.bootClock, frame.boot_clock);
+    assert.equal(decoded.replay, frame.replay);
     assert.deepEqual(decoded.ranges.map((s) => s.rangeM), frame.range.map((s) => Math.fround(s.range_m)));
   });
 }

@@ -25,10 +25,11 @@ static int encode(void) {
     static dropanchor_heading headings[MAX_SAMPLES];
     static dropanchor_bearing bearings[MAX_SAMPLES];
     dropanchor_frame f = {.imu = imu, .ranges = ranges, .headings = headings, .bearings = bearings};
-    int boot;
+    int boot, replay;
     char kind[16];
-    if (scanf("%d %" SCNu32 " %" SCNu32, &boot, &f.sequence, &f.boot_id) != 3) return 3;
+    if (scanf("%d %d %" SCNu32 " %" SCNu32, &boot, &replay, &f.sequence, &f.boot_id) != 4) return 3;
     f.boot_clock = boot != 0;
+    f.replay = replay != 0;
     int64_t t_ns;
     while (scanf("%15s %" SCNd64, kind, &t_ns) == 2) {
         uint32_t anchor = 0;
@@ -58,7 +59,7 @@ static int decode(void) {
     const size_t size = fread(payload, 1, sizeof payload, stdin);
     const dropanchor_reason reason = dropanchor_read(payload, size, &h);
     if (reason != DROPANCHOR_OK) return 4;
-    printf("%d %" PRIu32 " %" PRIu32 "\n", h.boot_clock, h.sequence, h.boot_id);
+    printf("%d %d %" PRIu32 " %" PRIu32 "\n", h.boot_clock, h.replay, h.sequence, h.boot_id);
     for (size_t i = 0; i < h.imu_count; i++) {
         const dropanchor_imu s = dropanchor_imu_at(payload, &h, i);
         printf("imu %" PRId64, s.t_ns);

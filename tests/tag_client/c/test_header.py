@@ -44,7 +44,7 @@ def run(codec: Path, *arguments: str, data: bytes = b"") -> subprocess.Completed
 
 def as_text(frame: dict[str, Any]) -> str:
     """A frame as the test program reads it."""
-    lines = [f"{int(frame['boot_clock'])} {frame['sequence']} {frame['boot_id']}"]
+    lines = [f"{int(frame['boot_clock'])} {int(frame['replay'])} {frame['sequence']} {frame['boot_id']}"]
     for kind in ("imu", "range", "heading", "bearing"):
         for sample in frame[kind]:
             lines.append(" ".join([kind, *(word for value in sample.values() for word in words(value, kind))]))
@@ -107,10 +107,10 @@ def reason(data: bytes) -> str:
 
 def test_what_cannot_be_sent_is_not_written(codec: Path) -> None:
     for frame in [
-        "0 1 1\n",
-        "0 1 1\nrange -1 7 0x1p+1 nan\n",
-        f"0 1 1\nrange {2**62} 7 0x1p+1 nan\n",
-        "0 1 1\nheading 0 0x1p+1 nan\nheading 4294967295500 0x1p+1 nan\n",
+        "0 0 1 1\n",
+        "0 0 1 1\nrange -1 7 0x1p+1 nan\n",
+        f"0 0 1 1\nrange {2**62} 7 0x1p+1 nan\n",
+        "0 0 1 1\nheading 0 0x1p+1 nan\nheading 4294967295500 0x1p+1 nan\n",
     ]:
         assert run(codec, "encode", data=frame.encode()).returncode == 4, frame
 
