@@ -79,7 +79,7 @@ def test_a_recording_that_starts_midway_is_compared_where_both_runs_have_a_posit
     assert main(["replay", str(tmp_path / "recordings")]) == 0
     output = capsys.readouterr().out
     assert "inf" not in output.replace("information", "")
-    assert "not compared, for their position is known either in the recording or in this replay only" in output
+    assert "not compared, because only the recording or only the replay has a position" in output
 
 
 def test_options_that_an_mcap_recording_contains_itself_are_refused(
