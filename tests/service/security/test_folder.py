@@ -85,7 +85,7 @@ def test_tags_are_added_listed_and_revoked(tmp_path: Path, capsys: pytest.Captur
     folder = ["--security", str(secured_site(tmp_path / "security").folder.path)]
     assert main(["tag", "add", "a", "b", *folder]) == 0
     assert main(["tag", "revoke", "a", *folder]) == 0
-    assert "restart of the router" in capsys.readouterr().out
+    assert "Restart the router" in capsys.readouterr().out
     assert main(["tag", "list", *folder]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("\t")[:2][0] for line in lines] == ["a", "b"]

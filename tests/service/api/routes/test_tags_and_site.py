@@ -168,5 +168,5 @@ def test_a_pattern_instead_of_a_tag_is_refused_with_an_explanation(escaped: str)
     house = make_api_bench()
     response = ask(house.app(), "PUT", f"/api/v1/tags/{escaped}/settings", json={})
     assert kind_of(response) == "invalid-request"
-    assert "settings for all tags do not exist" in response.json()["detail"]
+    assert "there are no settings for all tags" in response.json()["detail"]
     assert len(house.answers.tags) == 0

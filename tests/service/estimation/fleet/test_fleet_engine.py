@@ -237,7 +237,7 @@ def test_what_waits_is_part_of_the_state() -> None:
     fleet, restored = engine(3), FleetEngine(CALIBRATED)
     ahead = SampleBatch(batch.imu[:1000], batch.ranges[:110], batch.headings[:110])
     fleet.process(ahead)
-    assert len(fleet.state()["waiting"]) > 0
+    assert len(fleet.state()["pending"]) > 0
     restored.set_anchors(np.zeros(1, ANCHOR))
     restored.restore({name: array.copy() for name, array in fleet.state().items()})
     rest = SampleBatch(batch.imu[1000:], batch.ranges[110:], batch.headings[110:])
