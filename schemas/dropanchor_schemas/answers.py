@@ -59,6 +59,22 @@ class TagStatus(_Answer):
     settings: TagSettings
 
 
+class SamplesReceived(_Answer):
+    """What was taken in. Admission, duplicates and the values of samples are judged later: see the tag's counters."""
+
+    samples: int = Field(description="Samples in the payload.")
+
+
+class PhoneReadingsReceived(_Answer):
+    """What became of a batch of a phone's readings."""
+
+    samples: int = Field(description="IMU samples that are complete with this batch.")
+    unpaired: int = Field(description="Gyroscope readings that were given up: no acceleration at their time.")
+    damaged: int = Field(description="Readings that make no sense.")
+    duplicate: bool = Field(description="This message of this recording came before; nothing of it was used.")
+    waiting: int = Field(description="Messages of this recording that wait for one that was sent before them.")
+
+
 class TagList(_Answer):
     """Every tag that has sent data or is configured."""
 

@@ -3,7 +3,7 @@
 import logging
 import os
 import socket
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from threading import Event
 from types import TracebackType
@@ -47,6 +47,9 @@ from dropanchor_service.zenoh_io.publishers import ZenohPoses
 from dropanchor_service.zenoh_io.queryables import ZenohAnswers
 
 HTTP_STOP_S = 1.5
+
+OnLive = Callable[[str, bytes, str, int], None]
+"""Takes a live message: key, payload, encoding, UTC of its arrival in ns."""
 
 _log = logging.getLogger(__name__)
 
@@ -102,6 +105,7 @@ class Service:
             settings.ingest.period_ms * 1e-3,
             self._checkpoints.between_turns if self._checkpoints else lambda: None,
         )
+        self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self.metrics.register(
             FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
@@ -212,6 +216,7 @@ class Service:
             ask=caches.ask,
             new_publisher_limit=caches.new_publisher_limit,
         )
+        self._on_live = catch_up.on_live
         return ZenohIntake(
             session,
             site,
@@ -224,6 +229,10 @@ class Service:
             self._settings.max_tags,
         )
 
+    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
+        """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
+        self._on_live(samples_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
+
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         app = create_app(
             self.answers,
@@ -232,6 +241,7 @@ class Service:
             recorder=self._persistence.recorder,
             registry=self.metrics.registry,
             stopping=self._stopping,
+            receive=self._receive,
             max_tags=self._settings.max_tags,
             endpoints=endpoints_of(self._settings.zenoh, self._credentials),
             credentials=self._credentials,

@@ -36,6 +36,7 @@ class ApiBench:
     not_ready: Sequence[str] = ()
     now_ns: int = T_NS
     recorder: Recorder | None = None
+    received: list[tuple[str, bytes, str]] = field(default_factory=list)
 
     def move(self, *names: str, **fields: Any) -> None:
         """Give each named tag a new pose: tracked, of the time `now_ns`, with the given fields of POSE."""
@@ -67,6 +68,7 @@ class ApiBench:
             ready=lambda: (not self.not_ready, self.not_ready),
             registry=self.registry,
             stopping=self.stopping,
+            receive=lambda *message: self.received.append(message),
             recorder=self.recorder,
             max_tags=max_tags,
             dashboard=dashboard,

@@ -9,6 +9,7 @@ from fastapi.openapi.utils import get_openapi
 from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.answers import PoseFrame, Problem
+from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import OPEN_PATHS, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
@@ -18,12 +19,14 @@ from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import DashboardMount
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
+from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
+from dropanchor_service.phones.sensor_logger_intake import Receive
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
@@ -39,6 +42,7 @@ def create_app(
     ready: Ready,
     registry: CollectorRegistry,
     stopping: Event,
+    receive: Receive,
     impaired: Impaired = list,
     recorder: Recorder | None = None,
     max_tags: int = 20_000,
@@ -51,10 +55,10 @@ def create_app(
     """Return the application with all routes and middleware.
 
     ready: returns whether the service can do its work, and the reasons when it cannot. impaired: returns what else does
-    not work. stopping: ends the streams when set. recorder: None when there is no folder for recordings. dashboard: the
-    folder of the page; None for no page. endpoints: those of the Zenoh router, as configured. credentials: those of the
-    tags; None when they need none. authenticator: None when every client may do everything. rate_limiter: limits the
-    requests of each client; None for no limit.
+    not work. stopping: ends the streams when set. receive: takes samples that come over HTTP. recorder: None when there
+    is no folder for recordings. dashboard: the folder of the page; None for no page. endpoints: those of the Zenoh
+    router, as configured. credentials: those of the tags; None when they need none. authenticator: None when every
+    client may do everything. rate_limiter: limits the requests of each client; None for no limit.
     """
     app = FastAPI(
         title="Dropanchor",
@@ -76,6 +80,7 @@ def create_app(
         stream_router(answers, stopping),
         site_router(answers.site),
         connect_router(answers.site, endpoints, credentials),
+        ingest_router(receive),
         recordings_router(recorder),
         health_router(ready, impaired),
     ):
@@ -93,7 +98,7 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
         document = get_openapi(
             title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
         )
-        for model in (PoseFrame, Problem):  # no route has one of these as its only model
+        for model in (PoseFrame, Problem, SamplesMessage):  # no route has one of these as its only model
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
             document["components"]["schemas"] |= schema.pop("$defs") | {model.__name__: schema}
         _add_access(document)
@@ -122,6 +127,7 @@ _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
+    {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},
 ]

@@ -19,7 +19,14 @@ FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
 def text() -> str:
     """Return the document as JSON."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
-    app = create_app(answers, ready=lambda: (True, []), registry=CollectorRegistry(), stopping=Event(), dashboard=None)
+    app = create_app(
+        answers,
+        ready=lambda: (True, []),
+        registry=CollectorRegistry(),
+        stopping=Event(),
+        receive=lambda _tag, _payload, _encoding: None,
+        dashboard=None,
+    )
     return json.dumps(app.openapi(), indent=2, ensure_ascii=False) + "\n"
 
 

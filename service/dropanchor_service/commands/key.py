@@ -12,11 +12,13 @@ from dropanchor_service.security.identity import SCOPES, Scope
 DESCRIPTION = """\
 Manages the API keys of the REST interface and the page. A key is shown once and stored as a hash. A running service
 applies changes within a second. Scopes: read allows poses, tags, metrics and the stream; write also allows settings of
-tags and anchors; admin allows everything.
+tags and anchors; admin allows everything. A key with --tag sends the samples of that tag over HTTP and
+does nothing else; it is for a phone.
 """
 EPILOG = """\
 examples:
   dropanchor key add dashboard --scope read
+  dropanchor key add anna-phone --tag anna
   dropanchor key list
   dropanchor key revoke dashboard
   curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
@@ -28,7 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     add = actions.add_parser("add", help="create a key")
     add.add_argument("name", metavar="NAME", help="name of the user or program")
-    add.add_argument("--scope", choices=SCOPES, default="read", help="what the key allows (default: %(default)s)")
+    allowed = add.add_mutually_exclusive_group()
+    allowed.add_argument("--scope", choices=SCOPES, default="read", help="what the key allows (default: %(default)s)")
+    allowed.add_argument("--tag", help="allow only to send the samples of this tag")
     add.add_argument("--days", type=positive, metavar="N", help="days until the key expires (default: never)")
     revoke = actions.add_parser("revoke", help="revoke a key")
     revoke.add_argument("name", metavar="NAME")
@@ -50,7 +54,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
     """Add a key. Only the key goes to standard output, so that a script can read it."""
-    print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
+    if arguments.tag is None:
+        print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
+    else:
+        print(keys.add_for_tag(arguments.name, arguments.tag, arguments.days))
     sys.stderr.write("The key above is shown once. Send it as: Authorization: Bearer KEY\n")
 
 
@@ -62,4 +69,4 @@ def _revoke(keys: ApiKeys, arguments: argparse.Namespace) -> None:
 def _list(keys: ApiKeys, _arguments: argparse.Namespace) -> None:
     for identifier, key in sorted(keys.all().items(), key=lambda entry: entry[1].name):
         expires = "never expires" if key.expires is None else f"expires {key.expires:%Y-%m-%d}"
-        print(f"{key.name}\t{key.scope.word}\t{expires}\t{identifier}…\tmade {key.made:%Y-%m-%d}")
+        print(f"{key.name}\t{key.permission}\t{expires}\t{identifier}…\tmade {key.made:%Y-%m-%d}")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.files import PRIVATE, exclusive_lock
 from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
@@ -33,15 +34,23 @@ class ApiKeyError(ValueError):
 
 
 class ApiKey(BaseModel):
-    """The stored record of a key, without its secret."""
+    """The stored record of a key, without its secret. It has either a scope or a tag, whose samples it may send."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: str
-    scope: Scope
+    scope: Scope | None
     sha256: str
     made: datetime
     expires: datetime | None = None
+    tag: str | None = None
+
+    @property
+    def permission(self) -> str:
+        """What the key allows, in words."""
+        if self.tag is not None:
+            return f"ingest of tag {self.tag!r}"
+        return "nothing" if self.scope is None else self.scope.word
 
     @property
     def is_expired(self) -> bool:
@@ -72,6 +81,18 @@ class ApiKeys:
 
         days: the lifetime; None for a key that never expires. Raises ApiKeyError when the name is taken.
         """
+        return self._add(name, days, scope=scope)
+
+    def add_for_tag(self, name: str, tag: str, days: int | None = None) -> str:
+        """Create a key that may send the samples of this tag and nothing else; otherwise as `add`."""
+        try:
+            chunk_from_id(tag)
+            refuse_pattern(tag)
+        except InvalidKeyError as error:
+            raise ApiKeyError(str(error)) from error
+        return self._add(name, days, tag=tag)
+
+    def _add(self, name: str, days: int | None, scope: Scope | None = None, tag: str | None = None) -> str:
         with exclusive_lock(self._file.parent):
             keys = self._read()
             if any(key.name == name for key in keys.values()):
@@ -79,7 +100,7 @@ class ApiKeys:
             identifier, made = secrets.token_hex(4), datetime.now(UTC)
             secret = f"{PREFIX}{identifier}_{secrets.token_urlsafe(32)}"
             expires = None if days is None else made + timedelta(days=days)
-            keys[identifier] = ApiKey(name=name, scope=scope, sha256=_hash(secret), made=made, expires=expires)
+            keys[identifier] = ApiKey(name=name, scope=scope, sha256=_hash(secret), made=made, expires=expires, tag=tag)
             self._write(keys)
         return secret
 
@@ -103,7 +124,7 @@ class ApiKeys:
             raise UnauthenticatedError("the API key is unknown or was revoked")
         if key.is_expired:
             raise UnauthenticatedError("the API key has expired")
-        return Identity(SOURCE, key.name, key.scope)
+        return Identity(SOURCE, key.name, key.scope, tag=key.tag)
 
     def is_still_valid(self, identity: Identity) -> bool:
         self._reload_if_changed()

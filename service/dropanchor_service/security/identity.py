@@ -31,12 +31,14 @@ class Identity:
     """An authenticated client.
 
     source: the identity provider. scope: None when the client may do nothing. expires_s: Unix time; None: never.
+    tag: the tag whose samples the client may send; None: no tag.
     """
 
     source: str
     name: str
     scope: Scope | None
     expires_s: float | None = None
+    tag: str | None = None
 
 
 class UnauthenticatedError(Exception):

@@ -14,7 +14,7 @@ from hypothesis.errors import Unsatisfiable
 from schemathesis.checks import load_all_checks
 from schemathesis.core.result import Ok
 from schemathesis.schemas import APIOperation
-from schemathesis.specs.openapi.checks import positive_data_acceptance
+from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.wire import ENCODING_PACKED
@@ -28,8 +28,14 @@ Operation = APIOperation[Any, Any, Any, Any]
 EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
 """Valid requests per operation, and as many invalid ones. The seed is fixed, so that every run sends the same."""
 
-BEYOND_THE_SCHEMA = {"get_track": [positive_data_acceptance], "put_site": [positive_data_acceptance]}
-"""Rules that a schema cannot express: `from` and `to` are at most 31 days apart; each anchor is listed once."""
+BEYOND_THE_SCHEMA = {
+    "get_track": [positive_data_acceptance],
+    "put_site": [positive_data_acceptance],
+    "ingest_samples": [positive_data_acceptance],
+    "ingest_sensor_logger": [positive_data_acceptance, negative_data_rejection],
+}
+"""Rules that a schema cannot express: `from` and `to` are at most 31 days apart; each anchor is listed once; without
+credentials a request names the tag; a message holds a sample. And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(str.isprintable)

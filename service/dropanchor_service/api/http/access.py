@@ -5,7 +5,6 @@ import ipaddress
 import math
 from collections.abc import Mapping
 
-from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -16,6 +15,8 @@ from dropanchor_service.security.identity import Authenticator, Identity, Unauth
 from dropanchor_service.security.identity import Scope as AccessScope
 
 OPEN_PATHS = ("/api/v1/health/live", "/api/v1/health/ready", "/api/v1/openapi.json")
+INGEST = "/api/v1/ingest/"
+SENSOR_LOGGER = f"{INGEST}sensor-logger"
 _SITE = "/api/v1/site"
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
@@ -43,16 +44,17 @@ class Access:
         elif identity is None:
             await self._app(scope, receive, send)
         else:
+            scope.setdefault("state", {})["tag"] = identity.tag
             await self._app(scope, receive, self._while_valid(identity, send))
 
     async def _authenticate(self, request: Request) -> tuple[Identity | None, Response | None]:
         if self._authenticator is None:
             return None, None
-        scheme, _, secret = Headers(scope=request.scope).get("authorization", "").partition(" ")
-        if scheme.lower() != "bearer" or not secret.strip():
+        secret = _secret(request)
+        if not secret:
             return None, _unauthenticated(request, f"This request needs credentials. {_HOW_TO_AUTHENTICATE}")
         try:
-            provider, secret = self._authenticator.provider_of(secret.strip()), secret.strip()
+            provider = self._authenticator.provider_of(secret)
             if provider.may_block:
                 return await asyncio.to_thread(provider.identify, secret), None
             return provider.identify(secret), None
@@ -89,6 +91,14 @@ class Access:
         return sending
 
 
+def _secret(request: Request) -> str:
+    """Return the key or token of a request; empty without one. Sensor Logger may put it into the URL."""
+    scheme, _, secret = request.headers.get("authorization", "").partition(" ")
+    if scheme.lower() == "bearer" and secret.strip():
+        return secret.strip()
+    return request.query_params.get("token", "") if request.scope["path"] == SENSOR_LOGGER else ""
+
+
 def _is_protected(path: str) -> bool:
     """Return whether a path needs credentials. The dashboard's files do not: they hold no data of the site."""
     return (path.startswith("/api/") or path == "/metrics") and path not in OPEN_PATHS
@@ -102,11 +112,17 @@ def required_scope(method: str, path: str) -> AccessScope:
 
 
 def _forbidden(request: Request, identity: Identity | None) -> Response | None:
-    required = required_scope(request.method, request.scope["path"])
-    if identity is None or (identity.scope is not None and identity.scope >= required):
+    if identity is None:
+        return None
+    if request.scope["path"].startswith(INGEST):
+        allowed, needs = identity.tag is not None, "a key that was created with dropanchor key add NAME --tag TAG"
+    else:
+        required = required_scope(request.method, request.scope["path"])
+        allowed, needs = identity.scope is not None and identity.scope >= required, f"the scope {required.word}"
+    if allowed:
         return None
     has = "no scope" if identity.scope is None else f"the scope {identity.scope.word}"
-    detail = f"The {identity.source} of {identity.name!r} has {has}; this request needs the scope {required.word}."
+    detail = f"The {identity.source} of {identity.name!r} has {has}; this request needs {needs}."
     return problem_response(request, Kind.FORBIDDEN, detail)
 
 

@@ -43,6 +43,7 @@ class Kind(Enum):
     TAGS_FULL = (409, "The service has reached its limit of tags")
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")
+    SAMPLES_REJECTED = (422, "The samples cannot be decoded")
     TOO_MANY_REQUESTS = (429, "Too many requests")
     INTERNAL = (500, "An internal error occurred")
     NOT_SAVED = (503, "The change could not be saved")

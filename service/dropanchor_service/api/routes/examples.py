@@ -155,3 +155,5 @@ RECORDINGS: dict[str, Any] = NO_RECORDING | {
         }
     ]
 }
+SAMPLES: dict[str, Any] = {"range": [{"t_ns": 1_800_000_000_000_000_000, "anchor": "1", "range_m": 12.34}]}
+PHONE_READINGS: dict[str, Any] = {"samples": 100, "unpaired": 0, "damaged": 0, "duplicate": False, "waiting": 0}

@@ -1,0 +1,152 @@
+"""Samples that come over HTTP: the same payloads as over Zenoh, and what the app Sensor Logger pushes."""
+
+import asyncio
+from dataclasses import asdict
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import PlainTextResponse, Response
+
+from dropanchor_schemas.answers import PhoneReadingsReceived, SamplesReceived
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.samples import decode_json
+from dropanchor_schemas.site import ID_SCHEMA
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Reason, Rejection, read_header
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import example_response, json_response
+from dropanchor_service.phones.pairing import Signs
+from dropanchor_service.phones.sensor_logger import PhoneError
+from dropanchor_service.phones.sensor_logger_intake import Receive, SensorLoggerIntake
+from dropanchor_service.phones.session import WAIT_S
+
+PHONE_ERROR = 499
+"""The one status of which Sensor Logger shows the text."""
+
+_SENSOR_LOGGER_BODY = {
+    "type": "object",
+    "description": "One message of the app's HTTP Push.",
+    "properties": {
+        "messageId": {"type": "integer", "minimum": 0, "maximum": 2**53 - 1},
+        "sessionId": {"type": "string", "minLength": 1, "maxLength": 128},
+        "deviceId": {"type": "string"},
+        "payload": {"type": "array", "items": {"type": "object"}},
+    },
+}
+_SAMPLES_BODY = {
+    ENCODING_JSON: {"schema": {"$ref": "#/components/schemas/SamplesMessage"}, "example": examples.SAMPLES},
+    ENCODING_PACKED: {"schema": {"type": "string", "format": "binary"}},
+}
+
+
+class OfTag(BaseModel):
+    """The query of a route that takes samples."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    tag: str | None = Field(
+        default=None,
+        description="The tag's id. Needed without credentials; a tag's key speaks for its own tag only.",
+        examples=["tag-1"],
+        json_schema_extra=ID_SCHEMA,
+    )
+
+
+class OfPhone(OfTag):
+    """The query of a route that takes what a phone's app sends."""
+
+    token: str | None = Field(default=None, description="The tag's key, where the app cannot set a header.")
+    signs: Signs = Field(
+        default=Signs.AUTO,
+        description="Which way accelerations point: as on Android or, without standardised units and frames, on iOS; "
+        "auto: total acceleration is Android's, else gravity tells while the screen is up.",
+    )
+
+
+def ingest_router(receive: Receive) -> APIRouter:
+    router = APIRouter(tags=["ingest"])
+    _add_samples_route(router, receive)
+    _add_sensor_logger_route(router, SensorLoggerIntake(receive))
+    return router
+
+
+def _add_samples_route(router: APIRouter, receive: Receive) -> None:
+    @router.post(
+        "/ingest/samples",
+        operation_id="ingest_samples",
+        summary="Send samples of a tag",
+        description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
+        "65,536 bytes. It is treated as if it had come over Zenoh: order, clocks, admission and counters are the same.",
+        status_code=202,
+        response_model=SamplesReceived,
+        responses=example_response({"samples": 1}, 202)
+        | problems(Kind.INVALID_REQUEST, Kind.SAMPLES_REJECTED, Kind.BODY_TOO_LARGE),
+        openapi_extra={"requestBody": {"required": True, "content": _SAMPLES_BODY}},
+    )
+    async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
+        tag, payload = _tag(request, query), await request.body()
+        encoding = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        receive(tag, payload, encoding)  # what cannot be decoded is counted there too
+        samples = _count(payload, encoding)
+        if isinstance(samples, Rejection):
+            raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)
+        return json_response({"samples": samples}, status=202)
+
+
+def _add_sensor_logger_route(router: APIRouter, phones: SensorLoggerIntake) -> None:
+    @router.post(
+        "/ingest/sensor-logger",
+        operation_id="ingest_sensor_logger",
+        summary="Send readings of a phone with the app Sensor Logger",
+        description="The address for the app's HTTP Push. Readings become IMU samples of the tag: at the times of the "
+        "gyroscope, x to the top edge of the phone. Messages are put in order and used once each.",
+        response_model=PhoneReadingsReceived,
+        responses=example_response(examples.PHONE_READINGS)
+        | problems(Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE)
+        | {PHONE_ERROR: _phone_error()},
+        openapi_extra={
+            "requestBody": {"required": True, "content": {"application/json": {"schema": _SENSOR_LOGGER_BODY}}}
+        },
+    )
+    async def ingest_sensor_logger(request: Request, query: Annotated[OfPhone, Query()]) -> Response:
+        tag, body = _tag(request, query), await request.body()
+        try:
+            posted = await run_in_threadpool(phones.post, tag, body, query.signs)
+        except PhoneError as error:
+            return PlainTextResponse(str(error), PHONE_ERROR)
+        if posted.waiting:
+            loop = asyncio.get_running_loop()
+            loop.call_later(WAIT_S, loop.run_in_executor, None, phones.release_overdue)
+        return json_response(asdict(posted))
+
+
+def _phone_error() -> dict[str, Any]:
+    return {"description": "A sentence that the app shows.", "content": {"text/plain": {"schema": {"type": "string"}}}}
+
+
+def _tag(request: Request, query: OfTag) -> str:
+    """Return the tag that a request speaks for: that of its key, or without credentials the one it names."""
+    own: str | None = getattr(request.state, "tag", None)
+    if own is not None and query.tag not in (None, own):
+        raise ProblemError(Kind.FORBIDDEN, f"This key speaks for the tag {own!r} only.")
+    tag = own or query.tag
+    if tag is None:
+        raise ProblemError(Kind.INVALID_REQUEST, "query.tag: say which tag this is: add ?tag=NAME to the URL")
+    try:
+        chunk_from_id(tag)
+    except InvalidKeyError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"query.tag: {error}") from error
+    return tag
+
+
+def _count(payload: bytes, encoding: str) -> int | Rejection:
+    """Return how many samples a payload holds, or why it cannot be decoded."""
+    if encoding == ENCODING_PACKED:
+        header = read_header(payload)
+        return header if isinstance(header, Rejection) else sum(header[1])
+    if encoding == ENCODING_JSON:
+        frame = decode_json(payload)
+        return frame if isinstance(frame, Rejection) else len(frame)
+    return Rejection(Reason.ENCODING_UNKNOWN, f"the Content-Type is neither {ENCODING_JSON} nor {ENCODING_PACKED}")

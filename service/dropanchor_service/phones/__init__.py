@@ -1,0 +1,1 @@
+"""What phones send over HTTP, as samples of tags."""

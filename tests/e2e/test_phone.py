@@ -1,0 +1,91 @@
+"""Tags that speak HTTP only, through a real service: a key, posted batches, a pose over REST."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
+from dropanchor_service.cli import main
+from support.sensor_logger import G, recording
+from support.service import Running, running_service, settings_file, straight_north
+from support.zenoh_router import free_port, wait_until
+
+SENSORS = {
+    "gyroscope": lambda _: (0.0, 0.0, 0.0),
+    "accelerometer": lambda _: (0.0, 0.0, 0.0),
+    "gravity": lambda _: (0.0, 0.0, -G),
+    "magnetometer": lambda _: (0.0, 20.0, -40.0),
+}
+PHONE, SAMPLES = "/api/v1/ingest/sensor-logger", "/api/v1/ingest/samples"
+
+
+def ranges(seconds: int, start_ns: int) -> list[bytes]:
+    """What the other side measured, a message per second."""
+    walk = straight_north(10 * seconds, start_ns + seconds * 1_000_000_000)
+    parts = [walk.ranges[first : first + 10] for first in range(0, len(walk.ranges), 10)]
+    return [encode_json(Frame(ranges=part, sequence=n, boot_id=7)) for n, part in enumerate(parts)]
+
+
+def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(tmp_path: Path) -> None:
+    config, seconds = settings_file(tmp_path, ["anna"]), 20
+    start_ns = time.time_ns() - seconds * 1_000_000_000
+    batches = list(recording(seconds, SENSORS, start_ns=start_ns))
+    batches[3], batches[4] = batches[4], batches[3]
+    with running_service("--config", str(config)) as service:
+        for batch, distances in zip([*batches, batches[3]], [*ranges(seconds, start_ns), None], strict=True):
+            assert service.ask("POST", f"{PHONE}?tag=anna", content=batch).status_code == 200
+            if distances is not None:
+                json = {"content-type": ENCODING_JSON}
+                answer = service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
+                assert (answer.status_code, answer.json()) == (202, {"samples": 10})
+        wait_until(lambda: samples(service, {}) == {"imu": 100 * seconds - 1, "range": 10 * seconds})
+        pose = service.get("/api/v1/tags/anna/pose")
+        status = service.get("/api/v1/tags/anna")
+        service.ask("POST", f"{SAMPLES}?tag=anna", content=b"{", headers={"content-type": ENCODING_JSON})
+        wait_until(lambda: service.metric('dropanchor_rejected_total{reason="json_syntax"}') == 1)
+        wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"] == {"json_syntax": 1})
+    assert status["rejected"] == {}
+    assert pose["anchor"] == "7"
+    assert pose["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000
+
+
+def samples(service: Running, headers: dict[str, str]) -> dict[str, int]:
+    answer = service.ask("GET", "/api/v1/tags", headers=headers).json()
+    return next((dict(tag["samples"]) for tag in answer["tags"] if tag["tag"] == "anna"), {})
+
+
+def test_the_last_batch_is_used_although_the_one_before_never_comes(tmp_path: Path) -> None:
+    first, _, third = recording(3, SENSORS, start_ns=time.time_ns())
+    with running_service("--config", str(settings_file(tmp_path, ["anna"]))) as service:
+        service.ask("POST", f"{PHONE}?tag=anna", content=first)
+        assert service.ask("POST", f"{PHONE}?tag=anna", content=third).json()["waiting"] == 1
+        wait_until(lambda: samples(service, {}).get("imu", 0) > 190)
+
+
+def test_a_key_made_by_the_command_is_all_a_phone_needs_and_never_gets_into_the_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    security = tmp_path / "security"
+
+    def run(*words: str) -> str:
+        assert main([*words, "--security", str(security)]) == 0
+        return capsys.readouterr().out.strip()
+
+    port = free_port()
+    run("security", "init", "--host", "localhost", "--listen", f"tls/127.0.0.1:{port}")
+    token = run("key", "add", "anna-phone", "--tag", "anna").splitlines()[-1]
+    assert "ingest of tag 'anna'" in run("key", "list")
+    reader = {"authorization": f"Bearer {run('key', 'add', 'reader')}"}
+    options = ("--security", str(security), "--zenoh-listen", f"tls/127.0.0.1:{port}", "--log-level", "DEBUG")
+    with running_service(*options, ca=security / "ca.pem") as service:
+        for batch in recording(2, SENSORS, start_ns=time.time_ns()):
+            assert service.ask("POST", f"{PHONE}?token={token}", content=batch).status_code == 200
+        assert service.ask("POST", f"{PHONE}?token={token}", content=b"nonsense").status_code == 499
+        assert service.ask("POST", f"{PHONE}?token={token}x", content=b"{}").status_code == 401
+        assert service.ask("POST", f"{PHONE}?token={token}&tag=bert", content=b"{}").status_code == 403
+        wait_until(lambda: samples(service, reader).get("imu", 0) == 199)
+        assert service.stop() == 0
+    log = "".join(service.log)
+    assert token not in log
+    assert token.split("_", 2)[2] not in log

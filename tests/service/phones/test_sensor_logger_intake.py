@@ -1,0 +1,200 @@
+"""Recordings of phones from pushed messages to payloads: every reading once, in order, within limits."""
+
+import json
+import math
+import random
+
+import pytest
+
+from dropanchor_schemas.wire import ENCODING_PACKED, Frame, ImuSample, decode_packed
+from dropanchor_service.phones.pairing import Signs
+from dropanchor_service.phones.sensor_logger import PhoneError
+from dropanchor_service.phones.sensor_logger_intake import SESSIONS_PER_TAG, SensorLoggerIntake
+from dropanchor_service.phones.session import MAX_WAITING, WAIT_S
+from support.sensor_logger import T_NS, G, Value, Vector, message, reading, recording
+
+
+class Phones:
+    """An intake, and what it put out for one tag."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.frames: list[Frame] = []
+        self.intake = SensorLoggerIntake(self._receive, lambda: self.now_s)
+
+    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
+        assert (tag, encoding) == ("anna", ENCODING_PACKED)
+        frame = decode_packed(payload)
+        assert isinstance(frame, Frame)
+        self.frames.append(frame)
+
+    def post(self, body: bytes) -> int:
+        return self.intake.post("anna", body, Signs.AUTO).samples
+
+    @property
+    def samples(self) -> list[ImuSample]:
+        return [sample for frame in self.frames for sample in frame.imu]
+
+
+def turning(t_ns: int) -> Vector:
+    return 0.0, 0.0, math.sin((t_ns - T_NS) * 1e-9)
+
+
+ANDROID: dict[str, Value] = {
+    "gyroscope": turning,
+    "totalacceleration": lambda _: (0.0, 0.0, G),
+    "magnetometer": lambda _: (20.0, 0.0, -40.0),
+}
+IOS: dict[str, Value] = {
+    "gyroscope": turning,
+    "accelerometer": lambda _: (0.0, 0.0, 0.0),
+    "gravity": lambda _: (0.0, 0.0, -G),
+}
+
+
+def out_of_order(messages: list[bytes], seed: int) -> list[bytes]:
+    """Each message a few places from its own, and every seventh one twice."""
+    chance = random.Random(seed)
+    places = [(index + chance.uniform(0.0, 5.0), body) for index, body in enumerate(messages)]
+    places += [(index + chance.uniform(0.0, 9.0), body) for index, body in list(enumerate(messages))[::7]]
+    return [body for _, body in sorted(places, key=lambda place: place[0])]
+
+
+@pytest.mark.parametrize("sensors", [ANDROID, IOS], ids=["android", "ios"])
+def test_ten_minutes_at_100_hz_out_of_order_lose_no_reading_and_use_none_twice(sensors: dict[str, Value]) -> None:
+    phones = Phones()
+    taken = 0
+    for body in out_of_order(list(recording(600, sensors, batch_ns=200_000_000)), seed=3):
+        taken += phones.post(body)
+        phones.now_s += 0.175  # 3,429 messages in 600 s
+    times = [sample.t_ns for sample in phones.samples]
+    every = [T_NS + index * 10_000_000 for index in range(60_000)]
+    assert times == every[:-1]  # the last one has no acceleration after it
+    assert taken == len(times)
+    for sample in phones.samples[::997]:
+        assert sample.acc == pytest.approx((0.0, 0.0, G), rel=1e-6)
+        assert sample.gyro[2] == pytest.approx(turning(sample.t_ns)[2], abs=1e-6)
+    assert [frame.sequence for frame in phones.frames] == list(range(len(phones.frames)))
+    assert len({frame.boot_id for frame in phones.frames}) == 1
+
+
+def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
+    phones = Phones()
+    [body] = recording(1, ANDROID)
+    assert phones.post(body) == 99
+    assert phones.intake.post("anna", body, Signs.AUTO).duplicate
+    assert len(phones.samples) == 99
+
+
+def test_a_message_that_never_comes_is_given_up_after_a_while_without_another_one() -> None:
+    phones = Phones()
+    first, _, third = recording(3, ANDROID)
+    phones.post(first)
+    assert phones.intake.post("anna", third, Signs.AUTO).waiting == 1
+    phones.intake.release_overdue()
+    assert len(phones.samples) == 99
+    phones.now_s += WAIT_S
+    phones.intake.release_overdue()
+    assert len(phones.samples) > 190
+
+
+def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same() -> None:
+    phones = Phones()
+    first, second, third = recording(3, ANDROID)
+    phones.post(first)
+    phones.post(third)
+    phones.now_s += WAIT_S
+    phones.intake.release_overdue()
+    assert phones.post(second) > 90
+    times = [sample.t_ns for sample in phones.samples]
+    assert len(times) == len(set(times))
+
+
+def test_no_more_messages_wait_than_are_allowed() -> None:
+    phones = Phones()
+    bodies = list(recording(MAX_WAITING + 2, ANDROID))
+    waiting = [phones.intake.post("anna", body, Signs.AUTO).waiting for body in bodies[1:]]
+    assert max(waiting) == MAX_WAITING
+    assert waiting[-1] == 0
+
+
+def test_a_service_that_hears_a_recording_from_its_middle_on_does_not_wait_for_its_beginning() -> None:
+    phones = Phones()
+    bodies = list(recording(60, ANDROID))
+    assert phones.post(bodies[57]) == 99
+
+
+def test_a_new_recording_ends_the_wait_of_the_oldest_of_its_tag() -> None:
+    phones = Phones()
+    phones.post(message(1, [reading("gyroscope", T_NS, (0, 0, 0)), reading("totalacceleration", T_NS, (0, 0, G))]))
+    assert not phones.samples
+    for number in range(SESSIONS_PER_TAG):
+        phones.post(message(0, [reading("light", T_NS, (0, 0, 0))], session=f"later-{number}"))
+    assert len(phones.samples) == 1
+
+
+def test_a_large_message_fills_several_payloads() -> None:
+    phones = Phones()
+    [body] = recording(10, {"gyroscope": turning, "totalacceleration": lambda _: (0, 0, G)}, 400, T_NS, 10_000_000_000)
+    assert phones.post(body) == 3998
+    assert [len(frame.imu) for frame in phones.frames] == [1000, 1000, 1000, 998]
+
+
+def test_a_test_of_the_connection_is_welcome() -> None:
+    for body in (b"{}", b'{"payload": []}'):
+        assert Phones().post(body) == 0
+
+
+def test_times_as_text_and_values_beside_them_are_understood() -> None:
+    phones = Phones()
+    readings = [
+        {"name": name, "time": str(T_NS), "x": 0.0, "y": 0.0, "z": z}
+        for name, z in (("Gyroscope", 0.0), ("TotalAcceleration", G))
+    ]
+    assert phones.post(message(0, readings)) == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        (b"", "is not JSON"),
+        (b"\xff", "is not JSON"),
+        (b"[" * 100_000, "is not JSON"),
+        (b"[1]", "is not a JSON object"),
+        (b'{"payload": 1}', "payload is not a list"),
+        (json.dumps({"messageId": 0, "payload": [1]}).encode(), "sessionId is not"),
+        (json.dumps({"messageId": 0, "sessionId": "", "payload": [1]}).encode(), "sessionId is not"),
+        (json.dumps({"messageId": 0, "sessionId": "x" * 200, "payload": [1]}).encode(), "sessionId is not"),
+        (json.dumps({"messageId": -1, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
+        (json.dumps({"messageId": True, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
+        (json.dumps({"messageId": 2**60, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
+    ],
+)
+def test_what_is_no_message_is_refused_with_a_sentence(body: bytes, sentence: str) -> None:
+    phones = Phones()
+    with pytest.raises(PhoneError, match=sentence):
+        phones.post(body)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"time": None},
+        {"time": -1},
+        {"time": 2**63},
+        {"time": "noon"},
+        {"time": True},
+        {"time": 1e999},
+        {"values": None},
+        {"values": {"x": 0, "y": 0}},
+        {"values": {"x": 0, "y": 0, "z": None}},
+        {"values": {"x": 0, "y": 0, "z": math.nan}},
+        {"values": {"x": 0, "y": 0, "z": 1e300}},
+    ],
+)
+def test_a_damaged_reading_is_counted_and_harms_no_other(damage: dict[str, object]) -> None:
+    phones = Phones()
+    good = [reading("gyroscope", T_NS, (0, 0, 0)), reading("totalacceleration", T_NS, (0, 0, G))]
+    bad = [reading("gyroscope", T_NS + 1, (0, 0, 0)) | damage, 17, {"name": ["gyroscope"]}]
+    posted = phones.intake.post("anna", message(0, [*bad, *good]), Signs.AUTO)
+    assert (posted.samples, posted.damaged) == (1, 1)
