@@ -62,6 +62,12 @@ class Pairing:
         self._none = no_readings()
         self._fruitless = 0
 
+    def beginning_anew(self) -> "Pairing":
+        """Return one without readings that knows which way accelerations point."""
+        other = Pairing(Signs.AUTO)
+        other._sign = self._sign
+        return other
+
     def add(self, batch: Mapping[str, Stream]) -> Paired:
         """Return the samples that are complete with this batch."""
         for name, stream in batch.items():

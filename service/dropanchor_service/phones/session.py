@@ -26,7 +26,6 @@ class Session:
     """Times are monotonic, in s."""
 
     def __init__(self, signs: Signs) -> None:
-        self._signs = signs
         self._pairing = Pairing(signs)
         self._next: int | None = None
         self._known: set[int] = set()
@@ -40,7 +39,7 @@ class Session:
         if self._next is None:
             self._next = 0 if message.message_id < FIRST else message.message_id
         if message.message_id < self._next:  # it was given up; the readings around it are gone
-            return self._taken([Pairing(self._signs).add(message.streams)])
+            return self._taken([self._pairing.beginning_anew().add(message.streams)])
         self._waiting[message.message_id] = message, now_s
         return self.release(now_s - WAIT_S)
 

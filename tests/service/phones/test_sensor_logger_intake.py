@@ -98,9 +98,10 @@ def test_a_message_that_never_comes_is_given_up_after_a_while_without_another_on
     assert len(phones.samples) > 190
 
 
-def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same() -> None:
+def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same_and_with_the_signs_of_the_others() -> None:
     phones = Phones()
-    first, second, third = recording(3, ANDROID)
+    upright: dict[str, Value] = IOS | {"gravity": lambda t_ns: (0.0, 0.0, -G) if t_ns < T_NS + 10**9 else (0.0, G, 0.0)}
+    first, second, third = recording(3, upright)
     phones.post(first)
     phones.post(third)
     phones.now_s += WAIT_S
