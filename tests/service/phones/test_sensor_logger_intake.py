@@ -100,7 +100,9 @@ def test_a_message_that_never_comes_is_given_up_after_a_while_without_another_on
 
 def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same_and_with_the_signs_of_the_others() -> None:
     phones = Phones()
-    upright: dict[str, Value] = IOS | {"gravity": lambda t_ns: (0.0, 0.0, -G) if t_ns < T_NS + 10**9 else (0.0, G, 0.0)}
+    upright: dict[str, Value] = IOS | {
+        "gravity": lambda t_ns: (0.0, 0.0, -G) if t_ns < T_NS + 9 * 10**8 else (0.0, G, 0.0)
+    }
     first, second, third = recording(3, upright)
     phones.post(first)
     phones.post(third)
