@@ -130,6 +130,8 @@ def test_every_operation_has_a_name_a_tag_a_summary_and_its_problems() -> None:
         assert operation["tags"]
         assert operation["summary"]
         for status, response in operation["responses"].items():
+            if status == "499":  # Sensor Logger shows plain text
+                continue
             assert (status >= "400") == ("application/problem+json" in response.get("content", {}))
 
 
