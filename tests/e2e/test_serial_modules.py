@@ -19,6 +19,16 @@ from support.zenoh_router import wait_until
 SPEED_MPS = 1.0
 
 
+def shaken_acc() -> tuple[float, float, float]:
+    """Return what an accelerometer measures on a moving vehicle, m/s². Without vibration it would seem to rest."""
+    return gauss(0.0, 0.3), gauss(0.0, 0.3), gauss(9.81, 0.3)
+
+
+def shaken_gyro() -> tuple[float, float, float]:
+    """Return what its gyroscope measures, rad/s."""
+    return gauss(0.0, 0.02), gauss(0.0, 0.02), gauss(0.0, 0.02)
+
+
 def lec(range_m: float) -> bytes:
     return f"DIST,1,AN0,022E,0.00,0.00,0.00,{range_m:.2f}\r\n".encode()
 
@@ -38,7 +48,8 @@ def makerfabs(range_m: float) -> bytes:
 
 
 def linktrack(range_m: float) -> bytes:
-    frame = bytearray(struct.pack("<BBHBB 34x 6f 38x", 0x55, 4, 133, 2, 1, 0, 0, 0, 0, 0, gauss(9.81, 0.02)))
+    imu = (*shaken_gyro(), *shaken_acc())
+    frame = bytearray(struct.pack("<BBHBB 34x 6f 38x", 0x55, 4, 133, 2, 1, *imu))
     frame += struct.pack("<I 12x B", time.monotonic_ns() // 1_000_000 % 2**32, 1)
     frame += struct.pack("<BB", 1, 7) + round(range_m * 1000).to_bytes(3, "little") + bytes(8)
     return bytes(frame) + bytes([sum(frame) & 0xFF])
@@ -59,7 +70,7 @@ def publish_imu(endpoint: str, stop: Event) -> None:
         clients = [stack.enter_context(TagClient(tag, connect=endpoint)) for tag in MODULES if tag != "linktrack"]
         while not stop.wait(0.02):
             for client in clients:
-                client.publish_imu((0.0, 0.0, gauss(9.81, 0.02)), (0.0, 0.0, gauss(0.0, 1e-3)), (20.0, 0.0, -40.0))
+                client.publish_imu(shaken_acc(), shaken_gyro(), (20.0, 0.0, -40.0))
 
 
 def distance(began_s: float) -> float:
