@@ -36,6 +36,7 @@ TAG_SETTINGS = np.dtype(
         ("reverse_allowed", "?"),
         ("heading_source", "u1"),
         ("heading_std", "f8"),  # rad, of a platform's heading that does not drift; NaN: not known
+        ("magnetometer_calibrated", "?"),
         ("start_known", "?"),
         ("start_x", "f8"),
         ("start_y", "f8"),

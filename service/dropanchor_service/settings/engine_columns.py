@@ -30,6 +30,7 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["reverse_allowed"] = tag.reverse_allowed
     columns["heading_source"] = HeadingSource[tag.heading_source.upper()]
     columns["heading_std"] = _or_nan(tag.heading_std_rad)
+    columns["magnetometer_calibrated"] = tag.magnetometer_calibrated
     columns["declination"] = declination_rad
     if tag.start is not None:
         columns["start_known"] = True

@@ -17,7 +17,7 @@ from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-HARD_IRON = 1.0  # prior sd of an uncalibrated magnetometer's hard iron, in units of the field
+HARD_IRON, HARD_IRON_CALIBRATED = 1.0, 0.05  # prior sd of a magnetometer's hard iron, in units of the field
 
 _BY_ROW = ("rows", "fronts", "platforms")
 
@@ -48,7 +48,8 @@ class FleetEngine:
         self._reserve_rows(row + 1)
         release(self._rows[row], self._pool)
         self._rows[row] = configure_row(settings, self._tuning)
-        start_frontend(self._fronts[row], HARD_IRON, float(settings["declination"]))
+        hard_iron = HARD_IRON_CALIBRATED if settings["magnetometer_calibrated"] else HARD_IRON
+        start_frontend(self._fronts[row], hard_iron, float(settings["declination"]))
         self._platforms[row] = np.zeros((), PLATFORM)
         self._queue.forget(row)
 

@@ -23,7 +23,7 @@ class Tuning(NamedTuple):
     platform_slip_std: float = 0.15  # rad, of a heading without an IMU: slip, and lag of the readings
     platform_slip_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
-    aligned_log_prior: float = 3.0
+    aligned_log_prior: float = 2.0
     gyro_bias_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0
@@ -32,7 +32,7 @@ class Tuning(NamedTuple):
     class_rejected_weight: float = 1e-3  # weight below which a heading class no longer counts for the ellipse
     drift_again_log_prior: float = 0.0  # log prior of a drifting gyroscope, where heading and gyroscope drift apart
     q_gyro_own: float = 1e-6  # the same, of all others
-    acc_bias_std: float = 0.11  # m/s^2
+    acc_bias_std: float = 0.2  # m/s^2
     acc_bias_roughness: float = 0.7  # s: its variance grows by this times dv_var / dt, the roughness of the motion
     acc_bias_tau: float = 5.0  # s
     range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays
@@ -47,6 +47,7 @@ class Tuning(NamedTuple):
     nlos_log_prior: float = -2.5
     nlos_depth: float = 6.0  # log weight below the best at which a hypothesis gets no NLOS alternative
     nlos_min_bias: float = 0.15  # m, extra bias below which there is a line of sight
+    nlos_max_bias: float = 3.0  # m, extra bias above which the track is wrong and not the range
     nlos_tau: float = 2.0  # s
     nlos_run: int = 4
     own_error_log_prior: float = -1.0  # log prior of a slow error of the heading reference

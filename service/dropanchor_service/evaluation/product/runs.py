@@ -123,6 +123,7 @@ def _configure_everything(row: Row, run: Simulation, settings: Array) -> None:
     """Configure what is true of a simulated tag. A walker's device sways and its ranges are biased, so both stay."""
     settings["range_std"] = run.ranges.std_m[0]
     settings["reverse_allowed"] = row.scenario == "forklift"
+    settings["magnetometer_calibrated"] = row.sensors == "9-axis"
     if row.scenario in CARRIED:
         return
     settings["range_bias_std"] = settings["mount_angle_std"] = settings["slip_std"] = 0.0

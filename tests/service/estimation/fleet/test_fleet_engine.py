@@ -38,7 +38,10 @@ def samples(seed: int, row: int = 0) -> tuple[SampleBatch, Any]:
     imu = np.zeros((n - 1) * STEP, IMU)
     imu["row"], imu["t_ns"] = row, np.arange(len(imu)) * 10_000_000
     imu["gyro"][:, 2] = np.repeat(nodes["dyaw"][1:] / DT, STEP)
-    imu["acc"][:, 0] = np.repeat(nodes["dv_forward"][1:] / DT, STEP)
+    half = nodes["dyaw"][1:] / 2  # dv is in the frame at the start of a node, and the body turns with the tag
+    forward, left = nodes["dv_forward"][1:], nodes["dv_left"][1:]
+    imu["acc"][:, 0] = np.repeat((np.cos(half) * forward + np.sin(half) * left) / DT, STEP)
+    imu["acc"][:, 1] = np.repeat((np.cos(half) * left - np.sin(half) * forward) / DT, STEP)
     imu["acc"][:, 2] = 9.80665
     shaking = np.repeat(np.abs(truth.speed[1:]) > 0.0, STEP)[:, None] * np.random.default_rng(seed).standard_normal(
         (len(imu), 3)

@@ -48,7 +48,9 @@ def _sense(rng: Any, x: Any, y: Any, yaw: Any, v: Any, range_std: float, row: in
     nodes["row"], nodes["t_ns"], nodes["dt_s"] = row, (np.arange(n) * DT * 1e9).astype(np.int64), DT
     nodes["dyaw"][1:] = np.diff(yaw) + 0.002 * rng.standard_normal(n - 1)
     nodes["dyaw_var"] = 0.002**2
-    nodes["dv_forward"][1:] = np.diff(v) + 0.05 * DT + 0.01 * rng.standard_normal(n - 1)
+    turned = np.diff(yaw)  # dv is in the frame at the start of a node, to which a turn adds the centripetal part
+    nodes["dv_forward"][1:] = v[1:] * np.cos(turned) - v[:-1] + 0.05 * DT + 0.01 * rng.standard_normal(n - 1)
+    nodes["dv_left"][1:] = v[1:] * np.sin(turned)
     nodes["dv_var"] = 0.01**2
     nodes["heading"] = yaw + 0.03 * rng.standard_normal(n)
     nodes["heading_var"], nodes["heading_kind"] = 0.03**2, MEASURED_HEADING

@@ -20,7 +20,8 @@ GYRO_BIAS: Final = 6  # rad/s, residual bias of the yaw increments
 ACC_BIAS: Final = 7  # m/s^2, bias of the forward acceleration
 REFERENCE: Final = 8  # rad, error of the heading reference
 RANGE_BIAS: Final = 9  # m, bias of ranges to the primary anchor, as measured
-N: Final = 10
+LEFT_BIAS: Final = 10  # m/s^2, bias of the leftward acceleration
+N: Final = 11
 PACKED: Final = N * (N + 1) // 2  # entries of the upper triangle of a covariance
 
 WORKING_HYPOTHESES: Final = 320  # at most, of one row while it is being worked on
@@ -99,6 +100,7 @@ NLOS: Final = np.dtype(
         ("low_run", np.int32),  # and far too small
         ("misfit", np.float64),  # exponential mean of the outlier probability that the best hypothesis gave
         ("misfit_s", np.float64),  # s for which most ranges have been outliers
+        ("widened", np.int32),  # how often the track was widened since the ranges last agreed with it
         ("since_los_offer_s", np.float64),  # s since NLOS hypotheses were last offered a clear line of sight
     ]
 )

@@ -28,6 +28,8 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 OFFER_EVERY: Final = 1.0  # s between offers of a line of sight
 MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which most ranges are outliers
 CLOSE_SIGMAS, CLOSE_SLACK = 1.5, 0.2  # standard deviations and m within which a bias is that of a line of sight
+AGREEMENT: Final = 0.2  # mean outlier probability below which the ranges agree with the track
+MAX_WIDENED: Final = 2  # times that a track is widened before it is given up
 WIDEN_POSITION, WIDEN_SPEED = 1.0, 0.5  # m^2 and (m/s)^2 by which a track with a misfit is widened
 
 
@@ -109,14 +111,29 @@ def widen_after_misfit(work: Hypotheses, count: int, row: Row, node: Node, t: Tu
     """Widen a track whose ranges have been outliers for seconds: the ranges are right and the track is wrong."""
     nlos = row.nlos
     nlos.misfit_s = nlos.misfit_s + node.dt_s if nlos.misfit > MISFIT_LIMIT else 0.0
+    if nlos.misfit < AGREEMENT:
+        nlos.widened = 0
     if nlos.misfit_s < t.misfit_s:
         return
     nlos.misfit_s = 0.0
+    nlos.widened += 1
     for h in range(count):
         P = work[h].cov
         P[R, R] += WIDEN_POSITION
         P[PHI, PHI] += WIDEN_POSITION / max(work[h].mean[R], 1.0) ** 2
         P[V, V] += WIDEN_SPEED
+
+
+@njit(nogil=True)
+def contradicts_ranges(work: Hypotheses, count: int, row: Row, t: Tuning) -> bool:
+    """Return whether the track is wrong: ranges stay outliers, or only a detour of metres would explain them.
+
+    A lost line of sight makes a range longer by a metre or so. A track that has gone wrong needs a larger extra bias
+    as it moves away from the tag, and would take it for the path of the signal for ever.
+    """
+    best = work[best_of(work, count)]
+    extra = best.mean[RANGE_BIAS] - best.los_bias if best.nlos == 1 else 0.0
+    return bool(row.nlos.widened >= MAX_WIDENED or extra > t.nlos_max_bias)
 
 
 @njit(nogil=True)

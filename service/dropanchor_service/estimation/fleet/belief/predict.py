@@ -1,10 +1,13 @@
 """Predict one hypothesis over a node: constant-course step in polar coordinates.
 
-With w = dyaw - b_g dt, m = mount + slip, alpha = yaw + w/2 + m - phi, f = dv_forward cos m + dv_left sin m - b_a dt and
-d = v dt + f dt/2, and with the displacement g by a lever (forward, left), turned by yaw - phi:
+With w = dyaw - b_g dt, m = mount + slip, c = m + w/2, alpha = yaw + c - phi, f = dv_forward cos c + dv_left sin c
+- b_a dt and d = v dt + f dt/2, and with the displacement g by a lever (forward, left), turned by yaw - phi:
 
     z = (r + d cos alpha, d sin alpha) + R(yaw - phi) g,  r' = |z|,  phi' = phi + atan2(z_y, z_x),
     yaw' = yaw + w,  v' = v + f,  slip, b_a and the reference error decay with their time constants.
+
+dv is in the frame at the start of the node. A turn at constant speed v has dv = v (cos w - 1, sin w) there, which is at
+right angles to the course in the middle of the node: only along that course does it leave the speed unchanged.
 """
 
 import math
@@ -15,6 +18,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     DRIFTING,
     GYRO_BIAS,
+    LEFT_BIAS,
     MAGNETOMETER_MODEL,
     MOUNT,
     PHI,
@@ -42,7 +46,7 @@ def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
     dt = node.dt_s
     w = node.dyaw - s[GYRO_BIAS] * dt
     m = s[MOUNT] + s[SLIP]
-    cm, sm = math.cos(m), math.sin(m)
+    cm, sm = math.cos(m + w / 2), math.sin(m + w / 2)
     sensed = math.isfinite(node.dv_var)
     forward = node.dv_forward if sensed else 0.0
     left = node.dv_left if sensed else 0.0
@@ -50,6 +54,7 @@ def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
     f = forward * cm + left * sm - bias
     f_m = -forward * sm + left * cm
     f_b = -dt if sensed else 0.0
+    f_g = -f_m * dt / 2
     d = s[V] * dt + f * dt / 2
     alpha = s[YAW] + w / 2 + m - s[PHI]
     ca, sa = math.cos(alpha), math.sin(alpha)
@@ -69,10 +74,11 @@ def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
     F[0, V], F[1, V] = r_d * dt, p_d * dt
     F[0, MOUNT], F[1, MOUNT] = r_alpha + r_d * f_m * dt / 2, p_alpha + p_d * f_m * dt / 2
     F[0, SLIP], F[1, SLIP] = F[0, MOUNT], F[1, MOUNT]
-    F[0, GYRO_BIAS], F[1, GYRO_BIAS] = -r_alpha * dt / 2, -p_alpha * dt / 2
+    F[0, GYRO_BIAS] = (r_d * f_g - r_alpha) * dt / 2
+    F[1, GYRO_BIAS] = (p_d * f_g - p_alpha) * dt / 2
     F[0, ACC_BIAS], F[1, ACC_BIAS] = r_d * f_b * dt / 2, p_d * f_b * dt / 2
     F[2, YAW], F[2, GYRO_BIAS] = 1.0, -dt
-    F[3, V], F[3, MOUNT], F[3, SLIP], F[3, ACC_BIAS] = 1.0, f_m, f_m, f_b
+    F[3, V], F[3, MOUNT], F[3, SLIP], F[3, GYRO_BIAS], F[3, ACC_BIAS] = 1.0, f_m, f_m, f_g, f_b
     s[PHI] += fast_atan2(zx, zy)
     s[R] = r
     s[YAW] += w
@@ -112,11 +118,11 @@ def _dot(f: Any, p: Any) -> float:
 def predict_covariance(P: Floats, F: Floats, decay: Floats, A: Floats) -> None:
     """Predict the covariance: P = J P J^T, J = [F; diag(decay)], skipping zeros and ones of F. A (4, N) is scratch."""
     f, g = _row_of(F, R), _row_of(F, PHI)
-    yaw_g, v_m, v_a = F[YAW, GYRO_BIAS], F[V, MOUNT], F[V, ACC_BIAS]
+    yaw_g, v_m, v_g, v_a = F[YAW, GYRO_BIAS], F[V, MOUNT], F[V, GYRO_BIAS], F[V, ACC_BIAS]
     for j in range(N):
         p = _column_of(P, j)
         A[R, j], A[PHI, j] = _dot(f, p), _dot(g, p)
-        A[YAW, j], A[V, j] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_a * p[6]
+        A[YAW, j], A[V, j] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_g * p[5] + v_a * p[6]
     for i in range(4, N):
         for j in range(i, N):
             P[i, j] = P[j, i] = P[i, j] * (decay[i] * decay[j])
@@ -125,7 +131,7 @@ def predict_covariance(P: Floats, F: Floats, decay: Floats, A: Floats) -> None:
             P[i, j] = P[j, i] = A[i, j] * decay[j]
         p = _column_of(A.T, i)
         P[i, R], P[i, PHI] = _dot(f, p), _dot(g, p)
-        P[i, YAW], P[i, V] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_a * p[6]
+        P[i, YAW], P[i, V] = p[2] + yaw_g * p[5], p[3] + v_m * p[4] + v_g * p[5] + v_a * p[6]
     for i in range(4):
         for j in range(i):
             P[i, j] = P[j, i]
@@ -152,6 +158,7 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
     growth[SLIP] = row.settings.slip_std**2 * (1.0 - decay[SLIP] ** 2)
     growth[ACC_BIAS] = (t.acc_bias_std**2 + t.acc_bias_roughness * rough) * (1.0 - decay[ACC_BIAS] ** 2)
+    decay[LEFT_BIAS], growth[LEFT_BIAS] = decay[ACC_BIAS], growth[ACC_BIAS]
     growth[RANGE_BIAS] = t.q_range_bias * dt if row.settings.range_bias_std > 0.0 else 0.0
 
 

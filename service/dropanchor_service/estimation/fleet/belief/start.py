@@ -13,6 +13,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     EXACT,
     GYRO_BIAS,
+    LEFT_BIAS,
     MAGNETOMETER_MODEL,
     MOUNT,
     PHI,
@@ -29,13 +30,14 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
 from dropanchor_service.estimation.fleet.belief.states import NO_HEADING_YET, NO_RANGE
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
     DERIVED_HEADING,
     MEASURED_HEADING,
+    MOVING,
     NO_HEADING,
     RANGE,
     RELATIVE_HEADING,
@@ -64,7 +66,7 @@ def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_
     P[MOUNT, MOUNT] = settings.mount_angle_std**2
     P[SLIP, SLIP] = settings.slip_std**2
     P[GYRO_BIAS, GYRO_BIAS] = max(settings.gyro_bias_std**2, node.gyro_bias_var)
-    P[ACC_BIAS, ACC_BIAS] = t.acc_bias_std**2
+    P[ACC_BIAS, ACC_BIAS] = P[LEFT_BIAS, LEFT_BIAS] = t.acc_bias_std**2
     P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2
     work[h].log_weight = 0.0
     work[h].heading_class = EXACT
@@ -158,7 +160,9 @@ def start_known(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tunin
 
 
 @njit(nogil=True)
-def _start_ring(work: Hypotheses, row: Row, horizontal: float, node: Node, t: Tuning) -> int:
+def _start_ring(
+    work: Hypotheses, row: Row, horizontal: float, node: Node, yaw: float, yaw_var: float, t: Tuning
+) -> int:
     """Make hypotheses for all bearings and speeds, each with a standard deviation of half a cell. Return their count.
 
     Speeds are forward unless the tag may reverse. The numbers of the tuning keep the count within MAX_HYPOTHESES.
@@ -169,20 +173,17 @@ def _start_ring(work: Hypotheses, row: Row, horizontal: float, node: Node, t: Tu
     speeds = 1 if at_rest else (t.coarse_speeds if row.start.coarse == 1 else t.start_speeds) // signs
     cell = 2.0 * math.pi / bearings
     speed_cell = min(t.start_speed_max, row.settings.speed_max) / speeds
-    choose_model(row, node, t)
-    row.heading.in_site_frame = 1 if is_in_site_frame(node.heading_kind) else 0
-    variance = node.heading_var if row.heading.in_site_frame == 1 else RELATIVE_YAW_VAR
     h = 0
     for i in range(bearings):
         for k in range(speeds):
             for g in range(signs):
-                _initialise(work, h, row, node, node.heading, variance, t)
+                _initialise(work, h, row, node, yaw, yaw_var, t)
                 s, P = work[h].mean, work[h].cov
                 s[R], s[PHI] = horizontal, cell * i
                 _spread_ring(P, row, cell)
                 s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
                 P[V, V] = REST_SPEED_VAR if at_rest else (speed_cell / 2.0) ** 2
-                if row.heading.in_site_frame == 1:
+                if is_in_site_frame(node.heading_kind):
                     _, slow, _ = reference_error(row, node.heading_var)
                     add_common_rotation(P, slow)
                 h += 1
@@ -237,5 +238,34 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
         row.publication.reason = NO_RANGE
         return 0
     slant = float(np.median(start.ranges[: min(start.range_count, START_RANGES)]))
-    horizontal = math.sqrt(max(slant**2 - (row.settings.height - anchor.z) ** 2, 0.01))
-    return _start_ring(work, row, horizontal, node, t)
+    choose_model(row, node, t)
+    row.heading.in_site_frame = 1 if is_in_site_frame(node.heading_kind) else 0
+    variance = node.heading_var if row.heading.in_site_frame == 1 else RELATIVE_YAW_VAR
+    return _start_ring(work, row, _horizontal(row, anchor, slant), node, node.heading, variance, t)
+
+
+@njit(nogil=True)
+def _horizontal(row: Row, anchor: Anchor, slant: float) -> float:
+    """Return the horizontal distance, m, of a tag at the distance `slant`."""
+    return math.sqrt(max(slant**2 - (row.settings.height - anchor.z) ** 2, 0.01))
+
+
+@njit(nogil=True)
+def restart_on_ring(work: Hypotheses, count: int, row: Row, node: Node, anchor: Anchor, t: Tuning) -> int:
+    """Replace all hypotheses by a ring at the distance of the node's range. Return their count.
+
+    The ranges contradict the track, but not its yaw: that comes from gyroscope and heading, and is kept.
+    """
+    best = work[best_of(work, count)]
+    yaw, variance = best.mean[YAW], best.cov[YAW, YAW]
+    if uses_heading(row, node):
+        yaw, variance = node.heading - row.heading.north, node.heading_var
+    row.start.known = row.start.after_gap = row.start.coarse = 0
+    row.publication.resolved = 0
+    row.publication.resolved_s = 0.0
+    node.rest = MOVING  # a standstill that was wrong may be why the track is
+    nlos = row.nlos
+    nlos.high_run = nlos.low_run = nlos.widened = 0
+    nlos.misfit = nlos.misfit_s = 0.0
+    horizontal = _horizontal(row, anchor, start_distance(row, node.z))
+    return _start_ring(work, row, horizontal, node, yaw, variance, t)

@@ -11,6 +11,7 @@ from dropanchor_service.estimation.fleet.belief.gap import (
     restart_from_gap,
 )
 from dropanchor_service.estimation.fleet.belief.heading_classes import keep_both_classes
+from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, update_lateral
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
     MAX_HYPOTHESES,
@@ -41,6 +42,7 @@ from dropanchor_service.estimation.fleet.belief.mixture import (
 )
 from dropanchor_service.estimation.fleet.belief.nlos import (
     close_nlos,
+    contradicts_ranges,
     expect_los,
     propose_alternatives,
     widen_after_misfit,
@@ -54,11 +56,16 @@ from dropanchor_service.estimation.fleet.belief.predict import (
     predict_state,
 )
 from dropanchor_service.estimation.fleet.belief.publish import publish
-from dropanchor_service.estimation.fleet.belief.start import collect_start, is_in_site_frame, uses_heading
+from dropanchor_service.estimation.fleet.belief.start import (
+    collect_start,
+    is_in_site_frame,
+    restart_on_ring,
+    uses_heading,
+)
 from dropanchor_service.estimation.fleet.belief.states import FAULT, INITIALISING
-from dropanchor_service.estimation.fleet.belief.update import update_standstill
+from dropanchor_service.estimation.fleet.belief.update import refutes_standstill, update_standstill
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
 REDUCE_EVERY: Final = 0.1  # s between merging and splitting
@@ -74,11 +81,15 @@ def _is_empty(node: Node) -> bool:
 
 @njit(nogil=True)
 def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> None:
-    """Predict every hypothesis over the node, one heading class after the other: each has noise of its own."""
+    """Predict every hypothesis over the node, one heading class after the other: each has noise of its own.
+
+    An accelerometer in motion then corrects them by the increment of velocity across the course.
+    """
     if _is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     fill_noise(decay, growth, node, row, t)
+    lateral = is_lateral_known(node)
     for heading_class in range(CLASSES):
         filled = False
         for h in range(count):
@@ -89,6 +100,8 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 predict_state(work[h].mean, node, decay, F)
                 predict_covariance(work[h].cov, F, decay, FP)
                 add_process_noise(work[h].mean, work[h].cov, F, growth, node, t, work[h].nlos)
+                if lateral:
+                    update_lateral(work[h], scratch, node, row)
 
 
 @njit(nogil=True)
@@ -127,6 +140,8 @@ def _run_node(
 ) -> int:
     """Predict and update a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
     PH = scratch.PH
+    if node.rest == RESTING and refutes_standstill(work[best_of(work, count)], t):
+        node.rest = MOVING
     _predict_all(work, count, row, node, t, scratch)
     if is_in_site_frame(node.heading_kind):
         count = update_with_heading(work, count, row, node, t, scratch)
@@ -167,6 +182,7 @@ def _reset_row(row: Row, pool: Pool) -> None:
     row.publication.resolved_s = 0.0
     row.nlos.misfit = 0.0
     row.nlos.misfit_s = 0.0
+    row.nlos.widened = 0
 
 
 @njit(nogil=True)
@@ -198,6 +214,8 @@ def _advance_row(
             count = _run_node(work, count, row, node, anchors, t, scratch, belief)
             if count == 0:
                 _reset_after_fault(row, pool)
+            elif node.kind == RANGE and node.anchor == row.anchor and contradicts_ranges(work, count, row, t):
+                count = restart_on_ring(work, count, row, node, anchors[row.anchor], t)
             return count
         _reset_row(row, pool)
     if is_suspended(row, node):

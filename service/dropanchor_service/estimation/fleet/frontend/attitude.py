@@ -7,9 +7,12 @@ finds where north lies in that frame.
 Predict (Trawny & Roumeliotis 2005, eq. 99, mean rate over the step):  q <- q * exp((w - b) dt / 2)
 Correct (explicit complementary filter, Mahony, Hamel & Pflimlin 2008, eq. 32, with accelerometer only):
   e = a/|a| x R(q)^T z,   q <- q * exp(k e / 2),   b <- b - k_i e
-The gain is dt/tau; tau grows from zero with the time since start (a running mean), is short at confirmed rest, and
-the weight of a sample falls to nothing between 10 % and 20 % of deviation of |a| from the tag's own gravity (Valenti,
+The gain is dt/tau. It is a running mean for the first second, short at confirmed rest, and long under motion. The
+weight of a sample falls to nothing between 10 % and 20 % of deviation of |a| from the tag's own gravity (Valenti,
 Dryanovski & Xiao 2015, eq. 60). Own gravity: cheap accelerometers read 5 % high.
+A ramp of the speed and the centripetal acceleration of an arc last for seconds and look like a tilt. Once the tilt is
+known, |e| is therefore bounded, so that an acceleration bends it no faster than a small tilt would, and a sample
+teaches the size of gravity by the same weight as the tilt.
 """
 
 import math
@@ -35,6 +38,10 @@ TAU = 6.0  # s, of the tilt correction under motion
 TAU_REST = 0.5  # s, at confirmed rest
 TAU_BIAS = 40.0  # s, of the bias that tilt teaches
 TAU_GRAVITY = 30.0  # s
+SETTLE = 1.0  # s of running mean after switch-on
+SETTLED = 2.0 * TAU  # s, age from which the tilt is known
+BOUND = 0.1  # rad, of a deviation from a known tilt
+GRAVITY_WEIGHT = 0.02  # least weight of a sample for the size of gravity, so that a wrong one is found again
 FULL_WEIGHT, NO_WEIGHT = 0.1, 0.2  # relative deviation of |a|
 VERTICAL = 0.01  # smallest cos^2 of pitch at which yaw still has a rate
 SMALL_ANGLE = 0.04  # rad^2: below, two terms of the series are exact to 1e-9
@@ -108,15 +115,18 @@ def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: 
     if a.age == 0.0:
         a.gravity = n
     a.age += dt
-    tau_g = min(a.age, TAU_GRAVITY)
-    a.gravity += dt / (tau_g + dt) * (n - a.gravity)
     weight = down_weight(n / a.gravity - 1.0)
-    if rest:
-        a.age = max(a.age, TAU)  # from now on the tilt is known, and a deviation is motion
+    tau_g = min(a.age, TAU_GRAVITY)
+    a.gravity += max(weight, 1.0 if a.age < SETTLE else GRAVITY_WEIGHT) * dt / (tau_g + dt) * (n - a.gravity)
+    if rest or SETTLE < a.age < TAU:
+        a.age = max(a.age, SETTLED)  # from now on the tilt is known, and a deviation is motion
     ux, uy, uz = up_in_body(a.q)
     k = weight * dt / (min(a.age, TAU_REST if rest else TAU) + dt)
     s = 1.0 / n
     ex, ey, ez = s * (ay * uz - az * uy), s * (az * ux - ax * uz), s * (ax * uy - ay * ux)
+    if a.age >= SETTLED and not rest:
+        scale = min(1.0, BOUND / max(math.sqrt(ex * ex + ey * ey + ez * ez), BOUND))
+        ex, ey, ez = scale * ex, scale * ey, scale * ez
     rotate_by(a.q, k * ex, k * ey, k * ez)
     if a.age > TAU:
         ki = weight * dt / (TAU * TAU_BIAS)

@@ -18,6 +18,7 @@ from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import (
     ATTITUDE,
+    TAU,
     correct_tilt,
     level_attitude,
     predict_attitude,
@@ -143,6 +144,7 @@ def lose_yaw_over_gap(f: Frontend, gap: float) -> None:
     """Add to the variance of yaw what it may have turned in `gap` s without samples."""
     f.preintegration.gap_s += max(0.0, gap - f.preintegration.extrapolated_s)
     f.standstill.quiet = 0.0
+    f.attitude.age = min(f.attitude.age, TAU)  # the tilt is another one, too
     if f.magnetometer.unit > 0.0:
         spread_yaw_on_arc(f.magnetometer, unobserved_turn_var(gap))
     f.drift_var += unobserved_turn_var(gap)

@@ -40,6 +40,7 @@ UNOBSERVED_RATE = 1.0  # rad/s, sd of the rate of a tag whose IMU is silent
 ACC_FLOOR = 2e-4  # (m/s)^2/s
 ACC_ROUGH = 0.03  # s: what of the roughness leaks into the integral, measured on recordings
 ROUGH_TAU = 3.0  # s
+ROUGH_GROWTH, ROUGH_START = 4.0, 0.1  # a sample counts for so many times the roughness plus this, (m/s^2)^2, at most
 UNOBSERVED_ACC = 1.0  # m/s^2, sd of the acceleration of a tag whose IMU is silent
 
 
@@ -57,7 +58,12 @@ def unobserved_speed_var(s: float) -> float:
 
 @njit(cache=True, nogil=True)
 def add_acceleration(p: Preintegration, dt: float, q: Array, acc: Array, gravity: float, variance: float) -> None:
-    """Add dt of acceleration by the trapezoidal rule. q: attitude at the end of dt; variance: that of `standstill`."""
+    """Add dt of acceleration by the trapezoidal rule. q: attitude at the end of dt; variance: that of `standstill`.
+
+    The variance is bounded: half a second of a turn or ramp varies a hundred times more than a smooth ride, and
+    is no roughness. Roughness that stays is found within a second.
+    """
+    variance = min(variance, ROUGH_GROWTH * p.acc_var + ROUGH_START)
     p.acc_var += dt / (ROUGH_TAU + dt) * (variance - p.acc_var)
     w, x, y, z = q[0], q[1], q[2], q[3]
     k = G0 / gravity

@@ -21,6 +21,12 @@ import numpy as np
 
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
+from dropanchor_service.estimation.fleet.belief.lateral import (
+    BOUND,
+    is_lateral_known,
+    lateral_residual,
+    lateral_variance,
+)
 from dropanchor_service.estimation.fleet.belief.layout import (
     EXACT,
     GYRO_BIAS,
@@ -117,8 +123,11 @@ def _component(track: Track, k: int, index: int, z: float, variance: float, H: F
 
 @njit(nogil=True)
 def _inertial(track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, H: Floats) -> None:
-    """Fuse heading, standstill and the bounds on the speed."""
+    """Fuse heading, sideways acceleration, standstill and the bounds on the speed."""
     s = track.reference[k]
+    if is_lateral_known(node):
+        e = -lateral_residual(s, node, H)
+        _measure(track, k, H, e, max(lateral_variance(s, node, row), e * e / BOUND**2))
     if uses_heading(row, node) and (row.heading.model != PLATFORM_MODEL or heading_class == EXACT):
         white, _, _ = class_reference_error(row, heading_class, node.heading_var, t)
         H[:] = 0.0

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from dropanchor_service.estimation.fleet.belief.layout import Floats, N
 
-MEASUREMENTS: Final = 5  # of one node: heading, speed and gyro at rest, bound of the speed, range or bearing
+MEASUREMENTS: Final = 5  # of one node: heading, speed and gyro at rest or sideways acceleration, speed bound, range
 
 
 class Track(NamedTuple):

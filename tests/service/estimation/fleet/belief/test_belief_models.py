@@ -24,6 +24,7 @@ from dropanchor_service.estimation.fleet.belief.predict import predict_covarianc
 from dropanchor_service.estimation.fleet.belief.update import (
     predict_range,
     project,
+    refutes_standstill,
     truncate_speed,
     update_bearing,
     update_heading,
@@ -32,8 +33,8 @@ from dropanchor_service.estimation.fleet.belief.update import (
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-STATE = np.array([12.0, 0.7, -2.1, 1.4, 0.2, -0.05, 0.004, 0.08, 0.03, 0.12])
-DECAY = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.97, 1.0, 0.98, 0.995, 1.0])
+STATE = np.array([12.0, 0.7, -2.1, 1.4, 0.2, -0.05, 0.004, 0.08, 0.03, 0.12, -0.06])
+DECAY = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.97, 1.0, 0.98, 0.995, 1.0, 0.98])
 
 
 def node_of(
@@ -50,8 +51,9 @@ def readable_step(s: Any, node: Any) -> Any:
     dt = node["dt_s"]
     w = node["dyaw"] - s[GYRO_BIAS] * dt
     mount = s[MOUNT] + s[SLIP]
-    along = np.array([math.cos(mount), math.sin(mount)]) @ [node["dv_forward"], node["dv_left"]] - s[ACC_BIAS] * dt
-    course = s[YAW] + w / 2 + mount
+    middle = mount + w / 2  # the course in the middle of the node, seen from the body at its start
+    along = np.array([math.cos(middle), math.sin(middle)]) @ [node["dv_forward"], node["dv_left"]] - s[ACC_BIAS] * dt
+    course = s[YAW] + middle
     place = s[R] * np.array([math.cos(s[PHI]), math.sin(s[PHI])])
     place = place + (s[V] * dt + along * dt / 2) * np.array([math.cos(course), math.sin(course)])
     c, sn = math.cos(s[YAW]), math.sin(s[YAW])
@@ -106,6 +108,20 @@ def test_the_jacobian_of_the_step_equals_finite_differences(dyaw: float, swing: 
     np.testing.assert_allclose(stepped(STATE, node)[1], expected, atol=1e-7)
 
 
+@pytest.mark.parametrize("mount", [0.0, 0.4])
+def test_a_turn_at_constant_speed_leaves_the_speed_as_it_was(mount: float) -> None:
+    speed, turn = 3.0, 0.5
+    s = STATE.copy()
+    s[V], s[MOUNT], s[SLIP], s[GYRO_BIAS], s[ACC_BIAS] = speed, mount, 0.0, 0.0, 0.0
+    later, before = mount + turn, mount
+    node = node_of(
+        dyaw=turn,
+        forward=speed * (math.cos(later) - math.cos(before)),
+        left=speed * (math.sin(later) - math.sin(before)),
+    )
+    assert stepped(s, node)[0][V] == pytest.approx(speed, abs=1e-12)
+
+
 def test_the_covariance_is_carried_by_the_whole_jacobian() -> None:
     node, P = node_of(), covariance()
     A = jacobian_fd(lambda s: readable_step(s, node), STATE)
@@ -147,6 +163,13 @@ def kalman(s: Any, P: Any, h: Any, e: float, variance: float) -> tuple[Any, Any]
     K = P @ h / (h @ P @ h + variance)
     L = np.eye(N) - np.outer(K, h)
     return s + K * e, L @ P @ L.T + variance * np.outer(K, K)
+
+
+@pytest.mark.parametrize(("speed", "std", "rolls"), [(2.0, 0.1, True), (2.0, 1.0, False), (0.2, 0.01, False)])
+def test_a_speed_that_is_known_not_to_be_zero_refutes_a_standstill(speed: float, std: float, rolls: bool) -> None:
+    s, P = STATE.copy(), covariance()
+    s[V], P[V, V] = speed, std**2
+    assert refutes_standstill(hypothesis_of(s, P)[0], Tuning()) is rolls
 
 
 def test_a_heading_update_is_the_kalman_filter() -> None:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import State
+from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees
-from service.estimation.fleet.tracks import Drive, drive, track
+from service.estimation.fleet.tracks import Drive, drive, rows_of, run, track
 
 BURSTS_S = ((3.0, 5.0, 1.5), (12.0, 13.5, 0.8), (20.0, 23.0, 1.2))  # from, to, metres too long
 BIAS = 0.1  # rad
@@ -69,6 +70,20 @@ def test_a_heading_reference_with_a_constant_error_never_makes_the_ellipse_exclu
     tracking = [inside(b, d)[b["state"] == State.TRACKING].mean() for b, d in runs]
     assert np.mean(tracking) > 0.93
     assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
+
+
+def test_a_track_far_from_its_ranges_is_given_up_within_five_seconds_and_found_again() -> None:
+    """The start that was told is 8 m from where the tag is."""
+    truths = [drive(seed, legs=6) for seed in range(2000, 2012)]
+    ends, said = [], []
+    for d in truths:
+        rows = rows_of(1, known=True)
+        rows["start"]["x"], rows["start"]["y"] = 4.0, 5.0
+        beliefs = run(rows, make_pool(512), d.nodes)
+        ends.append(distance(beliefs, d)[-50:].max())
+        said.append(elsewhere(beliefs, d)[50:].mean())
+    assert np.mean(said) < 0.01
+    assert np.median(ends) < 1.0
 
 
 def test_the_ranges_tell_a_gyroscope_that_drifts_from_a_heading_that_does() -> None:

@@ -83,6 +83,17 @@ def test_a_rough_ride_has_a_larger_velocity_variance_than_a_smooth_one() -> None
     assert b["dv_var"][-1] > 3 * a["dv_var"][-1]
 
 
+def test_a_ramp_of_the_speed_is_no_roughness() -> None:
+    def ramp(t: Array) -> Array:
+        half_sine = np.where((t > 10) & (t < 10.5), 6.0 * np.sin(2.0 * math.pi * (t - 10)), 0.0)
+        return np.stack([half_sine, 0 * t, 0 * t], axis=1)
+
+    m = synthesise(np.arange(0, 14, 0.01), lambda t: np.zeros((len(t), 3)), ramp)
+    ends = np.arange(0.1, 13.9, 0.1)
+    nodes = run(new_frontend(), m, ends)
+    assert nodes["dv_var"][ends > 10].max() < 5 * nodes["dv_var"][ends < 9.9].max()
+
+
 def test_without_an_accelerometer_the_velocity_variance_is_infinite_and_yaw_goes_on() -> None:
     m = synthesise(np.arange(0, 20, 0.01), lambda t: turning(t, 0.6, 0.0))
     m.acc[:] = np.nan

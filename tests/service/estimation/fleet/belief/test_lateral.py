@@ -1,0 +1,67 @@
+"""The sideways acceleration against finite differences, and what it teaches."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import default_settings
+from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, lateral_residual, update_lateral
+from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, MOUNT, SLIP, N, V
+from dropanchor_service.estimation.fleet.configure import configure_row
+from dropanchor_service.estimation.fleet.tuning import Tuning
+from service.estimation.fleet.belief.test_belief_models import STATE, hypothesis_of, jacobian_fd, node_of
+
+
+def driven(before: float, after: float, turn: float, mount: float) -> Any:
+    """The node of a tag that travels along its course, from one speed to another, in the frame of its start."""
+    return node_of(
+        dyaw=turn,
+        forward=after * math.cos(mount + turn) - before * math.cos(mount),
+        left=after * math.sin(mount + turn) - before * math.sin(mount),
+    )
+
+
+def state_of(speed: float, mount: float) -> Any:
+    s = STATE.copy()
+    s[V], s[MOUNT], s[SLIP], s[GYRO_BIAS], s[ACC_BIAS], s[LEFT_BIAS] = speed, mount, 0.0, 0.0, 0.0, 0.0
+    return s
+
+
+@pytest.mark.parametrize("dyaw", [-0.4, 0.0, 0.06])
+def test_the_jacobian_of_the_sideways_increment_equals_finite_differences(dyaw: float) -> None:
+    node, H = node_of(dyaw=dyaw, forward=0.3, left=-0.2), np.zeros(N)
+    lateral_residual(STATE, node, H)
+    expected = jacobian_fd(lambda s: np.array([lateral_residual(s, node, np.zeros(N))]), STATE)[0]
+    np.testing.assert_allclose(H, expected, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("before", "turn", "mount"), [(1.0, 0.0, 0.0), (1.0, 0.0, 0.4), (2.5, 0.5, 0.0), (2.5, -0.3, 0.7), (2.5, 0.2, -2.0)]
+)
+def test_nothing_is_left_of_a_ramp_or_a_turn_of_a_tag_that_follows_its_course(
+    before: float, turn: float, mount: float
+) -> None:
+    node = driven(before, 2.5, turn, mount)
+    assert lateral_residual(state_of(2.5, mount), node, np.zeros(N)) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_one_ramp_of_the_speed_teaches_the_mounting_angle() -> None:
+    row = np.zeros(1, configure_row(default_settings(), Tuning()).dtype)
+    row[0] = configure_row(default_settings(), Tuning())
+    P = np.diag(np.full(N, 1e-4))
+    P[MOUNT, MOUNT], P[LEFT_BIAS, LEFT_BIAS] = 0.25, 0.04
+    one, scratch = hypothesis_of(state_of(0.0, 0.0), P)
+    for k in range(10):
+        one["mean"][V] = 0.3 * (k + 1)
+        update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row[0])
+    assert one["mean"][MOUNT] == pytest.approx(0.4, abs=0.1)
+    assert one["cov"][MOUNT, MOUNT] < 0.02
+
+
+@pytest.mark.parametrize(("roughness", "used"), [(0.002, True), (0.1, False), (math.inf, False)])
+def test_a_rough_ride_says_nothing_sideways(roughness: float, used: bool) -> None:
+    node = node_of(dt=0.1)
+    node["dv_var"] = roughness * 0.1
+    assert is_lateral_known(node) is used
