@@ -130,10 +130,10 @@ class TagSettings(_Settings):
         description="Standard deviation of the constant or slowly varying error of a platform heading that does not "
         "drift; 0: only noise; null: unknown, the heading may drift.",
     )
-    magnetometer_calibrated: Truth = Field(
+    magnetometer_calibrated: StrictBool = Field(
         default=False,
-        description="Whether the tag's magnetometer is calibrated where it is mounted, to 5 % of the field. Its heading "
-        "then counts at once, otherwise after the first turns.",
+        description="Whether the tag's magnetometer is calibrated where it is mounted, to 5 % of the field. Its "
+        "heading then counts at once, otherwise after the first turns.",
     )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
 

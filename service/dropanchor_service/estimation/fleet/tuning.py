@@ -23,7 +23,7 @@ class Tuning(NamedTuple):
     platform_slip_std: float = 0.15  # rad, of a heading without an IMU: slip, and lag of the readings
     platform_slip_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
-    aligned_log_prior: float = 2.0
+    aligned_log_prior: float = 3.0
     gyro_bias_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0

@@ -12,7 +12,8 @@ weight of a sample falls to nothing between 10 % and 20 % of deviation of |a| fr
 Dryanovski & Xiao 2015, eq. 60). Own gravity: cheap accelerometers read 5 % high.
 A ramp of the speed and the centripetal acceleration of an arc last for seconds and look like a tilt. Once the tilt is
 known, |e| is therefore bounded, so that an acceleration bends it no faster than a small tilt would, and a sample
-teaches the size of gravity by the same weight as the tilt.
+teaches the size of gravity by the same weight as the tilt. The bound grows with the roughness of the ride: steps have
+peaks on one side, and clipping these would shift their mean.
 """
 
 import math
@@ -40,7 +41,8 @@ TAU_BIAS = 40.0  # s, of the bias that tilt teaches
 TAU_GRAVITY = 30.0  # s
 SETTLE = 1.0  # s of running mean after switch-on
 SETTLED = 2.0 * TAU  # s, age from which the tilt is known
-BOUND = 0.1  # rad, of a deviation from a known tilt
+BOUND = 0.1  # rad, of a deviation from a known tilt on a smooth ride
+SHAKING = 2.0  # standard deviations of the acceleration that are added to it
 GRAVITY_WEIGHT = 0.02  # least weight of a sample for the size of gravity, so that a wrong one is found again
 FULL_WEIGHT, NO_WEIGHT = 0.1, 0.2  # relative deviation of |a|
 VERTICAL = 0.01  # smallest cos^2 of pitch at which yaw still has a rate
@@ -107,8 +109,8 @@ def predict_attitude(a: Attitude, dt: float, gyro: Array, rest: bool) -> None:
 
 
 @njit(cache=True, nogil=True)
-def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: bool) -> None:
-    """Correct with one accelerometer sample, m/s^2."""
+def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: bool, roughness: float) -> None:
+    """Correct with one accelerometer sample, m/s^2. roughness: its variance within tenths of a second, (m/s^2)^2."""
     n = math.sqrt(ax * ax + ay * ay + az * az)
     if n < 1.0 or dt == 0.0:
         return
@@ -125,7 +127,8 @@ def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: 
     s = 1.0 / n
     ex, ey, ez = s * (ay * uz - az * uy), s * (az * ux - ax * uz), s * (ax * uy - ay * ux)
     if a.age >= SETTLED and not rest:
-        scale = min(1.0, BOUND / max(math.sqrt(ex * ex + ey * ey + ez * ez), BOUND))
+        bound = BOUND + SHAKING * math.sqrt(roughness) / a.gravity
+        scale = bound / max(math.sqrt(ex * ex + ey * ey + ez * ez), bound)
         ex, ey, ez = scale * ex, scale * ey, scale * ez
     rotate_by(a.q, k * ex, k * ey, k * ez)
     if a.age > TAU:

@@ -191,7 +191,7 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
     rest = s.quiet > CONFIRM
     predict_attitude(a, dt, gyro, rest)
     if heard:
-        correct_tilt(a, dt, acc[0], acc[1], acc[2], rest)
+        correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var)
         add_acceleration(p, dt, a.q, acc, a.gravity, s.acc_var)
     p.yaw_rate = 0.0 if rest else yaw_rate_of(a)
     update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron)

@@ -31,7 +31,7 @@ def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Arra
     for k in range(len(t)):
         dt = t[k] - t[k - 1] if k else 0.0
         predict_attitude(a, dt, gyro[k], t[k] < rest_until)
-        correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until)
+        correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until, 0.0)
         q[k] = a.q
 
 
