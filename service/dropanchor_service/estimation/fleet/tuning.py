@@ -47,7 +47,7 @@ class Tuning(NamedTuple):
     nlos_log_prior: float = -2.5
     nlos_depth: float = 6.0  # log weight below the best at which a hypothesis gets no NLOS alternative
     nlos_min_bias: float = 0.15  # m, extra bias below which there is a line of sight
-    nlos_max_bias: float = 3.0  # m, extra bias above which the track is wrong and not the range
+    nlos_max_bias: float = 3.6  # m, extra bias above which the track is wrong and not the range
     nlos_tau: float = 2.0  # s
     nlos_run: int = 4
     own_error_log_prior: float = -1.0  # log prior of a slow error of the heading reference
