@@ -50,6 +50,7 @@ def configure_row(columns: Array, tuning: Tuning) -> Array:
     start["speed_std"] = START_SPEED_STD
     row["first_slot"] = -1
     row["anchor"] = -1
+    row["lateral_misfit"] = 0.0
     return row
 
 

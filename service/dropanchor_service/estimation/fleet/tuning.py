@@ -32,7 +32,8 @@ class Tuning(NamedTuple):
     class_rejected_weight: float = 1e-3  # weight below which a heading class no longer counts for the ellipse
     drift_again_log_prior: float = 0.0  # log prior of a drifting gyroscope, where heading and gyroscope drift apart
     q_gyro_own: float = 1e-6  # the same, of all others
-    acc_bias_std: float = 0.2  # m/s^2
+    acc_bias_std: float = 0.11  # m/s^2
+    left_bias_std: float = 0.2  # m/s^2, larger: an arc tilts the sideways axis for seconds
     acc_bias_roughness: float = 0.7  # s: its variance grows by this times dv_var / dt, the roughness of the motion
     acc_bias_tau: float = 5.0  # s
     range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays

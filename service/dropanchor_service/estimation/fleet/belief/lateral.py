@@ -30,7 +30,11 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
 
 BOUND: Final = 3.0  # standard deviations beyond which a sideways increment is a skid or a bump and counts less
-RIGID: Final = 0.015  # (m/s)^2/s, roughness of dv above which a tag is carried or jolted: it slips more than it tells
+SMOOTH: Final = 0.015  # (m/s)^2/s, roughness of dv above which the sideways axis tells more of jolts than of the course
+RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
+RIGID_BELOW: Final = 0.6  # mean square of its normalised innovation below which a mount is rigid
+RIGID_TAU: Final = 5.0  # s
+RIGID_CLIP: Final = 25.0  # most that one innovation counts
 LEAST_VAR: Final = 1e-6  # (m/s)^2
 SHARE: Final = 0.05  # of the increment, error of scale and timing: the body turns while a sharp turn is integrated
 
@@ -57,15 +61,37 @@ def lateral_residual(s: Floats, node: Node, H: Floats) -> float:
 @njit(nogil=True)
 def is_lateral_known(node: Node) -> bool:
     """Return whether the node has a sideways increment of velocity of a tag that moves smoothly."""
-    return bool(node.rest == MOVING and node.dt_s > 0.0 and node.dv_var < RIGID * node.dt_s)
+    return bool(node.rest == MOVING and node.dt_s > 0.0 and node.dv_var < SMOOTH * node.dt_s)
 
 
 @njit(nogil=True)
-def lateral_variance(s: Floats, node: Node, row: Row) -> float:
+def lateral_variance(s: Floats, node: Node, row: Row, slip_std: float) -> float:
     """Return the variance of that increment, (m/s)^2. A change of the slip is an increment of velocity, too."""
     shared_var = SHARE**2 * (node.dv_forward**2 + node.dv_left**2)
-    slip_var = row.settings.slip_std**2 * 2.0 * node.dt_s / row.settings.slip_tau
+    slip_var = slip_std**2 * 2.0 * node.dt_s / row.settings.slip_tau
     return float(node.dv_var + s[V] * s[V] * (node.dyaw_var + slip_var) + shared_var + LEAST_VAR)
+
+
+@njit(nogil=True)
+def is_rigid(row: Row) -> bool:
+    """Return whether nothing speaks against a rigid mount: only then the sideways axis tells of the course."""
+    return bool(row.lateral_misfit < RIGID_BELOW)
+
+
+@njit(nogil=True)
+def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None:
+    """Learn from a node whether the mount is rigid. one: the best hypothesis, before the node.
+
+    A hand, or a cart on grass, moves sideways more than a rigid mount explains. While several hypotheses compete, the
+    innovations tell of a wrong hypothesis and not of the mount.
+    """
+    if row.publication.resolved == 0:
+        return
+    s = one.mean
+    e = lateral_residual(s, node, scratch.H)
+    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, RIGID_SLIP)
+    share = node.dt_s / (RIGID_TAU + node.dt_s)
+    row.lateral_misfit += share * (min(e * e / S, RIGID_CLIP) - row.lateral_misfit)
 
 
 @njit(nogil=True)
@@ -76,6 +102,6 @@ def update_lateral(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> N
     """
     s = one.mean
     e = -lateral_residual(s, node, scratch.H)
-    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row)
+    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, row.settings.slip_std)
     S = max(S, e * e / BOUND**2)
     update_pda(s, one.cov, scratch.PH, S, e, 1.0)

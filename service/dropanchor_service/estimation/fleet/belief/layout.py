@@ -160,6 +160,7 @@ ROW: Final = np.dtype(
         ("since_reduction_s", np.float64),  # s since the mixture was last merged and split
         ("since_range_s", np.float64),
         ("since_class_check_s", np.float64),
+        ("lateral_misfit", np.float64),  # mean square of the sideways innovation of a rigid mount, in its variance
         ("lever_rate", np.float64),  # rad/s, mean yaw rate of the last node
     ],
     align=True,

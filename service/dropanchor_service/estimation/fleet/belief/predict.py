@@ -147,7 +147,7 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     decay[:] = 1.0
     growth[:] = 0.0
     decay[SLIP] = math.exp(-dt / row.settings.slip_tau)
-    decay[ACC_BIAS] = math.exp(-dt / t.acc_bias_tau)
+    decay[ACC_BIAS] = decay[LEFT_BIAS] = math.exp(-dt / t.acc_bias_tau)
     growth[YAW] = node.dyaw_var
     rough = 0.0
     if math.isfinite(node.dv_var):
@@ -157,8 +157,9 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
         growth[V] = t.q_speed_no_acc * dt
     growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
     growth[SLIP] = row.settings.slip_std**2 * (1.0 - decay[SLIP] ** 2)
-    growth[ACC_BIAS] = (t.acc_bias_std**2 + t.acc_bias_roughness * rough) * (1.0 - decay[ACC_BIAS] ** 2)
-    decay[LEFT_BIAS], growth[LEFT_BIAS] = decay[ACC_BIAS], growth[ACC_BIAS]
+    lost, rough_var = 1.0 - decay[ACC_BIAS] ** 2, t.acc_bias_roughness * rough
+    growth[ACC_BIAS] = (t.acc_bias_std**2 + rough_var) * lost
+    growth[LEFT_BIAS] = (t.left_bias_std**2 + rough_var) * lost
     growth[RANGE_BIAS] = t.q_range_bias * dt if row.settings.range_bias_std > 0.0 else 0.0
 
 

@@ -66,7 +66,7 @@ def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_
     P[MOUNT, MOUNT] = settings.mount_angle_std**2
     P[SLIP, SLIP] = settings.slip_std**2
     P[GYRO_BIAS, GYRO_BIAS] = max(settings.gyro_bias_std**2, node.gyro_bias_var)
-    P[ACC_BIAS, ACC_BIAS] = P[LEFT_BIAS, LEFT_BIAS] = t.acc_bias_std**2
+    P[ACC_BIAS, ACC_BIAS], P[LEFT_BIAS, LEFT_BIAS] = t.acc_bias_std**2, t.left_bias_std**2
     P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2
     work[h].log_weight = 0.0
     work[h].heading_class = EXACT

@@ -11,7 +11,7 @@ from dropanchor_service.estimation.fleet.belief.gap import (
     restart_from_gap,
 )
 from dropanchor_service.estimation.fleet.belief.heading_classes import keep_both_classes
-from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, update_lateral
+from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, is_rigid, judge_mount, update_lateral
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
     MAX_HYPOTHESES,
@@ -83,13 +83,16 @@ def _is_empty(node: Node) -> bool:
 def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> None:
     """Predict every hypothesis over the node, one heading class after the other: each has noise of its own.
 
-    An accelerometer in motion then corrects them by the increment of velocity across the course.
+    The accelerometer of a rigid mount then corrects them by the increment of velocity across the course.
     """
     if _is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     fill_noise(decay, growth, node, row, t)
     lateral = is_lateral_known(node)
+    if lateral:
+        judge_mount(work[best_of(work, count)], scratch, node, row)
+        lateral = is_rigid(row)
     for heading_class in range(CLASSES):
         filled = False
         for h in range(count):

@@ -24,6 +24,7 @@ from dropanchor_service.estimation.fleet.belief.heading_models import class_refe
 from dropanchor_service.estimation.fleet.belief.lateral import (
     BOUND,
     is_lateral_known,
+    is_rigid,
     lateral_residual,
     lateral_variance,
 )
@@ -125,9 +126,9 @@ def _component(track: Track, k: int, index: int, z: float, variance: float, H: F
 def _inertial(track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, H: Floats) -> None:
     """Fuse heading, sideways acceleration, standstill and the bounds on the speed."""
     s = track.reference[k]
-    if is_lateral_known(node):
+    if is_lateral_known(node) and is_rigid(row):
         e = -lateral_residual(s, node, H)
-        _measure(track, k, H, e, max(lateral_variance(s, node, row), e * e / BOUND**2))
+        _measure(track, k, H, e, max(lateral_variance(s, node, row, row.settings.slip_std), e * e / BOUND**2))
     if uses_heading(row, node) and (row.heading.model != PLATFORM_MODEL or heading_class == EXACT):
         white, _, _ = class_reference_error(row, heading_class, node.heading_var, t)
         H[:] = 0.0

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import default_settings
-from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, lateral_residual, update_lateral
+from dropanchor_service.estimation.fleet.belief.lateral import (
+    is_lateral_known,
+    is_rigid,
+    judge_mount,
+    lateral_residual,
+    update_lateral,
+)
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, MOUNT, SLIP, N, V
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -47,15 +53,41 @@ def test_nothing_is_left_of_a_ramp_or_a_turn_of_a_tag_that_follows_its_course(
     assert lateral_residual(state_of(2.5, mount), node, np.zeros(N)) == pytest.approx(0.0, abs=1e-12)
 
 
+def row_of(resolved: bool) -> Any:
+    rows = np.zeros(1, configure_row(default_settings(), Tuning()).dtype)
+    rows[0] = configure_row(default_settings(), Tuning())
+    rows[0]["publication"]["resolved"] = resolved
+    return rows[0]
+
+
+def judged(row: Any, sway: float) -> bool:
+    """Judge 10 s of a slalom at constant speed. sway: m/s, sd of a sideways increment that the course does not explain."""
+    rng = np.random.default_rng(7)
+    for k in range(100):
+        node = driven(2.0, 2.0, 0.1 * math.sin(0.3 * k), 0.0)
+        node["dv_left"] += rng.normal(0.0, sway)
+        one, scratch = hypothesis_of(state_of(2.0, 0.0), np.diag(np.full(N, 1e-6)))
+        judge_mount(one, scratch, node, row)
+    return bool(is_rigid(row))
+
+
+def test_a_tag_that_sways_more_than_a_rigid_mount_does_stops_teaching_sideways() -> None:
+    assert judged(row_of(resolved=True), sway=0.01)
+    assert not judged(row_of(resolved=True), sway=0.3)
+
+
+def test_the_mount_is_not_judged_while_hypotheses_compete() -> None:
+    assert judged(row_of(resolved=False), sway=0.3)
+
+
 def test_one_ramp_of_the_speed_teaches_the_mounting_angle() -> None:
-    row = np.zeros(1, configure_row(default_settings(), Tuning()).dtype)
-    row[0] = configure_row(default_settings(), Tuning())
+    row = row_of(resolved=True)
     P = np.diag(np.full(N, 1e-4))
     P[MOUNT, MOUNT], P[LEFT_BIAS, LEFT_BIAS] = 0.25, 0.04
     one, scratch = hypothesis_of(state_of(0.0, 0.0), P)
     for k in range(10):
         one["mean"][V] = 0.3 * (k + 1)
-        update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row[0])
+        update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row)
     assert one["mean"][MOUNT] == pytest.approx(0.4, abs=0.1)
     assert one["cov"][MOUNT, MOUNT] < 0.02
 
