@@ -61,7 +61,7 @@ def row_of(resolved: bool) -> Any:
 
 
 def judged(row: Any, sway: float) -> bool:
-    """Judge 10 s of a slalom at constant speed. sway: m/s, sd of a sideways increment that the course does not explain."""
+    """Judge 10 s of a slalom at constant speed. sway: m/s, sd of an increment that the course does not explain."""
     rng = np.random.default_rng(7)
     for k in range(100):
         node = driven(2.0, 2.0, 0.1 * math.sin(0.3 * k), 0.0)
