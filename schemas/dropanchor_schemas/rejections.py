@@ -1,8 +1,41 @@
-"""Explanations of all rejection reasons, for the documentation and for operators."""
+"""The reasons for rejections, each with an explanation. This module needs only the standard library."""
 
+from enum import StrEnum
 from typing import NamedTuple
 
-from dropanchor_schemas.wire import Reason
+
+class Reason(StrEnum):
+    """Why a payload, a sample or a key was rejected. The service counts rejections by these names."""
+
+    ENCODING_UNKNOWN = "encoding_unknown"
+    PAYLOAD_EMPTY = "payload_empty"
+    PAYLOAD_TOO_LARGE = "payload_too_large"
+    HEADER_TRUNCATED = "header_truncated"
+    VERSION_UNKNOWN = "version_unknown"
+    FLAGS_UNKNOWN = "flags_unknown"
+    RESERVED_NOT_ZERO = "reserved_not_zero"
+    LENGTH_MISMATCH = "length_mismatch"
+    NO_SAMPLES = "no_samples"
+    JSON_SYNTAX = "json_syntax"
+    JSON_SCHEMA = "json_schema"
+    TIME_OUT_OF_RANGE = "time_out_of_range"
+    NOT_FINITE = "not_finite"
+    RANGE_NEGATIVE = "range_negative"
+    RANGE_ABSURD = "range_absurd"
+    IMU_ABSURD = "imu_absurd"
+    HEADING_ABSURD = "heading_absurd"
+    BEARING_ABSURD = "bearing_absurd"
+    STD_INVALID = "std_invalid"
+    ANCHOR_UNKNOWN = "anchor_unknown"
+    LATE = "late"
+    DUPLICATE = "duplicate"
+    KEY_INVALID = "key_invalid"
+    TAG_UNKNOWN = "tag_unknown"
+    TAG_UNPROVEN = "tag_unproven"
+    TAG_QUARANTINED = "tag_quarantined"
+    TAGS_FULL = "tags_full"
+    SHED = "shed"
+    ESTIMATOR_FAULT = "estimator_fault"
 
 
 class Explanation(NamedTuple):
@@ -17,15 +50,17 @@ class Explanation(NamedTuple):
 
 REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.ENCODING_UNKNOWN: Explanation(
-        "message", "the Zenoh encoding is neither of the two (a schema after `;` is ignored)"
+        "message",
+        "the Zenoh encoding is neither of the two (a schema after `;` is ignored; `zenoh/bytes;application/…`, as "
+        "zenoh-pico sends it, is accepted too)",
     ),
     Reason.PAYLOAD_EMPTY: Explanation("message", "the payload is empty"),
     Reason.PAYLOAD_TOO_LARGE: Explanation("message", "more than 65,536 bytes"),
     Reason.HEADER_TRUNCATED: Explanation("message", "packed, shorter than the 32-byte header"),
     Reason.VERSION_UNKNOWN: Explanation("message", "the version is not 1"),
     Reason.FLAGS_UNKNOWN: Explanation("message", "a flag bit other than bits 0 and 1 is set"),
-    Reason.RESERVED_NOT_ZERO: Explanation("message", "one of the header's last six bytes is not zero"),
-    Reason.LENGTH_MISMATCH: Explanation("message", "the length does not match the four counts"),
+    Reason.RESERVED_NOT_ZERO: Explanation("message", "a byte of the header that no count uses is not zero"),
+    Reason.LENGTH_MISMATCH: Explanation("message", "the length does not match the counts"),
     Reason.NO_SAMPLES: Explanation("message", "the message has no samples"),
     Reason.JSON_SYNTAX: Explanation("message", "not JSON in UTF-8"),
     Reason.JSON_SCHEMA: Explanation("message", "JSON that does not match the schema"),

@@ -2,23 +2,14 @@
 
 import json
 import math
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from operator import attrgetter
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from dropanchor_schemas.wire import (
-    MAX_PAYLOAD_BYTES,
-    MAX_T_NS,
-    VERSION,
-    BearingSample,
-    Frame,
-    HeadingSample,
-    ImuSample,
-    RangeSample,
-    Reason,
-    Rejection,
-    anchor_number,
-)
+from dropanchor_schemas.kinds import IMU, KINDS, SCALARS, Frame, ImuSample, Kind, ScalarKind
+from dropanchor_schemas.wire import MAX_PAYLOAD_BYTES, MAX_T_NS, VERSION, Reason, Rejection, anchor_number
 
 TimeNs = Annotated[int, Field(ge=0, lt=MAX_T_NS, description="Time of measurement, ns, on the clock of the message.")]
 AnchorId = Annotated[
@@ -44,33 +35,16 @@ class Imu(_Message):
     mag: Vector | None = Field(default=None, description="Magnetic field, µT; omit it without a magnetometer.")
 
 
-class Range(_Message):
-    """One two-way range to an anchor."""
-
-    t_ns: TimeNs
-    anchor: AnchorId
-    range_m: float = Field(description="Slant range, m.")
-    std_m: Std = None
-
-
-class Heading(_Message):
-    """A heading from the tag's platform, for example a robot or a phone."""
-
-    t_ns: TimeNs
-    heading_rad: float = Field(description="Counter-clockwise from east, rad.")
-    std_rad: Std = None
+def _model_of(kind: ScalarKind) -> type[_Message]:
+    fields: dict[str, Any] = {"t_ns": TimeNs}
+    if kind.has_anchor:
+        fields["anchor"] = AnchorId
+    fields[kind.value] = Annotated[float, Field(description=kind.meaning)]
+    fields[kind.std] = (Std, None)
+    return create_model(kind.name.capitalize(), __base__=_Message, __doc__=kind.description, **fields)
 
 
-class Bearing(_Message):
-    """The bearing of the tag, seen from the anchor."""
-
-    t_ns: TimeNs
-    anchor: AnchorId
-    bearing_rad: float = Field(description="Counter-clockwise from east, rad.")
-    std_rad: Std = None
-
-
-class SamplesMessage(_Message):
+class _SamplesMessage(_Message):
     """A batch of raw samples of one tag."""
 
     model_config = ConfigDict(
@@ -109,9 +83,10 @@ class SamplesMessage(_Message):
         default=None, ge=0, lt=2**32, description="Random number, drawn at each start of the publisher."
     )
     imu: list[Imu] = []
-    range: list[Range] = []
-    heading: list[Heading] = []
-    bearing: list[Bearing] = []
+
+
+_LISTS: dict[str, Any] = {kind.name: (list[_model_of(kind)], []) for kind in SCALARS}  # type: ignore[misc]
+SamplesMessage = create_model("SamplesMessage", __base__=_SamplesMessage, __doc__=_SamplesMessage.__doc__, **_LISTS)
 
 
 def decode_json(payload: bytes) -> Frame | Rejection:
@@ -148,21 +123,27 @@ def _rejection(error: ValidationError) -> Rejection:
     return Rejection(Reason.JSON_SCHEMA, f"{where}: {first['msg']}")
 
 
-def _frame(message: SamplesMessage) -> Frame:
-    named = [s.anchor for s in message.range] + [s.anchor for s in message.bearing]
+def _frame(message: _SamplesMessage) -> Frame:
+    parsed = [(kind, getattr(message, kind.name)) for kind in KINDS]
+    named = [sample.anchor for kind, samples in parsed if kind.has_anchor for sample in samples]
+    lists: dict[str, Any] = {kind.field: _samples(kind, samples) for kind, samples in parsed}
     return Frame(
-        imu=[ImuSample(s.t_ns, s.acc, s.gyro, s.mag) for s in message.imu],
-        ranges=[RangeSample(s.t_ns, anchor_number(s.anchor), s.range_m, _std(s.std_m)) for s in message.range],
-        headings=[HeadingSample(s.t_ns, s.heading_rad, _std(s.std_rad)) for s in message.heading],
-        bearings=[
-            BearingSample(s.t_ns, anchor_number(s.anchor), s.bearing_rad, _std(s.std_rad)) for s in message.bearing
-        ],
+        **lists,
         sequence=message.sequence,
         boot_id=message.boot_id,
         boot_clock=message.clock == "boot",
         replay=message.replay,
         anchor_names={anchor_number(name): name for name in named if isinstance(name, str)},
     )
+
+
+def _samples(kind: Kind, parsed: Sequence[Any]) -> list[Any]:
+    values = map(attrgetter(*kind.sample._fields), parsed)
+    if kind is IMU:
+        return [ImuSample(*v) for v in values]
+    if kind.has_anchor:
+        return [kind.sample(t_ns, anchor_number(anchor), value, _std(std)) for t_ns, anchor, value, std in values]
+    return [kind.sample(t_ns, value, _std(std)) for t_ns, value, std in values]
 
 
 def _std(std: float | None) -> float:

@@ -9,9 +9,49 @@ import json
 import math
 import struct
 import zlib
-from dataclasses import dataclass, field
-from enum import StrEnum
+from itertools import accumulate, pairwise
+from operator import mul
 from typing import Any, NamedTuple
+
+from dropanchor_schemas.kinds import (
+    KINDS,
+    BearingSample,
+    Frame,
+    HeadingSample,
+    ImuSample,
+    RangeSample,
+    Vector,
+)
+from dropanchor_schemas.rejections import Reason
+
+__all__ = [
+    "COUNTS_AT",
+    "ENCODING_JSON",
+    "ENCODING_PACKED",
+    "FLAG_BOOT_CLOCK",
+    "FLAG_REPLAY",
+    "HEADER",
+    "KNOWN_FLAGS",
+    "MAX_PAYLOAD_BYTES",
+    "MAX_T_NS",
+    "VERSION",
+    "BearingSample",
+    "Frame",
+    "Header",
+    "HeadingSample",
+    "ImuSample",
+    "RangeSample",
+    "Reason",
+    "Rejection",
+    "Vector",
+    "anchor_number",
+    "decode_packed",
+    "encode_json",
+    "encode_packed",
+    "packed_size",
+    "payload_encoding",
+    "read_header",
+]
 
 ENCODING_PACKED = "application/vnd.dropanchor.samples"
 ENCODING_JSON = "application/json"
@@ -22,120 +62,17 @@ KNOWN_FLAGS = FLAG_BOOT_CLOCK | FLAG_REPLAY
 MAX_PAYLOAD_BYTES = 65_536
 MAX_T_NS = 2**62
 
-HEADER = struct.Struct("<BBHHHIIqHHI")
-IMU = struct.Struct("<I9f")
-RANGE = struct.Struct("<IIff")
-HEADING = struct.Struct("<Iff")
-BEARING = struct.Struct("<IIff")
-
-_NO_FIELD = (math.nan, math.nan, math.nan)
-
-Vector = tuple[float, float, float]
-
-
-class Reason(StrEnum):
-    """Why a payload, a sample or a key was rejected. The service counts rejections by these names."""
-
-    ENCODING_UNKNOWN = "encoding_unknown"
-    PAYLOAD_EMPTY = "payload_empty"
-    PAYLOAD_TOO_LARGE = "payload_too_large"
-    HEADER_TRUNCATED = "header_truncated"
-    VERSION_UNKNOWN = "version_unknown"
-    FLAGS_UNKNOWN = "flags_unknown"
-    RESERVED_NOT_ZERO = "reserved_not_zero"
-    LENGTH_MISMATCH = "length_mismatch"
-    NO_SAMPLES = "no_samples"
-    JSON_SYNTAX = "json_syntax"
-    JSON_SCHEMA = "json_schema"
-    TIME_OUT_OF_RANGE = "time_out_of_range"
-    NOT_FINITE = "not_finite"
-    RANGE_NEGATIVE = "range_negative"
-    RANGE_ABSURD = "range_absurd"
-    IMU_ABSURD = "imu_absurd"
-    HEADING_ABSURD = "heading_absurd"
-    BEARING_ABSURD = "bearing_absurd"
-    STD_INVALID = "std_invalid"
-    ANCHOR_UNKNOWN = "anchor_unknown"
-    LATE = "late"
-    DUPLICATE = "duplicate"
-    KEY_INVALID = "key_invalid"
-    TAG_UNKNOWN = "tag_unknown"
-    TAG_UNPROVEN = "tag_unproven"
-    TAG_QUARANTINED = "tag_quarantined"
-    TAGS_FULL = "tags_full"
-    SHED = "shed"
-    ESTIMATOR_FAULT = "estimator_fault"
+# Version, flags, three counts, sequence, boot id, t0_ns, four counts. The counts that no kind uses are zero.
+HEADER = struct.Struct("<BBHHHIIqHHHH")
+COUNTS_AT = (2, 4, 6, 24, 26, 28, 30)
+"""Byte of the header at which the u16 count of each of `KINDS` stands."""
+_UNUSED_COUNTS = (0,) * (len(COUNTS_AT) - len(KINDS))
+_SIZES = tuple(kind.record.size for kind in KINDS)
 
 
 class Rejection(NamedTuple):
     reason: Reason
     detail: str
-
-
-class ImuSample(NamedTuple):
-    """One IMU sample; body frame x forward, y left, z up.
-
-    acc: specific force, m/s². gyro: angular rate, rad/s. mag: magnetic field, µT; None without a magnetometer.
-    """
-
-    t_ns: int
-    acc: Vector
-    gyro: Vector
-    mag: Vector | None = None
-
-
-class RangeSample(NamedTuple):
-    """Slant range to the anchor with this number, m. std_m: standard deviation, NaN if unknown."""
-
-    t_ns: int
-    anchor: int
-    range_m: float
-    std_m: float = math.nan
-
-
-class HeadingSample(NamedTuple):
-    """Heading from the tag's platform, counter-clockwise from east, rad. std_rad: NaN if unknown."""
-
-    t_ns: int
-    heading_rad: float
-    std_rad: float = math.nan
-
-
-class BearingSample(NamedTuple):
-    """Bearing of the tag seen from the anchor, counter-clockwise from east, rad. std_rad: NaN if unknown."""
-
-    t_ns: int
-    anchor: int
-    bearing_rad: float
-    std_rad: float = math.nan
-
-
-@dataclass(slots=True)
-class Frame:
-    """The samples of one message. Times are UTC, or since the tag's boot if `boot_clock` is set.
-
-    sequence: message counter of the publisher; None if it does not count.
-    boot_id: random number, drawn at each start of the publisher. With None or 0 its messages are not numbered.
-    replay: whether the samples come from a replayed recording; their times are those of the recording.
-    anchor_names: number → name of the anchors that the message names by text.
-    """
-
-    imu: list[ImuSample] = field(default_factory=list)
-    ranges: list[RangeSample] = field(default_factory=list)
-    headings: list[HeadingSample] = field(default_factory=list)
-    bearings: list[BearingSample] = field(default_factory=list)
-    sequence: int | None = None
-    boot_id: int | None = None
-    boot_clock: bool = False
-    replay: bool = False
-    anchor_names: dict[int, str] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        return len(self.imu) + len(self.ranges) + len(self.headings) + len(self.bearings)
-
-    def times(self) -> list[int]:
-        groups = (self.imu, self.ranges, self.headings, self.bearings)
-        return [sample.t_ns for group in groups for sample in group]
 
 
 def payload_encoding(zenoh_encoding: str) -> str:
@@ -173,7 +110,7 @@ def encode_packed(frame: Frame) -> bytes:
     t0_ns = min(times, default=0)
     if _dt_us(max(times, default=0), t0_ns) >= 2**32:
         raise ValueError("the samples of one frame span at most 4,294 s")
-    size = packed_size(len(frame.imu), len(frame.ranges), len(frame.headings), len(frame.bearings))
+    size = packed_size(*frame.counts())
     if size > MAX_PAYLOAD_BYTES:
         raise ValueError(f"a payload has at most {MAX_PAYLOAD_BYTES} bytes, this one would have {size}")
     try:
@@ -182,9 +119,10 @@ def encode_packed(frame: Frame) -> bytes:
         raise ValueError(f"a value does not fit into its field: {error}") from error
 
 
-def packed_size(imu: int, ranges: int, headings: int, bearings: int) -> int:
-    """Return the size, in bytes, of a packed payload with these counts of samples."""
-    return HEADER.size + IMU.size * imu + RANGE.size * ranges + HEADING.size * headings + BEARING.size * bearings
+def packed_size(*counts: int) -> int:
+    """Return the size, in bytes, of a packed payload with these counts of samples, one for each of `KINDS`."""
+    size: int = HEADER.size + sum(map(mul, _SIZES, counts))
+    return size
 
 
 def decode_packed(payload: bytes) -> Frame | Rejection:
@@ -193,31 +131,23 @@ def decode_packed(payload: bytes) -> Frame | Rejection:
     if isinstance(header, Rejection):
         return header
     flags, counts, sequence, boot_id, t0_ns = header
-    imu_at = HEADER.size
-    range_at = imu_at + IMU.size * counts[0]
-    heading_at = range_at + RANGE.size * counts[1]
-    bearing_at = heading_at + HEADING.size * counts[2]
-    return Frame(
-        imu=[_imu(t0_ns, *v) for v in IMU.iter_unpack(payload[imu_at:range_at])],
-        ranges=[RangeSample(t0_ns + 1000 * v[0], *v[1:]) for v in RANGE.iter_unpack(payload[range_at:heading_at])],
-        headings=[
-            HeadingSample(t0_ns + 1000 * v[0], *v[1:]) for v in HEADING.iter_unpack(payload[heading_at:bearing_at])
-        ],
-        bearings=[BearingSample(t0_ns + 1000 * v[0], *v[1:]) for v in BEARING.iter_unpack(payload[bearing_at:])],
-        sequence=sequence,
-        boot_id=boot_id,
-        boot_clock=bool(flags & FLAG_BOOT_CLOCK),
-        replay=bool(flags & FLAG_REPLAY),
+    frame = Frame(
+        sequence=sequence, boot_id=boot_id, boot_clock=bool(flags & FLAG_BOOT_CLOCK), replay=bool(flags & FLAG_REPLAY)
     )
+    places = pairwise(accumulate(map(mul, _SIZES, counts), initial=HEADER.size))
+    for (kind, samples), (begin, end) in zip(frame.by_kind(), places, strict=True):
+        records = kind.record.iter_unpack(payload[begin:end])
+        samples += [kind.from_numbers(t0_ns + 1000 * v[0], *v[1:]) for v in records]
+    return frame
 
 
-Header = tuple[int, tuple[int, int, int, int], int, int, int]
+Header = tuple[int, tuple[int, ...], int, int, int]
 
 
 def read_header(payload: bytes) -> Header | Rejection:
     """Check the form of a packed payload and return its header, or a rejection.
 
-    The header is (flags, counts of imu/range/heading/bearing, sequence, boot id, t0_ns).
+    The header is (flags, count of each of `KINDS`, sequence, boot id, t0_ns).
     """
     if len(payload) == 0:
         return Rejection(Reason.PAYLOAD_EMPTY, "the payload is empty")
@@ -227,14 +157,17 @@ def read_header(payload: bytes) -> Header | Rejection:
         return Rejection(Reason.VERSION_UNKNOWN, f"version {payload[0]}, this decoder knows {VERSION}")
     if len(payload) < HEADER.size:
         return Rejection(Reason.HEADER_TRUNCATED, f"{len(payload)} bytes, the header alone has {HEADER.size}")
-    _, flags, *first, sequence, boot_id, t0_ns, last, zero16, zero32 = HEADER.unpack_from(payload)
-    counts = (first[0], first[1], first[2], last)
+    values = HEADER.unpack_from(payload)
+    flags, sequence, boot_id, t0_ns = values[1], *values[5:8]
+    slots = values[2:5] + values[8:]
+    counts, unused = slots[: len(KINDS)], slots[len(KINDS) :]
     if flags & ~KNOWN_FLAGS:
         return Rejection(Reason.FLAGS_UNKNOWN, f"flags {flags:#04x}, this decoder knows {KNOWN_FLAGS:#04x}")
-    if zero16 or zero32:
-        return Rejection(Reason.RESERVED_NOT_ZERO, "bytes 26 to 31 must be zero")
-    if len(payload) != packed_size(*counts):
-        return Rejection(Reason.LENGTH_MISMATCH, f"{len(payload)} bytes, counts {counts} need {packed_size(*counts)}")
+    if any(unused):
+        return Rejection(Reason.RESERVED_NOT_ZERO, f"bytes {COUNTS_AT[len(KINDS)]} to 31 must be zero")
+    size = packed_size(*counts)
+    if len(payload) != size:
+        return Rejection(Reason.LENGTH_MISMATCH, f"{len(payload)} bytes, counts {counts} need {size}")
     if not any(counts):
         return Rejection(Reason.NO_SAMPLES, "all counts are zero")
     if not 0 <= t0_ns < MAX_T_NS:
@@ -251,48 +184,36 @@ def encode_json(frame: Frame) -> bytes:
         message["sequence"] = frame.sequence
     if frame.boot_id is not None:
         message["boot_id"] = frame.boot_id
-    groups = {
-        "imu": [_without_unknown(s._asdict()) for s in frame.imu],
-        "range": [_named(frame, _without_unknown(s._asdict())) for s in frame.ranges],
-        "heading": [_without_unknown(s._asdict()) for s in frame.headings],
-        "bearing": [_named(frame, _without_unknown(s._asdict())) for s in frame.bearings],
-    }
-    message |= {name: samples for name, samples in groups.items() if samples}
+    message |= {kind.name: [_json_of(frame, s) for s in samples] for kind, samples in frame.by_kind() if samples}
     return json.dumps(message, separators=(",", ":"), allow_nan=False).encode()
 
 
 def _packed(frame: Frame, t0_ns: int) -> bytes:
     parts = [_pack_header(frame, t0_ns)]
-    parts += [IMU.pack(_dt_us(s.t_ns, t0_ns), *s.acc, *s.gyro, *(s.mag or _NO_FIELD)) for s in frame.imu]
-    parts += [RANGE.pack(_dt_us(s.t_ns, t0_ns), s.anchor, s.range_m, s.std_m) for s in frame.ranges]
-    parts += [HEADING.pack(_dt_us(s.t_ns, t0_ns), s.heading_rad, s.std_rad) for s in frame.headings]
-    parts += [BEARING.pack(_dt_us(s.t_ns, t0_ns), s.anchor, s.bearing_rad, s.std_rad) for s in frame.bearings]
+    for kind, samples in frame.by_kind():
+        pack, numbers = kind.record.pack, kind.numbers
+        parts += [pack(_dt_us(sample.t_ns, t0_ns), *numbers(sample)) for sample in samples]
     return b"".join(parts)
 
 
 def _pack_header(frame: Frame, t0_ns: int) -> bytes:
     flags = FLAG_BOOT_CLOCK * frame.boot_clock | FLAG_REPLAY * frame.replay
-    counts = len(frame.imu), len(frame.ranges), len(frame.headings)
+    counts = (*frame.counts(), *_UNUSED_COUNTS)
     ids = (frame.sequence or 0) % 2**32, frame.boot_id or 0
-    return HEADER.pack(VERSION, flags, *counts, *ids, t0_ns, len(frame.bearings), 0, 0)
+    return HEADER.pack(VERSION, flags, *counts[:3], *ids, t0_ns, *counts[3:])
 
 
 def _dt_us(t_ns: int, t0_ns: int) -> int:
     return (t_ns - t0_ns + 500) // 1000
 
 
-def _imu(t0_ns: int, dt_us: int, *v: float) -> ImuSample:
-    mag = None if math.isnan(v[6]) and math.isnan(v[7]) and math.isnan(v[8]) else (v[6], v[7], v[8])
-    return ImuSample(t0_ns + 1000 * dt_us, (v[0], v[1], v[2]), (v[3], v[4], v[5]), mag)
-
-
-def _without_unknown(sample: dict[str, Any]) -> dict[str, Any]:
-    return {
+def _json_of(frame: Frame, sample: Any) -> dict[str, Any]:
+    """Return a sample as JSON has it: without unknown values, with the name of its anchor."""
+    values = {
         name: value
-        for name, value in sample.items()
+        for name, value in sample._asdict().items()
         if value is not None and not (name.startswith("std_") and math.isnan(value))
     }
-
-
-def _named(frame: Frame, sample: dict[str, Any]) -> dict[str, Any]:
-    return sample | {"anchor": frame.anchor_names.get(sample["anchor"], sample["anchor"])}
+    if "anchor" in values:
+        values["anchor"] = frame.anchor_names.get(sample.anchor, sample.anchor)
+    return values

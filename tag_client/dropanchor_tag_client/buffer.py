@@ -2,9 +2,8 @@
 
 import math
 
-from dropanchor_schemas.wire import MAX_T_NS, BearingSample, Frame, HeadingSample, ImuSample, RangeSample, Reason
-
-Sample = ImuSample | RangeSample | HeadingSample | BearingSample
+from dropanchor_schemas.kinds import KIND_OF, Frame, ImuSample, Sample
+from dropanchor_schemas.wire import MAX_T_NS, Reason, anchor_number
 
 # Packed payloads count microseconds in 32 bits (4,294 s). This limit stays far below that.
 _MAX_SPAN_NS = 60_000_000_000
@@ -33,17 +32,10 @@ class SampleBuffer:
     def add(self, sample: Sample, anchor: int | str | None = None) -> None:
         if not len(self._frame):
             self._first_ns = sample.t_ns
-        match sample:
-            case ImuSample():
-                self._frame.imu.append(sample)
-            case RangeSample():
-                self._frame.ranges.append(sample)
-            case HeadingSample():
-                self._frame.headings.append(sample)
-            case BearingSample():
-                self._frame.bearings.append(sample)
-        if isinstance(anchor, str) and isinstance(sample, RangeSample | BearingSample):
-            self._frame.anchor_names[sample.anchor] = anchor
+        kind = KIND_OF[type(sample)]
+        getattr(self._frame, kind.field).append(sample)
+        if isinstance(anchor, str):
+            self._frame.anchor_names[anchor_number(anchor)] = anchor
 
     def take(self) -> Frame:
         """Return the buffered samples and empty the buffer."""
@@ -55,15 +47,10 @@ def rejection_reason(sample: Sample) -> Reason | None:
     """Return why a payload cannot hold this sample, or None if it can. A standard deviation of NaN means unknown."""
     if not 0 <= sample.t_ns < MAX_T_NS:
         return Reason.TIME_OUT_OF_RANGE
-    match sample:
-        case ImuSample():
-            values, std = (*sample.acc, *sample.gyro, *(sample.mag or ())), math.nan
-        case RangeSample():
-            values, std = (sample.range_m,), sample.std_m
-        case HeadingSample():
-            values, std = (sample.heading_rad,), sample.std_rad
-        case BearingSample():
-            values, std = (sample.bearing_rad,), sample.std_rad
+    if isinstance(sample, ImuSample):
+        values, std = (*sample.acc, *sample.gyro, *(sample.mag or ())), math.nan
+    else:
+        values, std = (sample[-2],), sample[-1]
     if not all(abs(value) <= _MAX_FLOAT32 for value in values):
         return Reason.NOT_FINITE
     return Reason.STD_INVALID if abs(std) > _MAX_FLOAT32 else None

@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple, Self
 import zenoh
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.kinds import Sample
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
     ENCODING_PACKED,
@@ -28,7 +29,7 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
-from dropanchor_tag_client.buffer import Sample, SampleBuffer, rejection_reason
+from dropanchor_tag_client.buffer import SampleBuffer, rejection_reason
 from dropanchor_tag_client.publisher import PlainPublisher, Publisher, recoverable_publisher
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
 

@@ -37,7 +37,7 @@ def tracks(duration_s: float, count: int = TRACKS) -> list[Track]:
 def message(body: bytes, sequence: int, boot_id: int, newest_ns: int) -> bytes:
     """Return a payload whose last IMU sample and last range are of `newest_ns`."""
     t0_ns = newest_ns - STEP_NS
-    return HEADER.pack(VERSION, 0, IMU_PER_MESSAGE, RANGES_PER_MESSAGE, 0, sequence, boot_id, t0_ns, 0, 0, 0) + body
+    return HEADER.pack(VERSION, 0, IMU_PER_MESSAGE, RANGES_PER_MESSAGE, 0, sequence, boot_id, t0_ns, 0, 0, 0, 0) + body
 
 
 def _track(run: Simulation) -> Track:

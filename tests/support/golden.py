@@ -74,10 +74,7 @@ def described(frame: Frame) -> dict[str, Any]:
         "replay": frame.replay,
         "sequence": frame.sequence or 0,
         "boot_id": frame.boot_id or 0,
-        "imu": [_described(sample) for sample in frame.imu],
-        "range": [_described(sample) for sample in frame.ranges],
-        "heading": [_described(sample) for sample in frame.headings],
-        "bearing": [_described(sample) for sample in frame.bearings],
+        **{kind.name: [_described(sample) for sample in samples] for kind, samples in frame.by_kind()},
     }
 
 

@@ -1,19 +1,12 @@
 """Hypothesis strategies for valid frames, their payloads, and damaged payloads."""
 
 import math
+from typing import Any
 
 from hypothesis import strategies as st
 
-from dropanchor_schemas.wire import (
-    BearingSample,
-    Frame,
-    HeadingSample,
-    ImuSample,
-    RangeSample,
-    anchor_number,
-    encode_json,
-    encode_packed,
-)
+from dropanchor_schemas.kinds import IMU, KINDS, SCALARS
+from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, anchor_number, encode_json, encode_packed
 
 T = 1_760_000_000_000_000_000
 
@@ -24,16 +17,17 @@ vectors = st.tuples(values, values, values)
 names = st.text(st.characters(codec="utf-8"), min_size=1, max_size=8)
 u32 = st.integers(0, 2**32 - 1)
 anchors = st.one_of(u32, names.map(anchor_number))
+samples_of = {
+    kind: st.builds(kind.sample, times, *([anchors] if kind.has_anchor else []), values, stds) for kind in SCALARS
+} | {IMU: st.builds(ImuSample, times, vectors, vectors, st.one_of(st.none(), vectors))}
 
 
 @st.composite
 def frames(draw: st.DrawFn) -> Frame:
     """Draw a frame with at least one sample, as a tag would send it."""
+    samples: dict[str, Any] = {kind.field: draw(st.lists(samples_of[kind], max_size=4)) for kind in KINDS}
     frame = Frame(
-        imu=draw(st.lists(st.builds(ImuSample, times, vectors, vectors, st.one_of(st.none(), vectors)), max_size=4)),
-        ranges=draw(st.lists(st.builds(RangeSample, times, anchors, values, stds), max_size=4)),
-        headings=draw(st.lists(st.builds(HeadingSample, times, values, stds), max_size=4)),
-        bearings=draw(st.lists(st.builds(BearingSample, times, anchors, values, stds), max_size=4)),
+        **samples,
         sequence=draw(u32),
         boot_id=draw(u32),
         boot_clock=draw(st.booleans()),

@@ -6,6 +6,7 @@ y left, z up. An unknown float is NaN.
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from operator import attrgetter
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -153,12 +154,24 @@ class StateReason(IntEnum):
 
 @dataclass(frozen=True)
 class SampleBatch:
-    """Samples of many tags, per row and kind in order of arrival. The engine puts the kinds in order of time."""
+    """Samples of many tags, per row and kind in order of arrival. The engine puts the kinds in order of time.
+
+    The fields stand in the order of the contract's `KINDS`. A column of a kind that measures one number ends in the
+    value and its std. An engine ignores the kinds that it does not use.
+    """
 
     imu: Array = field(default_factory=lambda: np.empty(0, IMU))
     ranges: Array = field(default_factory=lambda: np.empty(0, RANGE))
     headings: Array = field(default_factory=lambda: np.empty(0, HEADING))
     bearings: Array = field(default_factory=lambda: np.empty(0, BEARING))
+
+    def columns(self) -> tuple[Array, ...]:
+        """Return the column of every kind, in the order of `KINDS`."""
+        columns: tuple[Array, ...] = _columns_of(self)
+        return columns
+
+
+_columns_of = attrgetter(*SampleBatch.__dataclass_fields__)
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ def samples_of(recording: Recording, anchors: Sequence[str]) -> Samples:
     ranges["anchor"] = [anchor_number(anchor) for anchor in recording.range_anchors]
     decoded, refused = screen(
         Decoded(
-            np.ones(1, FORM),
+            forms=np.ones(1, FORM),
             imu=_imu(recording.imu),
             ranges=ranges[np.isin(ranges["anchor"], list(numbers))],
             headings=_scalars(recording.headings, "yaw_rad", "std_rad"),

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.wire import ENCODING_PACKED, HEADER
+from dropanchor_schemas.wire import COUNTS_AT, ENCODING_PACKED, HEADER
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.fair_share import fair_cap, sizes_from_newest
 from dropanchor_service.store.rings import rank_in_row
@@ -25,7 +25,7 @@ UNREGISTERED_PER_TURN = 250  # each costs many times as much as a message of a r
 MAX_WAIT_NS = 500_000_000
 CALM_NS = 2_000_000_000  # an overload ends after this time without shedding
 _KEPT_SHARE = 0.75  # of the capacity, kept when the buffer is full, so that shedding is rare
-_COUNTS = np.dtype({"names": ["some", "bearing"], "formats": [("<u2", 3), "<u2"], "offsets": [2, 24], "itemsize": 32})
+_COUNT_WORDS = [at // 2 for at in COUNTS_AT]
 _ROW, _PAYLOAD = itemgetter(0), itemgetter(1)
 
 
@@ -252,5 +252,5 @@ def _newest(rows: Array, sizes: Array, target_bytes: float) -> Array:
 def _samples_of(messages: Iterable[Message]) -> int:
     """Count the samples in the packed ones of these messages, from their headers."""
     headers = b"".join(m[1][: HEADER.size] for m in messages if m[2] == ENCODING_PACKED and len(m[1]) >= HEADER.size)
-    counts = np.frombuffer(headers, _COUNTS)
-    return int(counts["some"].sum() + counts["bearing"].sum())
+    words = np.frombuffer(headers, "<u2").reshape(-1, HEADER.size // 2)
+    return int(words[:, _COUNT_WORDS].sum())

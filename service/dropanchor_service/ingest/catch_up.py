@@ -296,5 +296,4 @@ def _number_of(payload: bytes, encoding: str) -> _Number | None:
     frame = decode_json(payload) if kind == ENCODING_JSON else None
     if not isinstance(frame, Frame) or frame.sequence is None or not frame.boot_id:
         return None
-    columns = (frame.imu, frame.ranges, frame.headings, frame.bearings)
-    return _Number(frame.boot_id, frame.sequence, min(sample.t_ns for column in columns for sample in column))
+    return _Number(frame.boot_id, frame.sequence, min(frame.times()))

@@ -6,30 +6,28 @@ the form is checked here, not the values.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from dropanchor_schemas.kinds import IMU, KINDS, Frame, Kind
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
     ENCODING_PACKED,
     HEADER,
     MAX_PAYLOAD_BYTES,
-    BearingSample,
-    Frame,
-    HeadingSample,
-    RangeSample,
     Reason,
     Rejection,
     read_header,
 )
-from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.kernels import packed
 from dropanchor_service.ingest.kernels.packed import FORM
 
 # `message` is the index of the payload. An IMU_SAMPLE has the memory layout of the engine's IMU, to be viewed as it.
 IMU_SAMPLE = np.dtype([("message", "i4"), ("t_ns", "i8"), ("acc", "f8", 3), ("gyro", "f8", 3), ("mag", "f8", 3)])
-# A range, heading or bearing; `anchor` is the number on the wire.
+# A sample of one of `SCALARS`; `anchor` is the number on the wire.
 SCALAR = np.dtype([("message", "i4"), ("t_ns", "i8"), ("anchor", "u4"), ("value", "f8"), ("std", "f8")])
 
 _NO_FIELD = (np.nan, np.nan, np.nan)
@@ -50,23 +48,22 @@ class Forms:
     frames: dict[int, Frame]
 
 
-@dataclass(frozen=True)
-class Decoded:
-    """Columns of a list of payloads; samples are in the order of their payloads.
+@dataclass(frozen=True, kw_only=True)
+class Decoded(SampleBatch):
+    """Columns of a list of payloads: IMU_SAMPLE, and SCALAR of each other kind, in the order of their payloads.
 
     forms: FORM, one per payload.
     rejected: index and reason of each payload that is not used.
-    imu: IMU_SAMPLE. ranges, headings, bearings: SCALAR.
     anchor_names: name by number, of the anchors that are named by text.
     """
 
     forms: Array
     rejected: list[tuple[int, Reason]] = field(default_factory=list)
-    imu: Array = field(default_factory=lambda: np.empty(0, IMU_SAMPLE))
-    ranges: Array = field(default_factory=lambda: np.empty(0, SCALAR))
-    headings: Array = field(default_factory=lambda: np.empty(0, SCALAR))
-    bearings: Array = field(default_factory=lambda: np.empty(0, SCALAR))
     anchor_names: dict[int, str] = field(default_factory=dict)
+
+    def with_columns(self, columns: Sequence[Array]) -> "Decoded":
+        """Return the same with other columns, one for each of `KINDS`."""
+        return Decoded(*columns, forms=self.forms, rejected=self.rejected, anchor_names=self.anchor_names)
 
 
 def decode(payloads: Sequence[bytes], encodings: Sequence[str]) -> Decoded:
@@ -95,10 +92,10 @@ def read_samples(read: Forms, chosen: Array) -> Decoded:
     """Return the columns of the payloads with the indices `chosen`, which were accepted, in that order."""
     words, floats = np.frombuffer(read.blob, "<u4"), np.frombuffer(read.blob, "<f4")
     counts = read.forms["counts"][chosen].sum(axis=0)
-    imu = np.empty(counts[0], IMU_SAMPLE)
-    ranges, headings, bearings = (np.empty(count, SCALAR) for count in counts[1:])
-    packed.read_samples(words, floats, read.forms, chosen, imu, ranges, headings, bearings)
-    decoded = Decoded(read.forms, read.rejected, imu, ranges, headings, bearings)
+    imu, scalars = np.empty(counts[0], IMU_SAMPLE), np.empty(counts[1:].sum(), SCALAR)
+    ends = np.cumsum(counts[1:])
+    packed.read_samples(words, floats, read.forms, chosen, imu, scalars, ends - counts[1:])
+    decoded = Decoded(imu, *np.split(scalars, ends[:-1]), forms=read.forms, rejected=read.rejected)
     return _with_json(decoded, read.frames, chosen) if read.frames else decoded
 
 
@@ -149,24 +146,19 @@ def _with_json(decoded: Decoded, all_frames: dict[int, Frame], chosen: Array) ->
     frames = [(index, all_frames[index]) for index in chosen.tolist() if index in all_frames]
     place = np.zeros(len(decoded.forms), np.int64)
     place[chosen] = np.arange(len(chosen))
-    imu = [(i, s.t_ns, s.acc, s.gyro, s.mag or _NO_FIELD) for i, f in frames for s in f.imu]
-    return Decoded(
-        decoded.forms,
-        decoded.rejected,
-        imu=_merged(decoded.imu, imu, place),
-        ranges=_merged(decoded.ranges, [_scalar(i, s) for i, f in frames for s in f.ranges], place),
-        headings=_merged(decoded.headings, [_scalar(i, s) for i, f in frames for s in f.headings], place),
-        bearings=_merged(decoded.bearings, [_scalar(i, s) for i, f in frames for s in f.bearings], place),
-        anchor_names={number: name for _, f in frames for number, name in f.anchor_names.items()},
-    )
+    columns = [
+        _merged(column, [_values(kind, i, s) for i, f in frames for s in getattr(f, kind.field)], place)
+        for kind, column in zip(KINDS, decoded.columns(), strict=True)
+    ]
+    names = {number: name for _, f in frames for number, name in f.anchor_names.items()}
+    return Decoded(*columns, forms=decoded.forms, rejected=decoded.rejected, anchor_names=names)
 
 
-def _scalar(index: int, sample: RangeSample | HeadingSample | BearingSample) -> tuple[int, int, int, float, float]:
-    match sample:
-        case HeadingSample(t_ns, value, std):
-            return index, t_ns, 0, value, std
-        case RangeSample(t_ns, anchor, value, std) | BearingSample(t_ns, anchor, value, std):
-            return index, t_ns, anchor, value, std
+def _values(kind: Kind, index: int, sample: Any) -> tuple[Any, ...]:
+    """Return the values of IMU_SAMPLE or SCALAR."""
+    if kind is IMU:
+        return index, sample.t_ns, sample.acc, sample.gyro, sample.mag or _NO_FIELD
+    return index, sample.t_ns, sample.anchor if kind.has_anchor else 0, *sample[-2:]
 
 
 def _merged(column: Array, samples: Sequence[tuple[object, ...]], place: Array) -> Array:

@@ -138,7 +138,7 @@ class GuardedEngine:
         yield from self._bisected(samples, now_ns)
 
     def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
-        rows = [column["row"] for column in _columns(samples)]
+        rows = [column["row"] for column in samples.columns()]
         self._reserve(max(int(column.max(initial=-1)) for column in rows) + 1)
         return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
 
@@ -169,7 +169,7 @@ class GuardedEngine:
         quarantine = times % FAULTS_BEFORE_QUARANTINE == 0
         self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if quarantine else 0)
         self._configure(row, start_known=False)
-        t_ns = max(int(column["t_ns"].max()) for column in _columns(samples) if len(column))
+        t_ns = max(int(column["t_ns"].max()) for column in samples.columns() if len(column))
         return PoseBatch(poses=_lost(row, t_ns))
 
     def _configure(self, row: int, start_known: bool = True) -> None:
@@ -202,14 +202,9 @@ def _lost(row: int, t_ns: int) -> Array:
     return pose
 
 
-def _columns(samples: SampleBatch) -> tuple[Array, Array, Array, Array]:
-    return samples.imu, samples.ranges, samples.headings, samples.bearings
-
-
 def _rows(samples: SampleBatch) -> Array:
-    return np.unique(np.concatenate([column["row"] for column in _columns(samples)]))
+    return np.unique(np.concatenate([column["row"] for column in samples.columns()]))
 
 
 def _selected(samples: SampleBatch, selects: Callable[[Array], Array]) -> SampleBatch:
-    imu, ranges, headings, bearings = (column[selects(column["row"])] for column in _columns(samples))
-    return SampleBatch(imu, ranges, headings, bearings)
+    return SampleBatch(*(column[selects(column["row"])] for column in samples.columns()))

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from dropanchor_schemas.kinds import SCALARS
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.estimation.columns import BEARING, HEADING, IMU, RANGE, Array, SampleBatch
+from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
@@ -19,6 +20,7 @@ from dropanchor_service.store import SiteStore, TagTable
 from dropanchor_service.store.rings import rank_in_row
 
 REORDER_BYTES = 2**26
+_DTYPES = [column.dtype for column in SampleBatch().columns()]
 
 
 class SampleReader:
@@ -107,15 +109,15 @@ class SampleReader:
     def _batch(self, decoded: Decoded, rejected: list[Rejected], of_row: Array, arrived: Array) -> SampleBatch:
         self._bind_first_anchor(decoded)
         self._note_unknown_anchors(decoded, of_row, arrived)
-        ranges = self._anchored(decoded.ranges, rejected)
-        bearings = self._anchored(decoded.bearings, rejected)
+        scalars = [
+            self._anchored(column, rejected) if kind.has_anchor else column
+            for kind, column in zip(SCALARS, decoded.columns()[1:], strict=True)
+        ]
         for entry in rejected:
             self._rejections.count_rejected(entry.reason, of_row[entry.messages])
         return SampleBatch(
-            imu=_imu_column(decoded.imu, of_row),
-            ranges=_columns(ranges, RANGE, "range", of_row),
-            headings=_columns(decoded.headings, HEADING, "heading", of_row),
-            bearings=_columns(bearings, BEARING, "bearing", of_row),
+            _imu_column(decoded.imu, of_row),
+            *(_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
         )
 
     def _bind_first_anchor(self, decoded: Decoded) -> None:
@@ -164,17 +166,15 @@ def _in_time(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Deco
     """Add the offset of its message to the time of each sample, and reject samples whose time is then out of range."""
     if not sum(shift_times(t_ns, messages, offsets) for messages, t_ns in _times(decoded)):
         return decoded
-    imu, ranges, headings, bearings = (
-        keep(samples, ~within_time(samples["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected)
-        for samples in (decoded.imu, decoded.ranges, decoded.headings, decoded.bearings)
-    )
-    return replace(decoded, imu=imu, ranges=ranges, headings=headings, bearings=bearings)
+    columns = [
+        keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected) for column in decoded.columns()
+    ]
+    return decoded.with_columns(columns)
 
 
 def _times(decoded: Decoded) -> list[tuple[Array, Array]]:
     """Return the index of the message and the time of each sample, for every kind."""
-    columns = (decoded.imu, decoded.ranges, decoded.headings, decoded.bearings)
-    return [(column["message"], column["t_ns"]) for column in columns]
+    return [(column["message"], column["t_ns"]) for column in decoded.columns()]
 
 
 def _imu_column(samples: Array, of_row: Array) -> Array:
@@ -184,13 +184,14 @@ def _imu_column(samples: Array, of_row: Array) -> Array:
     return imu
 
 
-def _columns(scalars: Array, dtype: "np.dtype[np.void]", value: str, of_row: Array) -> Array:
-    """Convert SCALAR to a column of the engine, with this dtype and name of the value."""
-    batch = np.empty(len(scalars), dtype)
+def _column(scalars: Array, dtype: "np.dtype[np.void]", of_row: Array) -> Array:
+    """Convert SCALAR to a column of the engine, with this dtype."""
+    column = np.empty(len(scalars), dtype)
     if not len(scalars):
-        return batch
-    batch["row"], batch["t_ns"] = of_row[scalars["message"]], scalars["t_ns"]
-    batch[value], batch["std"] = scalars["value"], scalars["std"]
-    if "anchor" in (dtype.names or ()):
-        batch["anchor"] = scalars["anchor"]
-    return batch
+        return column
+    names = dtype.names or ()
+    column["row"], column["t_ns"] = of_row[scalars["message"]], scalars["t_ns"]
+    column[names[-2]], column["std"] = scalars["value"], scalars["std"]
+    if "anchor" in names:
+        column["anchor"] = scalars["anchor"]
+    return column

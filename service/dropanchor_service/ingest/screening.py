@@ -1,25 +1,19 @@
 """Screen the values of samples in bulk. Every sample that is rejected has exactly one reason."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from dropanchor_schemas.kinds import SCALARS
 from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.decode import Decoded
 from dropanchor_service.ingest.kernels import values
 
-RANGE_LIMITS = (0.0, 3_000.0)  # m: UWB radios end far below
-ANGLE_LIMITS = (-1_000.0, 1_000.0)  # rad: headings may be unwrapped, but not without end
-RANGE_STD_LIMITS = (1e-3, 100.0)  # m
-ANGLE_STD_LIMITS = (1e-4, 2 * np.pi)  # rad
-
 _COMMON = {values.NOT_FINITE: Reason.NOT_FINITE, values.STD_INVALID: Reason.STD_INVALID}
 _OF_IMU = _COMMON | {values.ABSURD: Reason.IMU_ABSURD}
-_OF_RANGES = _COMMON | {values.NEGATIVE: Reason.RANGE_NEGATIVE, values.ABSURD: Reason.RANGE_ABSURD}
-_OF_HEADINGS = _COMMON | dict.fromkeys((values.NEGATIVE, values.ABSURD), Reason.HEADING_ABSURD)
-_OF_BEARINGS = _COMMON | dict.fromkeys((values.NEGATIVE, values.ABSURD), Reason.BEARING_ABSURD)
+_OF_SCALARS = [_COMMON | {values.NEGATIVE: kind.below, values.ABSURD: kind.above} for kind in SCALARS]
 
 
 @dataclass(frozen=True)
@@ -33,14 +27,11 @@ class Rejected:
 def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
     """Return the samples with values that a sensor can have measured, and the others by reason."""
     rejected: list[Rejected] = []
-    of_ranges, of_angles = (*RANGE_LIMITS, *RANGE_STD_LIMITS), (*ANGLE_LIMITS, *ANGLE_STD_LIMITS)
-    return replace(
-        decoded,
-        imu=_screened_imu(decoded.imu, rejected),
-        ranges=_screened(decoded.ranges, of_ranges, _OF_RANGES, rejected),
-        headings=_screened(decoded.headings, of_angles, _OF_HEADINGS, rejected),
-        bearings=_screened(decoded.bearings, of_angles, _OF_BEARINGS, rejected),
-    ), rejected
+    imu, *scalars = decoded.columns()
+    columns = [_screened_imu(imu, rejected)]
+    for kind, reasons, column in zip(SCALARS, _OF_SCALARS, scalars, strict=True):
+        columns.append(_screened(column, (*kind.limits, *kind.std_limits), reasons, rejected))
+    return decoded.with_columns(columns), rejected
 
 
 def keep(samples: Array, bad: Array, reason: Reason, rejected: list[Rejected]) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
 from dropanchor_service.ingest.admission import Admission
@@ -124,11 +125,11 @@ class Ingest:
             self._metrics.delay_seconds.observe((self._clock.now_ns() - messages[0][3]) * 1e-9)
 
     def _fuse_batch(self, samples: SampleBatch, now_ns: int) -> None:
-        for kind, column in _by_kind(samples):
+        for kind, column in zip(KINDS, samples.columns(), strict=True):
             if len(column):
-                self._tags.count_samples(kind, column["row"])
-                self._metrics.samples.labels(kind).inc(len(column))
-        if not any(len(column) for _, column in _by_kind(samples)):
+                self._tags.count_samples(kind.name, column["row"])
+                self._metrics.samples.labels(kind.name).inc(len(column))
+        if not any(map(len, samples.columns())):
             return
         started = time.perf_counter()
         for poses in self._engine.process(samples, now_ns):
@@ -138,12 +139,13 @@ class Ingest:
     def _outside_quarantine(self, samples: SampleBatch, now_ns: int) -> SampleBatch:
         if not self._engine.any_quarantined(now_ns):
             return samples
-        accepted: dict[str, Array] = {}
-        for kind, column in _by_kind(samples):
-            quarantined = self._engine.quarantined(column["row"], now_ns)
-            self._rejections.count_rejected(Reason.ESTIMATOR_FAULT, column["row"][quarantined])
-            accepted[kind] = column[~quarantined] if quarantined.any() else column
-        return SampleBatch(accepted["imu"], accepted["range"], accepted["heading"], accepted["bearing"])
+        return SampleBatch(*(self._accepted(column, now_ns) for column in samples.columns()))
+
+    def _accepted(self, column: Array, now_ns: int) -> Array:
+        quarantined = self._engine.quarantined(column["row"], now_ns)
+        self._rejections.count_rejected(Reason.ESTIMATOR_FAULT, column["row"][quarantined])
+        accepted: Array = column[~quarantined] if quarantined.any() else column
+        return accepted
 
     def _store(self, batch: PoseBatch) -> None:
         for outcomes in (batch.poses, batch.innovations):
@@ -170,12 +172,3 @@ class Ingest:
             times = np.fromiter(by_row.values(), np.int64, len(by_row))
             self._rejections.count_shed(np.repeat(rows, times), samples)
             self._publishers.allow_gap(rows)
-
-
-def _by_kind(samples: SampleBatch) -> tuple[tuple[str, Array], ...]:
-    return (
-        ("imu", samples.imu),
-        ("range", samples.ranges),
-        ("heading", samples.headings),
-        ("bearing", samples.bearings),
-    )

@@ -8,6 +8,7 @@ not arrays. Properties that do not fit are left out of the schema, but not of th
 from collections.abc import Mapping
 from typing import Any
 
+from dropanchor_schemas.kinds import SCALARS
 from dropanchor_service.answers.track_pages import ESTIMATED
 
 POSE = "foxglove.PoseInFrame"
@@ -53,9 +54,7 @@ def all_schemas() -> dict[str, Schema]:
         SAMPLES: _object(
             sequence=_INTEGER,
             imu=_array_of(t_ns=_INTEGER, acc=_numbers(3), gyro=_numbers(3)),
-            range=_array_of(t_ns=_INTEGER, range_m=_NUMBER),
-            heading=_array_of(t_ns=_INTEGER, heading_rad=_NUMBER),
-            bearing=_array_of(t_ns=_INTEGER, bearing_rad=_NUMBER),
+            **{kind.name: _array_of(t_ns=_INTEGER, **{kind.value: _NUMBER}) for kind in SCALARS},
         ),
         PACKED_SAMPLES: _object(data=_BASE64),
         SITE: _object(site=_object(id=_TEXT, name=_TEXT, anchors=_array_of(id=_TEXT, x=_NUMBER, y=_NUMBER, z=_NUMBER))),

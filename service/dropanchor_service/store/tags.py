@@ -7,12 +7,13 @@ from threading import Lock
 
 import numpy as np
 
+from dropanchor_schemas import kinds
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.store.unknown_anchors import UnknownAnchors
 
-KINDS = ("imu", "range", "heading", "bearing")
+KINDS = tuple(kind.name for kind in kinds.KINDS)
 REASONS = tuple(Reason)
 
 _COUNTS = np.dtype(

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any, BinaryIO, TextIO
 
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.options import add_connection_options, opened_client
 
@@ -71,25 +72,19 @@ def samples_of(line: bytes, clock: str = "utc") -> list[tuple[str, dict[str, Any
         raise BadLineError(f"not JSON: {error}") from None
     if not isinstance(value, dict):
         raise BadLineError("a JSON object was expected")
-    if value.keys() & {*_FIELDS, "version", "clock"}:
+    if value.keys() & {*_KINDS, "version", "clock"}:
         return _message(value, clock)
-    for kind, (needed, _) in _FIELDS.items():
-        if needed[-1] in value:
-            return [(kind, value)]
-    raise BadLineError("none of range_m, acc, heading_rad, bearing_rad, imu, range, heading, bearing is there")
+    for kind in KINDS:
+        if kind.value in value:
+            return [(kind.name, value)]
+    raise BadLineError(f"none of {', '.join([*(kind.value for kind in KINDS), *_KINDS])} is there")
 
 
-# Per kind: the fields that a sample must have, the last of which tells the kind, and those that it may have.
-_FIELDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "imu": (("gyro", "acc"), ("mag", "t_ns")),
-    "range": (("anchor", "range_m"), ("std_m", "t_ns")),
-    "heading": (("heading_rad",), ("std_rad", "t_ns")),
-    "bearing": (("anchor", "bearing_rad"), ("std_rad", "t_ns")),
-}
+_KINDS = {kind.name: kind for kind in KINDS}
 
 
 def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any]]]:
-    unknown = value.keys() - {*_FIELDS, "version", "clock", "sequence", "boot_id"}
+    unknown = value.keys() - {*_KINDS, "version", "clock", "sequence", "boot_id"}
     if unknown:
         raise BadLineError(f"a samples message has no field {min(unknown)!r}")
     if value.get("version", 1) != 1:
@@ -97,7 +92,7 @@ def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any
     if value.get("clock", clock) != clock:
         raise BadLineError(f"the clock is {value['clock']!r}; this program was started for {clock!r}")
     samples = []
-    for kind in _FIELDS.keys() & value.keys():
+    for kind in _KINDS.keys() & value.keys():
         if not isinstance(value[kind], list) or not all(isinstance(sample, dict) for sample in value[kind]):
             raise BadLineError(f"{kind}: a list of objects was expected")
         samples += [(kind, sample) for sample in value[kind]]
@@ -106,14 +101,14 @@ def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any
 
 def _publisher(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], None]:
     """What publishes the sample, after all of it has been checked. Raises BadLineError."""
-    needed, optional = _FIELDS[kind]
+    made = _KINDS[kind].sample
+    known, needed = {*made._fields}, [n for n in made._fields if n not in ("t_ns", *made._field_defaults)]
     for name in needed:
         if name not in sample:
             raise BadLineError(f"{kind}: {name} is missing")
-    known = {*needed, *optional}
     for name in sample.keys() - known:
         raise BadLineError(f"{kind}: there is no field {name!r}; known are {', '.join(sorted(known))}")
-    given = {name: _CHECKS[name](name, value) for name, value in sample.items() if value is not None or name in needed}
+    given = {name: _checked(name, value) for name, value in sample.items() if value is not None or name in needed}
     return lambda client: getattr(client, f"publish_{kind}")(**given)
 
 
@@ -150,8 +145,11 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "mag": _vector,
     "anchor": _anchor,
     "t_ns": _time,
-    **dict.fromkeys(("range_m", "std_m", "heading_rad", "std_rad", "bearing_rad"), _number),
 }
+
+
+def _checked(name: str, value: Any) -> Any:
+    return _CHECKS[name](name, value) if name in _CHECKS else _number(name, value)
 
 
 def _no_constant(name: str) -> float:

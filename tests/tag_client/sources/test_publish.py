@@ -52,7 +52,7 @@ BAD_LINES = [
     (b"hello", "not JSON"),
     (b"\xff\xfe", "not JSON"),
     (b"[1, 2]", "a JSON object was expected"),
-    (b"{}", "none of range_m, acc"),
+    (b"{}", "none of acc, range_m"),
     (b'{"range_m": 1}', "range: anchor is missing"),
     (b'{"anchor": 7, "range_m": "1"}', "range_m is '1', a number was expected"),
     (b'{"anchor": 7, "range_m": true}', "range_m is True, a number was expected"),

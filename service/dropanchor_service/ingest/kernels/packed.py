@@ -3,23 +3,13 @@
 The format is that of `dropanchor_schemas.wire`; every valid payload is a whole number of words.
 """
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numba import njit
 
-from dropanchor_schemas.wire import (
-    BEARING,
-    FLAG_BOOT_CLOCK,
-    FLAG_REPLAY,
-    HEADER,
-    HEADING,
-    IMU,
-    KNOWN_FLAGS,
-    MAX_T_NS,
-    RANGE,
-    VERSION,
-)
+from dropanchor_schemas.kinds import KINDS, SCALARS
+from dropanchor_schemas.wire import COUNTS_AT, FLAG_BOOT_CLOCK, FLAG_REPLAY, HEADER, KNOWN_FLAGS, MAX_T_NS, VERSION
 
 FORM = np.dtype(
     [
@@ -30,13 +20,23 @@ FORM = np.dtype(
         ("sequence", "u4"),
         ("boot_id", "u4"),
         ("t0_ns", "i8"),
-        ("counts", "i8", 4),  # imu, range, heading, bearing
+        ("counts", "i8", len(KINDS)),
         ("start", "i8"),  # word of the buffer at which its samples begin, -1: not packed
     ]
 )
 
-_HEADER_WORDS = HEADER.size // 4
-_IMU_WORDS, _RANGE_WORDS, _HEADING_WORDS, _BEARING_WORDS = (s.size // 4 for s in (IMU, RANGE, HEADING, BEARING))
+_KINDS: Final = len(KINDS)
+_HEADER_WORDS: Final = HEADER.size // 4
+_RECORD_WORDS: Final = tuple(kind.record.size // 4 for kind in KINDS)
+_COUNT_WORDS: Final = tuple(at // 4 for at in COUNTS_AT)
+_COUNT_SHIFTS: Final = tuple(at % 4 * 8 for at in COUNTS_AT)
+_ANCHOR_WORDS: Final = tuple(int(kind.has_anchor) for kind in SCALARS)
+
+
+@njit(nogil=True)
+def _count(words: Any, at: int, slot: int) -> int:
+    """Return one of the counts of the header that begins at a word."""
+    return int(words[at + _COUNT_WORDS[slot]]) >> _COUNT_SHIFTS[slot] & 0xFFFF
 
 
 @njit(cache=True, nogil=True)
@@ -49,19 +49,19 @@ def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> i
     for i in range(len(starts)):
         at = starts[i]
         first = words[at]
-        n_imu = np.int64(first >> 16)
-        n_range = np.int64(words[at + 1] & 0xFFFF)
-        n_heading = np.int64(words[at + 1] >> 16)
-        n_bearing = np.int64(words[at + 6] & 0xFFFF)
-        needed = n_imu * _IMU_WORDS + n_range * _RANGE_WORDS + n_heading * _HEADING_WORDS + n_bearing * _BEARING_WORDS
+        needed, unused = 0, 0
+        for k in range(len(_COUNT_WORDS)):
+            if k < _KINDS:
+                needed += _RECORD_WORDS[k] * _count(words, at, k)
+            else:
+                unused += _count(words, at, k)
         t0_ns = np.int64(words[at + 4]) | (np.int64(words[at + 5]) << 32)
         flags = (first >> 8) & 0xFF
         form = forms[where[i]]
         form.accepted = (
             first & 0xFF == VERSION
             and flags & ~KNOWN_FLAGS == 0
-            and words[at + 6] >> 16 == 0
-            and words[at + 7] == 0
+            and unused == 0
             and sizes[i] == _HEADER_WORDS + needed
             and needed > 0
             and 0 <= t0_ns < MAX_T_NS
@@ -74,51 +74,40 @@ def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> i
         form.sequence, form.boot_id = words[at + 2], words[at + 3]
         form.numbered = words[at + 3] != 0
         form.t0_ns = t0_ns
-        form.counts[0], form.counts[1], form.counts[2], form.counts[3] = n_imu, n_range, n_heading, n_bearing
+        for k in range(_KINDS):
+            form.counts[k] = _count(words, at, k)
         form.start = at + _HEADER_WORDS
     return accepted
 
 
 @njit(cache=True, nogil=True)
-def read_samples(
-    words: Any, floats: Any, forms: Any, chosen: Any, imu: Any, ranges: Any, headings: Any, bearings: Any
-) -> None:
+def read_samples(words: Any, floats: Any, forms: Any, chosen: Any, imu: Any, scalars: Any, starts: Any) -> None:
     """Fill the columns, which are large enough, with the samples of the payloads `chosen`, one after another.
 
-    floats: the same buffer as f4. imu: IMU_SAMPLE. ranges, headings, bearings: SCALAR.
+    floats: the same buffer as f4. imu: IMU_SAMPLE. scalars: SCALAR, the columns of all `SCALARS` one behind the other.
+    starts: index at which each of them begins.
     """
-    filled = np.zeros(4, np.int64)
+    filled_imu, filled = 0, starts.copy()
     for i in chosen:
         form = forms[i]
         at = form.start
         if at < 0:
             continue
         for _ in range(form.counts[0]):
-            sample = imu[filled[0]]
+            sample = imu[filled_imu]
             sample.message, sample.t_ns = i, form.t0_ns + 1000 * np.int64(words[at])
             for axis in range(3):
                 sample.acc[axis] = floats[at + 1 + axis]
                 sample.gyro[axis] = floats[at + 4 + axis]
                 sample.mag[axis] = floats[at + 7 + axis]
-            filled[0] += 1
-            at += _IMU_WORDS
-        for _ in range(form.counts[1]):
-            _read_anchored(words, floats, at, i, form.t0_ns, ranges[filled[1]])
-            filled[1] += 1
-            at += _RANGE_WORDS
-        for _ in range(form.counts[2]):
-            heading = headings[filled[2]]
-            heading.message, heading.t_ns = i, form.t0_ns + 1000 * np.int64(words[at])
-            heading.anchor, heading.value, heading.std = 0, floats[at + 1], floats[at + 2]
-            filled[2] += 1
-            at += _HEADING_WORDS
-        for _ in range(form.counts[3]):
-            _read_anchored(words, floats, at, i, form.t0_ns, bearings[filled[3]])
-            filled[3] += 1
-            at += _BEARING_WORDS
-
-
-@njit(nogil=True)
-def _read_anchored(words: Any, floats: Any, at: int, message: int, t0_ns: int, scalar: Any) -> None:
-    scalar.message, scalar.t_ns = message, t0_ns + 1000 * np.int64(words[at])
-    scalar.anchor, scalar.value, scalar.std = words[at + 1], floats[at + 2], floats[at + 3]
+            filled_imu += 1
+            at += _RECORD_WORDS[0]
+        for k in range(_KINDS - 1):
+            anchor_words = _ANCHOR_WORDS[k]
+            for _ in range(form.counts[k + 1]):
+                scalar = scalars[filled[k]]
+                scalar.message, scalar.t_ns = i, form.t0_ns + 1000 * np.int64(words[at])
+                scalar.anchor = words[at + 1] if anchor_words else 0
+                scalar.value, scalar.std = floats[at + anchor_words + 1], floats[at + anchor_words + 2]
+                filled[k] += 1
+                at += _RECORD_WORDS[k + 1]
