@@ -28,6 +28,7 @@ class Reason(StrEnum):
     STD_INVALID = "std_invalid"
     ANCHOR_UNKNOWN = "anchor_unknown"
     LATE = "late"
+    RANGE_STUCK = "range_stuck"
     DUPLICATE = "duplicate"
     KEY_INVALID = "key_invalid"
     TAG_UNKNOWN = "tag_unknown"
@@ -74,6 +75,7 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.STD_INVALID: Explanation("sample", "a standard deviation that is negative, zero or absurd"),
     Reason.ANCHOR_UNKNOWN: Explanation("sample", "an anchor that the site does not have"),
     Reason.LATE: Explanation("sample", "older than the samples that the estimator can still go back to"),
+    Reason.RANGE_STUCK: Explanation("sample", "the radio repeats this range although the tag moves"),
     Reason.DUPLICATE: Explanation("message", "this sequence of this boot id was already used"),
     Reason.KEY_INVALID: Explanation("message", "the key does not follow this contract"),
     Reason.TAG_UNKNOWN: Explanation("message", "the service admits registered tags only"),

@@ -181,13 +181,13 @@ class PoseBatch:
     hypotheses: HYPOTHESIS, the modes behind the last pose of each row that is ambiguous.
     innovations: INNOVATION of the likeliest hypothesis, one for every range or bearing that met a running belief, per
     row in order of time.
-    rejected: samples that were not used, counted by reason (names of the contract).
+    rejected: by reason (names of the contract), the row of each sample that was not used.
     """
 
     poses: Array = field(default_factory=lambda: np.empty(0, POSE))
     hypotheses: Array = field(default_factory=lambda: np.empty(0, HYPOTHESIS))
     innovations: Array = field(default_factory=lambda: np.empty(0, INNOVATION))
-    rejected: dict[str, int] = field(default_factory=dict)
+    rejected: dict[str, Array] = field(default_factory=dict)
 
 
 class Engine(Protocol):

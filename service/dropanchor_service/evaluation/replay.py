@@ -92,7 +92,7 @@ def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) ->
     while end_s <= samples.end_s:
         end_s += STEP_S
         batch = engine.process(_between(samples.batch, end_s - STEP_S, end_s))
-        samples.rejected.update(batch.rejected)
+        samples.rejected.update({reason: len(rows) for reason, rows in batch.rejected.items()})
         yield min(end_s, samples.end_s), batch.poses
 
 

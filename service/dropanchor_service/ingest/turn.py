@@ -152,8 +152,8 @@ class Ingest:
             self._publishers.to_utc(outcomes)
         self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
         self._metrics.poses.inc(len(batch.poses))
-        for reason, count in batch.rejected.items():
-            self._metrics.rejected.labels(reason).inc(count)
+        for reason, rows in batch.rejected.items():
+            self._rejections.count_rejected(Reason(reason), rows)
         self._notify(self._observers.poses, batch.poses)
 
     def _notify(self, observer: Callable[..., None], *values: object) -> None:

@@ -7,8 +7,8 @@ _INTRODUCTION = """\
 # Rejections
 
 Decoding never fails: bytes become samples or a named rejection. The service counts every rejection under one of these
-names, in `dropanchor_rejected_total` and per tag in `GET /api/v1/tags/{tag}` (`late` in the metrics only). A *message*
-is refused as a whole, a *sample* alone; the good samples of its message are used.
+names, in `dropanchor_rejected_total` and per tag in `GET /api/v1/tags/{tag}`. A *message* is refused as a whole, a
+*sample* alone; the good samples of its message are used.
 """
 
 

@@ -1,7 +1,5 @@
 """The engine `fleet`: one row of front-end and pose belief per tag, and a pool of hypotheses for all of them."""
 
-from collections import Counter
-
 import numpy as np
 
 from dropanchor_service.estimation.columns import ANCHOR, Array, PoseBatch, SampleBatch
@@ -14,7 +12,7 @@ from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, star
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
-from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of
+from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of, stuck_ranges_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 HARD_IRON, HARD_IRON_CALIBRATED = 1.0, 0.05  # prior sd of a magnetometer's hard iron, in units of the field
@@ -55,10 +53,9 @@ class FleetEngine:
 
     def process(self, samples: SampleBatch) -> PoseBatch:
         """Fuse the samples that are due. Measurements ahead of their row's IMU wait for it, 250 ms at most."""
-        rejected: Counter[str] = Counter()
-        due = self._queue.due(samples, len(self._anchors), rejected)
+        due = self._queue.due(samples, len(self._anchors))
         if not len(due.order):
-            return PoseBatch(rejected=dict(rejected))
+            return PoseBatch(rejected=due.rejected)
         nodes = np.zeros(len(due.order), NODE)
         nodes = nodes[
             : assemble_nodes(samples.imu, due.events, due.order, self._fronts, self._platforms, self._rows, nodes)
@@ -68,7 +65,7 @@ class FleetEngine:
             poses_of(nodes, beliefs),
             modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspace),
             innovations_of(nodes, beliefs),
-            dict(rejected),
+            due.rejected | stuck_ranges_of(nodes, beliefs),
         )
 
     def _reserve_rows(self, rows: int) -> None:

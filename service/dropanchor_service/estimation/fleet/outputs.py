@@ -9,7 +9,7 @@ from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, 
 from dropanchor_service.estimation.fleet.belief.modes import list_modes
 from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import RANGE, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, RANGE, Nodes
 
 MODES: Final = 8
 REJECTED_ABOVE: Final = 0.5  # outlier probability above which a measurement hardly moved the belief
@@ -26,6 +26,12 @@ def innovations_of(nodes: Nodes, beliefs: Beliefs) -> Array:
     """Return INNOVATION of the nodes whose measurement met a belief: z = predicted + innovation, as measured."""
     records = np.zeros(len(nodes), INNOVATION)
     return records[: _write_innovations(nodes, beliefs, records)]
+
+
+def stuck_ranges_of(nodes: Nodes, beliefs: Beliefs) -> dict[str, Array]:
+    """Return the row of each range that a stuck radio repeated, under the reason of its rejection."""
+    stuck = beliefs["stuck"]
+    return {"range_stuck": nodes["row"][stuck]} if stuck.any() else {}
 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:
@@ -59,6 +65,16 @@ def _write_poses(nodes: Nodes, beliefs: Beliefs, poses: Array) -> int:
     return n
 
 
+@njit(nogil=True)
+def _kind_of(measurement: int) -> int:
+    """Return the MeasurementKind of a node's measurement."""
+    if measurement == RANGE:
+        return OF_RANGE
+    if measurement == BEARING:
+        return OF_BEARING
+    raise ValueError("the node's measurement has no MeasurementKind: add it here")
+
+
 @njit(cache=True, nogil=True)
 def _write_innovations(nodes: Nodes, beliefs: Beliefs, records: Array) -> int:
     n = 0
@@ -69,7 +85,7 @@ def _write_innovations(nodes: Nodes, beliefs: Beliefs, records: Array) -> int:
         record = records[n]
         n += 1
         record.row, record.t_ns, record.anchor = node.row, node.t_ns, node.anchor
-        record.kind = OF_RANGE if node.kind == RANGE else OF_BEARING
+        record.kind = _kind_of(node.kind)
         record.measured = node.z
         record.innovation = belief.innovation
         record.predicted = node.z - record.innovation

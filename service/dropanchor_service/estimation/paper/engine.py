@@ -5,7 +5,6 @@ its track, so `p_mode` and `sigma_obs` of its poses are NaN.
 """
 
 import math
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from operator import itemgetter
@@ -59,20 +58,24 @@ class PaperEngine:
 
         Bearings are not part of the paper and are ignored.
         """
-        rejected: Counter[str] = Counter()
+        rejected: dict[str, list[int]] = {}
         poses = []
         innovations: list[tuple[Any, ...]] = []
         with np.errstate(all="ignore"):  # numbers out of range are a fault of their row, not a warning
             for event in _in_order(samples):
                 reason = self._rejection(event)
                 if reason is not None:
-                    rejected[reason] += 1
+                    rejected.setdefault(reason, []).append(event[0])
                     continue
                 pose = self._take(event)
                 if pose is not None:
                     poses.append((event[0], *pose))
                     innovations.extend(self._innovation(event))
-        return PoseBatch(np.array(poses, POSE), innovations=np.array(innovations, INNOVATION), rejected=dict(rejected))
+        return PoseBatch(
+            np.array(poses, POSE),
+            innovations=np.array(innovations, INNOVATION),
+            rejected={reason: np.array(rows, np.int32) for reason, rows in rejected.items()},
+        )
 
     def _innovation(self, event: Event) -> Iterator[tuple[Any, ...]]:
         """Yield INNOVATION of a range that met a belief, in metres as measured."""

@@ -11,6 +11,7 @@ from dropanchor_service.estimation.columns import (
     StateReason,
 )
 from service.estimation.paper.one_row import engine, headings, imu, ranges, start, state_of
+from service.estimation.rejected import rejected_rows
 
 
 def test_an_absurd_sample_is_counted_and_costs_the_row_nothing() -> None:
@@ -20,7 +21,7 @@ def test_an_absurd_sample_is_counted_and_costs_the_row_nothing() -> None:
     spinning = imu(0.1)
     spinning.imu["gyro"] = 1e300
     for sample, reason in ((spinning, "imu"), (ranges((0.1, -1e9)), "range"), (headings((0.1, 1e17)), "heading")):
-        assert made.process(sample).rejected == {f"{reason}_absurd": 1}
+        assert rejected_rows(made.process(sample)) == {f"{reason}_absurd": [0]}
     assert state_of(made.process(ranges((0.2, 10.0))).poses)[0] == State.TRACKING
 
 
@@ -40,7 +41,7 @@ def test_samples_older_than_the_row_are_late_and_change_nothing() -> None:
     made.process(ranges((1.0, 10.0)))
     for old in (ranges((0.9, 10.0)), headings((0.9, 3.0)), imu(0.9)):
         out = made.process(old)
-        assert out.rejected == {"late": 1}
+        assert rejected_rows(out) == {"late": [0]}
         assert len(out.poses) == 0
 
 
@@ -59,7 +60,7 @@ def test_a_bad_sample_is_counted_and_not_used(bad: SampleBatch, reason: str) -> 
     made.process(headings((0, 0.0)))
     before = made.process(ranges((0, 10.0))).poses
     out = made.process(bad)
-    assert out.rejected == {reason: 1}
+    assert rejected_rows(out) == {reason: [0]}
     assert len(out.poses) == 0
     after = made.process(ranges((0.1, 10.0))).poses  # not late: a refused sample does not move the row's time
     assert after["x"][0] == pytest.approx(before["x"][0], abs=0.05)
@@ -69,7 +70,7 @@ def test_a_bad_sample_is_counted_and_not_used(bad: SampleBatch, reason: str) -> 
 def test_an_imu_sample_that_is_not_finite_is_counted_and_not_used(field: str) -> None:
     samples = imu(0.0)
     samples.imu[field][0, 1] = math.nan
-    assert engine().process(samples).rejected == {"not_finite": 1}
+    assert rejected_rows(engine().process(samples)) == {"not_finite": [0]}
 
 
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e160, 1e18])

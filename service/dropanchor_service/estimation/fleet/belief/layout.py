@@ -195,6 +195,7 @@ BELIEF: Final = np.dtype(
         ("innovation", np.float64),  # of the likeliest hypothesis, in the units of the measurement
         ("innovation_variance", np.float64),  # 0: no measurement met a belief
         ("p_outlier", np.float64),
+        ("stuck", np.bool_),  # the range is one that a stuck radio repeats
         ("hypotheses", np.int32),
         ("state", np.uint8),
         ("reason", np.uint8),

@@ -154,8 +154,8 @@ def _run_node(
     row.since_range_s += node.dt_s
     widen_after_misfit(work, count, row, node, t)
     count = expect_los(work, count, row, node.dt_s, t)
-    stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
-    if node.kind == RANGE and row.anchor >= 0 and not stuck:
+    belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
+    if node.kind == RANGE and row.anchor >= 0 and not belief.stuck:
         update_with_range(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
         count = propose_alternatives(work, count, row, t)

@@ -6,10 +6,10 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, RANGE_EVENT, Event
+from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, Event
 from dropanchor_service.estimation.fleet.frontend.inertial import Frontend, add_sample, close_node
 from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, NO_MEASUREMENT, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import NO_MEASUREMENT, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.frontend.platform import (
     Platform,
     add_reading,
@@ -45,7 +45,7 @@ def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node)
 @njit(nogil=True)
 def _measure(node: Node, event: Event, row: Any, platform: Platform) -> None:
     """Put the event's measurement into the node."""
-    node.kind = RANGE if event.kind == RANGE_EVENT else BEARING
+    node.kind = event.kind
     node.anchor = event.anchor
     node.z = event.value
     node.z_std = event.std
@@ -95,7 +95,7 @@ def assemble_nodes(
                 if front.running == 1 or not _is_long(front, platform, t_ns):
                     continue
             _close(front, platform, row, t_ns, node)
-            if event.kind >= RANGE_EVENT:
+            if event.kind != HEADING_EVENT:
                 _measure(node, event, row, platform)
         node.row = r
         n += 1

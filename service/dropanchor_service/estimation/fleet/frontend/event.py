@@ -1,4 +1,4 @@
-"""A heading, range or bearing on its way to a node."""
+"""A heading, range or bearing on its way to a node, and what does not get there."""
 
 from typing import Any, Final, TypeAlias
 
@@ -20,3 +20,7 @@ EVENT: Final = np.dtype(
     ]
 )
 Event: TypeAlias = Any  # a record of EVENT
+
+ANCHOR_UNKNOWN, NOT_FINITE, LATE = range(3)
+REASONS: Final = {"anchor_unknown": ANCHOR_UNKNOWN, "not_finite": NOT_FINITE, "late": LATE}
+REJECTION: Final = np.dtype([("row", np.int32), ("reason", np.uint8)])

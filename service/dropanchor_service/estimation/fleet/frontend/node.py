@@ -9,6 +9,8 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from dropanchor_service.estimation.fleet.frontend.event import BEARING_EVENT, RANGE_EVENT
+
 NO_HEADING: Final = 0
 ABSOLUTE_HEADING: Final = 1  # from magnetic north; heading_var is of an error that lasts for minutes
 RELATIVE_HEADING: Final = 2  # from the gyroscope: its zero is arbitrary, or given at the start
@@ -20,8 +22,8 @@ RESTING: Final = 1  # confirmed by the IMU
 NOT_MOVED: Final = 2  # has not moved since the start, so far as ranges and headings tell
 
 NO_MEASUREMENT: Final = 0
-RANGE: Final = 1
-BEARING: Final = 2
+RANGE: Final = RANGE_EVENT
+BEARING: Final = BEARING_EVENT
 
 NODE: Final = np.dtype(
     [
@@ -41,7 +43,7 @@ NODE: Final = np.dtype(
         ("heading_var", np.float64),  # rad^2
         ("heading_kind", np.uint8),
         ("rest", np.uint8),  # MOVING, RESTING or NOT_MOVED
-        ("kind", np.uint8),  # NO_MEASUREMENT, RANGE or BEARING
+        ("kind", np.uint8),  # of the event that ended it, or NO_MEASUREMENT
         ("anchor", np.int32),  # index into the anchor table
         ("z", np.float64),  # m (slant range) or rad (azimuth of the tag seen from the anchor)
         ("z_std", np.float64),  # m or rad; NaN: the tag's setting

@@ -1,23 +1,20 @@
 """Samples of many rows to one order of row and time. Measurements wait until their row's IMU has caught up."""
 
-from collections import Counter
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array, SampleBatch
-from dropanchor_service.estimation.fleet.frontend.event import EVENT
-from dropanchor_service.estimation.fleet.frontend.sorting import (
+from dropanchor_service.estimation.fleet.frontend.event import EVENT, REASONS, REJECTION
+from dropanchor_service.estimation.fleet.frontend.pending import (
     NONE,
-    REJECTIONS,
     ROW_QUEUE,
     UNTOUCHED,
-    Batch,
     Pending,
     append_pending,
     drop_pending,
-    order_samples,
 )
+from dropanchor_service.estimation.fleet.frontend.sorting import REJECTED, Batch, order_samples
 
 NEVER: Final = np.iinfo(np.int64).min // 2
 FIRST_CAPACITY: Final = 64
@@ -27,11 +24,12 @@ class Due(NamedTuple):
     """Samples that can be fused now. Valid until the next batch.
 
     order: indices into the batch's IMU samples and, behind them, `events` (EVENT); by row, then time, then kind, then
-    arrival.
+    arrival. rejected: by reason, the row of each sample of the batch that is not usable.
     """
 
     events: Array
     order: Array
+    rejected: dict[str, Array]
 
 
 class SampleQueue:
@@ -75,8 +73,8 @@ class SampleQueue:
         for event in state["pending"]:
             append_pending(self._queues[event["row"]], self._pending, event)
 
-    def due(self, samples: SampleBatch, anchors: int, rejected: Counter[str]) -> Due:
-        """Return what can be fused now, and count what is not usable in `rejected`.
+    def due(self, samples: SampleBatch, anchors: int) -> Due:
+        """Return what can be fused now.
 
         Raises IndexError for a sample of a row that is not configured.
         """
@@ -86,10 +84,12 @@ class SampleQueue:
         ordered = order_samples(*columns, anchors, self._queues[: self._rows], self._pending, self._batch)
         if ordered == NONE:
             raise IndexError("a sample belongs to a row that is not configured: call configure for it first")
-        for reason, index in REJECTIONS.items():
-            if self._batch.counts[index]:
-                rejected[reason] += int(self._batch.counts[index])
-        return Due(self._batch.events, self._batch.order[:ordered])
+        return Due(self._batch.events, self._batch.order[:ordered], self._rejected())
+
+    def _rejected(self) -> dict[str, Array]:
+        rejected = self._batch.rejected[: self._batch.counts[REJECTED]]
+        by_reason = {reason: rejected["row"][rejected["reason"] == code] for reason, code in REASONS.items()}
+        return {reason: rows for reason, rows in by_reason.items() if len(rows)}
 
     def _reserve(self, samples: int, measurements: int) -> None:
         """Make room for this many samples, of which so many measurements may become pending."""
@@ -138,4 +138,5 @@ def _enlarge(pending: Pending, slots: int) -> Pending:
 def _make_batch(samples: int) -> Batch:
     following, order, spare, touched = np.zeros((4, samples), np.int32)
     times = np.zeros(samples, np.int64)
-    return Batch(np.zeros(samples, EVENT), following, times, order, spare, touched, np.zeros(5, np.int64))
+    events, rejected = np.zeros(samples, EVENT), np.zeros(samples, REJECTION)
+    return Batch(events, following, times, order, spare, touched, rejected, np.zeros(3, np.int64))

@@ -7,37 +7,34 @@ takes an array out of a tuple.
 """
 
 import math
-from typing import Any, Final, NamedTuple, TypeAlias
-
-import numpy as np
+from typing import Any, Final, NamedTuple
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.event import BEARING_EVENT, HEADING_EVENT, RANGE_EVENT, Event
+from dropanchor_service.estimation.fleet.frontend.event import (
+    ANCHOR_UNKNOWN,
+    BEARING_EVENT,
+    HEADING_EVENT,
+    LATE,
+    NOT_FINITE,
+    RANGE_EVENT,
+    Event,
+)
+from dropanchor_service.estimation.fleet.frontend.pending import (
+    NONE,
+    UNTOUCHED,
+    Pending,
+    RowQueue,
+    append_pending,
+    append_slot,
+    free_slot,
+)
 
 REORDER_WINDOW: Final = 250_000_000  # ns in which late samples are put in order
 TOLERANCE: Final = 40_000_000  # ns by which the IMU may lag behind a measurement
 IMU_TIMEOUT: Final = 1_000_000_000  # ns without an IMU sample after which no measurement waits for one
 
-NONE: Final = -1
-UNTOUCHED: Final = -2
-
-ROW_QUEUE: Final = np.dtype(
-    [
-        ("imu", np.int64),  # ns, newest IMU sample of the row
-        ("newest", np.int64),  # ns, newest sample of the row
-        ("imu_next", np.int64),  # the same two with the samples of the present batch
-        ("newest_next", np.int64),
-        ("first", np.int32),  # index of the row's first sample in the batch; UNTOUCHED: it has none
-        ("last", np.int32),
-        ("pending", np.int32),  # first and last slot of the row's pending events
-        ("pending_last", np.int32),
-    ]
-)
-RowQueue: TypeAlias = Any  # a record of ROW_QUEUE
-
-EVENTS, TOUCHED, ANCHOR_UNKNOWN, NOT_FINITE, LATE = range(5)  # indices of the counts of a batch
-REJECTIONS: Final = {"anchor_unknown": ANCHOR_UNKNOWN, "not_finite": NOT_FINITE, "late": LATE}
+EVENTS, TOUCHED, REJECTED = range(3)  # indices of the counts of a batch
 
 
 class Batch(NamedTuple):
@@ -49,14 +46,7 @@ class Batch(NamedTuple):
     order: Array  # the result: indices of samples
     spare: Array
     touched: Array  # rows
-    counts: Array
-
-
-class Pending(NamedTuple):
-    """Slots of pending events, in one list per row. Slot 0 is the head of the free list; counts[0] are in use."""
-
-    events: Array  # EVENT
-    following: Array
+    rejected: Array  # REJECTION
     counts: Array
 
 
@@ -79,18 +69,18 @@ def order_samples(
     if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
         return NONE
     batch.counts[:] = 0
-    _add_imu(imu, queues, batch.following, batch.times, batch.touched, batch.counts)
+    _add_imu(imu, queues, batch.following, batch.times, batch.touched, batch)
     for k in range(len(headings)):
         sample = headings[k]
         _add_event(len(imu), sample, sample.heading, HEADING_EVENT, NONE, queues, batch)
     for k in range(len(ranges)):
         sample = ranges[k]
-        if _anchor_known(sample.anchor, anchors, batch):
+        if _anchor_known(sample, anchors, batch):
             _add_event(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, queues, batch)
     for k in range(len(bearings)):
         sample = bearings[k]
-        if _anchor_known(sample.anchor, anchors, batch):
-            value = sample.bearing if sample.std > 0.0 else np.nan
+        if _anchor_known(sample, anchors, batch):
+            value = sample.bearing if sample.std > 0.0 else math.nan
             _add_event(len(imu), sample, value, BEARING_EVENT, sample.anchor, queues, batch)
     due = 0
     for k in range(batch.counts[TOUCHED]):
@@ -111,25 +101,33 @@ def _within(column: Array, rows: int) -> bool:
 
 
 @njit(nogil=True)
-def _anchor_known(anchor: int, anchors: int, batch: Batch) -> bool:
-    known = 0 <= anchor < anchors
+def _anchor_known(sample: Any, anchors: int, batch: Batch) -> bool:
+    known = bool(0 <= sample.anchor < anchors)
     if not known:
-        batch.counts[ANCHOR_UNKNOWN] += 1
+        _reject(sample.row, ANCHOR_UNKNOWN, batch)
     return known
 
 
 @njit(nogil=True)
-def _add_imu(imu: Array, queues: Array, following: Array, times: Array, touched: Array, counts: Array) -> None:
+def _reject(row: int, reason: int, batch: Batch) -> None:
+    rejection = batch.rejected[batch.counts[REJECTED]]
+    rejection.row, rejection.reason = row, reason
+    batch.counts[REJECTED] += 1
+
+
+@njit(nogil=True)
+def _add_imu(imu: Array, queues: Array, following: Array, times: Array, touched: Array, batch: Batch) -> None:
     """Append every usable IMU sample to its row's list. One from before an earlier batch's is late."""
+    counts = batch.counts
     for index in range(len(imu)):
         sample = imu[index]
         if not math.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
-            counts[NOT_FINITE] += 1
+            _reject(sample.row, NOT_FINITE, batch)
             continue
         queue, t_ns = queues[sample.row], sample.t_ns
         _open_list(queue, sample.row, touched, counts)
         if t_ns < queue.imu:
-            counts[LATE] += 1
+            _reject(sample.row, LATE, batch)
             continue
         queue.imu_next = max(queue.imu_next, t_ns)
         _append_sample(queue, t_ns, index, following, times)
@@ -140,12 +138,12 @@ def _add_event(imu_count: int, sample: Any, value: float, kind: int, anchor: int
     """Append a heading, range or bearing to its row's list, unless it is not finite or too late."""
     counts = batch.counts
     if not math.isfinite(value):
-        counts[NOT_FINITE] += 1
+        _reject(sample.row, NOT_FINITE, batch)
         return
     queue = queues[sample.row]
     _open_list(queue, sample.row, batch.touched, counts)
     if sample.t_ns < queue.newest - REORDER_WINDOW:
-        counts[LATE] += 1
+        _reject(sample.row, LATE, batch)
         return
     index = counts[EVENTS]
     counts[EVENTS] += 1
@@ -199,9 +197,9 @@ def _release_pending(imu_count: int, queue: RowQueue, pending: Pending, batch: B
             batch.times[imu_count + index] = pending.events[slot].t_ns
             batch.order[end] = imu_count + index
             end += 1
-            _free(pending, slot)
+            free_slot(pending, slot)
         else:
-            _append_slot(queue, pending, slot)
+            append_slot(queue, pending, slot)
         slot = following
     return end
 
@@ -221,42 +219,6 @@ def _release_new(
             append_pending(queue, pending, events[index - imu_count])
         index = following[index]
     return end
-
-
-@njit(nogil=True)
-def _free(pending: Pending, slot: int) -> None:
-    pending.following[slot] = pending.following[0]
-    pending.following[0] = slot
-    pending.counts[0] -= 1
-
-
-@njit(nogil=True)
-def _append_slot(queue: RowQueue, pending: Pending, slot: int) -> None:
-    if queue.pending == NONE:
-        queue.pending = slot
-    else:
-        pending.following[queue.pending_last] = slot
-    queue.pending_last = slot
-    pending.following[slot] = NONE
-
-
-@njit(cache=True, nogil=True)
-def append_pending(queue: RowQueue, pending: Pending, event: Event) -> None:
-    """Append the event to its row's pending ones. There must be a free slot."""
-    slot = pending.following[0]
-    pending.following[0] = pending.following[slot]
-    pending.counts[0] += 1
-    pending.events[slot] = event
-    _append_slot(queue, pending, slot)
-
-
-@njit(cache=True, nogil=True)
-def drop_pending(queue: RowQueue, pending: Pending) -> None:
-    """Drop all pending events of a row."""
-    while queue.pending != NONE:
-        slot = queue.pending
-        queue.pending = pending.following[slot]
-        _free(pending, slot)
 
 
 @njit(nogil=True)
