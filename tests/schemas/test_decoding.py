@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dropanchor_schemas import decode_json
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import (
+    COUNTS_AT,
     HEADER,
     MAX_PAYLOAD_BYTES,
     Frame,
@@ -75,10 +77,8 @@ def test_a_truncated_packed_payload_is_always_rejected(frame: Frame, data: st.Da
     assert isinstance(decode_packed(payload[: data.draw(st.integers(0, len(payload) - 1))]), Rejection)
 
 
-def header(
-    *, version: int = 1, flags: int = 0, ranges: int = 1, t0_ns: int = T, zero16: int = 0, zero32: int = 0
-) -> bytes:
-    return HEADER.pack(version, flags, 0, ranges, 0, 1, 1, t0_ns, 0, zero16, zero32, 0)
+def header(*, version: int = 1, flags: int = 0, ranges: int = 1, t0_ns: int = T) -> bytes:
+    return HEADER.pack(version, flags, 0, ranges, 0, 1, 1, t0_ns, 0, 0, 0, 0)
 
 
 ONE = struct.pack("<IIff", 0, 7, 1.0, 0.1)
@@ -88,7 +88,7 @@ PACKED = {
     Reason.HEADER_TRUNCATED: [b"\x01", header()[:31]],
     Reason.VERSION_UNKNOWN: [b"\x02", header(version=0) + ONE, header(version=2) + ONE],
     Reason.FLAGS_UNKNOWN: [header(flags=4) + ONE, header(flags=0x81) + ONE],
-    Reason.RESERVED_NOT_ZERO: [header(zero16=1) + ONE, header(zero32=1) + ONE],
+    Reason.RESERVED_NOT_ZERO: [header()[:at] + b"\1" + header()[at + 1 :] + ONE for at in COUNTS_AT[len(KINDS) :]],
     Reason.LENGTH_MISMATCH: [header(), header() + ONE[:-1], header() + ONE + b"\0", header(ranges=0) + ONE],
     Reason.NO_SAMPLES: [header(ranges=0)],
     Reason.TIME_OUT_OF_RANGE: [header(t0_ns=-1) + ONE, header(t0_ns=2**62) + ONE],

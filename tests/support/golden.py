@@ -9,6 +9,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import (
     BearingSample,
     Frame,
@@ -50,6 +51,9 @@ FRAMES = {
     "not numbered": Frame(imu=[ImuSample(T, (-1.5, 2.5, 3.4e38), (0.0, -0.0, 1e-42))]),
 }
 
+# A kind is part of the file once a frame above has it, because all codecs must know it then.
+GOLDEN_KINDS = [kind for kind in KINDS if any(getattr(frame, kind.field) for frame in FRAMES.values())]
+
 
 def refused() -> dict[str, bytes]:
     whole = encode_packed(FRAMES["one range"])
@@ -74,7 +78,7 @@ def described(frame: Frame) -> dict[str, Any]:
         "replay": frame.replay,
         "sequence": frame.sequence or 0,
         "boot_id": frame.boot_id or 0,
-        **{kind.name: [_described(sample) for sample in samples] for kind, samples in frame.by_kind()},
+        **{kind.name: [_described(sample) for sample in getattr(frame, kind.field)] for kind in GOLDEN_KINDS},
     }
 
 
