@@ -12,8 +12,9 @@ from typing import Any
 import pytest
 
 from dropanchor_schemas import keys
-from dropanchor_schemas.wire import Rejection, anchor_number, encode_packed, read_header
-from support.golden import FILE, FRAMES
+from dropanchor_schemas.kinds import KINDS
+from dropanchor_schemas.wire import COUNTS_AT, Rejection, anchor_number, encode_packed, read_header
+from support.golden import FILE, FRAMES, GOLDEN_KINDS
 
 ROOT = Path(__file__).parents[3]
 HEADER = ROOT / "tag_client/c"
@@ -87,6 +88,7 @@ def test_thousands_of_mutated_payloads_are_judged_alike_and_read_within_their_by
     rng = random.Random(7)
     whole = [encode_packed(frame) for frame in FRAMES.values()]
     payloads = [b"", bytes(70_000), *(mutated(rng, rng.choice(whole)) for _ in range(5000))]
+    payloads = [data for data in payloads if not has_later_kind(data)]
     done = run(codec, "check", data=b"".join(struct.pack("<I", len(data)) + data for data in payloads))
     found = done.stdout.decode().split()
     assert found == [reason(data) for data in payloads]
@@ -98,6 +100,11 @@ def mutated(rng: random.Random, data: bytes) -> bytes:
     for _ in range(rng.choice([0, 1, 1, 2])):
         broken[rng.randrange(min(len(broken), 40))] = rng.choice([0, 1, 2, 0x3F, 0x40, 0x80, 0xFF])
     return bytes(broken[: rng.choice([len(broken), len(broken), rng.randrange(len(broken))])])
+
+
+def has_later_kind(data: bytes) -> bool:
+    """Return whether the header counts samples of a kind that the C codec need not know."""
+    return any(any(data[at : at + 2]) for kind, at in zip(KINDS, COUNTS_AT, strict=False) if kind not in GOLDEN_KINDS)
 
 
 def reason(data: bytes) -> str:
