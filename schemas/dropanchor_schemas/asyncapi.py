@@ -8,8 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from dropanchor_schemas import keys
-from dropanchor_schemas.answers import PoseFrame
-from dropanchor_schemas.pose import Pose
+from dropanchor_schemas.pose import Pose, PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER, MAX_PAYLOAD_BYTES

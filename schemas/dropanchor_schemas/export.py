@@ -7,9 +7,8 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from dropanchor_schemas import asyncapi
-from dropanchor_schemas.answers import PoseFrame
 from dropanchor_schemas.explain import Explanation
-from dropanchor_schemas.pose import Pose, PoseList
+from dropanchor_schemas.pose import Pose, PoseFrame, PoseList
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, Site, TagSettings
 

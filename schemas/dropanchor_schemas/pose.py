@@ -91,3 +91,35 @@ class PoseList(_Answer):
 
     t_ns: int = Field(description="UTC, ns: the time of the answer.")
     poses: list[Pose]
+
+
+class PoseFrame(_Answer):
+    """Poses of many tags in columns: entry i of every column belongs to tag i. Names and units are those of a pose.
+    Metres and radians are rounded to 4 decimals, degrees to 9. `lat` and `lon` exist only if the site is
+    georeferenced."""
+
+    t_ns: int = Field(
+        description="UTC, ns: the time of the frame. The pose of tag i is age_s[i] older, unless the tag is a replay."
+    )
+    tags: list[str]
+    online: list[bool]
+    state: list[TrackingState]
+    reason: list[StateReason]
+    hint: list[str]
+    anchor: list[str | None]
+    age_s: list[float]
+    x: list[float | None]
+    y: list[float | None]
+    heading_rad: list[float | None]
+    speed_mps: list[float | None]
+    yaw_rate_radps: list[float | None]
+    range_m: list[float | None]
+    p_mode: list[float | None]
+    sigma_pos_m: list[float | None]
+    sigma_obs_m: list[float | None]
+    semi_major_m: list[float | None] = Field(description="Semi-major axis of the 95 % ellipse, m.")
+    semi_minor_m: list[float | None]
+    angle_rad: list[float | None]
+    hypotheses: list[list[Hypothesis] | None] = Field(description="Hypotheses of an ambiguous tag; null otherwise.")
+    lat: list[float | None] | None = None
+    lon: list[float | None] | None = None

@@ -14,6 +14,7 @@ from benchmarks import report
 from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.answers.columns import PoseColumns, columns_of, ellipse_95
+from dropanchor_service.answers.pose_fields import POSE_FIELDS
 from dropanchor_service.engines.warm_up import warm_up_answers
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
@@ -40,34 +41,12 @@ class Hypothesis(msgspec.Struct):
     ellipse_95: Ellipse | None
 
 
-class Pose(msgspec.Struct):
-    tag: str
-    t_ns: int
-    age_s: float
-    state: str
-    reason: str
-    hint: str
-    x: float
-    y: float
-    heading_rad: float
-    speed_mps: float
-    yaw_rate_radps: float
-    covariance: list[list[float]] | None
-    ellipse_95: Ellipse | None
-    p_mode: float
-    sigma_pos_m: float
-    sigma_obs_m: float
-    range_m: float
-    anchor: str | None
-    hypotheses: list[Hypothesis]
-    lat: float | None
-    lon: float | None
-    online: bool
+Pose = msgspec.defstruct("Pose", list(POSE_FIELDS))
 
 
 class PoseList(msgspec.Struct):
     t_ns: int
-    poses: list[Pose]
+    poses: list[Any]
 
 
 def test_a_pose_list_from_rows_to_bytes() -> None:
@@ -125,16 +104,14 @@ def encode_with_msgspec(answers: Answers) -> bytes:
 
 def fields(columns: PoseColumns, answers: Answers) -> Iterator[Any]:
     """Yield the values of each field of `Pose`."""
-    poses, nowhere = columns.poses, [None] * len(columns.poses)
-    yield from (columns.tags, poses["t_ns"].tolist(), columns.age_s.tolist())
-    yield from (columns.states, columns.reasons, columns.hints)
-    yield from (poses[name].tolist() for name in ("x", "y", "heading", "speed", "yaw_rate"))
-    yield poses["cov"].tolist()
-    yield ellipses(np.stack([columns.semi_major_m, columns.semi_minor_m, columns.angle_rad]))
-    yield from (poses[name].tolist() for name in ("p_mode", "sigma_pos", "sigma_obs", "range"))
-    yield columns.anchors
-    yield hypotheses(poses, answers)
-    yield from (nowhere, nowhere, columns.online.tolist())
+    for name, field in POSE_FIELDS.items():
+        match name:
+            case "ellipse_95":
+                yield ellipses(np.stack([columns.semi_major_m, columns.semi_minor_m, columns.angle_rad]))
+            case "hypotheses":
+                yield hypotheses(columns.poses, answers)
+            case _:
+                yield field.values(columns)
 
 
 def ellipses(axes: Array) -> list[Ellipse]:

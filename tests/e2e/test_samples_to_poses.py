@@ -10,8 +10,8 @@ import pytest
 import zenoh
 
 from dropanchor_schemas import Pose, keys
-from dropanchor_schemas.answers import PoseFrame
 from dropanchor_schemas.explain import Explanation
+from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encode_json, encode_packed
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.settings.sources import load_settings

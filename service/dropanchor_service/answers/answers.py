@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 import orjson
 
-from dropanchor_service.answers.columns import PoseColumns, aged_poses, columns_of, ellipse_95
+from dropanchor_service.answers.columns import aged_poses, columns_of, ellipse_95
 from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
+from dropanchor_service.answers.pose_fields import FRAME_FIELDS, POSE_FIELDS, ellipse_values
 from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
 from dropanchor_service.answers.track_pages import pose_in_tracks
 from dropanchor_service.estimation.columns import POSE, Array, State
@@ -131,31 +132,17 @@ class Answers:
     ) -> list[Answer]:
         """Return the `Pose` for each of these POSE rows, without hypotheses."""
         columns = columns_of(poses, self.site, self.tags, now_ns, historical, names)
-        return [dict(zip(_POSE_NAMES, values, strict=True)) for values in zip(*_pose_values(columns), strict=True)]
+        every = zip(*(field.values(columns) for field in POSE_FIELDS.values()), strict=True)
+        return [dict(zip(POSE_FIELDS, values, strict=True)) for values in every]
 
     def frame_of(self, poses: Array, now_ns: int) -> Answer:
         """Return the `PoseFrame` of these POSE rows: columns, cheap for many tags many times a second."""
         columns = columns_of(poses, self.site, self.tags, now_ns)
-        frame: Answer = {
-            "t_ns": now_ns,
-            "tags": columns.tags,
-            "online": columns.online.tolist(),
-            "state": columns.states,
-            "reason": columns.reasons,
-            "hint": columns.hints,
-            "anchor": columns.anchors,
-            "age_s": np.round(columns.age_s, 3),
-        }
-        for name, field in _FRAME_FIELDS.items():
-            frame[name] = np.round(columns.poses[field], 4)
-        frame["semi_major_m"] = np.round(columns.semi_major_m, 4)
-        frame["semi_minor_m"] = np.round(columns.semi_minor_m, 4)
-        frame["angle_rad"] = np.round(columns.angle_rad, 4)
+        values = {name: field.frame_values(columns) for name, field in FRAME_FIELDS.items()}
+        frame = {"t_ns": now_ns} | {name: column for name, column in values.items() if column is not None}
         modes = map(orjson.Fragment, self._hypotheses_json(columns.poses))
         ambiguous = columns.poses["state"] == State.AMBIGUOUS
         frame["hypotheses"] = [next(modes) if is_ambiguous else None for is_ambiguous in ambiguous.tolist()]
-        if columns.lat is not None and columns.lon is not None:
-            frame["lat"], frame["lon"] = np.round(columns.lat, 9), np.round(columns.lon, 9)
         return frame
 
     def rows(self, tags: Sequence[Tag] | None = None) -> Array:
@@ -169,57 +156,12 @@ class Answers:
         return _hypotheses(self.latest.hypotheses(row)) if state == _AMBIGUOUS else None
 
 
-_FRAME_FIELDS = {
-    "x": "x",
-    "y": "y",
-    "heading_rad": "heading",
-    "speed_mps": "speed",
-    "yaw_rate_radps": "yaw_rate",
-    "range_m": "range",
-    "p_mode": "p_mode",
-    "sigma_pos_m": "sigma_pos",
-    "sigma_obs_m": "sigma_obs",
-}
-
-_POSE_NAMES = (
-    *("tag", "t_ns", "age_s", "state", "reason", "hint"),
-    *("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps"),
-    *("covariance", "ellipse_95", "p_mode", "sigma_pos_m", "sigma_obs_m", "range_m", "anchor"),
-    *("hypotheses", "lat", "lon", "online"),
-)
-
-
-def _pose_values(columns: PoseColumns) -> tuple[Sequence[Any], ...]:
-    """Return one sequence per name in _POSE_NAMES."""
-    poses = columns.poses
-    known = np.isfinite(poses["cov"]).all(axis=(1, 2))
-    nulls = [None] * len(poses)
-    return (
-        *(columns.tags, poses["t_ns"].tolist(), columns.age_s.tolist(), columns.states, columns.reasons, columns.hints),
-        *(poses[field].tolist() for field in ("x", "y", "heading", "speed", "yaw_rate")),
-        [cov if finite else None for cov, finite in zip(poses["cov"].tolist(), known.tolist(), strict=True)],
-        _ellipses(columns.semi_major_m, columns.semi_minor_m, columns.angle_rad),
-        *(poses[field].tolist() for field in ("p_mode", "sigma_pos", "sigma_obs", "range")),
-        columns.anchors,
-        nulls,
-        nulls if columns.lat is None else columns.lat.tolist(),
-        nulls if columns.lon is None else columns.lon.tolist(),
-        columns.online.tolist(),
-    )
-
-
-def _ellipses(major: Array, minor: Array, angle: Array) -> list[Answer | None]:
-    """Return an `Ellipse` for each, None where it is NaN."""
-    return [
-        {"semi_major_m": a, "semi_minor_m": b, "angle_rad": c} if a == a else None
-        for a, b, c in zip(major.tolist(), minor.tolist(), angle.tolist(), strict=True)
-    ]
-
-
 def _hypotheses(modes: Array) -> list[Answer]:
     """Return a `Hypothesis` for each HYPOTHESIS."""
     fields = zip(*(modes[name].tolist() for name in ("weight", "x", "y", "heading", "speed")), strict=True)
     return [
         {"weight": weight, "x": x, "y": y, "heading_rad": heading, "speed_mps": speed, "ellipse_95": ellipse}
-        for (weight, x, y, heading, speed), ellipse in zip(fields, _ellipses(*ellipse_95(modes["cov"])), strict=True)
+        for (weight, x, y, heading, speed), ellipse in zip(
+            fields, ellipse_values(*ellipse_95(modes["cov"])), strict=True
+        )
     ]

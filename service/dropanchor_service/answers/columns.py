@@ -59,23 +59,6 @@ class PoseColumns:
     lat: Array | None
     lon: Array | None
 
-    @property
-    def states(self) -> list[str]:
-        return [STATES[state] for state in self.poses["state"].tolist()]
-
-    @property
-    def reasons(self) -> list[str]:
-        return [REASONS[reason] for reason in self.poses["reason"].tolist()]
-
-    @property
-    def hints(self) -> list[str]:
-        return [self.hint_texts[index] for index in self.hint.tolist()]
-
-    @property
-    def anchors(self) -> list[str | None]:
-        ids = self.anchor_ids
-        return [ids[index] if 0 <= index < len(ids) else None for index in self.poses["anchor"].tolist()]
-
 
 def columns_of(
     poses: Array,

@@ -9,26 +9,22 @@ from typing import Any
 import numpy as np
 import orjson
 
-from dropanchor_service.answers.columns import REASONS, STATES, PoseColumns, ellipse_95
-from dropanchor_service.answers.json_template import INTEGER, NUMBER, QUOTED, TEXT, Filled, filled, null_for
+from dropanchor_service.answers.columns import PoseColumns, ellipse_95
+from dropanchor_service.answers.json_template import NUMBER, Filled, filled, null_for
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
+from dropanchor_service.answers.pose_fields import DECIMALS, ELLIPSE, POSE_FIELDS, JsonPart
 from dropanchor_service.estimation.columns import Array, State
 
 CHUNK = 2500  # poses
-DECIMALS, FINE_DECIMALS = 6, 9  # digits of m, rad and s; of variances and degrees
-
-_DECIMALS = np.repeat([DECIMALS, FINE_DECIMALS, DECIMALS, FINE_DECIMALS], [6, 9, 7, 2])  # of the columns of _numbers
-_COVARIANCE = [[NUMBER] * 3] * 3
-_ELLIPSE = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 
 
 def poses_json(columns: PoseColumns, hypotheses: Iterable[bytes]) -> Filled:
     """Return the JSON of a `Pose` for each. hypotheses: JSON of those of each ambiguous pose."""
-    codes = _codes(columns)
-    used, form_of = np.unique(codes, return_inverse=True)
-    forms = [_form(columns, code) for code in used.tolist()]
-    texts = _texts(columns, hypotheses)
-    return filled(forms, form_of, _numbers(columns), _DECIMALS, columns.poses["t_ns"], texts)
+    parts = {name: field.json_part(columns) for name, field in POSE_FIELDS.items()}
+    forms, form_of = _forms(parts)
+    numbers = np.column_stack([column for part in parts.values() for column in part.numbers])
+    decimals = np.array([decimals for part in parts.values() for decimals in part.decimals])
+    return filled(forms, form_of, numbers, decimals, columns.poses["t_ns"], _texts(columns, hypotheses))
 
 
 def list_json(t_ns: int, chunks: Iterable[Filled]) -> Iterator[bytes | memoryview]:
@@ -43,7 +39,7 @@ def hypotheses_json(modes: Array, counts: Array) -> list[bytes]:
     """Return the JSON of the list of `Hypothesis` of each tag. counts: number of HYPOTHESIS of each tag."""
     axes = ellipse_95(modes["cov"])
     numbers = np.column_stack([modes[name] for name in ("weight", "x", "y", "heading", "speed")] + list(axes))
-    forms = [_hypothesis(ellipse) for ellipse in (null_for(3), _ELLIPSE)]
+    forms = [_hypothesis(ellipse) for ellipse in (null_for(3), ELLIPSE)]
     each = filled(forms, (axes[0] < BEYOND).astype(np.int64), numbers, np.full(8, DECIMALS)).each
     ends = np.cumsum(counts).tolist()
     return [b"[%b]" % b",".join(each[begin:end]) for begin, end in zip([0, *ends], ends, strict=False)]
@@ -54,47 +50,22 @@ def _hypothesis(ellipse: Any) -> bytes:
     return orjson.dumps(scalars | {"ellipse_95": ellipse})
 
 
-def _codes(columns: PoseColumns) -> Array:
-    """Return a code for each pose that holds everything its form depends on."""
-    poses = columns.poses
-    known = (np.abs(poses["cov"].reshape(-1, 9)) < BEYOND).all(axis=1)
-    anchor = np.where((poses["anchor"] >= 0) & (poses["anchor"] < len(columns.anchor_ids)), poses["anchor"], -1)
-    flags = columns.online * 4 + known * 2 + (columns.semi_major_m < BEYOND)
-    states = poses["state"].astype(np.int64) * len(REASONS) + poses["reason"]
-    hinted = columns.hint.astype(np.int64) * (len(columns.anchor_ids) + 1) + anchor + 1
-    codes: Array = (hinted * len(STATES) * len(REASONS) + states) * 8 + flags
-    return codes
+def _forms(parts: dict[str, JsonPart]) -> tuple[list[bytes], Array]:
+    """Return the forms of poses that occur, and the index of that of each pose."""
+    varied = {name: part.forms for name, part in parts.items() if part.form_of is not None}
+    choices = np.column_stack([part.form_of for part in parts.values() if part.form_of is not None])
+    codes = choices @ np.cumprod([1, *map(len, varied.values())])[:-1]
+    used, form_of = np.unique(codes, return_inverse=True)
+    examples = np.empty(len(used), np.int64)  # one pose of each form
+    examples[form_of] = np.arange(len(codes))
+    fixed = {name: part.forms[0] for name, part in parts.items()}
+    return [_form(fixed, varied, chosen) for chosen in choices[examples].tolist()], form_of
 
 
-def _form(columns: PoseColumns, code: int) -> bytes:
-    """Return the form of the poses with this code."""
-    code, flags = divmod(code, 8)
-    code, reason = divmod(code, len(REASONS))
-    code, state = divmod(code, len(STATES))
-    hint, anchor = divmod(code, len(columns.anchor_ids) + 1)
-    place = NUMBER if columns.lat is not None else None
+def _form(fixed: dict[str, Any], varied: dict[str, Sequence[Any]], chosen: list[int]) -> bytes:
+    """Return the JSON of a pose with `fixed` and with the chosen one of each `varied` field."""
     return orjson.dumps(
-        {"tag": QUOTED, "t_ns": INTEGER, "age_s": NUMBER}
-        | {"state": STATES[state], "reason": REASONS[reason], "hint": columns.hint_texts[hint]}
-        | dict.fromkeys(("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps"), NUMBER)
-        | {"covariance": _COVARIANCE if flags & 2 else null_for(9)}
-        | {"ellipse_95": _ELLIPSE if flags & 1 else null_for(3)}
-        | dict.fromkeys(("p_mode", "sigma_pos_m", "sigma_obs_m", "range_m"), NUMBER)
-        | {"anchor": columns.anchor_ids[anchor - 1] if anchor else None}
-        | {"hypotheses": TEXT if state == State.AMBIGUOUS else []}
-        | {"lat": place, "lon": place, "online": bool(flags & 4)}
-    )
-
-
-def _numbers(columns: PoseColumns) -> Array:
-    """Return the numbers of each pose, in the order of the placeholders of a form."""
-    poses = columns.poses
-    return np.column_stack(
-        [columns.age_s]
-        + [poses[name] for name in ("x", "y", "heading", "speed", "yaw_rate")]
-        + [poses["cov"].reshape(-1, 9), columns.semi_major_m, columns.semi_minor_m, columns.angle_rad]
-        + [poses[name] for name in ("p_mode", "sigma_pos", "sigma_obs", "range")]
-        + [column for column in (columns.lat, columns.lon) if column is not None]
+        fixed | {name: forms[choice] for (name, forms), choice in zip(varied.items(), chosen, strict=True)}
     )
 
 

@@ -8,7 +8,8 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from prometheus_client import CollectorRegistry
 
-from dropanchor_schemas.answers import PoseFrame, Problem
+from dropanchor_schemas.answers import Problem
+from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import OPEN_PATHS, Access

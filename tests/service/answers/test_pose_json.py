@@ -11,7 +11,8 @@ import pytest
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.answers.json_template import NUMBER, filled
-from dropanchor_service.answers.pose_json import CHUNK, DECIMALS, FINE_DECIMALS
+from dropanchor_service.answers.pose_fields import DECIMALS, FINE_DECIMALS
+from dropanchor_service.answers.pose_json import CHUNK
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from prometheus_client import Counter
 
-from dropanchor_schemas.answers import PoseFrame, TagList
+from dropanchor_schemas.answers import TagList
 from dropanchor_schemas.explain import Explanation
-from dropanchor_schemas.pose import PoseList
+from dropanchor_schemas.pose import PoseFrame, PoseList
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.api import export
 from dropanchor_service.api.app import MAX_BODY_BYTES

@@ -13,7 +13,7 @@ from typing import Any
 import httpx
 import pytest
 
-from dropanchor_schemas.answers import PoseFrame
+from dropanchor_schemas.pose import PoseFrame
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import ListenError, build_server, listen
