@@ -13,15 +13,15 @@ from pathlib import Path
 _SPEEDS = {115_200: termios.B115200, 921_600: termios.B921600}
 
 Answer = Callable[[bytes], bytes]
-"""What the module says to what it was sent; asked every `period_s` with nothing, too."""
+"""Return what the module prints after it received these bytes. Called every `period_s` without bytes, too."""
 
 
 class SerialModule:
-    """path: the port, as long as it is plugged in. heard: what was written to the module."""
+    """A module. path: of its port while it is plugged in. written: all bytes that were written to the module."""
 
     def __init__(self, path: Path, answer: Answer, baud: int, period_s: float) -> None:
         self.path = path
-        self.heard = b""
+        self.written = b""
         self._answer, self._baud, self._period_s = answer, baud, period_s
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -49,17 +49,17 @@ class SerialModule:
     def _run(self) -> None:
         while not self._stop.is_set():
             if select.select([self._master], [], [], self._period_s)[0]:
-                self._say(self._answer(self._read()))
+                self._print(self._answer(self._read()))
             else:
-                self._say(self._answer(b""))
+                self._print(self._answer(b""))
 
     def _read(self) -> bytes:
         data = os.read(self._master, 4096)
-        self.heard += data
+        self.written += data
         return data
 
-    def _say(self, data: bytes) -> None:
-        """At the pace of the wire, and readable only at the baud rate of the module."""
+    def _print(self, data: bytes) -> None:
+        """Send the bytes as fast as the wire allows. They are readable only at the baud rate of the module."""
         if termios.tcgetattr(self._master)[5] != _SPEEDS[self._baud]:
             data = bytes(byte ^ 0xA5 for byte in data)
         with suppress(BlockingIOError):  # nobody reads
@@ -78,7 +78,7 @@ def plugged_in(path: Path, answer: Answer, baud: int = 115_200, period_s: float 
 
 
 def talkative(*texts: str | bytes) -> Answer:
-    """A module that reports by itself, one text after the other, and ignores what it is sent."""
+    """Return a module that prints one text after the other by itself, and ignores what it receives."""
     turn = 0
 
     def answer(sent: bytes) -> bytes:
@@ -92,9 +92,8 @@ def talkative(*texts: str | bytes) -> Answer:
     return answer
 
 
-def woken_by(command: bytes, text: str, *, echo: str = "OK") -> Answer:
-    """A module that is silent until the command comes, and calls other lines an error; the same command again
-    silences it."""
+def started_by(command: bytes, text: str, *, echo: str = "OK") -> Answer:
+    """Return a module that starts and stops to print with this command. It answers other lines with an error."""
     reports, received = False, b""
 
     def answer(sent: bytes) -> bytes:
@@ -112,7 +111,7 @@ def woken_by(command: bytes, text: str, *, echo: str = "OK") -> Answer:
 
 
 def dwm1001_shell(text: str) -> Answer:
-    """A DWM1001: binary at first, a shell after two carriage returns, where `lec` starts and stops the reports."""
+    """Return a DWM1001: binary at first, then a shell after two carriage returns. `lec` starts and stops its reports."""
     shell, reports, received = False, False, b""
 
     def answer(sent: bytes) -> bytes:

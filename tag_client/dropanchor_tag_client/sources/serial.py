@@ -1,4 +1,4 @@
-"""A UWB module on a serial port is a tag, or an anchor that reports the ranges of several tags."""
+"""Publish what a UWB module on a serial port reports: a tag, or an anchor that reports several tags."""
 
 import argparse
 import sys
@@ -13,7 +13,7 @@ from dropanchor_tag_client.sources.modules.detect import Arrived
 from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
 from dropanchor_tag_client.sources.modules.outlet import ManyTags, OneTag, Outlet
 from dropanchor_tag_client.sources.modules.reader import Reader
-from dropanchor_tag_client.sources.modules.teller import Teller
+from dropanchor_tag_client.sources.modules.status_log import StatusLog
 
 _FLUSH_S = 0.1
 
@@ -47,23 +47,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Raises PortError, ConnectError, ValueError. Runs until it is interrupted."""
+    """Publish until interrupted. Raises PortError, ConnectError, ValueError."""
     _check(arguments)
-    teller = Teller()
+    log = StatusLog()
     module = MODULES.get(arguments.module)
-    reader = Reader(arguments.port, module, arguments.baud, arguments.start, teller.say)
+    reader = Reader(arguments.port, module, arguments.baud, arguments.start, log.add)
     reports = reader.reports()
-    next(reports)  # a port that cannot be opened is said before the router is waited for
+    next(reports)  # report a port that cannot be opened before waiting for the router
     try:
-        with _outlet(arguments, teller) as outlet:
-            publish(reader, reports, outlet, teller)
+        with _outlet(arguments, log) as outlet:
+            publish(reader, reports, outlet, log)
     finally:
-        sys.stderr.write(f"{teller.summary(reader.dropped)}\n")
+        sys.stderr.write(f"{log.summary(reader.dropped)}\n")
     return 0
 
 
-def publish(reader: Reader, reports: Iterator[Arrived], outlet: Outlet, teller: Teller) -> None:
-    """Publish whatever comes, for ever."""
+def publish(reader: Reader, reports: Iterator[Arrived], outlet: Outlet, log: StatusLog) -> None:
+    """Publish all reports. Runs for ever."""
     clock, flushed_s = DeviceClock(), time.monotonic()
     for arrival_ns, found in reports:
         for report in found:
@@ -72,21 +72,21 @@ def publish(reader: Reader, reports: Iterator[Arrived], outlet: Outlet, teller: 
         if time.monotonic() - flushed_s > _FLUSH_S:
             flushed_s = time.monotonic()
             outlet.flush()
-            teller.tell_dropped(reader.dropped)
+            log.add_dropped(reader.dropped)
 
 
 @contextmanager
-def _outlet(arguments: argparse.Namespace, teller: Teller) -> Iterator[Outlet]:
+def _outlet(arguments: argparse.Namespace, log: StatusLog) -> Iterator[Outlet]:
     names = dict(_name(text) for text in arguments.name)
     mounted = mounting(arguments.forward, arguments.up)
     with ExitStack() as stack:
         if not arguments.tag_from_id:
             client = stack.enter_context(opened_client(arguments, arguments.tag))
-            yield OneTag(client, names, mounted, teller)
+            yield OneTag(client, names, mounted, log)
             return
         session = stack.enter_context(opened_session(arguments))
         options = {"site": arguments.site, "connect": session, "encoding": arguments.encoding, "batch_s": None}
-        many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, teller)
+        many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, log)
         stack.callback(many.close)
         yield many
 

@@ -1,4 +1,4 @@
-"""The modules that the command knows: how each is reached, and what makes a silent one talk."""
+"""The supported modules: how to reach each of them, and how to start its reports."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,13 +13,16 @@ from dropanchor_tag_client.sources.modules.trek1000 import Trek1000
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """baud: as delivered. wake: what is written, a second apart, to a module that says nothing. hint: what its owner
-    can do when that does not help."""
+    """A supported module.
+
+    baud: as delivered. start_commands: written to a silent module, one per second. hint: what its owner can do if it
+    stays silent.
+    """
 
     name: str
     baud: int
     parser: Callable[[], Parser]
-    wake: tuple[bytes, ...]
+    start_commands: tuple[bytes, ...]
     hint: str
 
 

@@ -1,4 +1,4 @@
-"""Finds out which module is on a port: by listening, and by waking it only where nothing is heard."""
+"""Find out which module is on a port. Write to the port only if nothing arrives."""
 
 import time
 from collections.abc import Callable, Generator
@@ -14,31 +14,34 @@ _BETWEEN_WRITES_S = 1.0
 _CHUNK = 4096
 
 
-def detect(port: serial.Serial, baud: int | None, say: Callable[[str], None]) -> Generator[Arrived, None, Module]:
-    """Return the module whose report is understood first. Tries the usual baud rates in turn, for ever."""
+def detect(port: serial.Serial, baud: int | None, log: Callable[[str], None]) -> Generator[Arrived, None, Module]:
+    """Return the module whose report is understood first. Tries the usual baud rates in turn, for ever.
+
+    log: takes a message for the user.
+    """
     rates = [baud] if baud else sorted({module.baud for module in MODULES.values()})
     while True:
-        heard = dict.fromkeys(rates, 0)
+        counts = dict.fromkeys(rates, 0)
         for rate in rates:
             port.baudrate = rate
-            found, heard[rate] = yield from _listen(port)
-            silent = () if heard[rate] else (module for module in MODULES.values() if module.baud == rate)
-            for candidate in silent:  # what talks in a way that is not known is not disturbed
-                if found is None and candidate.wake:
-                    yield from write(port, candidate.wake)
+            found, counts[rate] = yield from _listen(port)
+            silent = () if counts[rate] else (module for module in MODULES.values() if module.baud == rate)
+            for candidate in silent:  # a module that sends something else is left alone
+                if found is None and candidate.start_commands:
+                    yield from write(port, candidate.start_commands)
                     found, _ = yield from _listen(port)
             if found is not None:
                 return found
-        say(f"{port.port}: no module recognised yet ({_what_was_heard(heard)}). --module says which it is.")
+        log(f"{port.port}: no module recognised yet ({_counts_text(counts)}). --module says which it is.")
 
 
 def read(port: serial.Serial) -> bytes:
-    """Return what has arrived, or nothing after a short while."""
+    """Return the bytes that have arrived, or none after a short while."""
     return bytes(port.read(max(1, min(port.in_waiting, _CHUNK))))
 
 
 def write(port: serial.Serial, commands: tuple[bytes, ...]) -> Generator[Arrived, None, None]:
-    """Write the commands, with a pause after each but the last in which what arrives is thrown away."""
+    """Write the commands, with a pause between them. What arrives in a pause is thrown away."""
     for index, command in enumerate(commands):
         end_s = time.monotonic() + (_BETWEEN_WRITES_S if index else 0.0)
         while time.monotonic() < end_s:
@@ -48,18 +51,18 @@ def write(port: serial.Serial, commands: tuple[bytes, ...]) -> Generator[Arrived
 
 
 def _listen(port: serial.Serial) -> Generator[Arrived, None, tuple[Module | None, int]]:
-    """Return the module whose report is understood within a while, and how many bytes were heard."""
+    """Return the module whose report is understood within a while, and how many bytes were received."""
     parsers = [(module, module.parser()) for module in MODULES.values()]
-    end_s, heard = time.monotonic() + _LISTEN_S, 0
+    end_s, received = time.monotonic() + _LISTEN_S, 0
     while time.monotonic() < end_s:
         data = read(port)
-        heard += len(data)
+        received += len(data)
         for module, parser in parsers:
             if parser.feed(data):
-                return module, heard
+                return module, received
         yield time.time_ns(), []
-    return None, heard
+    return None, received
 
 
-def _what_was_heard(heard: dict[int, int]) -> str:
-    return ", ".join(f"{count} bytes at {rate} baud" for rate, count in heard.items())
+def _counts_text(counts: dict[int, int]) -> str:
+    return ", ".join(f"{count} bytes at {rate} baud" for rate, count in counts.items())

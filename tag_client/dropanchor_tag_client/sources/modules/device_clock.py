@@ -1,21 +1,23 @@
-"""The clock of a module, laid onto ours."""
+"""Convert the clock of a module to UTC."""
 
-_DRIFT = 200e-6  # faster than any crystal drifts
+_DRIFT = 200e-6  # more than any crystal drifts
 _JUMP_NS = 1_000_000_000
 _NS_PER_MS = 1_000_000
 
 
 class DeviceClock:
-    """Turns the times of a module into ours by the fastest of its messages: the least delay is the best offset."""
+    """Convert the times of a module to UTC. The message with the least delay gives the offset between the clocks."""
 
     def __init__(self) -> None:
         self._offset_ns: int | None = None
         self._last_ns = 0
 
     def utc_ns(self, arrival_ns: int, device_ms: int) -> int:
-        """Return when the module measured, ns UTC: at its time device_ms, which arrived at arrival_ns.
+        """Return the time of a measurement, ns UTC.
 
-        A module that starts again, or a clock that is set, starts a new offset."""
+        arrival_ns: UTC, when it arrived. device_ms: its time on the module's clock. A jump of either clock, as after a
+        restart of the module, starts a new offset.
+        """
         device_ns = device_ms * _NS_PER_MS
         offset_ns = arrival_ns - device_ns
         if self._offset_ns is None or abs(offset_ns - self._offset_ns) > _JUMP_NS:

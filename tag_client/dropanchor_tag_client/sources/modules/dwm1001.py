@@ -1,7 +1,7 @@
 """Decawave DWM1001 with PANS: the shell commands `lec` and `les`.
 
-At high rates the firmware writes one line into another. A line counts only when all of it has the form it should
-have: the number of anchors that it announces, each with its index, a hexadecimal id and numbers of two decimals.
+At high rates the firmware writes one line into another. A line counts only if all of it is in order: the
+number of anchors that it announces, each with its index, a hexadecimal id and numbers of two decimals.
 """
 
 import re
@@ -24,7 +24,7 @@ _Anchors = list[tuple[str, float]]
 
 
 class Dwm1001:
-    """Ranges of a tag to its anchors, which are named as the module prints them (`022E`)."""
+    """Parse the ranges of a tag to its anchors, which are named as the module prints them (`022E`)."""
 
     def __init__(self) -> None:
         self.dropped: Counter[Drop] = Counter()
@@ -52,7 +52,7 @@ class Dwm1001:
 
 
 def _lec(text: str) -> _Anchors | None:
-    """Return the anchors of `DIST,n,AN0,id,x,y,z,range,…`; None when the line is damaged."""
+    """Return the anchors of `DIST,n,AN0,id,x,y,z,range,…`; None if the line is damaged."""
     head = _DIST.fullmatch(text)
     if head is None:
         return None
@@ -66,7 +66,7 @@ def _lec(text: str) -> _Anchors | None:
 
 
 def _les(text: str) -> _Anchors | None:
-    """Return the anchors of `id[x,y,z]=range … le_us=… est[…]`; None when the line is damaged."""
+    """Return the anchors of `id[x,y,z]=range … le_us=… est[…]`; None if the line is damaged."""
     rest, anchors = text, _Anchors()
     while found := _LES_ANCHOR.match(rest):
         anchors.append((found[1], float(found[2])))

@@ -24,7 +24,7 @@ _Fields = dict[str, str]
 
 
 class Dwm3001:
-    """Ranges to the other side, which is named by the number of its address (0x0001 is 1)."""
+    """Parse ranges to the other side, which is named by the number of its address (0x0001 is 1)."""
 
     def __init__(self) -> None:
         self.dropped: Counter[Drop] = Counter()
@@ -38,7 +38,7 @@ class Dwm3001:
         return [report for text in ended for report in self._reports(text)]
 
     def _reports(self, text: str) -> list[Report]:
-        """Return the report of what stands before a closing brace; only what follows its last start is whole."""
+        """Return the report of the text before a closing brace. Only the part after its last start is complete."""
         _, *begun = text.split(_START)
         if not begun:
             return []
@@ -60,7 +60,7 @@ class Dwm3001:
 
 
 def _measurements(text: str) -> list[_Fields] | None:
-    """Return the fields of each measurement; None when the notification is damaged."""
+    """Return the fields of each measurement; None if the notification is damaged."""
     head = _HEAD.match(text)
     if head is None:
         return None

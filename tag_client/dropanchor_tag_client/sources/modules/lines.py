@@ -1,4 +1,4 @@
-"""Bytes to lines of text, within a bound."""
+"""Split bytes into lines of text of limited length."""
 
 import re
 from collections import Counter
@@ -10,7 +10,7 @@ _END = re.compile(rb"[\r\n]+")
 
 
 class Lines:
-    """Collects bytes and returns whole lines. A line that does not end is given up at `MAX_LINE_BYTES`."""
+    """Collect bytes and return whole lines. A line of more than `MAX_LINE_BYTES` is dropped."""
 
     def __init__(self, dropped: Counter[Drop]) -> None:
         self._dropped = dropped
@@ -26,7 +26,7 @@ class Lines:
         return lines
 
     def _line(self, line: bytes) -> str:
-        """Return the text of a line; an empty one when it is too long."""
+        """Return the text of a line, empty if the line is too long."""
         too_long = self._skipping or len(line) > MAX_LINE_BYTES
         self._skipping = False
         if too_long:

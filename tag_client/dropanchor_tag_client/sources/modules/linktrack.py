@@ -13,7 +13,7 @@ from dropanchor_tag_client.sources.modules.report import Drop, Imu, Range, Repor
 _HEADER = 0x55
 _MIN_LENGTH, _MAX_LENGTH = 8, 1024  # the longest frame has some 650 bytes
 _ANCHOR, _TAG = 1, 2
-_G_MAX, _GYRO_MAX = 400.0, 100.0  # m/s², rad/s: beyond what the sensor can say
+_G_MAX, _GYRO_MAX = 400.0, 100.0  # m/s², rad/s: more than the sensor can measure
 
 # role, id | gyro and acc | local time, ms | number of nodes
 _FRAME2 = struct.Struct("<4xBB 4x3x9x9x9x 6f 12x6x16x4x I 10x2x B")
@@ -25,7 +25,7 @@ _MARK2, _MARK3 = 4, 5
 
 
 class LinkTrack:
-    """On a tag: its ranges and IMU. On an anchor: the ranges of the tags, each with its tag. Nodes are named by id."""
+    """Parse the ranges and the IMU of a tag, or the ranges of several tags from an anchor. Nodes are named by id."""
 
     def __init__(self) -> None:
         self.dropped: Counter[Drop] = Counter()
@@ -52,7 +52,7 @@ class LinkTrack:
         return reports
 
     def _report(self, frame: bytes) -> Report | None:
-        """Return the report of a frame whose sum is right; None for another frame or one that is not whole."""
+        """Return the report of a frame with a valid checksum, None if it is of another kind or incomplete."""
         if frame[1] not in (_MARK2, _MARK3):
             self.dropped[Drop.OTHER_FRAME] += 1
             return None

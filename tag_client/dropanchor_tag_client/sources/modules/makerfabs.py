@@ -21,7 +21,7 @@ _MAX_PLACES = 16
 
 
 class Makerfabs:
-    """Ranges of the tag that each line names. An anchor is named by its number."""
+    """Parse the ranges of the tag that each line names. An anchor is named by its number."""
 
     def __init__(self) -> None:
         self.dropped: Counter[Drop] = Counter()

@@ -1,4 +1,4 @@
-"""Where reports go: to one tag, or to every tag that the module names."""
+"""Publish the reports of a module: as one tag, or as every tag that the module names."""
 
 from collections.abc import Mapping
 from typing import Any, Protocol
@@ -6,7 +6,7 @@ from typing import Any, Protocol
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.sources.axes import Mounting, UpAxis, direction
 from dropanchor_tag_client.sources.modules.report import Imu, Range, Report
-from dropanchor_tag_client.sources.modules.teller import Teller
+from dropanchor_tag_client.sources.modules.status_log import StatusLog
 
 MAX_TAGS = 256
 
@@ -18,39 +18,39 @@ class Outlet(Protocol):
 
 
 class Samples:
-    """Publishes ranges and IMU samples under the names and in the axes of the site."""
+    """Publish ranges and IMU samples under the names and in the axes of the site."""
 
-    def __init__(self, names: Mapping[str, str], mounted: Mounting, teller: Teller) -> None:
+    def __init__(self, names: Mapping[str, str], mounted: Mounting, log: StatusLog) -> None:
         self._names = names
         self._mounted = mounted
-        self._teller = teller
-        self._heard: set[str] = set()
+        self._log = log
+        self._anchors: set[str] = set()
         self._up_axis: UpAxis | None = UpAxis()
 
     def range(self, client: TagClient, anchor: int | str, range_m: float, t_ns: int) -> None:
         name = self._names.get(str(anchor), anchor)
         client.publish_range(name, range_m, t_ns=t_ns)
-        self._teller.ranges += 1
-        if str(name) not in self._heard and len(self._heard) < MAX_TAGS:
-            self._heard.add(str(name))
-            self._teller.say(f'tag "{client.tag}": anchor "{name}" at {range_m:.2f} m')
+        self._log.ranges += 1
+        if str(name) not in self._anchors and len(self._anchors) < MAX_TAGS:
+            self._anchors.add(str(name))
+            self._log.add(f'tag "{client.tag}": anchor "{name}" at {range_m:.2f} m')
 
     def imu(self, client: TagClient, imu: Imu, t_ns: int) -> None:
         client.publish_imu(self._mounted.to_body(imu.acc), self._mounted.to_body(imu.gyro), t_ns=t_ns)
-        self._teller.imu += 1
+        self._log.imu += 1
         if self._up_axis is not None and (up := self._up_axis.add(imu.acc)) is not None:
             self._up_axis = None
             if self._mounted.up != direction(up):
-                self._teller.say(f"gravity says that axis {up} of the module points up: start again with --up={up}")
+                self._log.add(f"gravity says that axis {up} of the module points up: start again with --up={up}")
 
 
 class OneTag:
-    """Everything goes to one tag. Where the module reports several, that is the first one it names."""
+    """Publish everything as one tag. If the module reports several tags, only the first one counts."""
 
-    def __init__(self, client: TagClient, names: Mapping[str, str], mounted: Mounting, teller: Teller) -> None:
+    def __init__(self, client: TagClient, names: Mapping[str, str], mounted: Mounting, log: StatusLog) -> None:
         self._client = client
-        self._samples = Samples(names, mounted, teller)
-        self._teller = teller
+        self._samples = Samples(names, mounted, log)
+        self._log = log
         self._only: str | None = None
 
     def publish(self, report: Report, t_ns: int) -> None:
@@ -61,19 +61,19 @@ class OneTag:
             self._samples.imu(self._client, report.imu, t_ns)
 
     def flush(self) -> None:
-        """The client itself sends in time."""
+        """Do nothing: the client itself sends in time."""
 
     def _is_ours(self, tag: str | None) -> bool:
         if self._only is None:
             self._only = tag
         if tag == self._only:
             return True
-        self._teller.say(f"the module reports tag {tag} as well as {self._only}, which is left out; see --tag-from-id")
+        self._log.add(f"the module reports tag {tag} as well as {self._only}, which is left out; see --tag-from-id")
         return False
 
 
 class ManyTags:
-    """Each tag that the module names gets a client of its own, all in one session."""
+    """Publish as each tag that the module names, with a client per tag and one session."""
 
     def __init__(
         self,
@@ -82,19 +82,19 @@ class ManyTags:
         as_anchor: str | None,
         names: Mapping[str, str],
         mounted: Mounting,
-        teller: Teller,
+        log: StatusLog,
     ) -> None:
-        """options: of the clients. as_anchor: the anchor that the module is; what it calls an anchor is then a tag."""
+        """options: of the clients. as_anchor: the anchor that the module itself is; its ranges are then to tags."""
         self._prefix = prefix
         self._options = options
         self._as_anchor = as_anchor
-        self._samples = Samples(names, mounted, teller)
-        self._teller = teller
+        self._samples = Samples(names, mounted, log)
+        self._log = log
         self._clients: dict[str, TagClient] = {}
 
     def publish(self, report: Report, t_ns: int) -> None:
         for one in report.ranges:
-            tag, anchor = self._who(one)
+            tag, anchor = self._tag_and_anchor(one)
             if (client := self._client(tag)) is not None:
                 self._samples.range(client, anchor, one.range_m, t_ns)
         if report.imu is not None and self._as_anchor is None and (client := self._client(report.imu.tag)) is not None:
@@ -108,16 +108,16 @@ class ManyTags:
         for client in self._clients.values():
             client.close()
 
-    def _who(self, one: Range) -> tuple[str | None, int | str]:
+    def _tag_and_anchor(self, one: Range) -> tuple[str | None, int | str]:
         return (one.tag, one.anchor) if self._as_anchor is None else (str(one.anchor), self._as_anchor)
 
     def _client(self, tag: str | None) -> TagClient | None:
         if tag is None:
-            self._teller.say("the module does not say whose ranges these are; --as-anchor NAME: those of what it names")
+            self._log.add("the module does not say whose ranges these are; --as-anchor NAME: those of what it names")
             return None
         if tag not in self._clients:
             if len(self._clients) >= MAX_TAGS:
-                self._teller.say(f"the module has named {MAX_TAGS} tags; tag {tag} is left out")
+                self._log.add(f"the module has named {MAX_TAGS} tags; tag {tag} is left out")
                 return None
             client = TagClient(self._prefix + tag, **self._options)
             client.open()

@@ -1,4 +1,4 @@
-"""Opening a serial port, with sentences for what goes wrong."""
+"""Open a serial port, and explain what goes wrong."""
 
 import errno
 
@@ -9,11 +9,11 @@ READ_TIMEOUT_S = 0.1
 
 
 class PortError(ValueError):
-    """The port cannot be opened; the text says what to do."""
+    """The port cannot be opened. The message says what to do."""
 
 
 def open_port(name: str, baud: int) -> serial.Serial:
-    """Return the open port; nobody else may use it meanwhile. Raises PortError."""
+    """Return the open port, for exclusive use. Raises PortError."""
     try:
         return serial.Serial(name, baud, timeout=READ_TIMEOUT_S, write_timeout=1.0, exclusive=True)
     except (serial.SerialException, OSError, ValueError) as error:

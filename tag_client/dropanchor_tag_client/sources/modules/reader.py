@@ -1,4 +1,4 @@
-"""Reads reports from a port for ever: wakes a silent module, and comes back when it was unplugged."""
+"""Read the reports of a module from a port. Start a silent module, and continue after it was unplugged."""
 
 import time
 from collections import Counter
@@ -11,39 +11,42 @@ from dropanchor_tag_client.sources.modules.detect import Arrived, detect, read, 
 from dropanchor_tag_client.sources.modules.port import PortError, open_port
 from dropanchor_tag_client.sources.modules.report import Drop, Parser, Report
 
-# A resting DWM1001 may report every 10 s, and `lec` sent twice would stop it: the second attempt comes later than that.
-_WAKE_AFTER_S, _WAKE_AGAIN_S = 2.0, 15.0
+# A DWM1001 at rest may report only every 10 s, and a second `lec` would stop it: wait longer before the second attempt.
+_START_AFTER_S, _RESTART_AFTER_S = 2.0, 15.0
 _RETRY_S, _MAX_RETRY_S = 0.2, 5.0
 
 
 class Reader:
-    """The reports of one port. dropped: what was left out so far, by reason. raw_bytes: read so far."""
+    """The reports of one port. dropped: counts of what was left out, by reason. raw_bytes: count of bytes read."""
 
     def __init__(
-        self, port: str, module: Module | None, baud: int | None, start: str | None, say: Callable[[str], None]
+        self, port: str, module: Module | None, baud: int | None, start: str | None, log: Callable[[str], None]
     ) -> None:
-        """module: None to find out. start: a command that wakes the module instead of its usual one."""
+        """module: None to detect it. start: a command that starts the reports, instead of the usual one. log: takes
+        messages for the user."""
         self.dropped: Counter[Drop] = Counter()
         self.raw_bytes = 0
-        self._name, self._module, self._baud, self._start, self._say = port, module, baud, start, say
+        self._name, self._module, self._baud, self._start, self._log = port, module, baud, start, log
 
     @property
     def module(self) -> Module | None:
         return self._module
 
     def reports(self) -> Iterator[Arrived]:
-        """Yield (time of arrival in ns UTC, what arrived) at least a few times per second. Raises PortError when the
-        port cannot be opened at first."""
+        """Yield (time of arrival in ns UTC, reports) at least a few times per second.
+
+        Raises PortError if the port cannot be opened at first.
+        """
         port = self._open()
         yield time.time_ns(), []
         while True:
             try:
                 with port:
-                    yield from self._talk(port)
+                    yield from self._read_port(port)
             except (serial.SerialException, OSError):
-                self._say(f"{self._name} does not answer any more: was it unplugged? Trying again until it does.")
+                self._log(f"{self._name} does not answer any more: was it unplugged? Trying again until it does.")
             port = yield from self._reopened()
-            self._say(f"{self._name} is back.")
+            self._log(f"{self._name} is back.")
 
     def _open(self) -> serial.Serial:
         return open_port(self._name, self._baud or (self._module.baud if self._module else 115_200))
@@ -55,29 +58,29 @@ class Reader:
             try:
                 return self._open()
             except PortError as error:
-                self._say(str(error))
+                self._log(str(error))
             retry_s = min(2 * retry_s, _MAX_RETRY_S)
 
-    def _talk(self, port: serial.Serial) -> Iterator[Arrived]:
-        port.read(port.in_waiting)  # what waited has no time
+    def _read_port(self, port: serial.Serial) -> Iterator[Arrived]:
+        port.read(port.in_waiting)  # the time of older data is unknown
         if self._module is None:
-            self._module = yield from detect(port, self._baud, self._say)
-            self._say(f"{self._name}: {self._module.name} found.")
-        parser, wake = self._module.parser(), self._wake(self._module)
-        heard_s, patience_s = time.monotonic(), _WAKE_AFTER_S
+            self._module = yield from detect(port, self._baud, self._log)
+            self._log(f"{self._name}: {self._module.name} found.")
+        parser, commands = self._module.parser(), self._start_commands(self._module)
+        last_s, max_silence_s = time.monotonic(), _START_AFTER_S
         while True:
             data = read(port)
             found = self._parse(parser, data)
             yield time.time_ns(), found
             if found:
-                heard_s, patience_s = time.monotonic(), _WAKE_AGAIN_S
-            elif time.monotonic() - heard_s > patience_s:
-                heard_s, patience_s = time.monotonic(), _WAKE_AGAIN_S
-                self._say(f"{self._name}: {self._module.name} reports nothing. {self._module.hint}")
-                yield from write(port, wake)
+                last_s, max_silence_s = time.monotonic(), _RESTART_AFTER_S
+            elif time.monotonic() - last_s > max_silence_s:
+                last_s, max_silence_s = time.monotonic(), _RESTART_AFTER_S
+                self._log(f"{self._name}: {self._module.name} reports nothing. {self._module.hint}")
+                yield from write(port, commands)
 
-    def _wake(self, module: Module) -> tuple[bytes, ...]:
-        return module.wake if self._start is None else (self._start.encode() + b"\r\n",)
+    def _start_commands(self, module: Module) -> tuple[bytes, ...]:
+        return module.start_commands if self._start is None else (self._start.encode() + b"\r\n",)
 
     def _parse(self, parser: Parser, data: bytes) -> list[Report]:
         self.raw_bytes += len(data)
@@ -88,7 +91,7 @@ class Reader:
 
 
 def _pause(seconds: float) -> Iterator[Arrived]:
-    """Wait, but let the caller do its work a few times per second."""
+    """Wait, and let the caller do its work a few times per second."""
     end_s = time.monotonic() + seconds
     while (left_s := end_s - time.monotonic()) > 0:
         time.sleep(min(left_s, 0.1))

@@ -1,4 +1,4 @@
-"""What a parser makes of the bytes of a module, and why it left some of them out."""
+"""What a parser returns for the bytes of a module, and the reasons for leaving some of them out."""
 
 from collections import Counter
 from enum import StrEnum
@@ -6,11 +6,11 @@ from typing import NamedTuple, Protocol
 
 from dropanchor_schemas.wire import Vector
 
-MAX_RANGE_M = 1000.0  # beyond what these radios reach
+MAX_RANGE_M = 1000.0  # these radios do not reach further
 
 
 class Drop(StrEnum):
-    """Why something that the module sent was not used."""
+    """Reasons why data of a module were not used."""
 
     DAMAGED = "damaged"
     CHECKSUM = "checksum"
@@ -42,7 +42,7 @@ class Imu(NamedTuple):
 
 
 class Report(NamedTuple):
-    """What one line or frame holds. device_ms: the module's own clock, where it sends it."""
+    """The content of one line or frame. device_ms: time on the module's own clock, if it sends it."""
 
     ranges: tuple[Range, ...]
     imu: Imu | None = None
@@ -50,7 +50,7 @@ class Report(NamedTuple):
 
 
 class Parser(Protocol):
-    """Takes bytes as they come, in pieces of any size. Never raises; counts in `dropped` what it leaves out."""
+    """Parse bytes that arrive in pieces of any size. Never raises. Counts in `dropped` what it leaves out."""
 
     dropped: Counter[Drop]
 
@@ -58,7 +58,7 @@ class Parser(Protocol):
 
 
 def plausible(range_m: float, dropped: Counter[Drop]) -> bool:
-    """Return whether a radio can have measured this, and count it in `dropped` where not."""
+    """Return whether a radio can have measured this range. Count it in `dropped` if not."""
     if 0.0 <= range_m <= MAX_RANGE_M:
         return True
     dropped[Drop.NEGATIVE if range_m < 0.0 else Drop.ABSURD] += 1

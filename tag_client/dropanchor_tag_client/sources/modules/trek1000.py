@@ -19,13 +19,13 @@ _REPORT = re.compile(
     r"[0-9a-f]{4}\s+[0-9a-f]{2}\s+[0-9a-f]{1,8}\s+[at](\d{1,3}):\d{1,3}(\s+[0-9a-f]{4,8})?"
 )
 _NO_RANGE = (0, 0xFFFFFFFF)
-_PATIENCE = 3
+_MIN_UNCORRECTED = 3  # `mr` lines in sequence, until a module counts as one that prints no `mc` lines
 
 
 class Trek1000:
-    """Ranges of the tag that each line names. An anchor is named by its place in the line, 0 to 7.
+    """Parse the ranges of the tag that each line names. An anchor is named by its place in the line, 0 to 7.
 
-    `mr` lines are used only while no `mc` lines come: a module that prints both measured once.
+    `mr` lines are used only while no `mc` lines come: a module that prints both has measured only once.
     """
 
     def __init__(self) -> None:
@@ -42,17 +42,17 @@ class Trek1000:
             self.dropped[Drop.DAMAGED if line[:3] in ("mc ", "mr ", "ma ") else Drop.NOT_UNDERSTOOD] += 1
             return None
         kind, mask, ranges, tag, diagnosis = found.groups()
-        if reason := self._not_wanted(kind):
+        if reason := self._reason_to_drop(kind):
             self.dropped[reason] += 1
             return None
         valid = int(mask, 16) if diagnosis is None else 0xFF
         return Report(self._ranges([int(text, 16) for text in ranges.split()], valid, str(int(tag))))
 
-    def _not_wanted(self, kind: str) -> Drop | None:
+    def _reason_to_drop(self, kind: str) -> Drop | None:
         if kind == "a":
             return Drop.ANCHOR_TO_ANCHOR
         self._uncorrected = self._uncorrected + 1 if kind == "r" else 0
-        return Drop.UNCORRECTED if 0 < self._uncorrected <= _PATIENCE else None
+        return Drop.UNCORRECTED if 0 < self._uncorrected <= _MIN_UNCORRECTED else None
 
     def _ranges(self, millimetres: list[int], valid: int, tag: str) -> tuple[Range, ...]:
         return tuple(

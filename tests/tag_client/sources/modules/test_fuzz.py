@@ -1,4 +1,4 @@
-"""Parsers under arbitrary bytes and damaged documented strings: they never raise, stay small, and invent nothing."""
+"""Parsers with arbitrary bytes and damaged documented strings: they never raise, stay small, and invent nothing."""
 
 from collections.abc import Callable
 
@@ -30,7 +30,7 @@ def all_reports(parser: Parser, pieces: list[bytes]) -> list[Report]:
 
 
 def size(parser: Parser) -> int:
-    """Bytes that a parser keeps for later."""
+    """Return the count of bytes that a parser keeps for later."""
     kept = [value for part in (parser, getattr(parser, "_lines", None)) for value in vars(part or parser).values()]
     return sum(len(value) for value in kept if isinstance(value, bytes | str))
 

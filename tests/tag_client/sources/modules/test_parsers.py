@@ -13,33 +13,20 @@ from dropanchor_tag_client.sources.modules.makerfabs import Makerfabs
 from dropanchor_tag_client.sources.modules.report import Drop, Parser, Range, Report
 from dropanchor_tag_client.sources.modules.trek1000 import Trek1000
 from support import module_strings as said
-
-Pairs = list[tuple[int | str, float]]
+from support.module_strings import EXAMPLES, Pairs
 
 
 def parsed(parser: Parser, text: str | bytes) -> list[Pairs]:
-    """(anchor, range) of each report."""
+    """Return (anchor, range) of each report."""
     data = text if isinstance(text, bytes) else f"{text}\r\n".encode()
     return [[(one.anchor, one.range_m) for one in report.ranges] for report in parser.feed(data)]
 
 
-DOCUMENTED: list[tuple[Callable[[], Parser], str | bytes, Pairs]] = [
-    (Dwm1001, said.LEC, [*said.LEC_RANGES]),
-    (Dwm1001, f"dwm> {said.LEC}", [*said.LEC_RANGES]),
-    (Dwm1001, said.LEC_ONE, [("D00C", 0.79)]),
-    (Dwm1001, "DIST,0", []),
-    (Dwm1001, said.LES, [*said.LES_RANGES]),
-    (Dwm1001, said.LES_ONE, [("022E", 3.38)]),
-    (Dwm3001, said.NOTIFICATION, [(1, 0.71)]),
-    (Dwm3001, said.NOTIFICATION_TWO_LINES, [(1, 2.10)]),
-    (Dwm3001, said.NOTIFICATION_FOUR, [(1, 2.45), (2, 3.12), (4, 4.03)]),
-    (Trek1000, said.TREK_MC, [*said.TREK_MC_RANGES]),
-    (Trek1000, said.TREK_CLONE, [(2, 8.5), (3, 1.5)]),
-    (Makerfabs, said.MAKERFABS, [(2, 0.30)]),
-    (Makerfabs, said.MAKERFABS_NAMED, [(0, 9.97), (1, 13.21), (2, 9.11), (3, 7.38)]),
-    (LinkTrack, said.NODEFRAME2, [*said.NODEFRAME2_RANGES]),
-    (LinkTrack, said.NODEFRAME3, [*said.NODEFRAME3_RANGES]),
-]
+DOCUMENTED = [(MODULES[name].parser, *text) for name, example in EXAMPLES.items() for text in example.documented]
+
+
+def test_every_module_of_the_catalogue_has_examples() -> None:
+    assert EXAMPLES.keys() == MODULES.keys()
 
 
 @pytest.mark.parametrize(("parser", "text", "expected"), DOCUMENTED)
