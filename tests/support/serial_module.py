@@ -111,7 +111,7 @@ def started_by(command: bytes, text: str, *, echo: str = "OK") -> Answer:
 
 
 def dwm1001_shell(text: str) -> Answer:
-    """Return a DWM1001: binary at first, then a shell after two carriage returns. `lec` starts and stops its reports."""
+    """Return a DWM1001: binary at first, then a shell after two carriage returns. `lec` starts and stops reports."""
     shell, reports, received = False, False, b""
 
     def answer(sent: bytes) -> bytes:

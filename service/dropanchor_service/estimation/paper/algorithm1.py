@@ -13,6 +13,7 @@ each range, fuses the newest attitude and then the range; while no range comes i
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +28,9 @@ from dropanchor_service.estimation.paper.tag import Tag
 
 NAN = math.nan
 LARGEST_STD = 1e3  # m or rad; what claims more is not known
-NO_COV = np.full((3, 3), NAN)
 
-PoseRow = tuple[int, int, int, int, float, float, float, float, float, float, object, float, float, float]
-"""A POSE without its row."""
+PoseValues = dict[str, Any]
+"""Values of POSE by name, without its row. An absent value is NaN."""
 
 
 @dataclass
@@ -76,7 +76,7 @@ class Algorithm1:
             self._advance(self._ekf, t_ns)
             self._ekf.update_heading(course, _first_std(std, self._p.heading_std) ** 2)
 
-    def take_range(self, t_ns: int, index: int, anchor: Position, measured: float, std: float) -> PoseRow:
+    def take_range(self, t_ns: int, index: int, anchor: Position, measured: float, std: float) -> PoseValues:
         """Take a range, m, with its standard deviation or NaN. Return the pose after it.
 
         anchor: (x, y, height above the tag). measured = scale * distance + bias: z and R are those of the distance.
@@ -162,7 +162,7 @@ class Algorithm1:
             return self._course.straight(float(self._ekf.x[2]))
         return self._course.straight(NAN if newest is None else newest[1])
 
-    def _pose(self, t_ns: int, z: float) -> PoseRow:
+    def _pose(self, t_ns: int, z: float) -> PoseValues:
         if self._ekf is None:
             return self.pose_before_start(t_ns)
         x, y, theta, v, w = self._ekf.x.tolist()
@@ -170,14 +170,19 @@ class Algorithm1:
         sigma = math.sqrt(cov[0, 0] + cov[1, 1])
         state, reason = self._state(self._ekf, t_ns, sigma, z)
         heading = wrapped(theta - self._tag.mount_angle)
-        return (t_ns, state, reason, *self._fused, x, y, heading, v, w, cov, NAN, sigma, NAN)
+        motion = {"x": x, "y": y, "heading": heading, "speed": v, "yaw_rate": w, "cov": cov, "sigma_pos": sigma}
+        return self._values(t_ns, state, reason) | motion
 
-    def pose_before_start(self, t_ns: int) -> PoseRow:
+    def pose_before_start(self, t_ns: int) -> PoseValues:
         """Return the pose of a tag that may be anywhere."""
         state, reason = self._state_before_start()
         course = self._course.newest
         heading = NAN if course is None else wrapped(course[1] - self._tag.mount_angle)
-        return (t_ns, state, reason, *self._fused, NAN, NAN, heading, self._speed, NAN, NO_COV, NAN, NAN, NAN)
+        return self._values(t_ns, state, reason) | {"heading": heading, "speed": self._speed}
+
+    def _values(self, t_ns: int, state: State, reason: StateReason) -> PoseValues:
+        anchor, measured = self._fused
+        return {"t_ns": t_ns, "state": state, "reason": reason, "anchor": anchor, "range": measured}
 
     def _state_before_start(self) -> tuple[State, StateReason]:
         if self._faulted:

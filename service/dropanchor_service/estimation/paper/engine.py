@@ -21,7 +21,7 @@ from dropanchor_service.estimation.columns import (
     PoseBatch,
     SampleBatch,
 )
-from dropanchor_service.estimation.paper.algorithm1 import Algorithm1, PoseRow
+from dropanchor_service.estimation.paper.algorithm1 import Algorithm1, PoseValues
 from dropanchor_service.estimation.paper.parameters import PaperParameters
 from dropanchor_service.estimation.paper.tag import Tag
 
@@ -59,7 +59,7 @@ class PaperEngine:
         Bearings are not part of the paper and are ignored.
         """
         rejected: dict[str, list[int]] = {}
-        poses = []
+        poses: list[PoseValues] = []
         innovations: list[tuple[Any, ...]] = []
         with np.errstate(all="ignore"):  # numbers out of range are a fault of their row, not a warning
             for event in _in_order(samples):
@@ -69,10 +69,10 @@ class PaperEngine:
                     continue
                 pose = self._take(event)
                 if pose is not None:
-                    poses.append((event[0], *pose))
+                    poses.append({"row": event[0]} | pose)
                     innovations.extend(self._innovation(event))
         return PoseBatch(
-            np.array(poses, POSE),
+            _poses(poses),
             innovations=np.array(innovations, INNOVATION),
             rejected={reason: np.array(rows, np.int32) for reason, rows in rejected.items()},
         )
@@ -96,7 +96,7 @@ class PaperEngine:
             return "anchor_unknown"
         return _fault_of(kind, values)
 
-    def _take(self, event: Event) -> PoseRow | None:
+    def _take(self, event: Event) -> PoseValues | None:
         """Take one sample into its row. Numbers that overflow cost that row its state, and no other row anything."""
         row, t_ns, kind, _ = event
         self._times[row] = t_ns
@@ -110,7 +110,7 @@ class PaperEngine:
         self._filters[row] = Algorithm1(self._parameters, replace(self._tags[row], start_known=False), faulted=True)
         return self._filters[row].pose_before_start(t_ns) if kind == RANGE else None
 
-    def _fuse(self, event: Event) -> PoseRow | None:
+    def _fuse(self, event: Event) -> PoseValues | None:
         row, t_ns, kind, values = event
         tag_filter = self._filters[row]
         if kind == IMU:
@@ -122,6 +122,15 @@ class PaperEngine:
         index, measured, std = values
         x, y, z = self._anchors[index]
         return tag_filter.take_range(t_ns, index, (x, y, z - self._tags[row].height), measured, std)
+
+
+def _poses(rows: list[PoseValues]) -> Array:
+    """Return POSE of these values."""
+    poses = np.zeros(len(rows), POSE)
+    for name in POSE.names or ():
+        for pose, values in zip(poses, rows, strict=True):
+            pose[name] = values.get(name, np.nan)
+    return poses
 
 
 def _in_order(samples: SampleBatch) -> Iterator[Event]:
