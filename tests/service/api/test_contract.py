@@ -50,17 +50,17 @@ FOLDER = TemporaryDirectory(prefix="dropanchor-contract-")  # deleted together w
 
 def operations() -> Iterator[Operation]:
     site, folder = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.5, lon=13.4)), Path(FOLDER.name)
-    house = make_api_bench(site, folder, Retention(1, 0.0, 0, 10**18, 2**40))
+    bench = make_api_bench(site, folder, Retention(1, 0.0, 0, 10**18, 2**40))
     limits = Limits(2**30, 10**18, 1000, 10**18, 2**40)
-    house.recorder = Recorder(folder, limits, 1, house.answers.tags, house.answers.site, house.answers.now_ns, {})
-    house.recorder.start()
-    house.move("tag-1", "a")
-    house.write_history()
-    house.recorder.record_messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
-    house.recorder.writer.flush()
-    house.stopping.set()  # a stream ends after its first event
+    bench.recorder = Recorder(folder, limits, 1, bench.answers.tags, bench.answers.site, bench.answers.now_ns, {})
+    bench.recorder.start()
+    bench.move("tag-1", "a")
+    bench.write_history()
+    bench.recorder.record_messages([(0, b"payload", ENCODING_PACKED, bench.now_ns)])
+    bench.recorder.writer.flush()
+    bench.stopping.set()  # a stream ends after its first event
     load_all_checks()
-    document = schemathesis.openapi.from_asgi("/api/v1/openapi.json", house.app())
+    document = schemathesis.openapi.from_asgi("/api/v1/openapi.json", bench.app())
     for found in document.get_all_operations():
         assert isinstance(found, Ok)
         yield found.ok()

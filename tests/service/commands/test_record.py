@@ -16,18 +16,18 @@ from support.zenoh_router import free_port, wait_until
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> ApiBench:
-    house = make_api_bench()
-    answers = house.answers
+def bench(tmp_path: Path) -> ApiBench:
+    bench = make_api_bench()
+    answers = bench.answers
     answers.tags.register("a")
     limits = Limits(2**30, 10**18, 1000, 10**18, 2**40)
-    house.recorder = Recorder(tmp_path, limits, 1, answers.tags, answers.site, answers.now_ns, {})
-    return house
+    bench.recorder = Recorder(tmp_path, limits, 1, answers.tags, answers.site, answers.now_ns, {})
+    return bench
 
 
 @pytest.fixture
-def url(house: ApiBench) -> Iterator[str]:
-    with running_server(house.app(), house.stopping) as port:
+def url(bench: ApiBench) -> Iterator[str]:
+    with running_server(bench.app(), bench.stopping) as port:
         wait_until(lambda: _listens(port))
         yield f"http://127.0.0.1:{port}"
 
@@ -38,12 +38,12 @@ def _listens(port: int) -> bool:
 
 
 def test_a_recording_is_started_stopped_listed_and_fetched(
-    house: ApiBench, url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    bench: ApiBench, url: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    recorder = house.recorder
+    recorder = bench.recorder
     assert recorder is not None
     assert main(["record", "start", "a", "b", "--url", url]) == 0
-    recorder.record_messages([(0, b"payload", ENCODING_PACKED, house.now_ns)])
+    recorder.record_messages([(0, b"payload", ENCODING_PACKED, bench.now_ns)])
     recorder.writer.flush()
     assert main(["record", "stop", "--url", url]) == 0
     recorder.writer.flush()

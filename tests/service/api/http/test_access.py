@@ -26,9 +26,9 @@ class Guarded:
         self.clock_s = 0.0
         self.keys = ApiKeys(folder, lambda: self.clock_s)
         self.secrets = {scope: self.keys.add(scope.word, scope) for scope in Scope}
-        self.house = make_api_bench()
-        self.house.move("a")
-        self.app: FastAPI = self.house.app(authenticator=Authenticator({SOURCE: self.keys}), rate_limiter=rate_limiter)
+        self.bench = make_api_bench()
+        self.bench.move("a")
+        self.app: FastAPI = self.bench.app(authenticator=Authenticator({SOURCE: self.keys}), rate_limiter=rate_limiter)
 
     def ask(self, method: str, path: str, secret: str | Scope | None = None, **options: Any) -> httpx.Response:
         credential = self.secrets[secret] if isinstance(secret, Scope) else secret
@@ -115,7 +115,7 @@ def test_a_key_that_differs_in_one_letter_is_refused(guarded: Guarded) -> None:
 def test_revoking_a_key_ends_its_streams(tmp_path: Path) -> None:
     guarded = Guarded(tmp_path)
     headers = {"authorization": f"Bearer {guarded.secrets[READ]}"}
-    with running_server(guarded.app, guarded.house.stopping) as port:
+    with running_server(guarded.app, guarded.bench.stopping) as port:
         url = f"http://127.0.0.1:{port}/api/v1/stream?max_hz=30"
         with httpx.stream("GET", url, headers=headers, timeout=20.0, trust_env=False) as stream:
             lines = stream.iter_lines()
@@ -123,7 +123,7 @@ def test_revoking_a_key_ends_its_streams(tmp_path: Path) -> None:
             ApiKeys(tmp_path).revoke("read")
             guarded.clock_s += 2.0
             for number in range(20):
-                guarded.house.move("a", x=float(number))
+                guarded.bench.move("a", x=float(number))
                 if not list(zip(range(3), lines, strict=False)):
                     break
             assert list(lines) == []

@@ -48,18 +48,18 @@ def test_the_dashboard_is_read_only(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", ["tags", "tags/a", "site", "anchors", "anchors/17", "health/live", "health/ready"])
 def test_an_unknown_query_parameter_is_refused(path: str) -> None:
-    house = make_api_bench()
-    house.answers.tags.register("a")
-    app = house.app()
+    bench = make_api_bench()
+    bench.answers.tags.register("a")
+    app = bench.app()
     assert ask(app, "GET", f"/api/v1/{path}").status_code == 200
     assert kind_of(ask(app, "GET", f"/api/v1/{path}?verbose=1")) == "invalid-request"
 
 
 def test_an_internal_error_is_a_problem_without_details() -> None:
-    house = make_api_bench()
-    house.move("a")
-    house.answers.now_ns = lambda: int("a secret")
-    response = ask(house.app(), "GET", "/api/v1/poses")
+    bench = make_api_bench()
+    bench.move("a")
+    bench.answers.now_ns = lambda: int("a secret")
+    response = ask(bench.app(), "GET", "/api/v1/poses")
     assert kind_of(response) == "internal"
     assert "secret" not in response.text
 
@@ -79,11 +79,11 @@ def test_a_body_that_is_too_large_is_refused_by_its_content_length_and_by_its_si
 
 
 def test_readiness_gives_the_reasons_when_the_service_is_not_ready() -> None:
-    house = make_api_bench()
-    app = house.app()
+    bench = make_api_bench()
+    app = bench.app()
     assert ask(app, "GET", "/api/v1/health/live").json() == {"status": "live"}
     assert ask(app, "GET", "/api/v1/health/ready").json() == {"status": "ready", "impaired": []}
-    house.not_ready = ["no Zenoh session", "disk full"]
+    bench.not_ready = ["no Zenoh session", "disk full"]
     response = ask(app, "GET", "/api/v1/health/ready")
     assert kind_of(response) == "not-ready"
     assert response.json()["reasons"] == ["no Zenoh session", "disk full"]
@@ -91,12 +91,12 @@ def test_readiness_gives_the_reasons_when_the_service_is_not_ready() -> None:
 
 
 def test_metrics_come_from_the_given_registry() -> None:
-    house = make_api_bench()
-    Counter("eggs", "Eggs laid", registry=house.registry).inc(3)
-    response = ask(house.app(), "GET", "/metrics")
+    bench = make_api_bench()
+    Counter("eggs", "Eggs laid", registry=bench.registry).inc(3)
+    response = ask(bench.app(), "GET", "/metrics")
     assert response.headers["content-type"].startswith("text/plain")
     assert "eggs_total 3.0" in response.text
-    openmetrics = ask(house.app(), "GET", "/metrics", headers={"accept": "application/openmetrics-text"})
+    openmetrics = ask(bench.app(), "GET", "/metrics", headers={"accept": "application/openmetrics-text"})
     assert openmetrics.headers["content-type"].startswith("application/openmetrics-text")
 
 

@@ -34,9 +34,9 @@ class LongDeadlines(GuardedProtocol):
 
 
 @contextmanager
-def serving(house: ApiBench, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
+def serving(bench: ApiBench, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
     """Run a server and yield its port. The server and its streams have ended after the block."""
-    server = build_server(house.app(), house.stopping, protocol)
+    server = build_server(bench.app(), bench.stopping, protocol)
     bound = listen("127.0.0.1", 0)
     port = int(bound.getsockname()[1])
     thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
@@ -110,16 +110,16 @@ def _ended(client: socket.socket) -> bool:
 
 
 def test_a_stream_starts_with_all_tags_and_continues_with_changes() -> None:
-    house = make_api_bench()
-    house.move("a", "b", x=1.0)
-    with serving(house) as port, streaming(port) as events:
+    bench = make_api_bench()
+    bench.move("a", "b", x=1.0)
+    with serving(bench) as port, streaming(port) as events:
         name, frame = next(events)
         assert (name, frame["tags"], frame["x"]) == ("snapshot", ["a", "b"], [1.0, 1.0])
         PoseFrame.model_validate(frame)
-        house.move("b", x=2.0)
+        bench.move("b", x=2.0)
         name, frame = next(events)
         assert (name, frame["tags"], frame["x"]) == ("poses", ["b"], [2.0])
-        house.move("c", x=3.0)
+        bench.move("c", x=3.0)
         assert next(events)[1]["tags"] == ["c"]
 
 
@@ -130,24 +130,24 @@ def test_a_stream_without_poses_starts_with_an_empty_snapshot() -> None:
 
 
 def test_a_stream_of_selected_tags_includes_those_that_appear_later() -> None:
-    house = make_api_bench()
-    house.move("a", "b")
-    with serving(house) as port, streaming(port, "max_hz=30&tags=b,late") as events:
+    bench = make_api_bench()
+    bench.move("a", "b")
+    with serving(bench) as port, streaming(port, "max_hz=30&tags=b,late") as events:
         assert next(events)[1]["tags"] == ["b"]
-        house.move("a")
-        house.move("late")
+        bench.move("a")
+        bench.move("late")
         assert next(events)[1]["tags"] == ["late"]
 
 
 def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
-    house = make_api_bench()
-    house.move("a", x=0.0)
-    with serving(house) as port, streaming(port, "max_hz=5") as events:
+    bench = make_api_bench()
+    bench.move("a", x=0.0)
+    with serving(bench) as port, streaming(port, "max_hz=5") as events:
         next(events)
         start_s = time.monotonic()
         seen: list[float] = []
         for count in range(1, 101):
-            house.move("a", x=float(count))
+            bench.move("a", x=float(count))
             time.sleep(0.01)
         while not seen or seen[-1] != 100.0:
             seen.append(next(events)[1]["x"][0])
@@ -156,15 +156,15 @@ def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
 
 
 def test_a_tag_that_falls_silent_or_goes_offline_is_reported_without_a_new_pose() -> None:
-    house = make_api_bench()
-    house.move("a", "b")
-    house.answers.tags.set_online("b", True)
-    with serving(house) as port, streaming(port) as events:
+    bench = make_api_bench()
+    bench.move("a", "b")
+    bench.answers.tags.set_online("b", True)
+    with serving(bench) as port, streaming(port) as events:
         assert next(events)[1]["online"] == [False, True]
-        house.answers.tags.set_online("b", False)
+        bench.answers.tags.set_online("b", False)
         frame = next(events)[1]
         assert (frame["tags"], frame["online"]) == (["b"], [False])
-        house.now_ns += 2_000_000_000
+        bench.now_ns += 2_000_000_000
         assert next(events)[1]["state"] == ["coasting", "coasting"]
 
 
@@ -182,22 +182,22 @@ def test_invalid_stream_parameters_are_a_problem(query: str) -> None:
 
 
 def test_streams_end_when_the_server_stops() -> None:
-    house = make_api_bench()
-    with serving(house) as port, streaming(port, "max_hz=0.1") as events:
+    bench = make_api_bench()
+    with serving(bench) as port, streaming(port, "max_hz=0.1") as events:
         next(events)
-        house.stopping.set()
+        bench.stopping.set()
         start_s = time.monotonic()
         assert list(events) == []
         assert time.monotonic() - start_s < 8.0
 
 
 def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
-    house = make_api_bench()
-    house.move(*(f"tag-{number}" for number in range(2000)))
-    with serving(house) as port:
+    bench = make_api_bench()
+    bench.move(*(f"tag-{number}" for number in range(2000)))
+    with serving(bench) as port:
         client = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
         for _ in range(10):
-            house.move(*(f"tag-{number}" for number in range(2000)))
+            bench.move(*(f"tag-{number}" for number in range(2000)))
             time.sleep(0.05)
         start_s = time.monotonic()
     assert time.monotonic() - start_s < 20.0
@@ -205,15 +205,15 @@ def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
 
 
 def test_a_client_that_stops_reading_is_disconnected_and_does_not_delay_others() -> None:
-    house = make_api_bench()
+    bench = make_api_bench()
     names = [f"tag-{number}" for number in range(2000)]
-    house.move(*names)
-    with serving(house, ShortDeadlines) as port, streaming(port) as events:
+    bench.move(*names)
+    with serving(bench, ShortDeadlines) as port, streaming(port) as events:
         next(events)
         stuck = _connected(port, b"GET /api/v1/stream?max_hz=30 HTTP/1.1\r\nhost: x\r\n\r\n")
         gaps_s, end_s = [], time.monotonic() + 3.0
         while time.monotonic() < end_s:
-            house.move(*names)
+            bench.move(*names)
             start_s = time.monotonic()
             next(events)
             gaps_s.append(time.monotonic() - start_s)
@@ -257,8 +257,8 @@ def test_an_incomplete_second_request_is_disconnected_too() -> None:
 
 
 def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
-    house = make_api_bench()
-    with serving(house, LongDeadlines) as port, streaming(port) as events:
+    bench = make_api_bench()
+    with serving(bench, LongDeadlines) as port, streaming(port) as events:
         next(events)
         request = b"GET /api/v1/health/live HTTP/1.1\r\nhost: x\r\n\r\n"
         client = _connected(port, request[:20])
@@ -269,7 +269,7 @@ def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
             time.sleep(2.1)
             client.sendall(request)
             assert _answer(client).startswith(b"HTTP/1.1 200")
-        house.move("a")
+        bench.move("a")
         assert next(events)[1]["tags"] == ["a"]
 
 

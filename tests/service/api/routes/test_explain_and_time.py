@@ -13,27 +13,27 @@ SECOND = 1_000_000_000
 
 def driven(seconds: float = 5.0, speed: float = 2.0) -> ApiBench:
     """A tag that has driven east until now, with ten poses a second."""
-    house = make_api_bench()
+    bench = make_api_bench()
     for i in range(round(seconds * 10) + 1):
-        house.now_ns = T_NS - round((seconds - i / 10) * SECOND)
-        house.move("a", x=speed * i / 10, speed=speed, sigma_pos=0.2)
-    return house
+        bench.now_ns = T_NS - round((seconds - i / 10) * SECOND)
+        bench.move("a", x=speed * i / 10, speed=speed, sigma_pos=0.2)
+    return bench
 
 
-def pose_at(house: ApiBench, offset_s: float) -> Pose:
+def pose_at(bench: ApiBench, offset_s: float) -> Pose:
     path = f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}"
-    return Pose.model_validate(ask(house.app(), "GET", path).json())
+    return Pose.model_validate(ask(bench.app(), "GET", path).json())
 
 
-def problem_at(house: ApiBench, offset_s: float) -> tuple[str, str]:
-    response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
+def problem_at(bench: ApiBench, offset_s: float) -> tuple[str, str]:
+    response = ask(bench.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
     return kind_of(response), response.json()["detail"]
 
 
 def test_a_past_pose_is_interpolated_between_the_poses_in_memory() -> None:
-    house = driven()
+    bench = driven()
     for offset_s in (-4.0, -3.33, -0.05, 0.0):
-        pose = pose_at(house, offset_s)
+        pose = pose_at(bench, offset_s)
         assert pose.x == pytest.approx(10.0 + 2.0 * offset_s)
         assert pose.t_ns == T_NS + round(offset_s * SECOND)
         assert pose.age_s == pytest.approx(-offset_s)
@@ -41,14 +41,14 @@ def test_a_past_pose_is_interpolated_between_the_poses_in_memory() -> None:
 
 
 def test_the_state_of_a_past_pose_does_not_age() -> None:
-    house = driven()
-    house.now_ns = T_NS + 20 * SECOND
-    assert pose_at(house, -2.0).state == "tracking"
+    bench = driven()
+    bench.now_ns = T_NS + 20 * SECOND
+    assert pose_at(bench, -2.0).state == "tracking"
 
 
 def test_a_pose_in_the_near_future_is_extrapolated_with_a_growing_covariance() -> None:
-    house = driven()
-    now, soon, later = (pose_at(house, offset_s) for offset_s in (0.0, 0.5, 2.0))
+    bench = driven()
+    now, soon, later = (pose_at(bench, offset_s) for offset_s in (0.0, 0.5, 2.0))
     assert [soon.x, later.x] == pytest.approx([11.0, 14.0])
     sizes = [pose.ellipse_95.semi_major_m for pose in (now, soon, later) if pose.ellipse_95]
     assert len(sizes) == 3
@@ -56,29 +56,29 @@ def test_a_pose_in_the_near_future_is_extrapolated_with_a_growing_covariance() -
 
 
 def test_a_time_without_a_pose_is_refused_with_its_reason() -> None:
-    house = driven()
-    assert problem_at(house, 2.1)[0] == "too-far-ahead"
-    kind, detail = problem_at(house, -9.0)
+    bench = driven()
+    assert problem_at(bench, 2.1)[0] == "too-far-ahead"
+    kind, detail = problem_at(bench, -9.0)
     assert (kind, "begin" in detail) == ("no-pose-then", True)
-    house.now_ns = T_NS + 3 * SECOND
-    house.move("a", x=16.0, speed=2.0, sigma_pos=0.2)
-    kind, detail = problem_at(house, 1.5)
+    bench.now_ns = T_NS + 3 * SECOND
+    bench.move("a", x=16.0, speed=2.0, sigma_pos=0.2)
+    kind, detail = problem_at(bench, 1.5)
     assert (kind, "apart" in detail) == ("no-pose-then", True)
 
 
 def test_a_jump_of_the_estimate_is_not_interpolated() -> None:
-    house = driven()
-    house.now_ns = T_NS + SECOND // 2
-    house.move("a", x=-30.0, speed=2.0, sigma_pos=0.2)
-    kind, detail = problem_at(house, 0.25)
+    bench = driven()
+    bench.now_ns = T_NS + SECOND // 2
+    bench.move("a", x=-30.0, speed=2.0, sigma_pos=0.2)
+    kind, detail = problem_at(bench, 0.25)
     assert (kind, "jumped" in detail) == ("no-pose-then", True)
 
 
 def test_an_ambiguous_pose_is_not_extrapolated() -> None:
-    house = driven()
-    house.now_ns = T_NS + SECOND // 10
-    house.move("a", x=10.2, speed=2.0, sigma_pos=2.0, state=State.AMBIGUOUS)
-    assert problem_at(house, 0.5)[0] == "no-pose-then"
+    bench = driven()
+    bench.now_ns = T_NS + SECOND // 10
+    bench.move("a", x=10.2, speed=2.0, sigma_pos=2.0, state=State.AMBIGUOUS)
+    assert problem_at(bench, 0.5)[0] == "no-pose-then"
 
 
 @pytest.mark.parametrize("query", ["at=noon", "at=-1", "at=9223372036854775808", "when=5", "at=1&at=x"])
@@ -87,7 +87,7 @@ def test_an_invalid_time_is_refused(query: str) -> None:
 
 
 def explained_house() -> ApiBench:
-    house = driven()
+    bench = driven()
     records = np.zeros(60, INNOVATION)
     records["t_ns"] = T_NS - np.arange(60)[::-1] * SECOND // 10
     records["predicted"] = 10.0 + 2.0 * (records["t_ns"] - T_NS) * 1e-9
@@ -96,8 +96,8 @@ def explained_house() -> ApiBench:
     records["measured"] = records["predicted"] + records["innovation"]
     pose = np.zeros(1, POSE)
     pose["t_ns"], pose["state"], pose["speed"], pose["cov"] = T_NS + 1, State.TRACKING, 2.0, np.eye(3) * 0.01
-    house.answers.latest.write(pose, np.empty(0, HYPOTHESIS), records)
-    return house
+    bench.answers.latest.write(pose, np.empty(0, HYPOTHESIS), records)
+    return bench
 
 
 def test_an_explanation_holds_the_last_innovations_and_the_range_rate() -> None:
@@ -116,13 +116,13 @@ def test_an_explanation_holds_the_last_innovations_and_the_range_rate() -> None:
 
 
 def test_an_innovation_that_was_only_gated_has_no_outlier_probability() -> None:
-    house = make_api_bench()
-    house.move("a")
+    bench = make_api_bench()
+    bench.move("a")
     record = np.zeros(1, INNOVATION)
     record["S"], record["p_outlier"] = 1.0, np.nan
-    pose = house.answers.latest.since()[1]
-    house.answers.latest.write(pose, np.empty(0, HYPOTHESIS), record)
-    explanation = Explanation.model_validate(ask(house.app(), "GET", "/api/v1/tags/a/explain").json())
+    pose = bench.answers.latest.since()[1]
+    bench.answers.latest.write(pose, np.empty(0, HYPOTHESIS), record)
+    explanation = Explanation.model_validate(ask(bench.app(), "GET", "/api/v1/tags/a/explain").json())
     assert explanation.innovations[0].p_outlier is None
 
 
@@ -132,7 +132,7 @@ def test_an_invalid_query_for_an_explanation_is_refused(query: str) -> None:
 
 
 def test_an_unknown_tag_and_a_tag_without_a_pose_cannot_be_explained() -> None:
-    house = make_api_bench()
-    house.answers.tags.register("quiet")
-    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/explain")) == "unknown-tag"
-    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/quiet/explain")) == "no-pose-yet"
+    bench = make_api_bench()
+    bench.answers.tags.register("quiet")
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/nobody/explain")) == "unknown-tag"
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/quiet/explain")) == "no-pose-yet"

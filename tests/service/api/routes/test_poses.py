@@ -11,26 +11,26 @@ GEOREFERENCED = Site(georeference=Georeference(lat=52.5, lon=13.4))
 
 
 def test_the_pose_of_a_tag_is_its_latest_one() -> None:
-    house = make_api_bench()
-    house.move("a", x=1.0)
-    house.move("a", x=2.0, heading=0.5)
-    pose = Pose.model_validate(ask(house.app(), "GET", "/api/v1/tags/a/pose").json())
+    bench = make_api_bench()
+    bench.move("a", x=1.0)
+    bench.move("a", x=2.0, heading=0.5)
+    pose = Pose.model_validate(ask(bench.app(), "GET", "/api/v1/tags/a/pose").json())
     assert (pose.tag, pose.x, pose.heading_rad, pose.t_ns) == ("a", 2.0, 0.5, T_NS)
 
 
 def test_an_unknown_tag_and_a_tag_without_a_pose_are_different_problems() -> None:
-    house = make_api_bench()
-    house.answers.tags.register("quiet")
-    app = house.app()
+    bench = make_api_bench()
+    bench.answers.tags.register("quiet")
+    app = bench.app()
     assert kind_of(ask(app, "GET", "/api/v1/tags/nobody/pose")) == "unknown-tag"
     assert kind_of(ask(app, "GET", "/api/v1/tags/quiet/pose")) == "no-pose-yet"
 
 
 def test_an_id_may_contain_any_printable_character_even_a_slash() -> None:
-    house = make_api_bench()
-    house.move("a/pose", x=1.0)
-    house.move("Gerät 7%", x=2.0)
-    app = house.app()
+    bench = make_api_bench()
+    bench.move("a/pose", x=1.0)
+    bench.move("Gerät 7%", x=2.0)
+    app = bench.app()
     assert ask(app, "GET", "/api/v1/tags/a%2Fpose/pose").json()["tag"] == "a/pose"
     assert ask(app, "GET", "/api/v1/tags/Ger%C3%A4t%207%25/pose").json()["x"] == 2.0
 
@@ -42,9 +42,9 @@ def test_an_invalid_id_is_a_problem(chunk: str) -> None:
 
 
 def test_a_list_holds_all_poses_or_the_selected_ones() -> None:
-    house = make_api_bench()
-    house.move("a", "b", "c")
-    app = house.app()
+    bench = make_api_bench()
+    bench.move("a", "b", "c")
+    app = bench.app()
     all_poses = PoseList.model_validate(ask(app, "GET", "/api/v1/poses").json())
     assert all_poses.t_ns == T_NS
     assert [pose.tag for pose in all_poses.poses] == ["a", "b", "c"]
@@ -63,10 +63,10 @@ def test_a_single_pose_accepts_only_a_time_as_its_query() -> None:
 
 
 def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_position() -> None:
-    house = make_api_bench(GEOREFERENCED)
-    house.move("a", x=1000.0)
-    house.move("b", x=np.nan, y=np.nan)
-    response = ask(house.app(), "GET", "/api/v1/poses", headers={"accept": "application/geo+json"})
+    bench = make_api_bench(GEOREFERENCED)
+    bench.move("a", x=1000.0)
+    bench.move("b", x=np.nan, y=np.nan)
+    response = ask(bench.app(), "GET", "/api/v1/poses", headers={"accept": "application/geo+json"})
     assert response.headers["content-type"] == "application/geo+json"
     assert response.headers["vary"] == "accept"
     collection = response.json()
@@ -79,9 +79,9 @@ def test_geojson_has_longitude_before_latitude_and_null_for_an_unknown_position(
 
 
 def test_one_pose_is_a_feature() -> None:
-    house = make_api_bench(GEOREFERENCED)
-    house.move("a")
-    feature = ask(house.app(), "GET", "/api/v1/tags/a/pose", headers={"accept": "application/geo+json"}).json()
+    bench = make_api_bench(GEOREFERENCED)
+    bench.move("a")
+    feature = ask(bench.app(), "GET", "/api/v1/tags/a/pose", headers={"accept": "application/geo+json"}).json()
     assert (feature["type"], feature["geometry"]["coordinates"]) == ("Feature", pytest.approx([13.4, 52.5]))
 
 

@@ -14,16 +14,16 @@ LIMITS = Limits(2**30, 10**18, 1000, 10**18, 2**40)
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> ApiBench:
-    house = make_api_bench()
-    answers = house.answers
+def bench(tmp_path: Path) -> ApiBench:
+    bench = make_api_bench()
+    answers = bench.answers
     answers.tags.register("a")
-    house.recorder = Recorder(tmp_path, LIMITS, 1, answers.tags, answers.site, answers.now_ns, {})
-    return house
+    bench.recorder = Recorder(tmp_path, LIMITS, 1, answers.tags, answers.site, answers.now_ns, {})
+    return bench
 
 
-def test_a_recording_is_started_stopped_listed_and_downloaded(house: ApiBench) -> None:
-    app, recorder = house.app(), house.recorder
+def test_a_recording_is_started_stopped_listed_and_downloaded(bench: ApiBench) -> None:
+    app, recorder = bench.app(), bench.recorder
     assert recorder is not None
     started = ask(app, "POST", "/api/v1/recordings", json={"tags": ["a"]})
     assert started.status_code == 201
@@ -45,9 +45,9 @@ def test_a_recording_is_started_stopped_listed_and_downloaded(house: ApiBench) -
 
 
 @pytest.mark.parametrize("name", ["x.mcap", "..%2Fsite.json", "%2Fetc%2Fpasswd", "..", "x"])
-def test_only_recordings_can_be_downloaded(house: ApiBench, name: str, tmp_path: Path) -> None:
+def test_only_recordings_can_be_downloaded(bench: ApiBench, name: str, tmp_path: Path) -> None:
     (tmp_path / "site.json").write_text("{}")
-    assert ask(house.app(), "GET", f"/api/v1/recordings/{name}").status_code == 404
+    assert ask(bench.app(), "GET", f"/api/v1/recordings/{name}").status_code == 404
 
 
 def test_recording_needs_a_data_folder() -> None:
@@ -57,6 +57,6 @@ def test_recording_needs_a_data_folder() -> None:
     assert kind_of(ask(app, "POST", "/api/v1/recordings", json={})) == "no-recorder"
 
 
-def test_a_folder_that_cannot_be_created_is_reported_at_once(house: ApiBench, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_created_is_reported_at_once(bench: ApiBench, tmp_path: Path) -> None:
     (tmp_path / "recordings").write_text("in the way")
-    assert kind_of(ask(house.app(), "POST", "/api/v1/recordings", json={})) == "not-saved"
+    assert kind_of(ask(bench.app(), "POST", "/api/v1/recordings", json={})) == "not-saved"

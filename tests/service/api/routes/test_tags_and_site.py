@@ -13,31 +13,31 @@ from support.api import ask, kind_of, make_api_bench
 
 
 def test_a_tag_shows_its_counts_of_messages_samples_and_rejections() -> None:
-    house = make_api_bench()
-    tags = house.answers.tags
+    bench = make_api_bench()
+    tags = bench.answers.tags
     rows = np.array([tags.register("a").row])
     tags.count_messages(rows, 5_000)
     tags.count_samples("range", np.repeat(rows, 3))
     tags.count_rejected(Reason.LATE, rows)
     tags.set_online("a", True)
-    tag = TagStatus.model_validate(ask(house.app(), "GET", "/api/v1/tags/a").json())
+    tag = TagStatus.model_validate(ask(bench.app(), "GET", "/api/v1/tags/a").json())
     assert (tag.online, tag.first_heard_ns, tag.last_heard_ns, tag.messages) == (True, 5_000, 5_000, 1)
     assert (tag.samples, tag.rejected, tag.settings) == ({"range": 3}, {"late": 1}, TagSettings())
 
 
 def test_the_list_of_tags_includes_those_that_have_sent_nothing() -> None:
-    house = make_api_bench()
-    house.answers.tags.register("b")
-    house.answers.tags.register("a")
-    tags = TagList.model_validate(ask(house.app(), "GET", "/api/v1/tags").json()).tags
+    bench = make_api_bench()
+    bench.answers.tags.register("b")
+    bench.answers.tags.register("a")
+    tags = TagList.model_validate(ask(bench.app(), "GET", "/api/v1/tags").json()).tags
     assert [(tag.tag, tag.first_heard_ns) for tag in tags] == [("b", None), ("a", None)]
 
 
 def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
-    house = make_api_bench()
+    bench = make_api_bench()
     for name, t_ns in (("a", 10), ("b", 20), ("a", 30)):
-        house.answers.pending_tags.on_message(name, t_ns)
-    listed = NewcomerList.model_validate(ask(house.app(), "GET", "/api/v1/newcomers").json()).newcomers
+        bench.answers.pending_tags.on_message(name, t_ns)
+    listed = NewcomerList.model_validate(ask(bench.app(), "GET", "/api/v1/newcomers").json()).newcomers
     assert [(n.tag, n.first_heard_ns, n.last_heard_ns, n.messages) for n in listed] == [
         ("a", 10, 30, 2),
         ("b", 20, 20, 1),
@@ -45,26 +45,26 @@ def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
 
 
 def test_settings_are_stored_and_register_a_new_tag() -> None:
-    house = make_api_bench()
-    app = house.app()
+    bench = make_api_bench()
+    app = bench.app()
     settings = {"height_m": 1.5, "start": {"x": 1, "y": 2}}
     response = ask(app, "PUT", "/api/v1/tags/new%2Ftag/settings", json=settings)
     assert response.status_code == 200
     assert response.json() == TagSettings.model_validate(settings).model_dump()
-    assert house.answers.tags.find("new/tag") is not None
-    assert house.answers.site.tag_settings("new/tag").height_m == 1.5
+    assert bench.answers.tags.find("new/tag") is not None
+    assert bench.answers.site.tag_settings("new/tag").height_m == 1.5
     assert ask(app, "GET", "/api/v1/tags/new%2Ftag").json()["settings"] == response.json()
     assert ask(app, "GET", "/api/v1/tags/new%2Ftag/settings").json() == response.json()
     assert kind_of(ask(app, "GET", "/api/v1/tags/other/settings")) == "unknown-tag"
 
 
 def test_no_more_than_max_tags_are_registered() -> None:
-    house = make_api_bench()
-    app = house.app(max_tags=1)
+    bench = make_api_bench()
+    app = bench.app(max_tags=1)
     assert ask(app, "PUT", "/api/v1/tags/a/settings", json={}).status_code == 200
     assert ask(app, "PUT", "/api/v1/tags/a/settings", json={}).status_code == 200
     assert kind_of(ask(app, "PUT", "/api/v1/tags/b/settings", json={})) == "tags-full"
-    assert "b" not in house.answers.site.tags
+    assert "b" not in bench.answers.site.tags
 
 
 @pytest.mark.parametrize(
@@ -90,12 +90,12 @@ def test_no_more_than_max_tags_are_registered() -> None:
     ],
 )
 def test_invalid_settings_are_a_problem_that_names_the_field(body: bytes, location: str | None) -> None:
-    house = make_api_bench()
+    bench = make_api_bench()
     headers = {"content-type": "application/json"}
-    response = ask(house.app(), "PUT", "/api/v1/tags/a/settings", content=body, headers=headers)
+    response = ask(bench.app(), "PUT", "/api/v1/tags/a/settings", content=body, headers=headers)
     assert kind_of(response) == "invalid-request"
     assert location is None or location in [part["location"] for part in response.json()["errors"]]
-    assert len(house.answers.tags) == 0
+    assert len(bench.answers.tags) == 0
 
 
 def test_a_body_without_the_json_media_type_is_a_problem() -> None:
@@ -111,18 +111,18 @@ def test_a_problem_does_not_repeat_the_input() -> None:
 
 
 def test_the_site_is_replaced_as_a_whole() -> None:
-    house = make_api_bench()
-    app = house.app()
+    bench = make_api_bench()
+    app = bench.app()
     site = {"name": "Yard", "georeference": {"lat": 50, "lon": 8}, "anchors": [{"id": "1"}, {"id": "2", "x": 4}]}
     assert ask(app, "PUT", "/api/v1/site", json=site).status_code == 200
-    assert house.answers.site.site == Site.model_validate(site)
+    assert bench.answers.site.site == Site.model_validate(site)
     assert ask(app, "GET", "/api/v1/site").json() == Site.model_validate(site).model_dump()
 
 
 def test_the_id_of_the_site_is_fixed() -> None:
-    house = make_api_bench()
-    assert kind_of(ask(house.app(), "PUT", "/api/v1/site", json={"id": "other"})) == "site-id-fixed"
-    assert house.answers.site.site.id == "default"
+    bench = make_api_bench()
+    assert kind_of(ask(bench.app(), "PUT", "/api/v1/site", json={"id": "other"})) == "site-id-fixed"
+    assert bench.answers.site.site.id == "default"
 
 
 @pytest.mark.parametrize(
@@ -133,8 +133,8 @@ def test_invalid_anchors_are_a_problem(anchors: Any) -> None:
 
 
 def test_an_anchor_is_placed_moved_read_and_removed() -> None:
-    house = make_api_bench()
-    app = house.app()
+    bench = make_api_bench()
+    app = bench.app()
     path = "/api/v1/anchors/gate%2F1"
     assert kind_of(ask(app, "GET", path)) == "unknown-anchor"
     for x in (1.0, 2.0):
@@ -144,7 +144,7 @@ def test_an_anchor_is_placed_moved_read_and_removed() -> None:
     removed = ask(app, "DELETE", path)
     assert (removed.status_code, removed.content) == (204, b"")
     assert kind_of(ask(app, "DELETE", path)) == "unknown-anchor"
-    assert house.answers.site.site.anchors == [Anchor(id="17")]
+    assert bench.answers.site.site.anchors == [Anchor(id="17")]
 
 
 def test_the_ids_of_an_anchor_in_path_and_body_must_match() -> None:
@@ -154,19 +154,19 @@ def test_the_ids_of_an_anchor_in_path_and_body_must_match() -> None:
 
 def test_a_change_that_cannot_be_saved_is_not_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way of the folder")
-    house = make_api_bench(folder=tmp_path / "file")
-    app = house.app()
+    bench = make_api_bench(folder=tmp_path / "file")
+    app = bench.app()
     assert kind_of(ask(app, "PUT", "/api/v1/anchors/1", json={"id": "1"})) == "not-saved"
     assert kind_of(ask(app, "PUT", "/api/v1/site", json={})) == "not-saved"
     assert kind_of(ask(app, "PUT", "/api/v1/tags/a/settings", json={})) == "not-saved"
     assert kind_of(ask(app, "DELETE", "/api/v1/anchors/17")) == "not-saved"
-    assert (house.answers.site.site.anchors, len(house.answers.tags)) == ([Anchor(id="17")], 0)
+    assert (bench.answers.site.site.anchors, len(bench.answers.tags)) == ([Anchor(id="17")], 0)
 
 
 @pytest.mark.parametrize("escaped", ["*", "%2A", "forklift-*"])
 def test_a_pattern_instead_of_a_tag_is_refused_with_an_explanation(escaped: str) -> None:
-    house = make_api_bench()
-    response = ask(house.app(), "PUT", f"/api/v1/tags/{escaped}/settings", json={})
+    bench = make_api_bench()
+    response = ask(bench.app(), "PUT", f"/api/v1/tags/{escaped}/settings", json={})
     assert kind_of(response) == "invalid-request"
     assert "there are no settings for all tags" in response.json()["detail"]
-    assert len(house.answers.tags) == 0
+    assert len(bench.answers.tags) == 0

@@ -24,27 +24,27 @@ SECONDS = 600
 
 def driven(folder: Path, site: Site | None = None) -> ApiBench:
     """A tag that drove east at 2 m/s for ten minutes. Its poses are only in the stored history."""
-    house = make_api_bench(site, folder, RETENTION)
+    bench = make_api_bench(site, folder, RETENTION)
     for second in range(SECONDS + 1):
-        house.now_ns = T_NS - (SECONDS - second) * SECOND
-        house.move("a", x=2.0 * second, speed=2.0, sigma_pos=0.2, anchor=0)
-    house.write_history()
-    house.answers.latest = LatestPoses()
-    return house
+        bench.now_ns = T_NS - (SECONDS - second) * SECOND
+        bench.move("a", x=2.0 * second, speed=2.0, sigma_pos=0.2, anchor=0)
+    bench.write_history()
+    bench.answers.latest = LatestPoses()
+    return bench
 
 
-def track(house: ApiBench, query: str = "") -> Track:
-    response = ask(house.app(), "GET", f"/api/v1/tags/a/track?{query}")
+def track(bench: ApiBench, query: str = "") -> Track:
+    response = ask(bench.app(), "GET", f"/api/v1/tags/a/track?{query}")
     assert response.status_code == 200, response.text
     return Track.model_validate(response.json())
 
 
 def test_a_track_covers_the_last_hour_by_default(tmp_path: Path) -> None:
-    house = driven(tmp_path)
-    default = track(house)
+    bench = driven(tmp_path)
+    default = track(bench)
     assert (len(default.poses), default.next) == (SECONDS + 1, None)
     assert default.to_ns - default.from_ns == 3600 * SECOND
-    selected = track(house, f"from={T_NS - 20 * SECOND}&to={T_NS - 10 * SECOND}")
+    selected = track(bench, f"from={T_NS - 20 * SECOND}&to={T_NS - 10 * SECOND}")
     assert [(pose.t_ns - T_NS) // SECOND for pose in selected.poses] == list(range(-20, -9))
     last = selected.poses[-1]
     assert (last.x, last.speed_mps, last.anchor, last.state) == (1180.0, 2.0, "17", "tracking")
@@ -52,10 +52,10 @@ def test_a_track_covers_the_last_hour_by_default(tmp_path: Path) -> None:
 
 
 def test_pages_follow_each_other_without_a_gap(tmp_path: Path) -> None:
-    house = driven(tmp_path)
+    bench = driven(tmp_path)
     found, path = [], f"/api/v1/tags/a/track?to={T_NS}&limit=250"
     while path:
-        response = ask(house.app(), "GET", path)
+        response = ask(bench.app(), "GET", path)
         page = Track.model_validate(response.json())
         found += [pose.t_ns for pose in page.poses]
         link = response.headers.get("link", "")
@@ -65,8 +65,8 @@ def test_pages_follow_each_other_without_a_gap(tmp_path: Path) -> None:
 
 
 def test_csv_has_every_column_and_latitudes_only_on_a_georeferenced_site(tmp_path: Path) -> None:
-    house = driven(tmp_path)
-    response = ask(house.app(), "GET", "/api/v1/tags/a/track", headers={"accept": "text/csv"})
+    bench = driven(tmp_path)
+    response = ask(bench.app(), "GET", "/api/v1/tags/a/track", headers={"accept": "text/csv"})
     rows = list(csv.DictReader(io.StringIO(response.text)))
     assert response.headers["content-type"].startswith("text/csv")
     assert (len(rows), rows[5]["x"], rows[5]["var_x"], rows[5]["state"]) == (SECONDS + 1, "10.0", "0.04", "tracking")
@@ -79,25 +79,25 @@ def test_geojson_and_gpx_need_a_georeference(tmp_path: Path, form: str) -> None:
 
 
 def test_gpx_and_geojson_hold_geographic_coordinates(tmp_path: Path) -> None:
-    house = driven(tmp_path, GEOREFERENCED)
-    gpx = ask(house.app(), "GET", "/api/v1/tags/a/track?format=gpx")
+    bench = driven(tmp_path, GEOREFERENCED)
+    gpx = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=gpx")
     points = list(ElementTree.fromstring(gpx.text).iter("{http://www.topografix.com/GPX/1/1}trkpt"))
     assert (gpx.headers["content-type"], len(points)) == ("application/gpx+xml", SECONDS + 1)
     assert points[-1][0].text == "2027-01-15T08:00:00.000Z"
     metres = (float(points[-1].attrib["lon"]) - 13.4) * math.radians(1) * 6_378_137 * math.cos(math.radians(52.5))
     assert metres == pytest.approx(2.0 * SECONDS, rel=5e-3)
     accept = {"accept": "application/geo+json"}
-    features = ask(house.app(), "GET", "/api/v1/tags/a/track", headers=accept).json()["features"]
+    features = ask(bench.app(), "GET", "/api/v1/tags/a/track", headers=accept).json()["features"]
     assert features[-1]["geometry"]["coordinates"][0] == pytest.approx(float(points[-1].attrib["lon"]))
     assert features[-1]["properties"]["covariance"][0][0] == 0.04
 
 
 def test_gpx_leaves_out_ambiguous_poses(tmp_path: Path) -> None:
-    house = driven(tmp_path, GEOREFERENCED)
-    house.now_ns = T_NS + SECOND
-    house.move("a", x=0.0, state=State.AMBIGUOUS)
-    house.write_history()
-    text = ask(house.app(), "GET", "/api/v1/tags/a/track?format=gpx").text
+    bench = driven(tmp_path, GEOREFERENCED)
+    bench.now_ns = T_NS + SECOND
+    bench.move("a", x=0.0, state=State.AMBIGUOUS)
+    bench.write_history()
+    text = ask(bench.app(), "GET", "/api/v1/tags/a/track?format=gpx").text
     assert text.count("<trkpt") == SECONDS + 1
 
 
@@ -109,16 +109,16 @@ def test_invalid_track_parameters_are_refused(tmp_path: Path, query: str) -> Non
 
 
 def test_an_unknown_tag_a_missing_history_and_a_damaged_one_are_different_problems(tmp_path: Path) -> None:
-    house = driven(tmp_path)
-    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/nobody/track")) == "unknown-tag"
+    bench = driven(tmp_path)
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/nobody/track")) == "unknown-tag"
     assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track")) == "no-history"
     for file in tmp_path.glob("history.sqlite*"):
         file.write_bytes(b"torn " * 1000)
-    assert kind_of(ask(house.app(), "GET", "/api/v1/tags/a/track")) == "history-unreadable"
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/a/track")) == "history-unreadable"
 
 
-def pose_at(house: ApiBench, offset_s: float) -> Pose:
-    response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
+def pose_at(bench: ApiBench, offset_s: float) -> Pose:
+    response = ask(bench.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
     assert response.status_code == 200, response.text
     return Pose.model_validate(response.json())
 
@@ -126,8 +126,8 @@ def pose_at(house: ApiBench, offset_s: float) -> Pose:
 def test_a_stored_pose_is_interpolated_and_its_covariance_grows_between_its_neighbours(
     tmp_path: Path,
 ) -> None:
-    house = driven(tmp_path)
-    exact, between = pose_at(house, -300.0), pose_at(house, -299.5)
+    bench = driven(tmp_path)
+    exact, between = pose_at(bench, -300.0), pose_at(bench, -299.5)
     assert (exact.x, between.x) == (600.0, 601.0)
     assert exact.covariance is not None
     assert between.covariance is not None
@@ -137,20 +137,20 @@ def test_a_stored_pose_is_interpolated_and_its_covariance_grows_between_its_neig
 
 
 def test_a_past_pose_is_refused_where_no_stored_pose_is_near(tmp_path: Path) -> None:
-    house = driven(tmp_path)
-    house.now_ns = T_NS + 60 * SECOND
-    house.move("a", x=1200.0)
-    house.write_history()
+    bench = driven(tmp_path)
+    bench.now_ns = T_NS + 60 * SECOND
+    bench.move("a", x=1200.0)
+    bench.write_history()
     for offset_s in (-SECONDS - 1.0, 30.0):
-        response = ask(house.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
+        response = ask(bench.app(), "GET", f"/api/v1/tags/a/pose?at={T_NS + round(offset_s * SECOND)}")
         assert kind_of(response) == "no-pose-then", response.text
-    assert kind_of(ask(house.app(), "GET", f"/api/v1/tags/b/pose?at={T_NS}")) == "unknown-tag"
+    assert kind_of(ask(bench.app(), "GET", f"/api/v1/tags/b/pose?at={T_NS}")) == "unknown-tag"
 
 
 def test_memory_and_history_meet_without_a_gap(tmp_path: Path) -> None:
-    house = driven(tmp_path)
+    bench = driven(tmp_path)
     for tenth in range(5, 60):
-        house.now_ns = T_NS + tenth * SECOND // 10
-        house.move("a", x=1200.0 + 0.2 * tenth, speed=2.0, sigma_pos=0.2)  # not written yet
-    assert pose_at(house, 0.25).x == pytest.approx(1200.5)
-    assert pose_at(house, 5.05).x == pytest.approx(1210.1)
+        bench.now_ns = T_NS + tenth * SECOND // 10
+        bench.move("a", x=1200.0 + 0.2 * tenth, speed=2.0, sigma_pos=0.2)  # not written yet
+    assert pose_at(bench, 0.25).x == pytest.approx(1200.5)
+    assert pose_at(bench, 5.05).x == pytest.approx(1210.1)

@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import State, StateReason
 from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
-from service.estimation.fleet.tracks import Drive, drive, rows_of, run, track
+from support.fleet_tracks import Drive, drive, rows_of, run, track
 
 
 def errors(beliefs: Any, truth: Drive) -> Any:

@@ -11,7 +11,7 @@ import pytest
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees
-from service.estimation.fleet.tracks import Drive, drive, rows_of, run, track
+from support.fleet_tracks import Drive, drive, rows_of, run, track
 
 BURSTS_S = ((3.0, 5.0, 1.5), (12.0, 13.5, 0.8), (20.0, 23.0, 1.2))  # from, to, metres too long
 BIAS = 0.1  # rad

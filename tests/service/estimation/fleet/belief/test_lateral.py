@@ -17,7 +17,7 @@ from dropanchor_service.estimation.fleet.belief.lateral import (
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, MOUNT, SLIP, N, V
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.tuning import Tuning
-from service.estimation.fleet.belief.test_belief_models import STATE, hypothesis_of, jacobian_fd, node_of
+from support.belief import STATE, hypothesis_of, jacobian_fd, node_of
 
 
 def driven(before: float, after: float, turn: float, mount: float) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import State, StateReason
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING
-from service.estimation.fleet.tracks import drive, rows_of, run, track
+from support.fleet_tracks import drive, rows_of, run, track
 
 
 def judged(beliefs: Any) -> list[tuple[State, StateReason]]:

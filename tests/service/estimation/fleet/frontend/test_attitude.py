@@ -1,62 +1,25 @@
-"""The compiled attitude filter against known rotations, the readable filter and the library ahrs."""
+"""The compiled attitude filter against known rotations and the readable filter."""
 
 import math
 from typing import Any
 
-import ahrs
 import numpy as np
 import pytest
-from numba import njit
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dropanchor_service.estimation.fleet.frontend.attitude import (
-    ATTITUDE,
     BOUND,
     TAU,
-    correct_tilt,
     down_weight,
-    predict_attitude,
     rotate_by,
     yaw_of,
 )
 from dropanchor_service.estimation.paper.attitude import AttitudeFilter, AttitudeParameters
-from support.imu import G0, Motion, synthesise, turning, wrapped
+from support.fleet_attitude import angle_between, attitude_of, rotations, wxyz
+from support.imu import G0, synthesise, turning
 
 Array = NDArray[Any]
-
-
-@njit
-def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Array) -> None:
-    for k in range(len(t)):
-        dt = t[k] - t[k - 1] if k else 0.0
-        predict_attitude(a, dt, gyro[k], t[k] < rest_until)
-        correct_tilt(a, dt, acc[k, 0], acc[k, 1], acc[k, 2], t[k] < rest_until, 0.0)
-        q[k] = a.q
-
-
-def attitude_of(m: Motion, start: Array, rest_until: float = -1.0) -> tuple[Array, Array]:
-    """The quaternions (n, 4) and the row after the motion; start (w, x, y, z)."""
-    row = np.zeros(1, ATTITUDE)
-    row[0]["q"] = start
-    row[0]["gyro"] = m.gyro[0]
-    row[0]["gravity"] = G0
-    q = np.empty((len(m.t), 4))
-    follow(row[0], m.t, m.acc, m.gyro, rest_until, q)
-    return q, row[0]
-
-
-def wxyz(r: Rotation) -> Array:
-    return np.roll(r.as_quat(), 1, axis=-1)
-
-
-def rotations(q: Array) -> Rotation:
-    return Rotation.from_quat(np.roll(q, -1, axis=-1))
-
-
-def angle_between(q: Array, truth: Rotation) -> Array:
-    """rad, (n,)."""
-    return (rotations(q).inv() * truth).magnitude()  # type: ignore[no-any-return]
 
 
 def test_a_small_turn_is_the_exponential_map_on_both_sides_of_the_series_limit() -> None:
@@ -164,13 +127,3 @@ def test_the_readable_filter_agrees_on_the_same_six_axis_samples() -> None:
         theirs.append(readable.q)
     q, _ = attitude_of(m, np.array(theirs[0]))
     assert angle_between(q, rotations(np.array(theirs))).max() < math.radians(1.5)
-
-
-def test_ahrs_aqua_agrees_on_tilt_and_yaw_increments() -> None:
-    m = synthesise(np.arange(0, 40, 0.01), turning)
-    start = wxyz(m.attitude[0])
-    filtered = ahrs.filters.AQUA(gyr=m.gyro, acc=m.acc, frequency=100.0, q0=start * [1, -1, -1, -1])
-    theirs = rotations(filtered.Q * [1, -1, -1, -1])  # ahrs turns world into body
-    q, _ = attitude_of(m, start)
-    assert angle_between(q, theirs).max() < math.radians(1.5)
-    assert abs(wrapped(m.yaw - np.array([yaw_of(v) for v in q]))).max() < math.radians(0.1)

@@ -1,4 +1,4 @@
-"""The equations of the pose belief against finite differences and against an independent readable step."""
+"""The equations of the pose belief against finite differences, a readable step and the linear Kalman filter."""
 
 import math
 from typing import Any
@@ -18,7 +18,6 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     N,
     R,
     V,
-    make_workspace,
 )
 from dropanchor_service.estimation.fleet.belief.predict import predict_covariance, predict_state
 from dropanchor_service.estimation.fleet.belief.update import (
@@ -30,20 +29,10 @@ from dropanchor_service.estimation.fleet.belief.update import (
     update_heading,
     update_range,
 )
-from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.tuning import Tuning
+from support.belief import STATE, hypothesis_of, jacobian_fd, node_of
 
-STATE = np.array([12.0, 0.7, -2.1, 1.4, 0.2, -0.05, 0.004, 0.08, 0.03, 0.12, -0.06])
 DECAY = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.97, 1.0, 0.98, 0.995, 1.0, 0.98])
-
-
-def node_of(
-    dt: float = 0.1, dyaw: float = 0.06, forward: float = 0.05, left: float = 0.08, swing: tuple[float, float] = (0, 0)
-) -> Any:
-    node = np.zeros((), NODE)
-    node["swing_forward"], node["swing_left"] = swing
-    node["dt_s"], node["dyaw"], node["dv_forward"], node["dv_left"], node["dv_var"] = dt, dyaw, forward, left, 1e-4
-    return node.view(np.recarray)[()]
 
 
 def readable_step(s: Any, node: Any) -> Any:
@@ -74,23 +63,6 @@ def stepped(s: Any, node: Any) -> tuple[Any, Any]:
 def covariance(seed: int = 3) -> Any:
     A = np.random.default_rng(seed).standard_normal((N, N)) * 0.05
     return A @ A.T + np.diag(np.full(N, 1e-3))
-
-
-def hypothesis_of(s: Any, P: Any, H: Any = 0.0) -> tuple[Any, Any]:
-    """One hypothesis with this mean and covariance, and scratch with this Jacobian of a measurement."""
-    space = make_workspace()[0]
-    one, scratch = space["hypotheses"][0], space["scratch"]
-    one["mean"], one["cov"], scratch["H"] = s, P, H
-    return one, scratch
-
-
-def jacobian_fd(f: Any, s: Any) -> Any:
-    columns = []
-    for i in range(N):
-        h = np.zeros(N)
-        h[i] = 1e-6
-        columns.append((f(s + h) - f(s - h)) / 2e-6)
-    return np.array(columns).T
 
 
 @pytest.mark.parametrize("swing", [(0.0, 0.0), (-0.1, 0.3)])
