@@ -103,6 +103,6 @@ def test_the_page_marks_every_pose_as_out_of_date_until_the_service_is_back(chro
         with running_service("--config", str(config), "--port", str(port), endpoint=endpoint):
             page.wait_for("dropanchor.status() === 'live'", timeout_s=60)
             page.page.locator("#lost").wait_for(state="hidden")
-            frames = page.page.evaluate("dropanchor.received().frames")
-            page.wait_for(f"dropanchor.received().frames > {frames} + 5", timeout_s=60)
+            frames = page.page.evaluate("dropanchor.streaming().frames")
+            page.wait_for(f"dropanchor.streaming().frames > {frames} + 5", timeout_s=60)
             page.wait_for("dropanchor.tags().some(({ tag, state }) => tag === 'cart' && state !== 'outdated')")

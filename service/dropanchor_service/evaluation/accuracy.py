@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import Array, State
 
-CHI2_95_2DOF = 5.991464547107979  # 95 % quantile of χ² with two degrees of freedom
 MAX_TRUTH_GAP_S = 1.0
 
 
@@ -117,4 +117,4 @@ def nees(error: Array, cov: Array) -> Array:
 
 def _coverage(error: Array, cov: Array) -> float:
     """Return the share of errors (n, 2) in the 95 % ellipse of their covariance (n, 2, 2); singular ones are empty."""
-    return float(np.mean(nees(error, cov) <= CHI2_95_2DOF))
+    return float(np.mean(nees(error, cov) <= CHI2_95_OF_2))

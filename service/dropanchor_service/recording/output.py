@@ -1,5 +1,6 @@
 """The writing side of the recorder: write queued items to one file after the other."""
 
+import logging
 import time
 from base64 import b64encode
 from collections.abc import Callable, Sequence
@@ -13,6 +14,8 @@ from dropanchor_service.recording.messages import pose_messages, site_messages, 
 from dropanchor_service.recording.schemas import PACKED_SAMPLES, SAMPLES
 from dropanchor_service.store.site import SiteDocument, SiteStore
 from dropanchor_service.store.tags import TagTable
+
+_log = logging.getLogger(__name__)
 
 PRUNE_S = 10.0
 PACKED, JSON = "samples_packed", "samples"  # the last part of a topic, by the encoding of its samples
@@ -79,7 +82,7 @@ class Output:
         self._items_added = 0
         self._pruned_s = 0.0
         self.written = 0
-        self.omitted = 0  # messages of topics beyond what a file can hold
+        self._is_omitting = False  # messages, because the open file has no room for their topics
 
     @property
     def open_name(self) -> str | None:
@@ -124,7 +127,7 @@ class Output:
 
     def _file_at(self, turn_ns: int) -> McapFile:
         if self._file is None:
-            self._file = self._new_file(turn_ns)
+            self._file, self._is_omitting = self._new_file(turn_ns), False
             self._add_site(self._file, turn_ns)
         return self._file
 
@@ -150,7 +153,12 @@ class Output:
                     file.add(self._topic(row, JSON), SAMPLES, turn_ns, arrival_ns, payload)
                 self.written += 1
             except TooManyChannelsError:
-                self.omitted += 1
+                self._omit(file)
+
+    def _omit(self, file: McapFile) -> None:
+        if not self._is_omitting:
+            self._is_omitting = True
+            _log.warning("%s has no room for more tags; they are recorded again in the next file", file.path.name)
 
     def _topic(self, row: int, leaf: str) -> str:
         topic = self._topics.get((row, leaf))
@@ -170,4 +178,4 @@ class Output:
                     file.add(topic, schema, turn_ns, int(pose["t_ns"]), message)
                 self.written += 1
             except TooManyChannelsError:
-                self.omitted += 1
+                self._omit(file)

@@ -23,7 +23,7 @@ class Rolling:
     count: int = 5
 
     def draw(self, rng: np.random.Generator) -> Trajectory:
-        return drive(self._segments(rng), Start(10.0, 0.0, rng.uniform(-math.pi, math.pi)), DT)
+        return _drive_from_start(self._segments(rng), rng)
 
     def _segments(self, rng: np.random.Generator) -> Iterator[Segment]:
         yield Segment(REST_S, 0.0)
@@ -48,7 +48,7 @@ class Forklift:
     count: int = 4
 
     def draw(self, rng: np.random.Generator) -> Trajectory:
-        return drive(self._segments(rng), Start(10.0, 0.0, rng.uniform(-math.pi, math.pi)), DT)
+        return _drive_from_start(self._segments(rng), rng)
 
     def _segments(self, rng: np.random.Generator) -> Iterator[Segment]:
         yield Segment(REST_S, 0.0)
@@ -75,6 +75,11 @@ def smooth(models: SensorModels) -> SensorModels:
         rocking_std=0.002,
     )
     return replace(models, imu=imu)
+
+
+def _drive_from_start(segments: Iterator[Segment], rng: np.random.Generator) -> Trajectory:
+    """Drive 10 m east of the origin, with a random heading."""
+    return drive(segments, Start(10.0, 0.0, rng.uniform(-math.pi, math.pi)), DT)
 
 
 def _either_sign(rng: np.random.Generator, magnitude: Range) -> float:

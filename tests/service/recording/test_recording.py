@@ -16,6 +16,7 @@ from mcap.reader import make_reader
 from dropanchor_schemas.site import Anchor, Georeference, Site, TagSettings
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
 from dropanchor_service.estimation.columns import POSE, State
+from dropanchor_service.recording import mcap_file
 from dropanchor_service.recording.folder import Limits, files_in, prune
 from dropanchor_service.recording.reading import RecordingReader, Turn
 from dropanchor_service.recording.recorder import Recorder
@@ -166,6 +167,26 @@ def test_a_file_that_is_cut_off_anywhere_is_read_up_to_the_cut(tmp_path: Path) -
         assert read == everything[: len(read)]
         assert len(read) >= at_least
         assert reader.read_error is not None
+
+
+def test_a_file_without_room_for_more_tags_leaves_their_messages_out_and_says_so_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(mcap_file, "MAX_CHANNELS", 8)
+    bench = RecorderBench(tmp_path)
+    names = [bench.tags.register(f"tag-{number}").name for number in range(20)]
+    bench.recorder.start()
+    for row in range(2, 2 + len(names)):
+        bench.receive(row=row)
+    bench.write()
+    bench.recorder.stop()
+    bench.write()
+    recorded = {message[0] for turn in bench.turns() for message in turn.messages}
+    assert 0 < len(recorded) < 8
+    assert recorded < set(names)
+    assert [record.getMessage() for record in caplog.records if "no room for more tags" in record.getMessage()] == [
+        f"{bench.paths()[0].name} has no room for more tags; they are recorded again in the next file"
+    ]
 
 
 def test_a_full_file_is_followed_by_another_and_each_can_be_replayed_alone(tmp_path: Path) -> None:

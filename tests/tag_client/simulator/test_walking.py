@@ -119,8 +119,8 @@ def test_a_turned_device_turns_by_a_right_angle_and_its_carrier_does_not() -> No
     mount = truth.course - truth.heading
     step = float(np.abs(mount[150:] - mount[:-150]).max())
     assert step == pytest.approx(math.pi / 2, abs=0.4)
-    held = simulate_walk("hand", 5005).truth
-    assert float(np.ptp(held.course - held.heading)) < 1.2
+    walk = simulate_walk("hand", 5005).truth
+    assert float(np.ptp(walk.course - walk.heading)) < 1.2
 
 
 def test_ranges_are_nlos_from_behind_the_walker_and_not_from_ahead() -> None:

@@ -68,7 +68,7 @@ export class Connection extends EventTarget {
       const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal });
       this.#opened();
       for await (const { name, data } of eventsOf(response)) {
-        this.#received(name === "snapshot" ? "snapshot" : "change", data);
+        this.#dispatch(name === "snapshot" ? "snapshot" : "change", data);
       }
       this.#failed();
     } catch (error) {
@@ -82,7 +82,7 @@ export class Connection extends EventTarget {
   }
 
   /** @param {string} kind @param {string} data */
-  #received(kind, data) {
+  #dispatch(kind, data) {
     const begun = performance.now();
     this.dispatchEvent(new CustomEvent(kind, { detail: JSON.parse(data) }));
     this.stats = { frames: this.stats.frames + 1, ms: performance.now() - begun };

@@ -198,8 +198,8 @@ export class LiveMap extends EventTarget {
   #draw(now_ms) {
     const { view, fleet, choice } = this;
     const palette = fleet.current ? this.palette : withoutStates(this.palette);
-    const shown = (/** @type {number} */ row) => choice.shows(fleet, row);
-    this.#rows = rowsInView(fleet, view, shown);
+    const isShown = (/** @type {number} */ row) => choice.shows(fleet, row);
+    this.#rows = rowsInView(fleet, view, isShown);
     const scene = {
       ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
       rows: this.#rows, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
@@ -209,21 +209,21 @@ export class LiveMap extends EventTarget {
     drawGrid(this.#ctx, view, palette);
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
     if (centre) drawRings(this.#ctx, view, palette, centre);
-    this.#drawTags(scene, shown);
+    this.#drawTags(scene, isShown);
     drawScaleBar(this.#ctx, view, palette);
   }
 
-  /** @param {import("./scene.js").Scene} scene @param {(row: number) => boolean} shown */
-  #drawTags(scene, shown) {
+  /** @param {import("./scene.js").Scene} scene @param {(row: number) => boolean} isShown */
+  #drawTags(scene, isShown) {
     const density = scene.rows.length > DENSITY_ABOVE;
     this.stats = { ...this.stats, visible: scene.rows.length, density };
-    drawRangeRings(scene, shown);
+    drawRangeRings(scene, isShown);
     if (density) drawDensity(scene);
     else drawEllipses(scene);
     drawEvidence(scene, this.evidence.of(this.choice.selected));
     drawTrails(scene);
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
-    drawGhosts(scene, shown);
+    drawGhosts(scene, isShown);
     const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
     drawSelection(apart);
     this.stats.labels = drawLabels(apart);

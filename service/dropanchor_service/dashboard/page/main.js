@@ -131,7 +131,7 @@ roster.start();
 Object.defineProperty(window, "dropanchor", {
   value: Object.freeze({
     status: () => connection.status,
-    received: () => ({ ...connection.stats }),
+    streaming: () => ({ ...connection.stats }),
     drawing: () => ({ ...map.stats, still: map.still }),
     tags: () => fleet.names.map((tag, row) => ({
       tag,

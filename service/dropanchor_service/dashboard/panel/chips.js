@@ -24,9 +24,9 @@ export class StateChips {
     this.#outdated.element.hidden = this.fleet.current;
     write(this.#outdated.count, this.fleet.size);
     this.#chips.forEach(({ button, count }, state) => {
-      const shown = !this.choice.hiddenStates.has(state);
+      const isShown = !this.choice.hiddenStates.has(state);
       button.hidden = !this.fleet.current;
-      button.setAttribute("aria-pressed", String(shown));
+      button.setAttribute("aria-pressed", String(isShown));
       button.classList.toggle("none", counts[state] === 0);
       write(count, counts[state]);
     });

@@ -66,10 +66,10 @@ export class TagTable {
   }
 
   #paint() {
-    const shown = Math.ceil(this.box.clientHeight / ROW_PX) + SPARE;
-    const last = Math.max(0, this.#rows.length - shown);
+    const visible = Math.ceil(this.box.clientHeight / ROW_PX) + SPARE;
+    const last = Math.max(0, this.#rows.length - visible);
     const first = Math.min(last, Math.max(0, Math.floor(this.box.scrollTop / ROW_PX) - SPARE / 2));
-    const rows = this.#rows.slice(first, first + shown);
+    const rows = this.#rows.slice(first, first + visible);
     this.body.style.setProperty("--before", `${first * ROW_PX}px`);
     this.body.style.setProperty("--after", `${Math.max(0, this.#rows.length - first - rows.length) * ROW_PX}px`);
     while (this.#lines.length < rows.length) this.#addLine();

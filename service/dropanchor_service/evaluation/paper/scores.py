@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees, truth_at
+from dropanchor_service.evaluation.accuracy import nees, truth_at
 from dropanchor_service.evaluation.pcrb import Information, Path, Sensors, position_bound
 from dropanchor_service.evaluation.replay import Track
 from dropanchor_service.evaluation.simulated import truth_of
@@ -62,7 +63,7 @@ def score(simulation: Simulation, track: Track, bound: Array) -> RunScore:
         mse=float(np.mean(error[:, 0] ** 2 + error[:, 1] ** 2)),
         bound=float(np.mean(np.interp(track.t[known], simulation.truth.t_s, bound))),
         nees=float(np.nanmean(normalised)) if np.isfinite(normalised).any() else np.nan,
-        coverage=float(np.mean(normalised <= CHI2_95_2DOF)),
+        coverage=float(np.mean(normalised <= CHI2_95_OF_2)),
         missing=float(1 - known.mean()),
     )
 

@@ -5,8 +5,9 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import Array, State
-from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees, truth_at
+from dropanchor_service.evaluation.accuracy import nees, truth_at
 from dropanchor_service.evaluation.paper.estimators import engines
 from dropanchor_service.evaluation.paper.families import SEEDS_PER_TASK, Case, Task
 from dropanchor_service.evaluation.paper.tuning import STATED
@@ -97,7 +98,7 @@ def score(simulation: Simulation, track: Track) -> RunScore:
     second_half = distance[track.t > (track.t[0] + track.t[-1]) / 2]
     normalised = nees(error, poses["cov"][:, :2, :2])
     placed = np.isfinite(distance)
-    inside = normalised <= CHI2_95_2DOF
+    inside = normalised <= CHI2_95_OF_2
     return RunScore(
         declared_s=np.nan if first is None else float(track.t[first] - track.t[0]),
         first_wrong=np.nan if first is None else float(not right[first]),

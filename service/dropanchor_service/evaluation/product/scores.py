@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import Array, State
-from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, Truth, nees, share_of_time, truth_at
+from dropanchor_service.evaluation.accuracy import Truth, nees, share_of_time, truth_at
 from dropanchor_service.evaluation.replay import Track
 
 LOST_M = 2.0
@@ -87,7 +88,7 @@ def score(name: str, track: Track, truth: Truth, anchor: tuple[float, float], no
         tracking_after_s=float(track.t[tracking.argmax()] - track.t[0]) if tracking.any() else math.inf,
         tracking_share=share_of_time(track.t, track.poses["state"]).get("tracking", 0.0),
         tracked=len(squared),
-        covered=int(np.count_nonzero(squared <= CHI2_95_2DOF)),
+        covered=int(np.count_nonzero(squared <= CHI2_95_OF_2)),
         worst_sigma=float(np.sqrt(squared.max())) if len(squared) else math.nan,
     )
 

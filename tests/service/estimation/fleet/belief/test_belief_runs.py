@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import State, StateReason
 from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
@@ -18,7 +19,7 @@ def inside(beliefs: Any, truth: Drive) -> Any:
     """Whether the truth lies in the 95 % ellipse."""
     e = np.stack([beliefs["x"] - truth.x, beliefs["y"] - truth.y], axis=1)
     P = beliefs["cov"][:, :2, :2]
-    return np.einsum("ni,nij,nj->n", e, np.linalg.inv(P), e) < 5.991
+    return np.einsum("ni,nij,nj->n", e, np.linalg.inv(P), e) < CHI2_95_OF_2
 
 
 def test_from_a_known_start_every_run_stays_on_the_track_and_the_ellipses_hold() -> None:

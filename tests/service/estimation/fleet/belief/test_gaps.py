@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import ANCHOR, IMU, POSE, RANGE, SampleBatch, State, default_settings
 from dropanchor_service.estimation.fleet.belief.gap import RESTART_SPREAD, RESUME_ANYWHERE_AFTER
 from dropanchor_service.estimation.fleet.engine import FleetEngine
@@ -66,12 +67,12 @@ def poses_of(engine: FleetEngine, batches: list[SampleBatch]) -> Any:
 
 def holds_truth(poses: Any, runs: list[Simulation]) -> Any:
     """Whether each 95 % ellipse holds the truth."""
-    held = []
+    inside = []
     for pose in poses:
         truth, t_s = runs[pose["row"]].truth, pose["t_ns"] * 1e-9
         e = np.array([pose[axis] - np.interp(t_s, truth.t_s, getattr(truth, axis)) for axis in ("x", "y")])
-        held.append(e @ np.linalg.solve(pose["cov"][:2, :2], e) < 5.991)
-    return np.array(held)
+        inside.append(e @ np.linalg.solve(pose["cov"][:2, :2], e) < CHI2_95_OF_2)
+    return np.array(inside)
 
 
 def test_a_tag_of_which_every_fifth_message_arrives_is_held_where_it_was_without_any_hypothesis(

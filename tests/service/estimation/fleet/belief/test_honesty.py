@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import State
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
-from dropanchor_service.evaluation.accuracy import CHI2_95_2DOF, nees
+from dropanchor_service.evaluation.accuracy import nees
 from support.fleet_tracks import Drive, drive, rows_of, run, track
 
 BURSTS_S = ((3.0, 5.0, 1.5), (12.0, 13.5, 0.8), (20.0, 23.0, 1.2))  # from, to, metres too long
@@ -24,7 +25,7 @@ def distance(beliefs: Any, truth: Drive) -> Any:
 def inside(beliefs: Any, truth: Drive) -> Any:
     """Whether the truth lies in the 95 % ellipse."""
     e = np.stack([beliefs["x"] - truth.x, beliefs["y"] - truth.y], axis=1)
-    return nees(e, beliefs["cov"][:, :2, :2]) < CHI2_95_2DOF
+    return nees(e, beliefs["cov"][:, :2, :2]) < CHI2_95_OF_2
 
 
 def elsewhere(beliefs: Any, truth: Drive) -> Any:
@@ -33,7 +34,7 @@ def elsewhere(beliefs: Any, truth: Drive) -> Any:
     return (beliefs["state"] == State.TRACKING) & far
 
 
-def blocked(seed: int) -> Drive:
+def without_sight(seed: int) -> Drive:
     """A drive with bursts of ranges that are too long."""
     truth = drive(seed)
     t = truth.nodes["t_ns"] * 1e-9
@@ -58,7 +59,7 @@ def drifting(seed: int) -> Drive:
 
 @pytest.mark.parametrize("known", [True, False])
 def test_a_line_of_sight_that_is_blocked_for_seconds_is_seen_through(known: bool) -> None:
-    runs = [(track(d, known), d) for d in map(blocked, range(2000, 2012))]
+    runs = [(track(d, known), d) for d in map(without_sight, range(2000, 2012))]
     assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.01
     assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
     assert np.mean([distance(b, d)[-50:].max() < 2.0 for b, d in runs]) > 0.9

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import ANCHOR, State
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
 from dropanchor_service.estimation.fleet.smoother.trace import TracingEngine
@@ -17,7 +18,7 @@ def inside(poses: Any, truth: Any) -> Any:
     """Whether the truth lies in the 95 % ellipse."""
     index = np.round(poses["t_ns"] / 1e8).astype(int)
     e = np.stack([poses["x"] - truth.x[index], poses["y"] - truth.y[index]], axis=1)
-    return np.einsum("ni,nij,nj->n", e, np.linalg.inv(poses["cov"][:, :2, :2]), e) < 5.991
+    return np.einsum("ni,nij,nj->n", e, np.linalg.inv(poses["cov"][:, :2, :2]), e) < CHI2_95_OF_2
 
 
 def rms(error: Any) -> float:
