@@ -36,7 +36,7 @@ DECAY = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.97, 1.0, 0.98, 0.995, 1.0, 0.98])
 
 
 def readable_step(s: Any, node: Any) -> Any:
-    """The same step in Cartesian coordinates, written from the motion and not from the polar formulas."""
+    """Return the same step in Cartesian coordinates, from the motion and not from the polar formulas."""
     dt = node["dt_s"]
     w = node["dyaw"] - s[GYRO_BIAS] * dt
     mount = s[MOUNT] + s[SLIP]
@@ -131,7 +131,7 @@ def test_a_late_range_is_compared_with_where_the_tag_was() -> None:
 
 
 def kalman(s: Any, P: Any, h: Any, e: float, variance: float) -> tuple[Any, Any]:
-    """The textbook Joseph form."""
+    """Return the textbook Joseph form."""
     K = P @ h / (h @ P @ h + variance)
     L = np.eye(N) - np.outer(K, h)
     return s + K * e, L @ P @ L.T + variance * np.outer(K, K)

@@ -37,7 +37,7 @@ def test_the_jacobian_of_the_range_is_its_derivative(x: Array, height: float) ->
 
 
 def test_on_a_linear_problem_it_equals_the_kalman_filter_written_out() -> None:
-    """On the x axis, heading east, without turning, range and motion are linear in (x, v)."""
+    """Range and motion are linear in (x, v) on the x axis, for a tag that heads east and does not turn."""
     rng = np.random.default_rng(5)
     still = np.array([Q[0], 0.0, 0.0, Q[3], 0.0])
     pose = PoseFilter(np.array([10.0, 0.0, 0.0, 1.0, 0.0]), np.diag([1.0, 0.0, 0.0, 0.5, 0.0]), still)

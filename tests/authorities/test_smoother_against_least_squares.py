@@ -20,7 +20,7 @@ RADIAL = [R, V, ACC_BIAS, RANGE_BIAS]
 
 
 def radial_nodes(n: int = 60, dt: float = 0.05) -> Any:
-    """A tag that drives straight away from the anchor: in range, speed and both biases everything is linear."""
+    """Return nodes of a tag that drives straight away from the anchor: range, speed and both biases are then linear."""
     rng = np.random.default_rng(7)
     nodes = np.zeros(n, NODE)
     nodes["dt_s"], nodes["t_ns"] = dt, np.arange(n) * round(dt * 1e9)
@@ -46,7 +46,7 @@ def radial_track(nodes: Any, tuning: Tuning, follow: bool) -> Track:
 
 
 def least_squares(nodes: Any, t: Tuning) -> tuple[Any, Any]:
-    """(n, 4) and (n, 4, 4): all states of the radial drive in one dense system, written from its equations."""
+    """Return mean (n, 4) and covariance (n, 4, 4) of the radial drive, from one dense system of its equations."""
     n, dt = len(nodes), float(nodes["dt_s"][0])
     decay = math.exp(-dt / t.acc_bias_tau)
     A = np.array([[1.0, dt, -dt * dt / 2, 0.0], [0.0, 1.0, -dt, 0.0], [0.0, 0.0, decay, 0.0], [0.0, 0.0, 0.0, 1.0]])
@@ -72,7 +72,7 @@ def least_squares(nodes: Any, t: Tuning) -> tuple[Any, Any]:
 
 
 @pytest.mark.parametrize("follow", [True, False])
-def test_on_a_linear_drive_it_is_the_batch_least_squares_solution_with_its_covariance(follow: bool) -> None:
+def test_on_a_linear_drive_the_result_is_the_batch_least_squares_solution_with_its_covariance(follow: bool) -> None:
     tuning = Tuning(outlier_probability=0.0)
     nodes = radial_nodes()
     track = radial_track(nodes, tuning, follow)
@@ -82,7 +82,7 @@ def test_on_a_linear_drive_it_is_the_batch_least_squares_solution_with_its_covar
 
 
 def rauch_tung_striebel(track: Track) -> tuple[Any, Any]:
-    """The textbook recursion with inverses, from the filtered moments; predictions by undoing the updates."""
+    """Return the result of the textbook recursion, from the filtered moments. Predictions follow by undoing updates."""
     n = len(track.mean)
     x, P = track.mean.copy(), track.cov.copy()
     for k in range(n - 1, 0, -1):

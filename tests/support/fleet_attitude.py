@@ -27,7 +27,7 @@ def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Arra
 
 
 def attitude_of(m: Motion, start: Array, rest_until: float = -1.0) -> tuple[Array, Array]:
-    """The quaternions (n, 4) and the row after the motion; start (w, x, y, z)."""
+    """Return the quaternions (n, 4) and the row after the motion. start: (w, x, y, z)."""
     row = np.zeros(1, ATTITUDE)
     row[0]["q"] = start
     row[0]["gyro"] = m.gyro[0]
@@ -46,5 +46,5 @@ def rotations(q: Array) -> Rotation:
 
 
 def angle_between(q: Array, truth: Rotation) -> Array:
-    """rad, (n,)."""
+    """Return the angles in rad, (n,)."""
     return (rotations(q).inv() * truth).magnitude()  # type: ignore[no-any-return]

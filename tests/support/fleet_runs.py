@@ -30,7 +30,7 @@ def settings(known: bool = True) -> Any:
 
 
 def samples(seed: int, row: int = 0) -> tuple[SampleBatch, Any]:
-    """A drive as 100 Hz IMU, 10 Hz headings and 10 Hz ranges; the last a hundredth of a second after its IMU sample."""
+    """Return a drive as 100 Hz IMU samples, 10 Hz headings and 10 Hz ranges, and its truth."""
     truth = drive(seed, row=row)
     nodes, n = truth.nodes, len(truth.nodes)
     imu = np.zeros((n - 1) * STEP, IMU)

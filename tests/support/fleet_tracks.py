@@ -24,7 +24,7 @@ class Drive(NamedTuple):
 
 
 def drive(seed: int, legs: int = 4, turns: float = 1.0, range_std: float = 0.1, row: int = 0) -> Drive:
-    """1 s at rest at (10, 0), then legs of 8 s at 0.8-3 m/s, each after a turn of turns * (0.5-2) rad."""
+    """Return a drive from (10, 0): 1 s of rest, then legs of 8 s at 0.8-3 m/s, with turns of turns * (0.5-2) rad."""
     rng = np.random.default_rng(seed)
     speed, rate = [np.zeros(11)], [np.zeros(11)]
     for leg in range(legs):
@@ -61,7 +61,7 @@ def _sense(rng: Any, x: Any, y: Any, yaw: Any, v: Any, range_std: float, row: in
 
 
 def rows_of(count: int, known: bool) -> Any:
-    """ROW (count,) of tags with a known mounting, at the start of `drive` or with an unknown start."""
+    """Return ROW (count,) of tags with a known mounting, at the start of `drive` or with an unknown start."""
     settings = default_settings()
     settings["mount_angle"], settings["range_std"] = 0.0, 0.1
     if known:
@@ -75,12 +75,12 @@ ANCHORS = np.zeros(1, ANCHOR)
 
 
 def run(rows: Any, pool: Any, nodes: Any) -> Any:
-    """BELIEF, one per node."""
+    """Return BELIEF, one per node."""
     beliefs = np.zeros(len(nodes), BELIEF)
     assert advance(rows, pool, nodes, ANCHORS, CALIBRATED.record(), make_workspace(), beliefs) == 0
     return beliefs
 
 
 def track(drive_: Drive, known: bool) -> Any:
-    """BELIEF of one drive."""
+    """Return BELIEF of one drive."""
     return run(rows_of(1, known), make_pool(512), drive_.nodes)

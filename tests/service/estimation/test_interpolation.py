@@ -1,4 +1,4 @@
-"""Poses between two known ones, and a little ahead of the last."""
+"""Poses between two known ones, and shortly after the last one."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""Both engines take the operator's numbers the same way: measured = scale · distance + bias."""
+"""Both engines use the operator's calibration in the same way: measured = scale · distance + bias."""
 
 import math
 from collections.abc import Callable

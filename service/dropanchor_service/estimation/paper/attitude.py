@@ -40,12 +40,12 @@ class AttitudeParameters:
     still_acc: float = 0.1  # m/s², | |a| - g | of a body at rest (imu_complementary_filter)
     still_gyro: float = 0.2  # rad/s, |gyro - bias| per axis of a body at rest (imu_complementary_filter)
     still_change: float = 0.05  # rad/s, change per axis between samples of a body at rest (there 0.01; ours: noise)
-    still_after: float = 0.5  # s at rest before the bias is learnt (ours: slow turns look like rest for a moment)
-    longest_gap: float = 1.0  # s between samples after which the rotation in between counts as unknown (ours)
+    still_after: float = 0.5  # s at rest before the bias is learnt (ours: a slow turn looks like rest for a moment)
+    longest_gap: float = 1.0  # s between samples, after which the rotation between them counts as unknown (ours)
 
 
 def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Hamilton product p q: the rotation q, then p."""
+    """Return the Hamilton product p q: the rotation q, then p."""
     pw, px, py, pz = p
     qw, qx, qy, qz = q
     return (
@@ -57,14 +57,14 @@ def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
 
 
 def normalised(q: Quaternion) -> Quaternion:
-    """q / |q|."""
+    """Return q / |q|."""
     w, x, y, z = q
     n = math.sqrt(w * w + x * x + y * y + z * z)
     return (w / n, x / n, y / n, z / n)
 
 
 def rotate(q: Quaternion, v: Vector) -> Vector:
-    """R(q) v = v + 2 u x (u x v + w v), with q = (w, u)."""
+    """Return R(q) v = v + 2 u x (u x v + w v), with q = (w, u)."""
     w, x, y, z = q
     vx, vy, vz = v
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
@@ -72,25 +72,25 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
 
 
 def about_up(angle: float) -> Quaternion:
-    """The rotation by `angle` rad about the z axis."""
+    """Return the rotation by `angle` rad about the z axis."""
     return (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
 def yaw(q: Quaternion) -> float:
-    """Direction of the body's x axis, rad counter-clockwise from the world's x axis, in (-pi, pi]."""
+    """Return the direction of the body's x axis, rad counter-clockwise from the world's x axis, in (-pi, pi]."""
     w, x, y, z = q
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def wrapped(angle: float) -> float:
-    """The same angle in [-pi, pi]."""
+    """Return the angle in [-pi, pi]."""
     return math.remainder(angle, math.tau)
 
 
 def up_from(g: Vector) -> Quaternion:
-    """The rotation of the unit vector g to (0, 0, 1): Valenti's algebraic quaternion from gravity (25), inverted.
+    """Return the rotation of the unit vector g to (0, 0, 1): Valenti's quaternion from gravity (25), inverted.
 
-    Two forms, so that neither divides by a small number; for g_z >= 0 it is the shortest rotation.
+    There are two forms, so that neither divides by a small number. For g_z >= 0 it is the shortest rotation.
     """
     x, y, z = g
     if z >= 0:
@@ -101,7 +101,7 @@ def up_from(g: Vector) -> Quaternion:
 
 
 def rotation_by(v: Vector) -> Quaternion:
-    """exp(v / 2): the rotation by |v| rad about v."""
+    """Return exp(v / 2): the rotation by |v| rad about v."""
     x, y, z = v
     angle = math.sqrt(x * x + y * y + z * z)
     half = 0.5 - angle * angle / 48 if angle < 1e-4 else math.sin(angle / 2) / angle
@@ -109,7 +109,7 @@ def rotation_by(v: Vector) -> Quaternion:
 
 
 def part_of(q: Quaternion, gain: float) -> Quaternion:
-    """The share `gain` of the rotation q: LERP for small angles, else SLERP from the identity (48-52)."""
+    """Return the share `gain` of the rotation q: LERP for small angles, else SLERP from the identity (48-52)."""
     w, x, y, z = q if q[0] >= 0 else (-q[0], -q[1], -q[2], -q[3])
     if w > LERP_ABOVE:
         return normalised((1 - gain + gain * w, gain * x, gain * y, gain * z))
@@ -119,17 +119,17 @@ def part_of(q: Quaternion, gain: float) -> Quaternion:
 
 
 def acc_gain_factor(norm: float, low: float, high: float) -> float:
-    """1 while the specific force looks like gravity alone, falling linearly to 0 as it does not (60-61)."""
+    """Return 1 while the specific force looks like gravity alone. It falls linearly to 0 as the error grows (60-61)."""
     error = abs(norm - STANDARD_GRAVITY) / STANDARD_GRAVITY
     return min(1.0, max(0.0, (high - error) / (high - low)))
 
 
 class AttitudeFilter:
-    """The filter of one IMU.
+    """The attitude filter of one IMU.
 
     declination: true minus magnetic north, rad, positive east; magnetic north is pi/2 - declination from east.
-    yaw_start: the yaw with which a 6-axis IMU starts, rad; NaN: unknown, the yaw is then only relative. The first
-    sample with a magnetic field sets the yaw, whatever it was.
+    yaw_start: the yaw with which a 6-axis IMU starts, rad. NaN: unknown, and the yaw is then only relative. The first
+    sample with a magnetic field sets the yaw in any case.
     """
 
     def __init__(self, parameters: AttitudeParameters, declination: float = 0.0, yaw_start: float = math.nan) -> None:
@@ -144,23 +144,24 @@ class AttitudeFilter:
 
     @property
     def absolute(self) -> bool:
-        """Whether the yaw counts from east, and not from wherever the body pointed at first."""
+        """Return whether the yaw counts from east, and not from the first direction of the body."""
         return self.q is not None and (self._magnetic or math.isfinite(self._zero))
 
     @property
     def yaw(self) -> float:
-        """rad; NaN before the first usable sample."""
+        """Return the yaw in rad, NaN before the first usable sample."""
         return math.nan if self.q is None else yaw(self.q)
 
     def up_rate(self, gyro: Vector) -> float:
-        """The turn rate about up, rad/s, of a gyroscope sample."""
+        """Return the turn rate about up, rad/s, of a gyroscope sample."""
         rate = (gyro[0] - self.bias[0], gyro[1] - self.bias[1], gyro[2] - self.bias[2])
         return rate[2] if self.q is None else rotate(self.q, rate)[2]
 
     def step(self, dt: float, acc: Vector, gyro: Vector, mag: Vector) -> None:
-        """One sample, dt s after the one before (any dt before the first); m/s², rad/s, any unit of field.
+        """Update with one sample.
 
-        A field with NaN is no field. An acceleration near zero (free fall) or not finite gives no tilt.
+        dt: s since the previous sample, any value for the first. acc: m/s². gyro: rad/s. mag: any unit, NaN: no field.
+        An acceleration near zero (free fall) or one that is not finite gives no tilt.
         """
         norm = math.sqrt(acc[0] * acc[0] + acc[1] * acc[1] + acc[2] * acc[2])
         up_seen = 1e-3 * STANDARD_GRAVITY < norm < math.inf
@@ -198,7 +199,7 @@ class AttitudeFilter:
             self.q = normalised(multiply(part_of(up_from(rotate(self.q, up)), gain), self.q))
 
     def _correct_yaw(self, dt: float, mag: Vector) -> None:
-        """The turn about up that brings the horizontal part of the field to magnetic north; the first in full."""
+        """Turn about up, until the field points to magnetic north. The first field counts in full."""
         if self.q is None or math.isinf(self._p.yaw_time):
             return
         x, y, _ = rotate(self.q, mag)

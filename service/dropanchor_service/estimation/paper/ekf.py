@@ -1,7 +1,7 @@
-"""The extended Kalman filter of the paper (its equations 1 and 2), on filterpy's.
+"""The extended Kalman filter of the paper (its equations 1 and 2), based on that of filterpy.
 
 State x = [x, y, theta, v, w]: position, m; direction of travel, rad from east; speed, m/s; turn rate, rad/s.
-Functions take the state as an array of shape (5,) and give arrays of shape (5,), (5, 5) or (1, 5).
+Functions take the state as an array of shape (5,) and return arrays of shape (5,), (5, 5) or (1, 5).
 """
 
 import math
@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Position = tuple[float, float, float]
 
-NEAREST = 1e-3  # m: below, the direction from the anchor is not defined and the range tells nothing
+NEAREST = 1e-3  # m: nearer, the direction from the anchor is undefined and a range carries no information
 
 H_HEADING: Array = np.array([[0.0, 0.0, 1.0, 0.0, 0.0]])
 
 
 def f(x: Array, dt: float) -> Array:
-    """The kinematics (1) over dt s, at the heading of the middle of the interval.
+    """Return the state after dt s by the kinematics (1), with the heading in the middle of the interval.
 
         x' = x + v cos(theta + w dt/2) dt      theta' = theta + w dt      v' = v
         y' = y + v sin(theta + w dt/2) dt                                 w' = w
 
-    The accelerations a and b of (1) are the process noise. The middle of the interval, because between two ranges
-    a tag may turn by a tenth of a radian: at its beginning, as in the released code, arcs would come out too wide.
+    The accelerations a and b of (1) are the process noise. A tag may turn by a tenth of a radian between two ranges:
+    with the heading at the beginning of the interval, as in the released code, arcs would be too wide.
     """
     px, py, theta, v, w = x.tolist()
     middle = theta + w * dt / 2
@@ -36,7 +36,7 @@ def f(x: Array, dt: float) -> Array:
 
 
 def F(x: Array, dt: float) -> Array:  # noqa: N802
-    """df/dx, shape (5, 5)."""
+    """Return df/dx, shape (5, 5)."""
     _, _, theta, v, w = x.tolist()
     c, s = math.cos(theta + w * dt / 2) * dt, math.sin(theta + w * dt / 2) * dt
     return np.array(
@@ -51,13 +51,13 @@ def F(x: Array, dt: float) -> Array:  # noqa: N802
 
 
 def h_range(x: Array, anchor: Position) -> float:
-    """h1 of (2) with heights: sqrt((x - x_A)² + (y - y_A)² + dz²), m. anchor = (x_A, y_A, anchor minus tag height)."""
+    """Return h1 of (2) with heights, m: sqrt((x - x_A)² + (y - y_A)² + dz²). anchor: (x_A, y_A, dz above the tag)."""
     px, py = x[:2].tolist()
     return math.sqrt((px - anchor[0]) ** 2 + (py - anchor[1]) ** 2 + anchor[2] ** 2)
 
 
 def H_range(x: Array, anchor: Position) -> Array:  # noqa: N802
-    """dh1/dx = [(x - x_A)/h1, (y - y_A)/h1, 0, 0, 0], shape (1, 5); zero on the anchor itself."""
+    """Return dh1/dx = [(x - x_A)/h1, (y - y_A)/h1, 0, 0, 0], shape (1, 5), zero at the anchor."""
     r = h_range(x, anchor)
     if r < NEAREST:
         return np.zeros((1, 5))
@@ -66,7 +66,7 @@ def H_range(x: Array, anchor: Position) -> Array:  # noqa: N802
 
 
 class Innovation(NamedTuple):
-    """What a range, m, told: predicted, y = z - predicted, its variance S, m², and whether it was fused."""
+    """The innovation of a range: predicted, m, y = z - predicted, its variance S, m², and whether it was fused."""
 
     predicted: float
     y: float
@@ -119,5 +119,5 @@ class PoseFilter(ExtendedKalmanFilter):  # type: ignore[misc]
 
     @property
     def finite(self) -> bool:
-        """Whether every number of the belief is one, and every variance positive."""
+        """Return whether all numbers of the belief are finite and all variances positive."""
         return bool(np.isfinite(self.x).all() and np.isfinite(self.P).all() and (self.P.diagonal() > 0).all())

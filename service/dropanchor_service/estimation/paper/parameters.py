@@ -1,4 +1,4 @@
-"""The parameters of Algorithm 1, with their units and where their values come from."""
+"""The parameters of Algorithm 1, with units and the sources of their values."""
 
 import math
 from dataclasses import dataclass, field
@@ -10,12 +10,12 @@ RELEASED_STEP = 0.005  # s: the step of the authors' released simulation, for wh
 
 @dataclass(frozen=True)
 class PaperParameters:
-    """Defaults are the paper's where it gives a value, else those of the authors' released code.
+    """The parameters. Defaults are the paper's values, or those of the authors' released code if the paper has none.
 
     Released code: github.com/MISTLab/RangeTracker, commit b0394c6 (trackerCore/tracker.py, speedEstimator.py,
-    parameters.py). Its covariances per step of 0.005 s stand here as powers per second. Values marked "ours" are in
-    neither. The defaults are made for their simulation: 200 Hz, 0.005 m and 0.01 rad of noise (the paper says 0.2 m
-    and 0.1 rad; the data released with the code has the former). `TUNED` is what we found for realistic noise.
+    parameters.py). Its covariances per step of 0.005 s are given here as powers per second. Values marked "ours" are in
+    neither. The defaults suit their simulation: 200 Hz, 0.005 m and 0.01 rad of noise (the paper says 0.2 m
+    and 0.1 rad; the data released with the code has the former). `TUNED` has values for realistic noise.
     """
 
     # extended Kalman filter
@@ -23,14 +23,16 @@ class PaperParameters:
     q_heading: float = 0.01 / RELEASED_STEP  # rad²/s; released: covS_Ori = 0.01
     q_speed: float = 0.01 / RELEASED_STEP  # (m/s)²/s; released: covS_LVel = 0.01
     q_turn_rate: float = 0.01 / RELEASED_STEP  # (rad/s)²/s; ours: the released filter has no w, the paper's has
-    range_std: float = math.sqrt(0.1)  # m, where neither sample nor tag says; released: covM_Range = 0.1 m²
-    heading_std: float = math.sqrt(0.1)  # rad, where the sample does not say; released: covM_Ori = 0.1 rad²
-    start_std: float = 1.0  # m, where the start does not say; released: P0 = I
+    range_std: float = math.sqrt(0.1)  # m, if neither sample nor tag gives it; released: covM_Range = 0.1 m²
+    heading_std: float = math.sqrt(0.1)  # rad, if the sample does not give it; released: covM_Ori = 0.1 rad²
+    start_std: float = 1.0  # m, if the start does not give it; released: P0 = I
     start_heading_std: float = 1.0  # rad; released: P0 = I
     start_speed_std: float = 1.0  # m/s; released: P0 = I, speed 0
     start_turn_rate_std: float = 1.0  # rad/s; ours, as P0 = I
     gate: float = 5.0  # standard deviations of the range innovation; ours: the paper has none, inf is as published
-    heading_interval: float = 0.1  # s between attitudes fused while no range comes; ours: the paper's come together
+    heading_interval: float = (
+        0.1  # s between attitudes that are fused while no range arrives; ours: the paper's come together
+    )
 
     # range filter
     q_smooth: float = 0.001 / RELEASED_STEP  # m²/s; released: rangeKF.Q = 0.001
@@ -52,7 +54,7 @@ class PaperParameters:
     degraded_sigma: float = 1.5  # m of sigma_pos ...
     degraded_share: float = 0.05  # ... or this share of the range, whichever is larger
 
-    backwards: float = 1.0  # standard deviations of the speed below zero that count as driving backwards
+    backwards: float = 1.0  # standard deviations below zero at which a speed counts as driving backwards
 
     attitude: AttitudeParameters = field(default_factory=AttitudeParameters)
 
@@ -76,7 +78,7 @@ TUNED = PaperParameters(
     window_base=1.0,
     window_ratio=0.12,
 )
-"""Algorithm 1 for realistic noise: a random search on simulated tags alone, never on recordings.
+"""Algorithm 1 for realistic noise, from a random search on simulated tags only, never on recordings.
 
 The tags: straight legs of 8 to 14 s at 0.5 to 4 m/s from a known start, ranges at 10 Hz with 0.1 m, headings of a
 platform with 0.05 rad or a 9-axis IMU at 100 Hz; seeds 1000 to 1011. On other seeds (2000 to 2023) the median RMSE is

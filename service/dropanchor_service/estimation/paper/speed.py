@@ -5,7 +5,7 @@ D the distance of that point from the anchor,
 
     r(t)² = D² + (s0 + v t)²        so the second divided difference of r² is v².
 
-A height difference between tag and anchor only adds to D²: slant ranges serve as they are.
+A difference in height between tag and anchor only adds to D², so slant ranges need no correction.
 """
 
 import math
@@ -15,18 +15,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class KeyRange:
-    """A key range pair: r, m, at t, s."""
+    """A key range pair: the range r, m, at the time t, s."""
 
     t: float
     r: float
 
 
 def speed_squared(k0: KeyRange, k1: KeyRange, k2: KeyRange) -> float:
-    """v² in m²/s² from three ranges at any distinct times; negative where noise outweighs the curvature of r².
+    """Return v² in m²/s² from three ranges at distinct times, negative if noise outweighs the curvature of r².
 
         v² = [ (r2² - r1²) - (dt2/dt1) (r1² - r0²) ] / (dt1 dt2 + dt2²)      dt1 = t1 - t0,  dt2 = t2 - t1
 
-    The paper prints dt1 dt2 + dt1², which is right for equal intervals only. From r_i² = D² + (s + v t_i)², t_1 = 0:
+    The paper prints dt1 dt2 + dt1², which is correct only for equal intervals. From r_i² = D² + (s + v t_i)², t_1 = 0:
     r2² - r1² = 2 s v dt2 + v² dt2² and r1² - r0² = 2 s v dt1 - v² dt1²; eliminating s leaves v² (dt2² + dt1 dt2).
     """
     dt1, dt2 = k1.t - k0.t, k2.t - k1.t
@@ -35,12 +35,12 @@ def speed_squared(k0: KeyRange, k1: KeyRange, k2: KeyRange) -> float:
 
 
 class SpeedEstimator:
-    """VelEstimator of Algorithm 1: key range pairs, three-point speed, mean over a window that grows with the range.
+    """The VelEstimator of Algorithm 1: the mean speed of a window that grows with the range, from key range pairs.
 
     threshold: TH_distance, m, by which the smoothed range must differ from the last key range.
-    spacing: how many key pairs lie from one of the three points to the next (the paper: 1, consecutive).
+    spacing: count of key pairs from one of the three points to the next (the paper: 1, consecutive).
     window_base, window_ratio: windowLen = base + ratio · range, in speeds (the paper: base 0).
-    Where v² < 0 there is no speed; the released code takes |v²|, which turns noise into speed.
+    If v² < 0 there is no speed. The released code takes |v²|, which turns noise into speed.
     """
 
     def __init__(self, threshold: float, spacing: int, window_base: float, window_ratio: float) -> None:
@@ -52,11 +52,11 @@ class SpeedEstimator:
         self._spacing = spacing
 
     def end_of_line(self) -> None:
-        """The tag turned: pairs from before the turn are not on the line after it."""
+        """Forget the pairs after a turn: they are not on the new line."""
         self._pairs.clear()
 
     def step(self, t: float, r: float) -> float | None:
-        """The speed, m/s, if the smoothed range r, m, at t, s, makes a new key pair that gives one."""
+        """Add the smoothed range r, m, at t, s. Return the mean speed, m/s, if it makes a key pair that gives one."""
         if self._pairs and not (abs(r - self._pairs[-1].r) > self._threshold and t > self._pairs[-1].t):
             return None
         self._pairs.append(KeyRange(t, r))

@@ -1,4 +1,4 @@
-"""What an operator tells of a tag, in its row."""
+"""The settings of an operator in the row of a tag."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_a_bias_that_is_not_calibrated_has_the_default_spread() -> None:
 
 
 @pytest.mark.parametrize("std", [0.0, 0.04])
-def test_a_bias_is_known_as_well_as_the_operator_says(std: float) -> None:
+def test_a_bias_is_as_certain_as_the_operators_setting(std: float) -> None:
     row = row_of(TagSettings(range_bias_m=0.2, range_bias_std_m=std))
     assert [row["settings"][name].item() for name in ("range_bias", "range_bias_std")] == [0.2, std]
 
@@ -42,9 +42,9 @@ def test_a_known_mounting_angle_leaves_slip_and_an_unknown_one_sway() -> None:
     assert row_of(TagSettings())["settings"]["slip_std"] == SLIP_UNKNOWN_STD
 
 
-@pytest.mark.parametrize(("told", "kept"), [(None, Tuning().platform_slip_std), (0.0, 0.0), (0.4, 0.4)])
-def test_a_platforms_slip_is_the_default_only_where_it_is_not_told(told: float | None, kept: float) -> None:
-    rows = row_of(TagSettings(slip_std_rad=told)).reshape(1)
+@pytest.mark.parametrize(("given", "kept"), [(None, Tuning().platform_slip_std), (0.0, 0.0), (0.4, 0.4)])
+def test_a_platforms_slip_is_the_default_only_where_it_is_not_set(given: float | None, kept: float) -> None:
+    rows = row_of(TagSettings(slip_std_rad=given)).reshape(1)
     node = np.zeros(1, NODE)
     node["heading_kind"] = DERIVED_HEADING
     choose_model(rows[0], node[0], Tuning())
@@ -52,7 +52,7 @@ def test_a_platforms_slip_is_the_default_only_where_it_is_not_told(told: float |
     assert rows[0]["settings"]["slip_std"] == kept
 
 
-def test_a_tag_is_no_faster_than_the_operator_says() -> None:
+def test_a_tag_is_no_faster_than_the_operators_limit() -> None:
     assert row_of(TagSettings())["settings"]["speed_max"] == SPEED_MAX
     assert row_of(TagSettings(speed_max_mps=1.5))["settings"]["speed_max"] == 1.5
 
@@ -60,13 +60,13 @@ def test_a_tag_is_no_faster_than_the_operator_says() -> None:
 @pytest.mark.parametrize(
     ("angle", "std", "kept"), [(None, None, MOUNT_UNKNOWN_STD), (0.3, None, MOUNT_KNOWN_STD), (0.3, 0.0, 0.0)]
 )
-def test_a_mounting_angle_is_known_as_well_as_the_operator_says(
+def test_a_mounting_angle_is_as_certain_as_the_operators_setting(
     angle: float | None, std: float | None, kept: float
 ) -> None:
     assert row_of(TagSettings(mount_angle_rad=angle, mount_angle_std_rad=std))["settings"]["mount_angle_std"] == kept
 
 
-def test_a_heading_told_not_to_drift_has_one_class_and_no_error_beyond_what_was_told() -> None:
+def test_a_heading_set_not_to_drift_has_one_class_and_no_error_beyond_the_setting() -> None:
     for told, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
         rows = row_of(TagSettings(heading_std_rad=told)).reshape(1)
         rows["heading"]["model"] = PLATFORM_MODEL
@@ -74,7 +74,7 @@ def test_a_heading_told_not_to_drift_has_one_class_and_no_error_beyond_what_was_
         assert reference_error(rows[0], 1.0)[1] == slow
 
 
-def test_a_magnetic_heading_is_not_what_was_told_of_the_platforms() -> None:
+def test_the_setting_for_a_platforms_heading_does_not_change_a_magnetic_one() -> None:
     rows = row_of(TagSettings(heading_std_rad=0.0)).reshape(1)
     rows["heading"]["model"] = MAGNETOMETER_MODEL
     assert reference_error(rows[0], 0.04)[1] == 0.2
@@ -82,7 +82,7 @@ def test_a_magnetic_heading_is_not_what_was_told_of_the_platforms() -> None:
 
 
 @pytest.mark.parametrize(("heading", "times"), [(0.5, SOFT_IRON_FACTOR), (None, 1.0)])
-def test_a_magnetometer_counts_for_less_where_the_heading_at_the_start_was_told(
+def test_a_magnetometer_counts_for_less_where_the_heading_at_the_start_was_set(
     heading: float | None, times: float
 ) -> None:
     row = row_of(TagSettings(start=StartPose(x=1.0, y=0.0, heading_rad=heading))).reshape(1)

@@ -105,7 +105,7 @@ def test_a_bearing_settles_where_a_standing_tag_is() -> None:
     assert np.arctan2(pose["y"], pose["x"]) == pytest.approx(0.8, abs=0.1)
 
 
-def test_a_row_that_is_configured_again_starts_afresh() -> None:
+def test_a_row_that_is_configured_again_starts_again() -> None:
     batch, _ = samples(2000)
     fleet = engine()
     expected = fleet.process(batch).poses
@@ -168,7 +168,7 @@ def test_samples_of_a_row_that_is_not_configured_are_an_error() -> None:
         engine(1).process(batch)
 
 
-def test_what_waits_is_part_of_the_state() -> None:
+def test_pending_samples_are_part_of_the_state() -> None:
     batch, _ = samples(2009)
     fleet, restored = engine(3), FleetEngine(CALIBRATED)
     ahead = SampleBatch(batch.imu[:1000], batch.ranges[:110], batch.headings[:110])

@@ -1,4 +1,4 @@
-"""The front-end on recordings with ground truth, one set of defaults for all. Bounds: as measured, with margin."""
+"""The front-end on recordings with ground truth, with one set of defaults. Bounds are measured values with a margin."""
 
 import math
 from typing import Any
@@ -17,14 +17,14 @@ PERIOD = 0.1
 
 
 def nodes_of(r: Recording) -> tuple[Array, Array]:
-    """Node ends (s) and NODE, every 0.1 s."""
+    """Return the ends of the nodes in s, and NODE, every 0.1 s."""
     t, acc, gyro, mag = r.imu[:, 0], r.imu[:, 1:4], r.imu[:, 4:7], r.imu[:, 7:10]
     ends = np.arange(t[0] + PERIOD, t[-1], PERIOD)
     return ends, run(new_frontend(), Motion(t, acc, gyro, mag, None), ends)
 
 
 def yaw_drift(r: Recording, ends: Array, nodes: Array) -> Array:
-    """deg: summed increments against the true yaw, zero at the start."""
+    """Return the error of the summed yaw increments in degrees, zero at the start."""
     e = np.degrees(np.unwrap(wrapped(np.cumsum(nodes["dyaw"]) - r.yaw_at(ends))))
     return e - np.median(e[:10])  # type: ignore[no-any-return]
 
@@ -85,7 +85,7 @@ def test_the_gyroscope_alone_drifts_by_degrees_and_stays_inside_its_variance(
 
 
 @pytest.mark.parametrize("name", ["iasl_s1", "iasl_s3", "starloc_fast_s1_tag1", "inrol_1", "inrol_2"])
-def test_a_moving_tag_is_never_said_to_rest(name: str) -> None:
+def test_a_moving_tag_never_counts_as_resting(name: str) -> None:
     r = recording(name)
     ends, nodes = nodes_of(r)
     assert not nodes["rest"][r.speed_at(ends) > 0.1].any()

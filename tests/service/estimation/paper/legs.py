@@ -1,4 +1,4 @@
-"""A tag on straight legs around an anchor at the origin, and what its sensors say: truth for tests of engines."""
+"""A tag on straight legs around an anchor at the origin, with the samples of its sensors, for tests of engines."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ T0_NS = 1_760_000_000_000_000_000
 
 @dataclass(frozen=True)
 class Track:
-    """Truth at times t, s: arrays of one length; m, rad, m/s, rad/s."""
+    """The truth at the times t, s: arrays of one length, in m, rad, m/s and rad/s."""
 
     t: Array
     x: Array
@@ -23,12 +23,12 @@ class Track:
     yaw_rate: Array
 
     def at(self, t: Array) -> tuple[Array, Array]:
-        """x and y at the times t, s."""
+        """Return x and y at the times t, s."""
         return np.interp(t, self.t, self.x), np.interp(t, self.t, self.y)
 
 
 def straight_legs(seed: int, legs: int = 5, dt: float = 0.01) -> Track:
-    """Rest, then legs of 8 to 14 s at 0.5 to 4 m/s with half-second turns between; from (10, 0)."""
+    """Return a track from (10, 0): rest, then legs of 8 to 14 s at 0.5 to 4 m/s with half-second turns between them."""
     rng = np.random.default_rng(seed)
     speed, turn = [np.zeros(100)], [np.zeros(100)]
     v = 0.0
@@ -46,7 +46,7 @@ def straight_legs(seed: int, legs: int = 5, dt: float = 0.01) -> Track:
 
 
 def settings_at_start(track: Track) -> Array:
-    """TAG_SETTINGS of a tag whose start is known."""
+    """Return TAG_SETTINGS of a tag whose start is known."""
     settings = default_settings()
     settings["start_known"] = True
     settings["start_x"], settings["start_y"], settings["start_std"] = track.x[0], track.y[0], 0.1
@@ -59,7 +59,7 @@ def _times(columns: Array, t: Array) -> Array:
 
 
 def range_samples(track: Track, rng: np.random.Generator, every: int = 10, std: float = 0.1) -> Array:
-    """RANGE: every so many steps of the track, with white noise."""
+    """Return RANGE at every nth step of the track, with white noise."""
     at = slice(0, None, every)
     samples = _times(np.zeros(len(track.t[at]), RANGE), track.t[at])
     samples["range"] = np.hypot(track.x, track.y)[at] + rng.normal(0, std, len(samples))
@@ -68,7 +68,7 @@ def range_samples(track: Track, rng: np.random.Generator, every: int = 10, std: 
 
 
 def heading_samples(track: Track, rng: np.random.Generator, every: int = 1, std: float = 0.05) -> Array:
-    """HEADING: of a platform, with white noise."""
+    """Return HEADING of a platform, with white noise."""
     at = slice(0, None, every)
     samples = _times(np.zeros(len(track.t[at]), HEADING), track.t[at])
     samples["heading"] = (
@@ -79,7 +79,7 @@ def heading_samples(track: Track, rng: np.random.Generator, every: int = 1, std:
 
 
 def imu_samples(track: Track, rng: np.random.Generator, magnetometer: bool = True) -> Array:
-    """IMU: a level body that looks where it goes; field of 20 µT north and 44 µT down."""
+    """Return IMU of a level body that points along its course. The field is 20 µT north and 44 µT down."""
     n = len(track.t)
     samples = _times(np.zeros(n, IMU), track.t)
     samples["acc"][:, 0] = np.gradient(track.speed, track.t)
@@ -94,7 +94,7 @@ def imu_samples(track: Track, rng: np.random.Generator, magnetometer: bool = Tru
 
 
 def samples_of(track: Track, seed: int, imu: bool = True) -> SampleBatch:
-    """10 Hz ranges with 0.1 m of noise, and an IMU or a platform's headings at the rate of the track."""
+    """Return 10 Hz ranges with 0.1 m of noise, and an IMU or a platform's headings at the rate of the track."""
     rng = np.random.default_rng(seed)
     ranges = range_samples(track, rng)
     if imu:

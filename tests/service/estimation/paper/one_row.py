@@ -1,4 +1,4 @@
-"""Samples of one tag, given in a line, and an engine with that tag: for tests of single behaviours."""
+"""Samples of one tag, each kind in one line, and an engine with that tag."""
 
 import math
 
@@ -21,7 +21,7 @@ from service.estimation.paper.legs import T0_NS
 
 
 def engine(row_settings: Array | None = None) -> PaperEngine:
-    """With one anchor at the origin and row 0, which starts at (10, 0)."""
+    """Return an engine with one anchor at the origin and row 0, which starts at (10, 0)."""
     made = PaperEngine(TUNED)
     made.set_anchors(np.zeros(1, ANCHOR))
     made.configure(0, start() if row_settings is None else row_settings)
@@ -36,17 +36,17 @@ def start(**changes: object) -> Array:
 
 
 def ranges(*pairs: tuple[float, float], anchor: int = 0, row: int = 0) -> SampleBatch:
-    """(t, s, range, m)."""
+    """Return RANGE of pairs (time, s, range, m)."""
     return SampleBatch(ranges=np.array([(row, at(t), anchor, r, math.nan) for t, r in pairs], RANGE))
 
 
 def headings(*pairs: tuple[float, float], row: int = 0) -> SampleBatch:
-    """(t, s, heading, rad)."""
+    """Return HEADING of pairs (time, s, heading, rad)."""
     return SampleBatch(headings=np.array([(row, at(t), h, math.nan) for t, h in pairs], HEADING))
 
 
 def imu(*times: float, mag: tuple[float, float, float] = (math.nan,) * 3) -> SampleBatch:
-    """A level body at rest."""
+    """Return IMU of a level body at rest."""
     return SampleBatch(imu=np.array([(0, at(t), (0, 0, 9.80665), (0, 0, 0), mag) for t in times], IMU))
 
 

@@ -1,4 +1,4 @@
-"""The attitude filter against rotations that are known."""
+"""The attitude filter against known rotations."""
 
 import math
 
@@ -76,7 +76,7 @@ def test_one_sample_of_gravity_and_field_gives_the_attitude(yaw: float, pitch: f
 
 @pytest.mark.parametrize("declination", [-0.3, 0.2])
 def test_declination_turns_magnetic_into_true_north(declination: float) -> None:
-    """A declination of +0.2 rad: magnetic north lies 0.2 rad east of true north."""
+    """With a declination of +0.2 rad, magnetic north lies 0.2 rad east of true north."""
     filter_ = settled(declination=declination)
     filter_.step(0.0, UP, STILL, (20.0, 0.0, -44.0))  # the body looks to magnetic north
     assert filter_.yaw == pytest.approx(math.pi / 2 - declination)
@@ -169,7 +169,7 @@ def test_an_infinite_time_constant_leaves_the_magnetometer_out() -> None:
     "acc", [STILL, (1e-9, 0.0, 0.0), (math.nan, 0.0, 9.8), (math.inf, 0.0, 0.0), (1e200, 1e200, 0.0)]
 )
 @pytest.mark.parametrize("mag", [NO_FIELD, STILL, (math.inf, 0.0, 0.0), (1e200, 1e200, 0.0), (0.0, 0.0, -40.0)])
-def test_no_acceleration_or_field_however_bad_harms_the_attitude(acc: Vector, mag: Vector) -> None:
+def test_no_invalid_acceleration_or_field_harms_the_attitude(acc: Vector, mag: Vector) -> None:
     filter_ = settled()
     filter_.step(0.0, acc, STILL, mag)
     filter_.step(DT, UP, STILL, in_body(pose_of(1.0), FIELD))

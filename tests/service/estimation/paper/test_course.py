@@ -1,4 +1,4 @@
-"""Direction of travel, and whether it is a straight line."""
+"""The direction of travel, and the detection of straight lines."""
 
 import math
 
@@ -46,7 +46,7 @@ def test_without_a_gyroscope_a_line_is_straight_while_the_course_stays_near_wher
     assert made.straight(-3.0)  # of the line that began at -3.05
 
 
-def test_auto_takes_the_platform_until_the_imu_knows_where_north_is() -> None:
+def test_auto_takes_the_platform_until_the_imu_has_found_north() -> None:
     made = course(heading_source=HeadingSource.AUTO)
     assert not made.any_heading
     made.take_imu(0, UP, (0.0, 0.0, 0.0), NO_FIELD)

@@ -1,4 +1,4 @@
-"""The engine `paper` on tags whose truth is known."""
+"""The engine `paper` on tags with a known truth."""
 
 import math
 from dataclasses import replace
@@ -29,7 +29,7 @@ def engine_for(settings: Array) -> PaperEngine:
 
 
 def between(samples: SampleBatch, first: int, last: int) -> SampleBatch:
-    """What was measured after `first` and not after `last`, ns."""
+    """Return the samples after `first` and up to `last`, ns."""
     cut = [columns[(columns["t_ns"] > first) & (columns["t_ns"] <= last)] for columns in (samples.imu, samples.ranges)]
     return SampleBatch(imu=cut[0], ranges=cut[1])
 
@@ -41,7 +41,7 @@ def rmse(poses: Array, track: Track) -> float:
 
 @pytest.mark.parametrize("imu", [True, False], ids=["imu", "platform heading"])
 def test_most_runs_on_straight_legs_from_a_known_start_are_tracked(imu: bool) -> None:
-    """Most: one in five ends in the mirror image, which is in the nature of a filter with one mode."""
+    """One in five ends in the mirror image, as a filter with one mode cannot avoid."""
     errors = []
     for seed in range(8):
         track = straight_legs(seed)
@@ -90,7 +90,7 @@ def test_samples_that_arrive_out_of_order_within_a_batch_are_put_in_order() -> N
 
 
 def test_a_turn_ends_the_line_from_which_speed_is_taken() -> None:
-    """Out east past the anchor, a turn by a right angle, and on: pairs across the turn would give a wrong speed."""
+    """Drive east past the anchor, turn by 90° and drive on. Pairs across the turn would give a wrong speed."""
     t = np.arange(0, 20, 0.01)
     turn = np.where((t > 10) & (t <= 10.5), math.pi, 0.0)
     heading, speed = np.cumsum(turn) * 0.01, np.full(len(t), 2.0)
@@ -105,7 +105,7 @@ def test_a_turn_ends_the_line_from_which_speed_is_taken() -> None:
 
 
 def test_the_speed_estimator_pulls_the_speed_of_the_filter_towards_the_truth() -> None:
-    """Algorithm 1 against the vanilla EKF (w = 1: no blending), from a speed that is badly known, in the mean."""
+    """Compare the mean of Algorithm 1 with the plain EKF (w = 1: no blending), from an uncertain speed."""
     errors = {}
     for blend in (TUNED.blend, 1.0):
         engine, wrong = PaperEngine(replace(TUNED, blend=blend)), []

@@ -1,4 +1,4 @@
-"""What the engine `paper` does with samples that are late, absurd or not numbers, and with a fault."""
+"""The engine `paper` with samples that are late, absurd or not numbers, and after a fault."""
 
 import math
 
@@ -97,7 +97,7 @@ def test_absurd_numbers_never_escape_as_a_pose_or_an_exception(kind: str, value:
     assert state_of(made.process(ranges((1.0, 10.0), row=1)).poses)[0] != State.INITIALISING
 
 
-def test_a_row_whose_numbers_blow_up_starts_afresh_and_its_neighbour_notices_nothing() -> None:
+def test_a_row_whose_numbers_blow_up_starts_again_and_its_neighbour_is_unaffected() -> None:
     made, alone = engine(), engine()
     made.configure(1, start())
     for row in (0, 1):

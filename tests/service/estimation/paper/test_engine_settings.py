@@ -1,4 +1,4 @@
-"""What the settings of a tag do in the engine `paper`."""
+"""The settings of a tag in the engine `paper`."""
 
 import math
 import subprocess

@@ -1,4 +1,4 @@
-"""What the engine `paper` says about itself: states and their reasons."""
+"""The states of the engine `paper` and their reasons."""
 
 import numpy as np
 import pytest

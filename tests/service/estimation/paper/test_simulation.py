@@ -1,4 +1,4 @@
-"""The simulation of the paper, with the stages of the authors' released code, through the whole engine."""
+"""The simulation of the paper with the stages of the authors' released code, through the whole engine."""
 
 import math
 from dataclasses import replace
@@ -20,7 +20,7 @@ PEAKS = (4.7, 6.1, 3.5, 5.0, 7.1)  # rad/s, of the half sine of 50 steps between
 
 @cache
 def stages() -> Track:
-    """As in github.com/MISTLab/RangeTracker, commit 3039e4a: from (10, 0), heading north, at rest."""
+    """Return the track of github.com/MISTLab/RangeTracker, commit 3039e4a: from (10, 0), heading north, at rest."""
     speed, yaw_rate = np.zeros(STEPS), np.zeros(STEPS)
     phase = (np.arange(50) + 0.5) / 50 * math.pi
     for start, before, after, peak in zip(STARTS[1:], SPEEDS[:-1], SPEEDS[1:], PEAKS, strict=True):
@@ -33,7 +33,7 @@ def stages() -> Track:
 
 
 def mean_error(range_std: float, heading_std: float, blend: float) -> float:
-    """m; the authors' script prints this mean under the name of RMSE."""
+    """Return the mean error in m, which the authors' script calls RMSE."""
     track, rng = stages(), np.random.default_rng(1)
     engine = PaperEngine(replace(PaperParameters(), gate=math.inf, blend=blend))
     engine.set_anchors(np.zeros(1, ANCHOR))
@@ -47,7 +47,7 @@ def mean_error(range_std: float, heading_std: float, blend: float) -> float:
 
 
 def test_at_the_noise_of_the_released_data_the_gain_over_the_plain_filter_is_as_the_paper_says() -> None:
-    """The paper: 1.73 m without, 0.48 m with the speed estimator, a factor of 3.6."""
+    """The paper has 1.73 m without and 0.48 m with the speed estimator, a factor of 3.6."""
     with_it, without = mean_error(0.005, 0.01, blend=0.5), mean_error(0.005, 0.01, blend=1.0)
     assert without == pytest.approx(1.73, rel=0.5)
     assert with_it == pytest.approx(0.48, rel=0.7)

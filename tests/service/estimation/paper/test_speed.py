@@ -70,7 +70,7 @@ def test_points_may_be_several_key_pairs_apart() -> None:
 
 @pytest.mark.parametrize(("ratio", "expected"), [(0.0, 7.0), (0.1, 5.0), (100.0, 4.0)])
 def test_the_window_of_the_mean_grows_with_the_range(ratio: float, expected: float) -> None:
-    """Radially outward near 40 m at 1, 2, ... 7 m/s, each speed held for just three key pairs."""
+    """Move radially outward near 40 m at 1, 2, … 7 m/s, with three key pairs for each speed."""
     estimator = SpeedEstimator(threshold=0.01, spacing=1, window_base=1, window_ratio=ratio)
     mean = None
     for v in range(1, 8):

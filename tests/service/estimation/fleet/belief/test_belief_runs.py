@@ -16,7 +16,7 @@ def errors(beliefs: Any, truth: Drive) -> Any:
 
 
 def inside(beliefs: Any, truth: Drive) -> Any:
-    """Whether the truth lies in the 95 % ellipse."""
+    """Return whether the truth lies in the 95 % ellipse."""
     e = np.stack([beliefs["x"] - truth.x, beliefs["y"] - truth.y], axis=1)
     P = beliefs["cov"][:, :2, :2]
     return np.einsum("ni,nij,nj->n", e, np.linalg.inv(P), e) < CHI2_95_OF_2
@@ -58,7 +58,7 @@ def test_results_do_not_depend_on_how_the_nodes_were_cut_into_batches() -> None:
     assert whole.tobytes() == np.concatenate(parts).tobytes()
 
 
-def test_a_row_that_is_fed_nonsense_starts_afresh_and_its_neighbour_notices_nothing() -> None:
+def test_a_row_with_invalid_samples_starts_again_and_leaves_its_neighbour_alone() -> None:
     alone = track(drive(2001), known=True)
     mixed = np.concatenate([drive(2000, row=0).nodes, drive(2001, row=1).nodes])
     mixed["z"][100] = np.nan
@@ -106,7 +106,7 @@ def test_a_tag_that_may_reverse_is_found_too_or_stays_ambiguous() -> None:
     for truth in map(drive, range(2000, 2004)):
         rows = rows_of(1, known=False)
         rows["settings"]["reverse_allowed"] = 1
-        moving = truth.nodes[15:]  # first seen in motion: the ring has both directions of travel
+        moving = truth.nodes[15:]  # it moves from its first range on: the ring has both directions of travel
         beliefs = run(rows, make_pool(512), moving)
         assert rows["count"][0] <= MAX_HYPOTHESES
         assert rows["faults"][0] == 0

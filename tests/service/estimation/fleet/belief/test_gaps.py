@@ -1,4 +1,4 @@
-"""A tag whose samples come in pieces: what it costs and what it says of itself."""
+"""A tag whose samples arrive with gaps: its hypotheses and the honesty of its poses."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +15,7 @@ from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 
 MESSAGE_NS = 200_000_000
-FIRST = 40  # messages that all arrive
+FIRST = 40  # messages from the start that all arrive
 SEEDS = range(7100, 7106)
 
 Arrives = Callable[[Any], Any]  # of the messages with these numbers
@@ -39,7 +39,7 @@ def engine_of(runs: list[Simulation]) -> FleetEngine:
 
 
 def samples_of(runs: list[Simulation], arrives: Arrives) -> SampleBatch:
-    """What arrives of all runs, each run's in order of time."""
+    """Return the samples of all runs that arrive, for each run in order of time."""
     imu: list[Any] = []
     ranges: list[Any] = []
     for row, run in enumerate(runs):
@@ -66,7 +66,7 @@ def poses_of(engine: FleetEngine, batches: list[SampleBatch]) -> Any:
 
 
 def holds_truth(poses: Any, runs: list[Simulation]) -> Any:
-    """Whether each 95 % ellipse holds the truth."""
+    """Return whether the truth lies in the 95 % ellipse of each pose."""
     inside = []
     for pose in poses:
         truth, t_s = runs[pose["row"]].truth, pose["t_ns"] * 1e-9
@@ -75,7 +75,7 @@ def holds_truth(poses: Any, runs: list[Simulation]) -> Any:
     return np.array(inside)
 
 
-def test_a_tag_of_which_every_fifth_message_arrives_is_held_where_it_was_without_any_hypothesis(
+def test_a_tag_of_which_every_fifth_message_arrives_keeps_its_last_place_without_any_hypothesis(
     runs: list[Simulation],
 ) -> None:
     engine = engine_of(runs)
@@ -100,7 +100,7 @@ def test_after_gaps_it_begins_again_with_a_bounded_number_of_hypotheses_and_an_e
     assert holds_truth(after, runs).mean() > 0.8
 
 
-def test_tags_that_were_heard_in_pieces_begin_again_one_after_another(runs: list[Simulation]) -> None:
+def test_tags_after_gaps_begin_again_one_after_another(runs: list[Simulation]) -> None:
     engine, begun, poses = engine_of(runs), [], []
     for batch in in_messages(samples_of(runs, lambda number: (number % 5 == 0) | (number > 100))):
         poses.append(engine.process(batch).poses)

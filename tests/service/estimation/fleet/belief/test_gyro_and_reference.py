@@ -1,4 +1,4 @@
-"""What a belief knows of the gyroscope's bias, and how its yaw comes to count from a magnetometer."""
+"""The gyroscope bias in a belief, and the change of its yaw to the reference of a magnetometer."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def resting(gyro_bias_var: float) -> Array:
     return node[0]  # type: ignore[no-any-return]
 
 
-def test_however_long_a_tag_rests_its_bias_is_known_no_better_than_the_front_end_knows_it() -> None:
+def test_however_long_a_tag_rests_its_bias_is_no_more_certain_than_in_the_front_end() -> None:
     s, P = np.zeros(N), np.eye(N)
     s[GYRO_BIAS], P[GYRO_BIAS, GYRO_BIAS] = 0.004, 0.01**2
     for _ in range(50):
@@ -35,7 +35,7 @@ def test_however_long_a_tag_rests_its_bias_is_known_no_better_than_the_front_end
     assert 0.0 < s[GYRO_BIAS] < 0.001
 
 
-def test_what_is_known_better_from_headings_than_from_rest_is_kept() -> None:
+def test_a_bias_that_headings_determine_better_than_rest_is_kept() -> None:
     s, P = np.zeros(N), np.eye(N)
     s[GYRO_BIAS], P[GYRO_BIAS, GYRO_BIAS] = 0.004, 0.001**2
     update_standstill(s, P, np.zeros(N), resting(0.01**2), TUNING)
@@ -56,7 +56,7 @@ def test_yaw_that_counts_from_the_reference_leaves_the_course_as_it_was() -> Non
     assert np.linalg.eigvalsh(P).min() > -1e-12
 
 
-def test_what_a_rest_teaches_of_the_bias_is_told_with_its_step() -> None:
+def test_a_bias_learned_at_rest_comes_with_its_step() -> None:
     rng, t = np.random.default_rng(1), np.arange(0.0, 6.0, 0.01)
     acc = np.tile([0.0, 0.0, 9.80665], (len(t), 1)) + 0.01 * rng.standard_normal((len(t), 3))
     gyro = np.tile([0.0, 0.0, 0.006], (len(t), 1)) + 0.002 * rng.standard_normal((len(t), 3))

@@ -1,4 +1,4 @@
-"""What the belief promises when things go wrong: not to be sure of a place in which the tag is not.
+"""When things go wrong, the belief must not be sure of a place where the tag is not.
 
 Seeds 2000 to 2011; the belief was tuned on others.
 """
@@ -23,19 +23,19 @@ def distance(beliefs: Any, truth: Drive) -> Any:
 
 
 def inside(beliefs: Any, truth: Drive) -> Any:
-    """Whether the truth lies in the 95 % ellipse."""
+    """Return whether the truth lies in the 95 % ellipse."""
     e = np.stack([beliefs["x"] - truth.x, beliefs["y"] - truth.y], axis=1)
     return nees(e, beliefs["cov"][:, :2, :2]) < CHI2_95_OF_2
 
 
 def elsewhere(beliefs: Any, truth: Drive) -> Any:
-    """Tracking, and further from the truth than 2 m and a tenth of the range."""
+    """Return whether a belief is tracking, and further from the truth than 2 m and a tenth of the range."""
     far = distance(beliefs, truth) > np.maximum(2.0, 0.1 * np.hypot(truth.x, truth.y))
     return (beliefs["state"] == State.TRACKING) & far
 
 
 def without_sight(seed: int) -> Drive:
-    """A drive with bursts of ranges that are too long."""
+    """Return a drive with bursts of ranges that are too long."""
     truth = drive(seed)
     t = truth.nodes["t_ns"] * 1e-9
     for first, last, excess in BURSTS_S:
@@ -44,21 +44,21 @@ def without_sight(seed: int) -> Drive:
 
 
 def misled(seed: int) -> Drive:
-    """A drive with a heading reference that is wrong by a constant."""
+    """Return a drive with a heading reference that is wrong by a constant."""
     truth = drive(seed)
     truth.nodes["heading"] += BIAS
     return truth
 
 
 def drifting(seed: int) -> Drive:
-    """A drive with a gyroscope whose bias swings by 0.03 rad/s within a minute."""
+    """Return a drive with a gyroscope whose bias swings by 0.03 rad/s within a minute."""
     truth = drive(seed)
     truth.nodes["dyaw"] += 0.03 * np.sin(2 * np.pi * truth.nodes["t_ns"] * 1e-9 / 60.0) * truth.nodes["dt_s"]
     return truth
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_line_of_sight_that_is_blocked_for_seconds_is_seen_through(known: bool) -> None:
+def test_a_line_of_sight_that_is_blocked_for_seconds_does_not_mislead(known: bool) -> None:
     runs = [(track(d, known), d) for d in map(without_sight, range(2000, 2012))]
     assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.01
     assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
@@ -74,7 +74,7 @@ def test_a_heading_reference_with_a_constant_error_never_makes_the_ellipse_exclu
 
 
 def test_most_tracks_far_from_their_ranges_are_given_up_within_five_seconds_and_found_again() -> None:
-    """The start that was told is 8 m from where the tag is."""
+    """The start in the settings is 8 m from the tag."""
     truths = [drive(seed, legs=6) for seed in range(2000, 2012)]
     ends, said = [], []
     for d in truths:
@@ -87,20 +87,20 @@ def test_most_tracks_far_from_their_ranges_are_given_up_within_five_seconds_and_
     assert np.median(ends) < 1.0
 
 
-def test_the_ranges_tell_a_gyroscope_that_drifts_from_a_heading_that_does() -> None:
+def test_the_ranges_distinguish_a_drifting_gyroscope_from_a_drifting_heading() -> None:
     runs = [(track(d, known=True), d) for d in map(drifting, range(2000, 2012))]
     assert np.median([np.sqrt(np.mean(distance(b, d) ** 2)) for b, d in runs]) < 0.5
     assert np.mean([inside(b, d)[20:].mean() for b, d in runs]) > 0.93
     assert np.mean([elsewhere(b, d).mean() for b, d in runs]) < 0.02
 
 
-def test_while_it_does_not_know_the_ellipse_holds_all_the_places_where_the_tag_may_be() -> None:
+def test_while_the_place_is_uncertain_the_ellipse_holds_all_the_places_where_the_tag_may_be() -> None:
     runs = [(track(d, known=False), d) for d in map(drive, range(2000, 2012))]
     ambiguous = [inside(b, d)[20:][b["state"][20:] == State.AMBIGUOUS] for b, d in runs]
     assert np.concatenate(ambiguous).mean() > 0.9
 
 
-def test_a_tag_that_is_first_heard_in_motion_is_not_declared_in_the_wrong_place() -> None:
+def test_a_tag_that_moves_at_its_first_sample_is_not_declared_in_the_wrong_place() -> None:
     for truth in map(drive, range(2000, 2012)):
         late = Drive(*(column[100:] for column in truth))
         beliefs = track(late, known=False)

@@ -1,4 +1,4 @@
-"""Which hypotheses become one."""
+"""Merging of hypotheses."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ STD = 0.2  # m, of the distance
 
 
 def pair(apart: float, log_weight: float) -> Any:
-    """Two hypotheses that many standard deviations of distance apart; the second has this log weight to the first."""
+    """Return two hypotheses with this distance in standard deviations. The second has this log weight to the first."""
     work = make_workspace()["hypotheses"][0]
     for h, (distance, weight) in enumerate([(10.0, 0.0), (10.0 + apart * STD, log_weight)]):
         work["mean"][h, R], work["mean"][h, PHI] = distance, 0.3

@@ -1,4 +1,4 @@
-"""The states that the engine `fleet` gives its poses, each with the reason that its rule says."""
+"""The states that the engine `fleet` gives its poses, each with the reason of its rule."""
 
 from typing import Any
 

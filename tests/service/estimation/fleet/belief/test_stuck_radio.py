@@ -1,4 +1,4 @@
-"""A radio that repeats itself."""
+"""A radio that repeats its last range."""
 
 from itertools import cycle, islice
 
@@ -12,7 +12,7 @@ from dropanchor_service.estimation.fleet.frontend.node import NODE, RANGE
 
 
 def heard(anchors: list[int], ranges: list[float], count: int = 12, rest: int = 0) -> list[bool]:
-    """Return what `is_stuck` says about ranges to these anchors in turn, every 50 ms."""
+    """Return the result of `is_stuck` for ranges to these anchors in turn, every 50 ms."""
     rows: Array = np.zeros(1, ROW)
     nodes = np.zeros(count, NODE)
     nodes["t_ns"] = np.arange(count) * 50_000_000

@@ -1,4 +1,4 @@
-"""The front-end as a row: deterministic, indifferent to batches, unharmed by bad numbers."""
+"""The front-end of a row: deterministic, independent of batches, and safe from invalid numbers."""
 
 from typing import Any
 
@@ -24,12 +24,12 @@ def ride(seconds: float = 20.0) -> Motion:
 
 
 def finite(rows: Array) -> bool:
-    """Whether every float of the row is finite."""
+    """Return whether every float of the row is finite."""
     return bool(np.isfinite(np.frombuffer(flatten(rows).tobytes())).all())
 
 
 def flatten(value: Array) -> Array:
-    """All float64 fields of a structured array, one after the other."""
+    """Return all float64 fields of a structured array, one after the other."""
     if value.dtype.names is None:
         return value.ravel() if value.dtype == np.float64 else np.empty(0)
     return np.concatenate([flatten(value[name]) for name in value.dtype.names])

@@ -1,4 +1,4 @@
-"""A tag that is not where the point is that follows the course."""
+"""A tag beside the point that follows the course."""
 
 import math
 from typing import Any
@@ -34,7 +34,7 @@ def test_a_turn_swings_the_tag_about_its_pivot() -> None:
     np.testing.assert_allclose([node["swing_forward"], node["swing_left"]], expected, atol=1e-12)
 
 
-def test_what_the_tag_accelerates_by_swinging_is_not_the_pivots() -> None:
+def test_the_acceleration_of_a_swinging_tag_is_not_that_of_its_pivot() -> None:
     node = filled(1.5, 0.2)
 
     def velocity(rate: float) -> Array:
@@ -50,7 +50,7 @@ def test_without_a_lever_nothing_changes() -> None:
 
 
 def carried(seconds: float = 60.0) -> tuple[SampleBatch, Array]:
-    """2 s of rest at (5, 0), then curves at 0.9 m/s with the tag held out; its samples and its track (n, 2)."""
+    """Return samples and track (n, 2) of a tag on an arm: 2 s of rest at (5, 0), then curves at 0.9 m/s."""
     rng = np.random.default_rng(7)
     t = np.arange(0.0, seconds, STEP_S)
     moving = np.clip((t - 2.0) / 1.0, 0.0, 1.0)
@@ -90,7 +90,7 @@ def rms_error(lever: tuple[float, float]) -> float:
     return float(np.sqrt(np.mean((poses["x"] - true[:, 0]) ** 2 + (poses["y"] - true[:, 1]) ** 2)))
 
 
-def test_a_tag_that_is_held_out_is_followed_where_its_lever_is_told() -> None:
+def test_a_tag_on_an_arm_is_followed_if_its_lever_is_set() -> None:
     told, not_told, mirrored = (rms_error(lever) for lever in (LEVER, (0.0, 0.0), (-LEVER[0], -LEVER[1])))
     assert told < 1.0
     assert not_told > 2.0 * told

@@ -16,7 +16,7 @@ IRON = np.array([0.5, -0.8, 0.9])  # as large as the field, whose norm is 1
 
 
 def noisy(seconds: float, rate: float = 0.6, unit: float = 1.0, iron: Array = IRON, seed: int = 1) -> Motion:
-    """A circling, swaying tag with white noise and hard iron."""
+    """Return the motion of a circling, swaying tag with white noise and hard iron."""
     rng = np.random.default_rng(seed)
     m = synthesise(np.arange(0, seconds, 0.01), lambda t: turning(t, rate))
     m.mag = unit * (m.mag + iron + rng.normal(0, 0.02, m.mag.shape))
@@ -30,7 +30,7 @@ def ends_of(m: Motion) -> Array:
 
 
 def heading_error(m: Motion, nodes: Array, ends: Array) -> Array:
-    """rad, against the true yaw."""
+    """Return the heading error in rad."""
     return wrapped(nodes["heading"] - np.interp(ends, m.t, np.unwrap(m.yaw)))
 
 
@@ -84,7 +84,7 @@ def test_a_disturbance_makes_the_heading_uncertain_and_does_not_turn_it() -> Non
 
 
 @pytest.mark.parametrize("seconds", [0.5, 2.0, 5.0, 8.0])
-def test_after_a_turn_that_nobody_watched_the_field_tells_the_heading_by_the_hard_iron_that_is_known(
+def test_after_a_turn_without_samples_the_field_and_the_known_hard_iron_give_the_heading(
     seconds: float,
 ) -> None:
     m = noisy(60)
@@ -126,7 +126,7 @@ def test_a_gyroscope_bias_left_over_is_followed_by_the_field() -> None:
     assert abs(heading_error(m, nodes, ends)[ends > 30]).max() < math.radians(4)
 
 
-def test_a_resting_tag_does_not_talk_itself_into_certainty() -> None:
+def test_the_heading_of_a_resting_tag_does_not_become_more_certain() -> None:
     rng = np.random.default_rng(3)
     m = synthesise(np.arange(0, 600, 0.05), lambda t: np.zeros((len(t), 3)))
     m.mag = m.mag + 0.05 + rng.normal(0, 0.01, m.mag.shape)

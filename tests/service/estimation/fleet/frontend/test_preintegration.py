@@ -1,4 +1,4 @@
-"""Nodes against a fine, independent integration, and what makes their variances grow."""
+"""Nodes against a fine, independent integration, and the growth of their variances."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ Array = NDArray[Any]
 
 
 def weaving(t: Array) -> Array:
-    """ENU acceleration, m/s²."""
+    """Return the acceleration in ENU, m/s²."""
     return np.stack([0.8 * np.cos(1.1 * t), 0.6 * np.sin(1.7 * t), 0.3 * np.sin(2.3 * t)], axis=1)
 
 
@@ -26,7 +26,7 @@ def six_axis(seconds: float, dt: float = 0.01) -> Motion:
 
 
 def velocity_change(t0: Array, t1: Array) -> Array:
-    """(n, 2) m/s, ENU: the exact integral of `weaving`."""
+    """Return the exact integral of `weaving`, (n, 2) m/s in ENU."""
 
     def v(t: Array) -> Array:
         return np.stack([0.8 / 1.1 * np.sin(1.1 * t), -0.6 / 1.7 * np.cos(1.7 * t)], axis=1)
@@ -118,7 +118,7 @@ def test_a_silent_imu_makes_the_turn_uncertain_by_what_it_may_have_been(silence:
     assert nodes["dyaw_var"][inside].max() > 100 * nodes["dyaw_var"][ends < 9].max()
 
 
-def test_before_the_first_sample_a_node_says_that_it_knows_nothing() -> None:
+def test_before_the_first_sample_a_node_has_infinite_variances() -> None:
     m = six_axis(2)
     m.t += 1.0
     nodes = run(new_frontend(), m, np.array([0.3, 0.7]))

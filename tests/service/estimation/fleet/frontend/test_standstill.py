@@ -1,4 +1,4 @@
-"""Standstill and the gyroscope bias that rest teaches."""
+"""Standstill, and the gyroscope bias learned at rest."""
 
 from typing import Any
 
@@ -28,7 +28,7 @@ def watch_all(s: Any, dt: float, acc: Array, gyro: Array, bias: Array, rest: Arr
 
 
 def watched(acc: Array, gyro: Array, dt: float = 0.01) -> tuple[Array, Array, Array]:
-    """rest (n,), bias (3,) and the row after the samples."""
+    """Return rest (n,), bias (3,) and the row after the samples."""
     s, bias, rest = np.zeros(1, STANDSTILL), np.zeros(3), np.zeros(len(acc), np.bool_)
     watch_all(s[0], dt, acc, gyro, bias, rest)
     return rest, bias, s[0]

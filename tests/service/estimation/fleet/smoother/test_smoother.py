@@ -15,7 +15,7 @@ SEEDS = range(2000, 2008)
 
 
 def inside(poses: Any, truth: Any) -> Any:
-    """Whether the truth lies in the 95 % ellipse."""
+    """Return whether the truth lies in the 95 % ellipse."""
     index = np.round(poses["t_ns"] / 1e8).astype(int)
     e = np.stack([poses["x"] - truth.x[index], poses["y"] - truth.y[index]], axis=1)
     return np.einsum("ni,nij,nj->n", e, np.linalg.inv(poses["cov"][:, :2, :2]), e) < CHI2_95_OF_2
@@ -25,7 +25,7 @@ def rms(error: Any) -> float:
     return float(np.sqrt(np.nanmean(error**2)))
 
 
-def test_the_more_of_the_future_it_has_seen_the_better_and_its_ellipses_hold() -> None:
+def test_more_later_samples_give_a_better_track_and_the_ellipses_hold() -> None:
     errors, cover = [], []
     for seed in SEEDS:
         fleet, poses, truth = traced(seed)
@@ -41,7 +41,7 @@ def test_the_more_of_the_future_it_has_seen_the_better_and_its_ellipses_hold() -
     assert np.mean(cover, axis=0)[1] >= np.mean(cover, axis=0)[0]  # a wrong mode of the filter is one of the lag too
 
 
-def test_what_was_ambiguous_at_first_is_known_from_the_first_pose_on_once_all_is_seen() -> None:
+def test_with_all_samples_an_ambiguous_start_is_resolved_from_the_first_pose_on() -> None:
     ratios = []
     for seed in SEEDS[:4]:
         fleet, poses, truth = traced(seed, known=False)
@@ -54,7 +54,7 @@ def test_what_was_ambiguous_at_first_is_known_from_the_first_pose_on_once_all_is
     assert np.mean(np.array(ratios) < 1.0) > 0.7  # one in ten begins in the mirror image, as the filter may
 
 
-def test_a_fixed_lag_track_knows_nothing_of_what_comes_later() -> None:
+def test_a_fixed_lag_track_does_not_depend_on_later_samples() -> None:
     batch, _ = samples(2001)
     part = cut(batch, 0, 15_000_000_000)
     tracks = []
@@ -91,7 +91,7 @@ def test_single_ranges_that_are_far_too_long_do_no_harm() -> None:
     assert spoilt < 1.5 * rms(error_of(smoothed_poses(clean, 0, None), truth)) + 0.05
 
 
-def test_a_row_that_has_heard_nothing_has_no_smoothed_pose() -> None:
+def test_a_row_without_samples_has_no_smoothed_pose() -> None:
     fleet = TracingEngine(CALIBRATED)
     fleet.configure(0, settings())
     assert len(smoothed_poses(fleet, 0, None)) == 0
