@@ -67,8 +67,8 @@ def test_a_mounting_angle_is_as_certain_as_the_operators_setting(
 
 
 def test_a_heading_set_not_to_drift_has_one_class_and_no_error_beyond_the_setting() -> None:
-    for told, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
-        rows = row_of(TagSettings(heading_std_rad=told)).reshape(1)
+    for given, classes, slow in ((None, 1, 0.03), (0.0, 0, 0.0), (0.01, 0, 0.01)):
+        rows = row_of(TagSettings(heading_std_rad=given)).reshape(1)
         rows["heading"]["model"] = PLATFORM_MODEL
         assert add_own_error_class(make_workspace()[0]["hypotheses"], 0, 1, rows[0], Tuning(), False) == classes
         assert reference_error(rows[0], 1.0)[1] == slow

@@ -117,15 +117,15 @@ def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
     fleet, (batch, _) = engine(), samples(5)
     batch.ranges["range"][40] += 5.0
     result = fleet.process(batch)
-    told = result.innovations
-    assert len(told) >= len(result.poses) - 1
-    assert (told["t_ns"] == result.poses["t_ns"][-len(told) :]).all()
-    assert (told["measured"] == result.poses["range"][-len(told) :]).all()
-    np.testing.assert_allclose(told["predicted"] + told["innovation"], told["measured"])
-    outlier = np.abs(told["measured"] - batch.ranges["range"][40]) < 1e-12
-    assert told["p_outlier"][outlier] > 0.9
-    assert not told["fused"][outlier]
-    good = told[~outlier]
+    innovations = result.innovations
+    assert len(innovations) >= len(result.poses) - 1
+    assert (innovations["t_ns"] == result.poses["t_ns"][-len(innovations) :]).all()
+    assert (innovations["measured"] == result.poses["range"][-len(innovations) :]).all()
+    np.testing.assert_allclose(innovations["predicted"] + innovations["innovation"], innovations["measured"])
+    outlier = np.abs(innovations["measured"] - batch.ranges["range"][40]) < 1e-12
+    assert innovations["p_outlier"][outlier] > 0.9
+    assert not innovations["fused"][outlier]
+    good = innovations[~outlier]
     assert good["fused"].mean() > 0.95
     assert np.mean(good["innovation"] ** 2 / good["S"]) == pytest.approx(1.0, abs=0.5)
 
@@ -133,11 +133,11 @@ def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
 def test_the_last_innovations_can_be_explained() -> None:
     batch, _ = samples(2000)
     result = engine().process(batch)
-    told = result.innovations
-    assert told["t_ns"].tolist() == result.poses["t_ns"][-len(told) :].tolist()
-    assert (told["S"] > 0).all()
-    assert np.abs(told["innovation"] / np.sqrt(told["S"])).mean() < 2.0
-    assert ((told["p_outlier"] >= 0) & (told["p_outlier"] <= 1)).all()
+    innovations = result.innovations
+    assert innovations["t_ns"].tolist() == result.poses["t_ns"][-len(innovations) :].tolist()
+    assert (innovations["S"] > 0).all()
+    assert np.abs(innovations["innovation"] / np.sqrt(innovations["S"])).mean() < 2.0
+    assert ((innovations["p_outlier"] >= 0) & (innovations["p_outlier"] <= 1)).all()
 
 
 def test_samples_of_one_batch_may_come_in_any_order() -> None:

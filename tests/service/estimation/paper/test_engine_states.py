@@ -50,12 +50,12 @@ def test_a_range_that_fits_is_fused_and_one_that_does_not_is_refused() -> None:
 def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
     made = engine()
     made.process(headings((0, 0.0)))
-    told = made.process(ranges((0.1, 10.0), (0.2, 10.1), (0.3, 30.0))).innovations
-    np.testing.assert_allclose(told["predicted"] + told["innovation"], told["measured"])
-    assert told["measured"].tolist() == [10.0, 10.1, 30.0]
-    assert told["fused"].tolist() == [True, True, False]
-    assert told["innovation"][-1] ** 2 / told["S"][-1] > 25
-    assert np.isnan(told["p_outlier"]).all()
+    innovations = made.process(ranges((0.1, 10.0), (0.2, 10.1), (0.3, 30.0))).innovations
+    np.testing.assert_allclose(innovations["predicted"] + innovations["innovation"], innovations["measured"])
+    assert innovations["measured"].tolist() == [10.0, 10.1, 30.0]
+    assert innovations["fused"].tolist() == [True, True, False]
+    assert innovations["innovation"][-1] ** 2 / innovations["S"][-1] > 25
+    assert np.isnan(innovations["p_outlier"]).all()
 
 
 def test_refused_ranges_make_it_coast_and_then_lose_the_tag() -> None:

@@ -91,7 +91,7 @@ def rms_error(lever: tuple[float, float]) -> float:
 
 
 def test_a_tag_on_an_arm_is_followed_if_its_lever_is_set() -> None:
-    told, not_told, mirrored = (rms_error(lever) for lever in (LEVER, (0.0, 0.0), (-LEVER[0], -LEVER[1])))
-    assert told < 1.0
-    assert not_told > 2.0 * told
-    assert mirrored > 5.0 * told
+    with_lever, without, mirrored = (rms_error(lever) for lever in (LEVER, (0.0, 0.0), (-LEVER[0], -LEVER[1])))
+    assert with_lever < 1.0
+    assert without > 2.0 * with_lever
+    assert mirrored > 5.0 * with_lever
