@@ -32,6 +32,23 @@ class SamplesReceived(_Answer):
     samples: int = Field(description="Samples in the payload.")
 
 
+class SamplesAcknowledged(_Answer):
+    """The answer to one message on the WebSocket for samples. The service has the samples; as with `SamplesReceived`,
+    they are judged later."""
+
+    message: int = Field(description="Number of the message on this connection, from 1. 0 is the greeting.")
+    samples: int = Field(description="Samples in the payload; 0 when it was rejected.")
+    rejected: str | None = Field(description="Why the payload cannot be decoded. To send it again is of no use.")
+    detail: str = Field(description="More about the rejection, for people.")
+    t_ns: int = Field(description="UTC, ns: when the service took the message.")
+    started_ns: int = Field(description="UTC, ns: when this service started. It changes with a restart.")
+    tag: str = Field(description="The tag whose samples these are.")
+    state: str | None = Field(
+        description="Tracking state of the tag, at most a second old; null before its first pose."
+    )
+    hint: str = Field(description="What a person can do about the state; empty when there is nothing to do.")
+
+
 class PhoneReadingsReceived(_Answer):
     """What became of a batch of a phone's readings."""
 

@@ -8,6 +8,7 @@ from threading import Event, Thread
 from starlette.types import ASGIApp
 
 from dropanchor_service.api.http.server import build_server, listen
+from support.zenoh_router import wait_until
 
 
 @contextmanager
@@ -17,6 +18,7 @@ def running_server(app: ASGIApp, stopping: Event, port: int = 0) -> Iterator[int
     server = build_server(app, stopping)
     thread = Thread(target=lambda: asyncio.run(server.serve(sockets=[socket])))
     thread.start()
+    wait_until(lambda: server.started)
     try:
         yield socket.getsockname()[1]
     finally:

@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from prometheus_client import CollectorRegistry
 
-from dropanchor_schemas.answers import Problem
+from dropanchor_schemas.answers import Problem, SamplesAcknowledged
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_service.answers.answers import Answers
@@ -21,6 +21,7 @@ from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import DashboardMount
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.ingest import ingest_router
+from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.site import site_router
@@ -82,6 +83,7 @@ def create_app(
         site_router(answers.site),
         connect_router(answers.site, endpoints, credentials),
         ingest_router(receive),
+        ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
         recordings_router(recorder),
         health_router(ready, impaired),
     ):
@@ -99,9 +101,9 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
         document = get_openapi(
             title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
         )
-        for model in (PoseFrame, Problem, SamplesMessage):  # no route has one of these as its only model
+        for model in (PoseFrame, Problem, SamplesAcknowledged, SamplesMessage):  # of no route, or not its only model
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
-            document["components"]["schemas"] |= schema.pop("$defs") | {model.__name__: schema}
+            document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
         _add_access(document)
         app.openapi_schema = document
     return app.openapi_schema

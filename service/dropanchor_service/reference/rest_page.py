@@ -2,7 +2,12 @@
 
 from typing import Any
 
+from dropanchor_schemas.answers import SamplesAcknowledged
+from dropanchor_schemas.wire import MAX_PAYLOAD_BYTES
 from dropanchor_service.api.http.errors import Kind
+from dropanchor_service.api.http.server import PING_S
+from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES
+from dropanchor_service.api.routes import ingest_stream
 from dropanchor_service.reference.markdown import table
 
 _INTRODUCTION = """\
@@ -14,6 +19,43 @@ are UTC in ns. With credentials, every request but those for health and the docu
 `Authorization: Bearer KEY`.
 """
 
+_STREAM = """\
+### Stream of samples
+
+`GET /api/v1/ingest/stream` opens a WebSocket for the samples of one tag. OpenAPI has no WebSockets, so this section
+describes it. Each message is one payload of the contract: a text message is JSON, a binary message is packed. Decoding,
+admission and counters are those of samples over Zenoh.
+
+The service answers every message with one JSON object, in the order of the messages; a greeting of the same form comes
+first. It is `SamplesAcknowledged` in the document:
+
+{fields}
+**Nothing is lost** if the client keeps each message until its answer, and after a break connects and sends again what
+was not answered. An answered message is in the service's buffer, and an orderly stop still uses it. After a kill,
+`started_ns` differs: then the client should also send again what was answered in the last 5 s, which the last
+checkpoint may lack. A message that arrives twice counts as `duplicate` and is used once, if it has `sequence` and
+`boot_id`. Samples that come later than those of other publishers of the tag may be counted as `late`.
+
+**Credentials**: the key of a tag (`dropanchor key add NAME --tag TAG`) in `Authorization: Bearer KEY`. A browser cannot
+set this header: it offers the two protocols `{protocol}` and `{key_protocol}KEY`. The key chooses the tag.
+Without credentials the URL names it: `?tag=NAME`; only pages of the service's own origin are then accepted.
+
+**Limits**: {connections} connections for each key. A payload has at most {payload:,} bytes; a message of more than
+{message:,} bytes ends the connection. Messages count as requests: a client that is too fast has to wait for its
+answers. The service pings every {ping:.0f} s and cuts a client that does not answer within {ping:.0f} s.
+
+The service ends a connection with one of these codes and a sentence:
+
+{codes}"""
+_CODES = (
+    (ingest_stream.UNREADABLE, "The tag is missing from the URL, or its name cannot be used."),
+    (ingest_stream.UNAUTHENTICATED, "The key is missing, unknown, revoked or expired."),
+    (ingest_stream.FORBIDDEN, "The key belongs to another tag or to none, or the page to another origin."),
+    (ingest_stream.TOO_MANY, "The key has too many connections. Try again later."),
+    (ingest_stream.RESTART, "The service stops. Connect again and send again what was not answered."),
+    (1009, "The message was too large."),
+)
+
 
 def page(document: dict[str, Any]) -> str:
     """Return the page as Markdown. document: OpenAPI 3.1."""
@@ -23,12 +65,28 @@ def page(document: dict[str, Any]) -> str:
         rows = [_row(path, method, operation) for path, method, operation in _operations(document, group)]
         header = ("request", "answer", "query parameters", "status codes")
         sections.append(f"## {group.capitalize()}\n\n{table(header, rows)}")
+        if group == "ingest":
+            sections.append(_stream_of_samples())
     kinds = ((f"`{kind.type}`", str(kind.status), kind.title) for kind in Kind)
     sections.append(
         "## Errors\n\nEvery error is `application/problem+json` (RFC 9457) of one of these types:\n\n"
         + table(("type", "status", "title"), kinds)
     )
     return "\n".join(sections)
+
+
+def _stream_of_samples() -> str:
+    fields = SamplesAcknowledged.model_fields.items()
+    return _STREAM.format(
+        fields=table(("field", "what"), ((f"`{name}`", field.description or "") for name, field in fields)),
+        codes=table(("code", "when"), ((f"`{code}`", when) for code, when in _CODES)),
+        protocol=ingest_stream.PROTOCOL,
+        key_protocol=ingest_stream.KEY_PROTOCOL,
+        connections=ingest_stream.CONNECTIONS_PER_KEY,
+        payload=MAX_PAYLOAD_BYTES,
+        message=MAX_MESSAGE_BYTES,
+        ping=PING_S,
+    )
 
 
 def _operations(document: dict[str, Any], group: str) -> list[tuple[str, str, dict[str, Any]]]:

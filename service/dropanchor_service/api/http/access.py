@@ -5,7 +5,7 @@ import ipaddress
 import math
 from collections.abc import Mapping
 
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -17,6 +17,7 @@ from dropanchor_service.security.identity import Scope as AccessScope
 OPEN_PATHS = ("/api/v1/health/live", "/api/v1/health/ready", "/api/v1/openapi.json")
 INGEST = "/api/v1/ingest/"
 SENSOR_LOGGER = f"{INGEST}sensor-logger"
+LOOPBACK = "loopback"
 _SITE = "/api/v1/site"
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
@@ -25,7 +26,10 @@ _HOW_TO_AUTHENTICATE = (
 
 
 class Access:
-    """ASGI middleware. Without an authenticator every client may do everything, and loopback has no rate limit."""
+    """ASGI middleware. Without an authenticator every client may do everything, and loopback has no rate limit.
+
+    WebSockets pass: a browser can read why it is refused only after their handshake, so their route checks them.
+    """
 
     def __init__(self, app: ASGIApp, authenticator: Authenticator | None, rate_limiter: RateLimiter | None) -> None:
         self._app = app
@@ -54,17 +58,13 @@ class Access:
         if not secret:
             return None, _unauthenticated(request, f"This request needs credentials. {_HOW_TO_AUTHENTICATE}")
         try:
-            provider = self._authenticator.provider_of(secret)
-            if provider.may_block:
-                return await asyncio.to_thread(provider.identify, secret), None
-            return provider.identify(secret), None
+            return await identify(self._authenticator, secret), None
         except UnauthenticatedError as error:
             return None, _unauthenticated(request, f"Authentication failed: {error}. {_HOW_TO_AUTHENTICATE}")
 
     def _rate_limited(self, request: Request, identity: Identity | None) -> Response | None:
-        address = "" if request.client is None else request.client.host
-        client = _network(address) if identity is None else f"{identity.source} {identity.name}"
-        if self._rate_limiter is None or (self._authenticator is None and client == "loopback"):
+        client = client_of(request, identity)
+        if self._rate_limiter is None or (self._authenticator is None and client == LOOPBACK):
             return None
         wait_s = self._rate_limiter.wait_s(client)
         if wait_s == 0:
@@ -91,12 +91,31 @@ class Access:
         return sending
 
 
+async def identify(authenticator: Authenticator, secret: str) -> Identity:
+    """Return the identity that the secret belongs to. Raises UnauthenticatedError."""
+    provider = authenticator.provider_of(secret)
+    if provider.may_block:
+        return await asyncio.to_thread(provider.identify, secret)
+    return provider.identify(secret)
+
+
+def client_of(connection: HTTPConnection, identity: Identity | None) -> str:
+    """Return what limits are counted by: the key or token, or without one the network address."""
+    if identity is not None:
+        return f"{identity.source} {identity.name}"
+    return _network("" if connection.client is None else connection.client.host)
+
+
+def bearer_of(connection: HTTPConnection) -> str:
+    """Return the key or token in the header `Authorization`; empty without one."""
+    scheme, _, secret = connection.headers.get("authorization", "").partition(" ")
+    return secret.strip() if scheme.lower() == "bearer" else ""
+
+
 def _secret(request: Request) -> str:
     """Return the key or token of a request; empty without one. Sensor Logger may put it into the URL."""
-    scheme, _, secret = request.headers.get("authorization", "").partition(" ")
-    if scheme.lower() == "bearer" and secret.strip():
-        return secret.strip()
-    return request.query_params.get("token", "") if request.scope["path"] == SENSOR_LOGGER else ""
+    in_url = request.query_params.get("token", "") if request.scope["path"] == SENSOR_LOGGER else ""
+    return bearer_of(request) or in_url
 
 
 def _is_protected(path: str) -> bool:
@@ -138,5 +157,5 @@ def _network(address: str) -> str:
     except ValueError:
         return address
     if parsed.is_loopback:
-        return "loopback"
+        return LOOPBACK
     return str(ipaddress.ip_network((parsed, 64), strict=False)) if parsed.version == 6 else address

@@ -10,9 +10,11 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from dropanchor_service.api.http.limits import GuardedProtocol
+from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES, GuardedWebSocket
 from dropanchor_service.security.certificate import Certificate
 
 GRACE_S = 1  # for open requests at shutdown; stuck clients use all of it
+PING_S = 10.0  # between two pings of a WebSocket, and the time to answer one
 _SEND_BUFFER_BYTES = 262_144  # how much data a client that stops reading can hold in the kernel
 _MAX_HEADER_BYTES = 16_384
 
@@ -49,7 +51,11 @@ def build_server(
     config = uvicorn.Config(
         app,
         http=protocol,
-        ws="none",
+        ws=GuardedWebSocket,
+        ws_max_size=MAX_MESSAGE_BYTES,
+        ws_ping_interval=PING_S,
+        ws_ping_timeout=PING_S,
+        ws_per_message_deflate=False,  # little to gain, and a small message may unpack to a large one
         log_config=None,
         access_log=False,
         server_header=False,

@@ -31,8 +31,8 @@ class DashboardMount(Mount):
         super().__init__("/", app=_Files(directory=folder, html=True), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        is_read = scope["method"] in ("GET", "HEAD")
-        if scope["path"].startswith("/api/"):
+        if scope["type"] != "http" or scope["path"].startswith("/api/"):
             return Match.NONE, {}
+        is_read = scope["method"] in ("GET", "HEAD")
         match, child_scope = super().matches(scope)
         return (match if is_read or match is Match.NONE else Match.PARTIAL), child_scope

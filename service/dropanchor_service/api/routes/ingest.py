@@ -89,7 +89,7 @@ def _add_samples_route(router: APIRouter, receive: Receive) -> None:
         tag, payload = _tag(request, query), await request.body()
         encoding = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         receive(tag, payload, encoding)  # what cannot be decoded is counted there too
-        samples = _count(payload, encoding)
+        samples = count_samples(payload, encoding)
         if isinstance(samples, Rejection):
             raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)
         return json_response({"samples": samples}, status=202)
@@ -141,7 +141,7 @@ def _tag(request: Request, query: OfTag) -> str:
     return tag
 
 
-def _count(payload: bytes, encoding: str) -> int | Rejection:
+def count_samples(payload: bytes, encoding: str) -> int | Rejection:
     """Return how many samples a payload holds, or why it cannot be decoded."""
     if encoding == ENCODING_PACKED:
         header = read_header(payload)

@@ -1,0 +1,235 @@
+"""Samples over a WebSocket: each message is a payload of the contract, and each is acknowledged.
+
+A client that keeps a message until its acknowledgement loses nothing when the connection breaks. It may send a message
+again: the numbers in the payload say that it is the same one, and it is counted as a duplicate.
+"""
+
+import asyncio
+import time
+from collections import Counter
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
+from threading import Event
+from urllib.parse import urlsplit
+
+from fastapi import APIRouter
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from dropanchor_schemas.answers import SamplesAcknowledged
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
+from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.routes.ingest import count_samples
+from dropanchor_service.phones.sensor_logger_intake import Receive
+from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
+
+PROTOCOL = "dropanchor.samples"
+KEY_PROTOCOL = "dropanchor.key."
+"""A browser cannot set headers of a WebSocket: it offers its key as a second protocol that begins with this."""
+CONNECTIONS_PER_KEY = 8
+STATE_S = 1.0  # how old the state of the tag in an acknowledgement may be
+MAX_REASON_BYTES = 123
+
+RESTART = 1012
+UNREADABLE, UNAUTHENTICATED, FORBIDDEN, TOO_MANY = 4400, 4401, 4403, 4429
+_MAKE_A_KEY = "Make a key with dropanchor key add NAME --tag TAG."
+
+
+class _ClosedError(Exception):
+    """The service ends a connection. reason: a sentence for the person."""
+
+    def __init__(self, code: int, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+        self.reason = reason.encode()[:MAX_REASON_BYTES].decode(errors="ignore")
+
+
+class _Connections:
+    """Open connections of each key."""
+
+    def __init__(self) -> None:
+        self._open: Counter[str] = Counter()
+
+    @contextmanager
+    def one_more(self, client: str) -> Iterator[None]:
+        """Count a connection until the block ends. Raises _ClosedError when there are too many."""
+        if self._open[client] >= CONNECTIONS_PER_KEY:
+            raise _ClosedError(TOO_MANY, f"This key has {CONNECTIONS_PER_KEY} connections: end one, or make more keys.")
+        self._open[client] += 1
+        try:
+            yield
+        finally:
+            self._open[client] -= 1
+            if not self._open[client]:
+                del self._open[client]
+
+
+class _Acknowledgements:
+    """Of one connection."""
+
+    def __init__(self, answers: Answers, tag: str, started_ns: int) -> None:
+        self._answers = answers
+        self._tag = tag
+        self._started_ns = started_ns
+        self._messages = 0
+        self._looked_s = float("-inf")
+        self._state: tuple[str | None, str] = (None, "")
+
+    def greeting(self) -> str:
+        return self._json(0)
+
+    def of(self, payload: bytes, encoding: str) -> str:
+        self._messages += 1
+        return self._json(count_samples(payload, encoding))
+
+    def _json(self, found: int | Rejection) -> str:
+        self._look()
+        rejection = found if isinstance(found, Rejection) else None
+        return SamplesAcknowledged(
+            message=self._messages,
+            samples=found if isinstance(found, int) else 0,
+            rejected=None if rejection is None else rejection.reason.value,
+            detail="" if rejection is None else rejection.detail,
+            t_ns=self._answers.now_ns(),
+            started_ns=self._started_ns,
+            tag=self._tag,
+            state=self._state[0],
+            hint=self._state[1],
+        ).model_dump_json()
+
+    def _look(self) -> None:
+        """Read the state of the tag where the known one is too old."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s < STATE_S:
+            return
+        self._looked_s = now_s
+        tag = self._answers.tags.find(self._tag)
+        pose = None if tag is None else self._answers.pose_of(tag)
+        self._state = (None, "") if pose is None else (pose["state"], pose["hint"])
+
+
+class _Stream:
+    """What the connections share."""
+
+    def __init__(
+        self,
+        receive: Receive,
+        answers: Answers,
+        stopping: Event,
+        authenticator: Authenticator | None,
+        rate_limiter: RateLimiter | None,
+    ) -> None:
+        self._receive = receive
+        self._answers = answers
+        self._stopping = stopping
+        self._authenticator = authenticator
+        self._rate_limiter = rate_limiter
+        self._connections = _Connections()
+        self._started_ns = answers.now_ns()
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Serve an accepted connection until its end. Raises _ClosedError and WebSocketDisconnect."""
+        identity = await self._identity(socket)
+        tag = _tag(socket, identity)
+        client = client_of(socket, identity)
+        acknowledgements = _Acknowledgements(self._answers, tag, self._started_ns)
+        with self._connections.one_more(client):
+            await socket.send_text(acknowledgements.greeting())
+            async for payload, encoding in _messages(socket):
+                await self._wait_for_turn(client)
+                self._refuse_at_the_end(identity)
+                self._receive(tag, payload, encoding)
+                await socket.send_text(acknowledgements.of(payload, encoding))
+
+    async def _identity(self, socket: WebSocket) -> Identity | None:
+        if self._authenticator is None:
+            _refuse_other_origin(socket)
+            return None
+        offered = (name.removeprefix(KEY_PROTOCOL) for name in _protocols(socket) if name.startswith(KEY_PROTOCOL))
+        secret = bearer_of(socket) or next(offered, "")
+        if not secret:
+            raise _ClosedError(UNAUTHENTICATED, f"This service needs a key. {_MAKE_A_KEY}")
+        try:
+            return await identify(self._authenticator, secret)
+        except UnauthenticatedError as error:
+            raise _ClosedError(UNAUTHENTICATED, f"Not accepted: {error}.") from error
+
+    async def _wait_for_turn(self, client: str) -> None:
+        """Take messages no faster than the limit of the client allows: it has to wait, but loses nothing."""
+        if self._rate_limiter is None or (self._authenticator is None and client == LOOPBACK):
+            return
+        while wait_s := self._rate_limiter.wait_s(client):
+            await asyncio.sleep(wait_s)
+
+    def _refuse_at_the_end(self, identity: Identity | None) -> None:
+        """Raise _ClosedError once the key is no longer valid, or once what is taken would not be used any more."""
+        if self._stopping.is_set():
+            raise _ClosedError(RESTART, "The service stops. Connect again and send this message again.")
+        if (
+            identity is not None
+            and self._authenticator is not None
+            and not self._authenticator.is_still_valid(identity)
+        ):
+            raise _ClosedError(UNAUTHENTICATED, f"The key was revoked or has expired. {_MAKE_A_KEY}")
+
+
+def ingest_stream_router(
+    receive: Receive,
+    answers: Answers,
+    stopping: Event,
+    authenticator: Authenticator | None,
+    rate_limiter: RateLimiter | None,
+) -> APIRouter:
+    """Return the router of the WebSocket. OpenAPI has no WebSockets: `reference/rest.md` describes it."""
+    router, stream = APIRouter(), _Stream(receive, answers, stopping, authenticator, rate_limiter)
+
+    @router.websocket("/ingest/stream")
+    async def ingest_stream(socket: WebSocket) -> None:
+        await socket.accept(PROTOCOL if PROTOCOL in _protocols(socket) else None)
+        try:
+            await stream.serve(socket)
+        except _ClosedError as end:
+            await socket.close(end.code, end.reason)
+        except WebSocketDisconnect:
+            pass
+
+    return router
+
+
+async def _messages(socket: WebSocket) -> AsyncIterator[tuple[bytes, str]]:
+    """Yield each payload and its encoding until the client is gone."""
+    while (message := await socket.receive())["type"] == "websocket.receive":
+        text = message.get("text")
+        yield (message["bytes"], ENCODING_PACKED) if text is None else (text.encode(), ENCODING_JSON)
+
+
+def _protocols(socket: WebSocket) -> list[str]:
+    found: list[str] = socket.scope.get("subprotocols", [])
+    return found
+
+
+def _tag(socket: WebSocket, identity: Identity | None) -> str:
+    """Return the tag that a connection speaks for: that of its key, or without credentials the one it names."""
+    named = socket.query_params.get("tag")
+    own = None if identity is None else identity.tag
+    if identity is not None and own is None:
+        raise _ClosedError(FORBIDDEN, f"This key may not send samples. {_MAKE_A_KEY}")
+    if own is not None and named not in (None, own):
+        raise _ClosedError(FORBIDDEN, f"This key speaks for the tag {own!r} only.")
+    tag = own or named
+    if tag is None:
+        raise _ClosedError(UNREADABLE, "Say which tag this is: add ?tag=NAME to the URL.")
+    try:
+        chunk_from_id(tag)
+    except InvalidKeyError as error:
+        raise _ClosedError(UNREADABLE, f"The tag's name cannot be used: {error}.") from error
+    return tag
+
+
+def _refuse_other_origin(socket: WebSocket) -> None:
+    """Without credentials, pages of other origins must not send samples through a browser beside the service."""
+    origin = socket.headers.get("origin")
+    if origin is not None and urlsplit(origin).netloc != socket.headers.get("host"):
+        raise _ClosedError(FORBIDDEN, "A page of another origin may not send samples to a service without keys.")
