@@ -52,7 +52,8 @@ class Place:
     def connect(self, secret: str = "", query: str = "", **options: Any) -> ClientConnection:
         headers = {"authorization": f"Bearer {secret}"} if secret else {}
         url = f"ws://127.0.0.1:{self.port}/api/v1/ingest/stream{query}"
-        return connect(url, additional_headers=headers, proxy=None, **options)
+        connection: ClientConnection = connect(url, additional_headers=headers, proxy=None, **options)
+        return connection
 
     def refusal(self, secret: str = "", query: str = "", **options: Any) -> tuple[int, str]:
         """Return the code and the sentence with which a connection is ended."""
@@ -129,7 +130,7 @@ def test_the_answer_tells_the_state_of_the_tag_and_the_time_of_the_service(place
 
 
 def test_a_browser_offers_its_key_as_a_protocol(place: Place) -> None:
-    with place.running(), place.connect(subprotocols=[PROTOCOL, f"{KEY_PROTOCOL}{place.anna}"]) as socket:  # type: ignore[list-item]
+    with place.running(), place.connect(subprotocols=[PROTOCOL, f"{KEY_PROTOCOL}{place.anna}"]) as socket:
         assert answer(socket).tag == "anna"
         assert socket.subprotocol == PROTOCOL
 
@@ -150,7 +151,7 @@ def test_without_credentials_the_url_names_the_tag_and_pages_of_other_origins_ar
         assert place.refusal(query=f"?tag={'a' * 100}")[0] == 4400
         assert place.refusal(query="?tag=bert", origin="http://evil.example")[0] == 4403
         own = f"http://127.0.0.1:{place.port}"
-        with place.connect(query="?tag=bert", origin=own) as socket:  # type: ignore[arg-type]
+        with place.connect(query="?tag=bert", origin=own) as socket:
             assert answer(socket).tag == "bert"
 
 
@@ -206,7 +207,7 @@ def test_a_client_that_is_too_fast_is_slowed_down_and_loses_nothing(place: Place
 def test_the_key_never_gets_into_the_log(place: Place, caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG)
     with place.running():
-        with place.connect(subprotocols=[PROTOCOL, f"{KEY_PROTOCOL}{place.anna}"], logger=logging.Logger("client")):  # type: ignore[list-item]
+        with place.connect(subprotocols=[PROTOCOL, f"{KEY_PROTOCOL}{place.anna}"], logger=logging.Logger("client")):
             pass
         place.refusal(query=f"?token={place.anna}", logger=logging.Logger("client"))
     assert place.anna not in caplog.text

@@ -1,0 +1,258 @@
+"""The page that makes a phone a tag, in a real browser against the real interface."""
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Event
+
+import pytest
+from playwright.sync_api import Browser
+
+from dropanchor_schemas.wire import ENCODING_PACKED, Frame, anchor_number, decode_packed
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.security.api_keys import SOURCE, ApiKeys
+from dropanchor_service.security.identity import Authenticator
+from support.api import ApiBench, make_api_bench
+from support.http_server import running_server
+from support.module_strings import LEC, LEC_DAMAGED, LEC_RANGES, LES, LES_RANGES
+from support.tag_page import APPLE, SERIAL, TagPage, tag_page
+from support.zenoh_router import free_port, wait_until
+
+pytestmark = pytest.mark.browser
+
+LONGEST_SILENCE_S = 6.0  # longer than the page waits for an answer before it connects anew
+
+
+class Service:
+    """The interface with the key of the tag anna, at an address that stays. It can be cut and started again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.bench: ApiBench = make_api_bench()
+        self.bench.answers.now_ns = time.time_ns
+        self.keys = ApiKeys(folder)
+        self.anna = self.keys.add_for_tag("anna's phone", "anna")
+        self.port = free_port()
+        self.link = f"http://127.0.0.1:{self.port}/tag#key={self.anna}&tag=anna"
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        self.bench.stopping = Event()
+        app = self.bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: self.keys}))
+        with running_server(app, self.bench.stopping, self.port):
+            yield
+
+    def frames(self) -> list[Frame]:
+        """Return what arrived, each message once, in the order of its first arrival."""
+        found: dict[tuple[int | None, int | None], Frame] = {}
+        for tag, payload, encoding in self.bench.received:
+            frame = decode_packed(payload)
+            assert (tag, encoding) == ("anna", ENCODING_PACKED)
+            assert isinstance(frame, Frame)
+            found.setdefault((frame.boot_id, frame.sequence), frame)
+        return list(found.values())
+
+    def imu_samples(self) -> int:
+        return sum(len(frame.imu) for frame in self.frames())
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Service:
+    return Service(tmp_path)
+
+
+def assert_nothing_is_missing(service: Service, page: TagPage) -> None:
+    """Wait until all is answered, and check that every message arrived, in its order."""
+    page.rest()
+    page.wait_for("counts.waiting === 0 && counts.sent === counts.taken")
+    assert page.counts()["lost"] == 0
+    frames = service.frames()
+    assert [frame.sequence for frame in frames] == list(range(len(frames)))
+    assert len({frame.boot_id for frame in frames}) == 1
+    times = [sample.t_ns for frame in frames for sample in frame.imu]
+    assert times == sorted(set(times))
+    assert len(times) == page.counts()["taken"]
+
+
+def test_samples_arrive_with_the_units_and_axes_of_a_tag(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.start()
+        page.move((1.0, 2.0, 9.5), (10.0, 20.0, 30.0))
+        page.wait_for("counts.sent > 60")
+        assert page.text("screen") == "Screen up"
+        page.wait_for("Number(document.getElementById('rate').textContent) > 30")
+        assert_nothing_is_missing(service, page)
+        assert page.errors == []
+    sample = service.frames()[0].imu[0]
+    assert sample.acc == pytest.approx((2.0, -1.0, 9.5), abs=1e-6)
+    assert sample.gyro == pytest.approx([math.radians(rate) for rate in (20.0, -10.0, 30.0)], abs=1e-6)
+    assert sample.mag is None
+    assert abs(sample.t_ns - time.time_ns()) < 60e9
+
+
+def test_a_browser_of_apple_is_asked_in_the_tap_and_its_accelerations_are_turned_round(
+    chromium: Browser, service: Service
+) -> None:
+    with service.running(), tag_page(chromium, service.link, APPLE % "granted") as page:
+        page.start()
+        page.move((1.0, 2.0, -9.5), (10.0, 20.0, 30.0))
+        page.wait_for("counts.sent > 10")
+        assert page.page.evaluate("asked") == 1
+    sample = service.frames()[0].imu[0]
+    assert sample.acc == pytest.approx((-2.0, 1.0, 9.5), abs=1e-6)
+    assert sample.gyro == pytest.approx([math.radians(rate) for rate in (20.0, -10.0, 30.0)], abs=1e-6)
+
+
+def test_a_person_who_does_not_allow_motion_reads_what_to_do(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link, APPLE % "denied") as page:
+        page.start()
+        page.wait_for("!document.getElementById('problem').hidden")
+        assert page.text("problem").startswith("Motion was not allowed.")
+
+
+def test_a_device_without_sensors_says_so(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.start()
+        page.wait_for("!document.getElementById('problem').hidden")
+        assert page.text("problem").startswith("This device reports no motion")
+
+
+def test_an_outage_of_the_service_loses_nothing(chromium: Browser, service: Service) -> None:
+    """The outage is shorter than those that people have; the queue has room for an hour."""
+    with service.running():
+        opened = tag_page(chromium, service.link)
+        page = opened.__enter__()
+        page.start()
+        page.move()
+        page.wait_for("counts.sent > 30")
+    page.wait_for("dropanchor.status() === 'broken'")
+    page.wait_for(f"counts.waiting > {60 * LONGEST_SILENCE_S / 2}")
+    assert "wait on this device" in page.text("problem")
+    with service.running():
+        page.wait_for("dropanchor.status() === 'open'")
+        assert_nothing_is_missing(service, page)
+        assert page.errors == []
+        opened.__exit__(None, None, None)
+
+
+def test_what_waits_survives_a_reload_of_the_page(chromium: Browser, service: Service) -> None:
+    with service.running():
+        opened = tag_page(chromium, service.link)
+        page = opened.__enter__()
+        page.start()
+        page.move()
+        page.wait_for("counts.sent > 30")
+    page.wait_for("counts.waiting > 60")
+    page.rest()
+    page.page.wait_for_timeout(1500)  # the page stores what waits every second
+    taken = page.counts()["taken"]
+    with service.running():
+        page.page.reload()
+        page.wait_for("counts.waiting > 60")
+        page.start()
+        page.wait_for("counts.waiting === 0")
+        assert service.imu_samples() == taken
+        opened.__exit__(None, None, None)
+
+
+def test_a_service_that_was_killed_gets_again_what_it_had_answered_just_before(
+    chromium: Browser, service: Service
+) -> None:
+    with service.running():
+        opened = tag_page(chromium, service.link)
+        page = opened.__enter__()
+        page.start()
+        page.move()
+        page.wait_for("counts.sent > 60")
+    before, service.bench.received = service.bench.received, []
+    with service.running():
+        page.wait_for("dropanchor.status() === 'open' && counts.waiting < 20")
+        again = set(service.bench.received)
+        assert set(before[-10:]) <= again
+        service.bench.received = [*before, *service.bench.received]
+        assert_nothing_is_missing(service, page)
+        opened.__exit__(None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("key", "tag", "sentence"),
+    [
+        ("dropanchor_no", "anna", "Not accepted: the API key is unknown or was revoked."),
+        ("a wrong one", "anna", "This is not a key: it has characters that no key has."),
+        ("", "anna", "This service needs a key. Make a key with dropanchor key add NAME --tag TAG."),
+        (None, "bert", "This key speaks for the tag 'anna' only."),
+    ],
+)
+def test_a_key_that_does_not_fit_gives_a_sentence(
+    chromium: Browser, service: Service, key: str | None, tag: str, sentence: str
+) -> None:
+    with service.running(), tag_page(chromium, f"http://127.0.0.1:{service.port}/tag") as page:
+        page.page.locator("#tag").fill(tag)
+        page.page.locator("#key").fill(service.anna if key is None else key)
+        page.page.keyboard.press("Enter")
+        page.start()
+        page.wait_for("dropanchor.status() === 'refused'")
+        page.wait_for("!document.getElementById('problem').hidden")
+        assert page.text("problem").startswith(sentence)
+        assert page.page.locator("#change").is_visible()
+
+
+def test_the_key_stays_out_of_the_address_the_page_and_every_request_line(chromium: Browser, service: Service) -> None:
+    urls: list[str] = []
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.page.on("request", lambda request: urls.append(request.url))
+        page.page.on("websocket", lambda socket: urls.append(socket.url))
+        page.page.reload()
+        page.start()
+        page.wait_for("dropanchor.status() === 'open'")
+        assert page.page.url == f"http://127.0.0.1:{service.port}/tag/"
+        assert service.anna not in page.page.content()
+        assert not any(service.anna in url for url in urls)
+        assert page.page.evaluate("document.cookie + JSON.stringify({ ...localStorage })") == "{}"
+
+
+def test_a_module_at_a_serial_port_gives_the_ranges(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link, SERIAL) as page:
+        page.start()
+        page.page.locator("#module").click()
+        page.wait_for("written.length === 2")
+        assert page.page.evaluate("[baudRate, ...written]") == [115200, "\r\r", "lec\r"]
+        text = f"dwm> lec\r\n{LEC}\r\n{LEC_DAMAGED}\r\n{LES}\r\n"
+        for part in (text[:30], text[30:200], text[200:]):
+            page.page.evaluate("text => module.print(text)", part)
+        wait_until(lambda: sum(len(frame.ranges) for frame in service.frames()) == 8)
+        page.wait_for("document.getElementById('ranges').textContent === '8 ranges'")
+        page.page.evaluate("module.unplug()")
+        page.wait_for("document.getElementById('module-problem').textContent")
+        assert page.text("module-problem") == "The module cannot be read: The device has been lost."
+        assert page.page.locator("#module").is_visible()
+    ranges = [(sample.anchor, round(sample.range_m, 3)) for frame in service.frames() for sample in frame.ranges]
+    assert ranges == [(anchor_number(name), range_m) for name, range_m in [*LEC_RANGES, *LES_RANGES]]
+
+
+def test_the_page_shows_the_state_of_the_tag_and_the_offset_of_its_clock(chromium: Browser, service: Service) -> None:
+    ahead_ns = 5_000_000_000
+    service.bench.answers.now_ns = lambda: time.time_ns() + ahead_ns
+    service.bench.move("anna", t_ns=time.time_ns() + ahead_ns)
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.start()
+        page.move()
+        page.wait_for("document.getElementById('offset').textContent.endsWith('corrected')")
+        assert 4500 < float(page.text("offset").split()[0]) < 5500
+        assert page.text("state") in ("Tracking", "Coasting")
+        sent = page.counts()["sent"]
+        page.wait_for(f"counts.sent > {sent + 20}")
+    assert abs(service.frames()[-1].imu[-1].t_ns - time.time_ns() - ahead_ns) < 2e9
+
+
+def test_after_stop_nothing_more_is_taken_and_the_rest_is_sent(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.start()
+        page.move()
+        page.wait_for("counts.sent > 10")
+        page.page.locator("#toggle").click()
+        page.wait_for("dropanchor.status() === 'closed' && counts.waiting === 0")
+        taken = page.counts()["taken"]
+        page.page.wait_for_timeout(300)
+        assert page.counts()["taken"] == taken == service.imu_samples()

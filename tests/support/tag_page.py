@@ -1,0 +1,112 @@
+"""The page of a tag in a real browser, with sensors and a serial port that the test plays."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from playwright.sync_api import Browser, Page
+
+from support.browser import Scheme
+
+PHONE = (390, 844)
+SENSORS = """
+    const step_ms = 1000 / 60;
+    let timer = 0;
+    window.phone = {
+        start(acceleration, rotation) {
+            clearInterval(timer);
+            timer = setInterval(() => {
+                const [x, y, z] = acceleration, [alpha, beta, gamma] = rotation;
+                dispatchEvent(new DeviceMotionEvent("devicemotion", {
+                    accelerationIncludingGravity: { x, y, z }, rotationRate: { alpha, beta, gamma }, interval: step_ms,
+                }));
+            }, step_ms);
+        },
+        stop() { clearInterval(timer); },
+    };
+"""
+APPLE = """
+    Object.defineProperty(Navigator.prototype, "vendor", { get: () => "Apple Computer, Inc." });
+    window.asked = 0;
+    DeviceMotionEvent.requestPermission = async () => {
+        window.asked += 1;
+        return navigator.userActivation.isActive ? "%s" : "denied";
+    };
+"""
+SERIAL = """
+    const written = window.written = [];
+    let printer;
+    const port = {
+        async open({ baudRate }) { window.baudRate = baudRate; },
+        async close() {},
+        readable: new ReadableStream({ start(controller) { printer = controller; } }),
+        writable: new WritableStream({ write(bytes) { written.push(new TextDecoder().decode(bytes)); } }),
+    };
+    window.module = {
+        print(text) { printer.enqueue(new TextEncoder().encode(text)); },
+        unplug() { printer.error(new DOMException("The device has been lost.", "NetworkError")); },
+    };
+    Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
+"""
+
+
+@dataclass
+class TagPage:
+    """errors: what the page logged, except for connections that failed."""
+
+    page: Page
+    errors: list[str] = field(default_factory=list)
+
+    def start(self) -> None:
+        self.page.locator("#toggle").click()
+
+    def move(self, acceleration: tuple[float, ...] = (0.0, 0.0, 9.81), rotation: tuple[float, ...] = (0, 0, 0)) -> None:
+        """Play a sensor that goes on reporting this, in the phone's axes, m/s² and °/s."""
+        self.page.evaluate(
+            "([acceleration, rotation]) => phone.start(acceleration, rotation)", [acceleration, rotation]
+        )
+
+    def rest(self) -> None:
+        """Let the sensors report nothing more."""
+        self.page.evaluate("phone.stop()")
+
+    def counts(self) -> dict[str, int]:
+        counts: dict[str, int] = self.page.evaluate("dropanchor.counts()")
+        return counts
+
+    def wait_for(self, condition: str, timeout_s: float = 40) -> None:
+        """Wait until a JavaScript expression is true; `counts` in it are the numbers of samples.
+
+        The expression is evaluated from outside, since the content security policy forbids it inside the page.
+        """
+        script = f"() => {{ const counts = window.dropanchor?.counts() ?? {{}}; return ({condition}); }}"
+        end_s = time.monotonic() + timeout_s
+        while not self.page.evaluate(script):
+            assert time.monotonic() < end_s, f"not within {timeout_s} s: {condition}"
+            self.page.wait_for_timeout(50)
+
+    def text(self, element: str) -> str:
+        return self.page.locator(f"#{element}").inner_text()
+
+
+@contextmanager
+def tag_page(browser: Browser, url: str, *scripts: str, scheme: Scheme = "light", **options: Any) -> Iterator[TagPage]:
+    """Open the page on a phone's screen. scripts: run in it before its own."""
+    context = browser.new_context(viewport={"width": PHONE[0], "height": PHONE[1]}, color_scheme=scheme, **options)
+    for script in (SENSORS, *scripts):
+        context.add_init_script(f"{{ {script} }}")
+    opened = TagPage(context.new_page())
+    opened.page.on("pageerror", lambda error: opened.errors.append(str(error)))
+    opened.page.on("console", lambda line: _note(opened.errors, line.type, line.text))
+    opened.page.goto(url)
+    try:
+        yield opened
+    finally:
+        context.close()
+
+
+def _note(errors: list[str], kind: str, text: str) -> None:
+    if kind in ("error", "warning") and "WebSocket connection to" not in text:
+        errors.append(text)
