@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Event
 
@@ -15,6 +15,8 @@ from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator
 from support.api import ApiBench, make_api_bench
+from support.axe import axe_source, violations
+from support.browser import Scheme
 from support.http_server import running_server
 from support.module_strings import LEC, LEC_DAMAGED, LEC_RANGES, LES, LES_RANGES
 from support.tag_page import APPLE, SERIAL, TagPage, tag_page
@@ -80,7 +82,7 @@ def test_samples_arrive_with_the_units_and_axes_of_a_tag(chromium: Browser, serv
         page.start()
         page.move((1.0, 2.0, 9.5), (10.0, 20.0, 30.0))
         page.wait_for("counts.sent > 60")
-        assert page.text("screen") == "Screen up"
+        assert page.text("screen") == "up"
         page.wait_for("Number(document.getElementById('rate').textContent) > 30")
         assert_nothing_is_missing(service, page)
         assert page.errors == []
@@ -120,59 +122,56 @@ def test_a_device_without_sensors_says_so(chromium: Browser, service: Service) -
 
 def test_an_outage_of_the_service_loses_nothing(chromium: Browser, service: Service) -> None:
     """The outage is shorter than those that people have; the queue has room for an hour."""
-    with service.running():
-        opened = tag_page(chromium, service.link)
-        page = opened.__enter__()
-        page.start()
-        page.move()
-        page.wait_for("counts.sent > 30")
-    page.wait_for("dropanchor.status() === 'broken'")
-    page.wait_for(f"counts.waiting > {60 * LONGEST_SILENCE_S / 2}")
-    assert "wait on this device" in page.text("problem")
-    with service.running():
-        page.wait_for("dropanchor.status() === 'open'")
-        assert_nothing_is_missing(service, page)
-        assert page.errors == []
-        opened.__exit__(None, None, None)
+    with ExitStack() as opened:
+        with service.running():
+            page = opened.enter_context(tag_page(chromium, service.link))
+            page.start()
+            page.move()
+            page.wait_for("counts.sent > 30")
+        page.wait_for("dropanchor.status() === 'broken'")
+        page.wait_for(f"counts.waiting > {60 * LONGEST_SILENCE_S / 2}")
+        assert "wait on this device" in page.text("problem")
+        with service.running():
+            page.wait_for("dropanchor.status() === 'open'")
+            assert_nothing_is_missing(service, page)
+            assert page.errors == []
 
 
 def test_what_waits_survives_a_reload_of_the_page(chromium: Browser, service: Service) -> None:
-    with service.running():
-        opened = tag_page(chromium, service.link)
-        page = opened.__enter__()
-        page.start()
-        page.move()
-        page.wait_for("counts.sent > 30")
-    page.wait_for("counts.waiting > 60")
-    page.rest()
-    page.page.wait_for_timeout(1500)  # the page stores what waits every second
-    taken = page.counts()["taken"]
-    with service.running():
-        page.page.reload()
+    with ExitStack() as opened:
+        with service.running():
+            page = opened.enter_context(tag_page(chromium, service.link))
+            page.start()
+            page.move()
+            page.wait_for("counts.sent > 30")
         page.wait_for("counts.waiting > 60")
-        page.start()
-        page.wait_for("counts.waiting === 0")
-        assert service.imu_samples() == taken
-        opened.__exit__(None, None, None)
+        page.rest()
+        page.page.wait_for_timeout(1500)  # the page stores what waits every second
+        taken = page.counts()["taken"]
+        with service.running():
+            page.page.reload()
+            page.wait_for("counts.waiting > 60")
+            page.start()
+            page.wait_for("counts.waiting === 0")
+            assert service.imu_samples() == taken
 
 
 def test_a_service_that_was_killed_gets_again_what_it_had_answered_just_before(
     chromium: Browser, service: Service
 ) -> None:
-    with service.running():
-        opened = tag_page(chromium, service.link)
-        page = opened.__enter__()
-        page.start()
-        page.move()
-        page.wait_for("counts.sent > 60")
-    before, service.bench.received = service.bench.received, []
-    with service.running():
-        page.wait_for("dropanchor.status() === 'open' && counts.waiting < 20")
-        again = set(service.bench.received)
-        assert set(before[-10:]) <= again
-        service.bench.received = [*before, *service.bench.received]
-        assert_nothing_is_missing(service, page)
-        opened.__exit__(None, None, None)
+    with ExitStack() as opened:
+        with service.running():
+            page = opened.enter_context(tag_page(chromium, service.link))
+            page.start()
+            page.move()
+            page.wait_for("counts.sent > 60")
+        before, service.bench.received = service.bench.received, []
+        with service.running():
+            page.wait_for("dropanchor.status() === 'open' && counts.waiting < 20")
+            again = set(service.bench.received)
+            assert set(before[-10:]) <= again
+            service.bench.received = [*before, *service.bench.received]
+            assert_nothing_is_missing(service, page)
 
 
 @pytest.mark.parametrize(
@@ -256,3 +255,29 @@ def test_after_stop_nothing_more_is_taken_and_the_rest_is_sent(chromium: Browser
         taken = page.counts()["taken"]
         page.page.wait_for_timeout(300)
         assert page.counts()["taken"] == taken == service.imu_samples()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_has_no_accessibility_violation(
+    chromium: Browser, service: Service, scheme: Scheme, tmp_path: Path
+) -> None:
+    axe = axe_source(tmp_path)
+    with ExitStack() as opened:
+        with service.running():
+            with tag_page(chromium, f"http://127.0.0.1:{service.port}/tag", scheme=scheme) as page:
+                page.page.locator("#form").wait_for(state="visible")
+                assert violations(page.page, axe) == []
+            service.bench.move("anna", t_ns=time.time_ns())
+            page = opened.enter_context(
+                tag_page(chromium, service.link, SERIAL, scheme=scheme, reduced_motion="reduce")
+            )
+            page.page.locator("#live").wait_for(state="visible")
+            assert violations(page.page, axe) == []
+            page.start()
+            page.move()
+            page.wait_for("counts.sent > 30")
+            assert violations(page.page, axe) == []
+        page.wait_for("!document.getElementById('problem').hidden")
+        assert page.text("state") == "Out of date"
+        assert violations(page.page, axe) == []
+        page.page.screenshot(path=tmp_path / f"{scheme}.png")

@@ -1,6 +1,6 @@
 /** The page of a tag: a form for the key, one button, and what happens to the samples. */
 
-import { STATES } from "../data/states.js";
+import { OUT_OF_DATE, STATES } from "../data/states.js";
 import { fixed, UNKNOWN } from "../data/format.js";
 import { installTheme } from "../page/theme.js";
 import { remember, remembered, takeFromAddress } from "./link.js";
@@ -38,6 +38,12 @@ function offset(tag) {
   return tag.clock.correction_us ? `${sentence}, corrected` : sentence;
 }
 
+/** The tracking state of the last answer; undefined before the first pose. @param {ThisTag} tag */
+function stateOf({ uplink }) {
+  const state = STATES.find(({ name }) => name === uplink.answer?.state);
+  return state && uplink.status !== "open" ? OUT_OF_DATE : state;
+}
+
 /** The sentences that the person should read now, the most urgent first. @param {ThisTag} tag */
 function* problems(tag) {
   const { uplink, motion, queue } = tag;
@@ -52,20 +58,20 @@ function* problems(tag) {
 /** @param {ThisTag} tag */
 function show(tag) {
   const { uplink, motion, queue, serial } = tag;
-  const state = STATES.find(({ name }) => name === uplink.answer?.state);
-  byId("status").dataset.status = { open: "live", connecting: "connecting" }[String(uplink.status)] ?? "lost";
+  const state = stateOf(tag);
+  byId("status").dataset.status = { open: "live", broken: "lost", refused: "lost" }[String(uplink.status)] ?? "connecting";
   write("status-text", STATUS[uplink.status]);
   write("toggle", tag.running ? "Stop" : "Start");
   byId("toggle").classList.toggle("on", tag.running);
   write("rate", tag.running ? fixed(motion.rate_hz, 0) : UNKNOWN);
-  write("screen", motion.screen && `Screen ${motion.screen}`);
+  write("screen", motion.screen || UNKNOWN);
   write("sent", counted(uplink.sent));
   write("waiting", counted(queue.samples));
   write("lost", counted(queue.lost));
   write("offset", offset(tag));
   byId("pose").dataset.state = state?.name ?? "initialising";
   write("state", state?.label ?? (uplink.answer === null ? UNKNOWN : "No position yet"));
-  write("hint", uplink.answer?.hint || state?.meaning || "Motion alone gives no position: this tag needs ranges too.");
+  write("hint", (uplink.status === "open" && uplink.answer?.hint) || state?.meaning || "Motion alone gives no position: this tag needs ranges too.");
   const [first, ...others] = problems(tag);
   byId("problem").hidden = first === undefined;
   write("problem", [first, ...others].join(" "));
