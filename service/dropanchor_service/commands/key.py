@@ -2,6 +2,9 @@
 
 import argparse
 import sys
+from urllib.parse import quote, urlsplit
+
+import segno
 
 from dropanchor_service.commands.options import positive
 from dropanchor_service.commands.security import add_folder_option
@@ -18,7 +21,7 @@ does nothing else; it is for a phone.
 EPILOG = """\
 examples:
   dropanchor key add dashboard --scope read
-  dropanchor key add anna-phone --tag anna
+  dropanchor key add anna-phone --tag anna --url https://yard.example:8080
   dropanchor key list
   dropanchor key revoke dashboard
   curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
@@ -33,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     allowed = add.add_mutually_exclusive_group()
     allowed.add_argument("--scope", choices=SCOPES, default="read", help="what the key allows (default: %(default)s)")
     allowed.add_argument("--tag", help="allow only to send the samples of this tag")
+    add.add_argument("--url", metavar="URL", help="print the link that makes a phone this tag, and its QR code")
     add.add_argument("--days", type=positive, metavar="N", help="days until the key expires (default: never)")
     revoke = actions.add_parser("revoke", help="revoke a key")
     revoke.add_argument("name", metavar="NAME")
@@ -54,11 +58,38 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
     """Add a key. Only the key goes to standard output, so that a script can read it."""
+    if arguments.url is not None:
+        _refuse_url(arguments.url, arguments.tag)
     if arguments.tag is None:
         print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
     else:
-        print(keys.add_for_tag(arguments.name, arguments.tag, arguments.days))
+        secret = keys.add_for_tag(arguments.name, arguments.tag, arguments.days)
+        print(secret)
+        if arguments.url is not None:
+            _show_link(tag_page_link(arguments.url, arguments.tag, secret))
     sys.stderr.write("The key above is shown once. Send it as: Authorization: Bearer KEY\n")
+
+
+def tag_page_link(url: str, tag: str, secret: str) -> str:
+    """Return the link to the page of a tag. Browsers keep what follows the # to themselves, so no log has the key."""
+    return f"{url.rstrip('/')}/tag/#tag={quote(tag, safe='')}&key={quote(secret, safe='')}"
+
+
+def _refuse_url(url: str, tag: str | None) -> None:
+    """Raise ApiKeyError where there is no link to show, before a key is made."""
+    if tag is None:
+        raise ApiKeyError("--url needs --tag: the link makes a phone that tag")
+    parts = urlsplit(url)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.query or parts.fragment:
+        raise ApiKeyError(f"--url {url}: give the address of the page, such as https://yard.example:8080")
+
+
+def _show_link(link: str) -> None:
+    """Print the QR code of a link and the link. Whoever sees them can send samples of the tag."""
+    segno.make(link, error="l").terminal(out=sys.stderr, border=2, compact=True)
+    sys.stderr.write(f"Scan the code with the phone, or open: {link}\n")
+    if not link.startswith("https:"):
+        sys.stderr.write("Phones give their motion to pages over https:// only.\n")
 
 
 def _revoke(keys: ApiKeys, arguments: argparse.Namespace) -> None:

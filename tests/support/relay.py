@@ -1,0 +1,64 @@
+"""A TCP relay in this process that can fall silent, as a network does that a phone walks out of."""
+
+import select
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Event, Thread
+
+_CHUNK = 65_536
+
+
+class Relay:
+    """port: where it listens. silent: while set, nothing that arrives is passed on, and nobody is told."""
+
+    def __init__(self, target: int) -> None:
+        self.silent = Event()
+        self._target = target
+        self._stop = Event()
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listening.getsockname()[1]
+        self._peers: dict[socket.socket, socket.socket] = {}
+
+    def run(self) -> None:
+        while not self._stop.is_set():
+            for ready in select.select([self._listening, *self._peers], [], [], 0.05)[0]:
+                if ready is self._listening:
+                    self._accept()
+                elif ready in self._peers:
+                    self._pass_on(ready)
+        for each in (self._listening, *self._peers):
+            each.close()
+
+    def stop(self) -> None:
+        self._stop.set()
+
+    def _accept(self) -> None:
+        client, _ = self._listening.accept()
+        server = socket.create_connection(("127.0.0.1", self._target))
+        self._peers |= {client: server, server: client}
+
+    def _pass_on(self, source: socket.socket) -> None:
+        try:
+            data = source.recv(_CHUNK)
+            if data and not self.silent.is_set():
+                self._peers[source].sendall(data)
+        except OSError:
+            data = b""
+        if not data:
+            for each in (self._peers.pop(source), source):
+                self._peers.pop(each, None)
+                each.close()
+
+
+@contextmanager
+def running_relay(target: int) -> Iterator[Relay]:
+    """Relay connections to a port of the loopback until the block ends."""
+    relay = Relay(target)
+    thread = Thread(target=relay.run)
+    thread.start()
+    try:
+        yield relay
+    finally:
+        relay.stop()
+        thread.join()
