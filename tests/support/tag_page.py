@@ -15,10 +15,11 @@ SENSORS = """
     const step_ms = 1000 / 60;
     let timer = 0;
     window.phone = {
-        start(acceleration, rotation) {
+        start(acceleration, rotation, shake) {
             clearInterval(timer);
             timer = setInterval(() => {
-                const [x, y, z] = acceleration, [alpha, beta, gamma] = rotation;
+                const [x, y, z] = acceleration.map((value) => value + shake * (2 * Math.random() - 1));
+                const [alpha, beta, gamma] = rotation;
                 dispatchEvent(new DeviceMotionEvent("devicemotion", {
                     accelerationIncludingGravity: { x, y, z }, rotationRate: { alpha, beta, gamma }, interval: step_ms,
                 }));
@@ -62,11 +63,14 @@ class TagPage:
     def start(self) -> None:
         self.page.locator("#toggle").click()
 
-    def move(self, acceleration: tuple[float, ...] = (0.0, 0.0, 9.81), rotation: tuple[float, ...] = (0, 0, 0)) -> None:
-        """Play a sensor that goes on reporting this, in the phone's axes, m/s² and °/s."""
-        self.page.evaluate(
-            "([acceleration, rotation]) => phone.start(acceleration, rotation)", [acceleration, rotation]
-        )
+    def move(
+        self,
+        acceleration: tuple[float, ...] = (0.0, 0.0, 9.81),
+        rotation: tuple[float, ...] = (0, 0, 0),
+        shake: float = 0.0,
+    ) -> None:
+        """Play a sensor that goes on reporting this, in the phone's axes, m/s² and °/s. shake: at random, m/s²."""
+        self.page.evaluate("values => phone.start(...values)", [acceleration, rotation, shake])
 
     def rest(self) -> None:
         """Let the sensors report nothing more."""
