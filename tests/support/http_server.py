@@ -7,15 +7,18 @@ from threading import Event, Thread
 
 from starlette.types import ASGIApp
 
+from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import build_server, listen
 from support.zenoh_router import wait_until
 
 
 @contextmanager
-def running_server(app: ASGIApp, stopping: Event, port: int = 0) -> Iterator[int]:
+def running_server(
+    app: ASGIApp, stopping: Event, port: int = 0, protocol: type[GuardedProtocol] = GuardedProtocol
+) -> Iterator[int]:
     """Serve the app on loopback until the block ends. Yield the port."""
     socket = listen("127.0.0.1", port)
-    server = build_server(app, stopping)
+    server = build_server(app, stopping, protocol)
     thread = Thread(target=lambda: asyncio.run(server.serve(sockets=[socket])))
     thread.start()
     wait_until(lambda: server.started)

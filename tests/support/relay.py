@@ -19,6 +19,7 @@ class Relay:
         self._listening = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listening.getsockname()[1]
         self._peers: dict[socket.socket, socket.socket] = {}
+        self._deaf: list[socket.socket] = []
 
     def run(self) -> None:
         while not self._stop.is_set():
@@ -27,7 +28,7 @@ class Relay:
                     self._accept()
                 elif ready in self._peers:
                     self._pass_on(ready)
-        for each in (self._listening, *self._peers):
+        for each in (self._listening, *self._peers, *self._deaf):
             each.close()
 
     def stop(self) -> None:
@@ -46,9 +47,18 @@ class Relay:
         except OSError:
             data = b""
         if not data:
-            for each in (self._peers.pop(source), source):
-                self._peers.pop(each, None)
-                each.close()
+            self._ended(source)
+
+    def _ended(self, source: socket.socket) -> None:
+        """Close the other side too, which does not hear of it while this is silent."""
+        peer = self._peers.pop(source)
+        source.close()
+        if self._peers.pop(peer, None) is None:
+            return
+        if self.silent.is_set():
+            self._deaf.append(peer)
+        else:
+            peer.close()
 
 
 @contextmanager

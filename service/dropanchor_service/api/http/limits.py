@@ -70,6 +70,7 @@ class GuardedProtocol(H11Protocol):
 
     _deadline: asyncio.TimerHandle | None = None
     _stall: asyncio.TimerHandle | None = None
+    _is_web_socket = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
@@ -80,11 +81,15 @@ class GuardedProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        incomplete = self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
+        incomplete = not self._is_web_socket and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not incomplete:
             self._deadline = _cancelled(self._deadline)
         elif self._deadline is None:
             self._deadline = self.loop.call_later(self.request_s, self._cut)
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        super().handle_websocket_upgrade(event)
+        self._is_web_socket = True  # another protocol has the connection now
 
     def pause_writing(self) -> None:
         super().pause_writing()

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -21,6 +22,7 @@ from dropanchor_schemas.wire import (
     encode_json,
     encode_packed,
 )
+from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest_stream import CONNECTIONS_PER_KEY, KEY_PROTOCOL, PROTOCOL
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
@@ -202,6 +204,22 @@ def test_a_client_that_is_too_fast_is_slowed_down_and_loses_nothing(place: Place
         assert [answer(socket).message for _ in range(20)] == list(range(1, 21))
     assert len(place.bench.received) == 20
     assert now_s > 0.15
+
+
+class _Impatient(GuardedProtocol):
+    request_s = 0.2
+
+
+def test_a_connection_is_not_a_request_that_never_completes(place: Place) -> None:
+    bench = place.bench
+    with (
+        running_server(bench.app(), bench.stopping, protocol=_Impatient) as place.port,
+        place.connect(query="?tag=anna") as socket,
+    ):
+        answer(socket)
+        time.sleep(3 * _Impatient.request_s)
+        socket.send(JSON)
+        assert answer(socket).samples == 2
 
 
 def test_the_key_never_gets_into_the_log(place: Place, caplog: pytest.LogCaptureFixture) -> None:
