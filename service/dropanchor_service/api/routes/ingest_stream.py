@@ -127,7 +127,7 @@ class _Stream:
         self._authenticator = authenticator
         self._rate_limiter = rate_limiter
         self._connections = _Connections()
-        self._started_ns = answers.now_ns()
+        self._started_ns = time.time_ns()
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve an accepted connection until its end. Raises _ClosedError and WebSocketDisconnect."""
