@@ -4,7 +4,9 @@ import time
 from pathlib import Path
 
 import pytest
+from websockets.sync.client import connect
 
+from dropanchor_schemas.answers import SamplesAcknowledged
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
 from dropanchor_service.cli import main
 from support.sensor_logger import G, recording
@@ -48,6 +50,20 @@ def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(tmp_pa
     assert status["rejected"] == {}
     assert pose["anchor"] == "7"
     assert pose["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000
+
+
+def test_a_message_that_is_sent_again_over_a_web_socket_counts_as_a_duplicate_and_is_used_once(tmp_path: Path) -> None:
+    config, messages = settings_file(tmp_path, ["anna"]), ranges(3, time.time_ns() - 3_000_000_000)
+    with running_service("--config", str(config)) as service:
+        url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=anna"
+        for sent in (messages[:2], messages[1:]):
+            with connect(url, proxy=None) as socket:
+                assert SamplesAcknowledged.model_validate_json(socket.recv(5)).message == 0
+                for message in sent:
+                    socket.send(message.decode())
+                    assert SamplesAcknowledged.model_validate_json(socket.recv(5)).samples == 10
+        wait_until(lambda: samples(service, {}) == {"range": 30})
+        wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"] == {"duplicate": 1})
 
 
 def samples(service: Running, headers: dict[str, str]) -> dict[str, int]:
