@@ -15,15 +15,18 @@ SENSORS = """
     const step_ms = 1000 / 60;
     let timer = 0;
     window.phone = {
-        start(acceleration, rotation, shake) {
-            clearInterval(timer);
-            timer = setInterval(() => {
+        report(acceleration, rotation, shake, times) {
+            for (let i = 0; i < times; i++) {
                 const [x, y, z] = acceleration.map((value) => value + shake * (2 * Math.random() - 1));
                 const [alpha, beta, gamma] = rotation;
                 dispatchEvent(new DeviceMotionEvent("devicemotion", {
                     accelerationIncludingGravity: { x, y, z }, rotationRate: { alpha, beta, gamma }, interval: step_ms,
                 }));
-            }, step_ms);
+            }
+        },
+        start(...values) {
+            clearInterval(timer);
+            timer = setInterval(() => phone.report(...values, 1), step_ms);
         },
         stop() { clearInterval(timer); },
     };

@@ -94,6 +94,16 @@ def test_samples_arrive_with_the_units_and_axes_of_a_tag(chromium: Browser, serv
     assert abs(sample.t_ns - time.time_ns()) < 60e9
 
 
+def test_more_samples_at_once_than_a_payload_holds_become_several_messages(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.start()
+        page.wait_for("dropanchor.status() === 'open'")
+        page.page.evaluate("phone.report([0, 0, 9.81], [0, 0, 0], 0, 2500)")
+        page.wait_for("counts.taken === 2500")
+        assert_nothing_is_missing(service, page)
+    assert len(service.frames()) == 3
+
+
 def test_a_browser_of_apple_is_asked_in_the_tap_and_its_accelerations_are_turned_round(
     chromium: Browser, service: Service
 ) -> None:

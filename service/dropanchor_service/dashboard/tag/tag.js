@@ -9,10 +9,12 @@ import { Uplink } from "./uplink.js";
 
 const MESSAGE_MS = 100;
 const SAVE_MS = 1000;
+/** Samples of one kind in a message. A payload has room for more, and browsers slow down the timers of hidden pages. */
+const MAX_OF_A_KIND = 1000;
 
 export class ThisTag {
   running = false;
-  /** Samples of this start. */
+  /** Samples since the page was opened. */
   taken = 0;
   #imu = /** @type {import("./packed.js").ImuSample[]} */ ([]);
   #ranges = /** @type {import("./packed.js").RangeSample[]} */ ([]);
@@ -28,8 +30,8 @@ export class ThisTag {
     this.clock = new Clock();
     this.queue = new Queue(store);
     this.uplink = new Uplink(url, key, this.queue, this.clock);
-    this.motion = new Motion(this.clock, (sample) => this.running && this.#imu.push(sample));
-    this.serial = new Serial(this.clock, (sample) => this.running && this.#ranges.push(sample));
+    this.motion = new Motion(this.clock, (sample) => this.#take(this.#imu, sample));
+    this.serial = new Serial(this.clock, (sample) => this.#take(this.#ranges, sample));
     setInterval(() => this.#turn(), MESSAGE_MS);
     setInterval(() => this.#save(), SAVE_MS);
     addEventListener("pagehide", () => this.#save());
@@ -67,12 +69,17 @@ export class ThisTag {
     return this.#wakeLock !== null && !this.#wakeLock.released;
   }
 
+  /** @template S @param {S[]} samples @param {S} sample */
+  #take(samples, sample) {
+    if (!this.running) return;
+    samples.push(sample);
+    this.taken++;
+  }
+
   #turn() {
-    const [imu, ranges] = [this.#imu.splice(0), this.#ranges.splice(0)];
-    const samples = imu.length + ranges.length;
-    if (samples) {
-      this.taken += samples;
-      this.queue.add({ samples, ...packed(imu, ranges, this.#sequence++, this.#bootId) });
+    while (this.#imu.length || this.#ranges.length) {
+      const [imu, ranges] = [this.#imu.splice(0, MAX_OF_A_KIND), this.#ranges.splice(0, MAX_OF_A_KIND)];
+      this.queue.add({ samples: imu.length + ranges.length, ...packed(imu, ranges, this.#sequence++, this.#bootId) });
     }
     this.uplink.send();
     if (!this.running && !this.queue.length && this.uplink.status === "open") this.uplink.close();
