@@ -8,6 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 from operator import index
+from pathlib import Path
 from types import TracebackType
 from typing import Literal, NamedTuple, Self
 
@@ -30,8 +31,11 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_tag_client.buffer import SampleBuffer, rejection_reason
+from dropanchor_tag_client.link import TagKeys
 from dropanchor_tag_client.publisher import PlainPublisher, Publisher, recoverable_publisher
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
+from dropanchor_tag_client.spool import Spool
+from dropanchor_tag_client.spooling import SpoolCounts, SpoolingPublisher
 
 _MAX_BATCH = 50  # about 8 kB in JSON, the limit that routers in the field are configured for
 
@@ -61,10 +65,14 @@ class TagClient:
     wait_when_congested: wait for a slow router instead of dropping messages. Do not use this for live data.
     connect_timeout_s: how long `open` waits for the router before it raises ConnectError. With None it waits without a
         limit and logs a warning. An open client always reconnects by itself, and publishing never blocks.
+    spool: a folder for the messages of outages that are longer than the cache, or of a tag that is switched off before
+        the network is back. Then `open` does not wait for the router. It needs the UTC clock.
+    spool_limit_bytes: the oldest messages are deleted beyond this.
     """
 
     _session: zenoh.Session | None = None
     _publisher: Publisher | None = None
+    _spooling: SpoolingPublisher | None = None
     _token: zenoh.LivelinessToken | None = None
     _timer: threading.Thread | None = None
     _due_s = math.inf
@@ -84,9 +92,15 @@ class TagClient:
         cache_messages: int = 600,
         wait_when_congested: bool = False,
         connect_timeout_s: float | None = None,
+        spool: str | Path | None = None,
+        spool_limit_bytes: int = 100_000_000,
     ) -> None:
         if not 1 <= batch_samples <= _MAX_BATCH:
             raise ValueError(f"batch_samples is {batch_samples}; 1 to {_MAX_BATCH} was expected")
+        if spool is not None and (clock != "utc" or cache_messages == 0 or connect_timeout_s is not None):
+            raise ValueError(
+                "a spool needs clock='utc' and a cache, and no connect_timeout_s: it tries without a limit"
+            )
         self.tag = tag
         self.boot_id = int.from_bytes(os.urandom(4), "little") or 1
         self.refused: Counter[Reason] = Counter()
@@ -100,6 +114,9 @@ class TagClient:
         self._cache_messages = cache_messages
         self._wait_when_congested = wait_when_congested
         self._connect_timeout_s = connect_timeout_s
+        self._pose_key = keys.pose_key(site, tag)
+        self._spool = None if spool is None else Path(spool, keys.chunk_from_id(site), keys.chunk_from_id(tag))
+        self._spool_limit_bytes = spool_limit_bytes
         self._buffer = SampleBuffer(batch_samples)
         self._condition = threading.Condition()
 
@@ -113,15 +130,18 @@ class TagClient:
         self.close()
 
     def open(self) -> None:
-        """Connect to the router. Raises ConnectError if that takes longer than `connect_timeout_s`."""
+        """Connect to the router. Raises ConnectError if that takes longer than `connect_timeout_s`, and SpoolError."""
         if self._publisher is not None:
             raise RuntimeError(f"the client of tag {self.tag!r} is already open")
-        if isinstance(self._connect, SessionSettings):
-            self._session = open_session(self._connect, self._connect_timeout_s)
+        if self._spool is not None:
+            self._publisher = self._spooling = self._spooling_publisher(self._spool)
         else:
-            self._session = self._connect
-        self._publisher = self._declare_publisher(self._session)
-        self._token = self._session.liveliness().declare_token(self._alive_key)
+            if isinstance(self._connect, SessionSettings):
+                self._session = open_session(self._connect, self._connect_timeout_s)
+            else:
+                self._session = self._connect
+            self._publisher = self._declare_publisher(self._session)
+            self._token = self._session.liveliness().declare_token(self._alive_key)
         if self._batch_s is not None:
             self._timer = threading.Thread(target=self._flush_when_due, name=f"flush {self.tag}", daemon=True)
             self._timer.start()
@@ -182,6 +202,20 @@ class TagClient:
     def sent(self) -> Sent:
         """Return what the client has sent since it was created."""
         return self._sent
+
+    @property
+    def spool_counts(self) -> SpoolCounts | None:
+        """Return what the spool holds and has lost, None without a spool."""
+        return None if self._spooling is None else self._spooling.counts
+
+    def _spooling_publisher(self, folder: Path) -> SpoolingPublisher:
+        return SpoolingPublisher(
+            Spool(folder, self._spool_limit_bytes),
+            self._connect,
+            TagKeys(self._samples_key, self._alive_key, self._pose_key),
+            self._declare_publisher,
+            self._cache_messages,
+        )
 
     def _declare_publisher(self, session: zenoh.Session) -> Publisher:
         encoding = ENCODING_PACKED if self._packed else ENCODING_JSON

@@ -46,6 +46,29 @@ def add_connection_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_spool_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("outages")
+    group.add_argument(
+        "--spool",
+        metavar="FOLDER",
+        help="keep the samples of long outages on disk, and send them afterwards, even after a restart",
+    )
+    group.add_argument(
+        "--spool-limit",
+        type=float,
+        default=100.0,
+        metavar="MB",
+        help="delete the oldest samples when the spool of a tag is larger (default: %(default)g)",
+    )
+
+
+def spool_settings(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Return the spool settings of a TagClient."""
+    if "spool" not in arguments or arguments.spool is None:
+        return {}
+    return {"spool": arguments.spool, "spool_limit_bytes": round(arguments.spool_limit * 1_000_000)}
+
+
 def apply_defaults(arguments: argparse.Namespace) -> None:
     """Fill in missing options from the credentials folder, then from the defaults. Raises ValueError."""
     if arguments.credentials is not None:
@@ -83,6 +106,7 @@ def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> I
         connect=session_settings(arguments),
         encoding=arguments.encoding,
         connect_timeout_s=arguments.connect_timeout,
+        **spool_settings(arguments),
         **settings,
     )
     with _interruptible():

@@ -41,6 +41,8 @@ def test_the_help_has_examples(command: list[str], capsys: pytest.CaptureFixture
         (["publish", "--tag", "a", "--cert", "x"], "cert and key go together"),
         (["publish", "--tag", "a", "--user", "x"], "DROPANCHOR_PASSWORD"),
         (["publish", "--tag", "a", "--connect", free_endpoint(), "--connect-timeout", "0.2"], "Cannot connect to"),
+        (["publish", "--tag", "a", "--spool", "/proc/spool"], "the spool /proc/spool/default/a cannot be used"),
+        (["publish", "--tag", "a", "--spool", "/tmp", "--clock", "boot"], "a spool needs clock='utc'"),
     ],
 )
 def test_an_error_prints_a_message_and_exits_with_code_2(

@@ -8,7 +8,7 @@ from typing import Any, BinaryIO, TextIO
 
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_tag_client.client import TagClient
-from dropanchor_tag_client.options import add_connection_options, opened_client
+from dropanchor_tag_client.options import add_connection_options, add_spool_options, opened_client
 
 _MAX_LINE_BYTES = 1_000_000
 
@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--clock", choices=["utc", "boot"], default="utc", help="what t_ns counts from (default: %(default)s)"
     )
     add_connection_options(parser)
+    add_spool_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -6,7 +6,13 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
-from dropanchor_tag_client.options import add_connection_options, opened_client, opened_session
+from dropanchor_tag_client.options import (
+    add_connection_options,
+    add_spool_options,
+    opened_client,
+    opened_session,
+    spool_settings,
+)
 from dropanchor_tag_client.sources.axes import AXES, mounting
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from dropanchor_tag_client.sources.modules.detect import Arrived
@@ -44,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     imu.add_argument("--up", choices=AXES, default="z", help="the axis that points up (default: %(default)s)")
     add_connection_options(parser)
+    add_spool_options(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -86,6 +93,7 @@ def _outlet(arguments: argparse.Namespace, log: StatusLog) -> Iterator[Outlet]:
             return
         session = stack.enter_context(opened_session(arguments))
         options = {"site": arguments.site, "connect": session, "encoding": arguments.encoding, "batch_s": None}
+        options |= spool_settings(arguments)
         many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, log)
         stack.callback(many.close)
         yield many

@@ -1,0 +1,127 @@
+"""The connection of a spooling publisher: made in the background, and watched."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from dropanchor_tag_client.session import ConnectError, SessionSettings, open_session
+
+_ATTEMPT_S, _LOG_EVERY_S = 1.0, 60.0
+_ANSWER_S = 5.0  # longer than the lease of a link (4 s): a link that was cut is known to be down by then
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class TagKeys:
+    """The keys of a tag: of its samples, its liveliness token and its pose."""
+
+    samples: str
+    alive: str
+    pose: str
+
+
+class Link:
+    """A session in which the tag is declared."""
+
+    def __init__(
+        self, session: zenoh.Session, tag_keys: TagKeys, declare: Callable[[zenoh.Session], Any], *, owned: bool
+    ) -> None:
+        self._session = session
+        self._pose_key = tag_keys.pose
+        self._owned = owned
+        self._publisher = declare(session)
+        self._matching = session.declare_publisher(tag_keys.samples)  # an advanced publisher does not know its match
+        self._token = session.liveliness().declare_token(tag_keys.alive)
+
+    @property
+    def has_subscriber(self) -> bool:
+        """Return whether the router is connected and somebody subscribes to the samples."""
+        status: Any = self._matching.matching_status
+        return bool(status.matching)
+
+    def put(self, payload: bytes, encoding: str) -> None:
+        self._publisher.put(payload, encoding=encoding)
+
+    def has_delivered(self) -> bool:
+        """Wait until the router has what was put before. Return whether the link held.
+
+        A query follows the messages on their way, and the router ends it once it has passed them on.
+        """
+        for _ in self._session.get(self._pose_key, timeout=_ANSWER_S):
+            pass
+        return self.has_subscriber
+
+    def close(self) -> None:
+        self._token.undeclare()
+        self._matching.undeclare()
+        self._publisher.undeclare()
+        if self._owned:
+            self._session.close()
+
+
+class Linker:
+    """Connects in the background, because connecting blocks while the router is away."""
+
+    def __init__(
+        self,
+        connect: SessionSettings | zenoh.Session,
+        tag_keys: TagKeys,
+        declare: Callable[[zenoh.Session], Any],
+        on_linked: Callable[[], None],
+    ) -> None:
+        self._connect = connect
+        self._tag_keys = tag_keys
+        self._declare = declare
+        self._on_linked = on_linked
+        self._lock = threading.Lock()
+        self._link: Link | None = None
+        self._closed = False
+        self._next_log_s = 0.0
+        self._thread = threading.Thread(target=self._run, name=f"connect {tag_keys.samples}", daemon=True)
+        self._thread.start()
+
+    @property
+    def link(self) -> Link | None:
+        return self._link
+
+    def close(self) -> None:
+        """Close the link. An attempt to connect that is under way ends within a second.
+
+        The interpreter must not end before it: it would abort in the middle of the native call.
+        """
+        with self._lock:
+            self._closed = True
+            link, self._link = self._link, None
+        self._thread.join()
+        if link is not None:
+            link.close()
+
+    def _run(self) -> None:
+        while not self._closed:
+            session = self._session()
+            if session is None:
+                continue
+            with self._lock:
+                if not self._closed:
+                    owned = isinstance(self._connect, SessionSettings)
+                    self._link = Link(session, self._tag_keys, self._declare, owned=owned)
+                    self._on_linked()
+                    return
+            session.close()
+
+    def _session(self) -> zenoh.Session | None:
+        if not isinstance(self._connect, SessionSettings):
+            return self._connect
+        try:
+            return open_session(self._connect, _ATTEMPT_S)
+        except ConnectError as error:
+            if time.monotonic() >= self._next_log_s:
+                self._next_log_s = time.monotonic() + _LOG_EVERY_S
+                _log.warning("%s Still trying; messages go to the spool.", error)
+            return None
