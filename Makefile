@@ -12,7 +12,7 @@ PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/p
 
 RESULTS := service/docs/results
 
-.PHONY: help demo test check bench results install chromium clean
+.PHONY: help demo test check bench results install chromium mosquitto clean
 .DEFAULT_GOAL := help
 
 help:
@@ -44,7 +44,13 @@ chromium:
 		apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || { \
 		echo 'The browser tests need Chromium: install the package chromium and run make test again.' >&2; exit 1; }
 
-test: install chromium
+mosquitto:
+	@command -v mosquitto >/dev/null || test -x /usr/sbin/mosquitto || { \
+		echo '== installing mosquitto for the MQTT tests'; \
+		apt-get update -qq && apt-get install -y -qq mosquitto >/dev/null; } || \
+		echo 'The MQTT tests need the package mosquitto: without it they are skipped.' >&2
+
+test: install chromium mosquitto
 	@echo '== running all tests'
 	@$(BIN)/python -m pytest $(PARALLEL) $(PYTEST)
 

@@ -16,6 +16,7 @@ _FORMATTER = argparse.RawDescriptionHelpFormatter
 _EXTRAS = {
     "numpy": ("the simulator needs numpy", "numpy"),
     "serial": ("modules on a serial port need pyserial", "pyserial"),
+    "paho": ("MQTT needs paho-mqtt", "paho-mqtt"),
 }
 _INTERRUPTED, _TERMINATED = 130, 143
 
@@ -24,6 +25,8 @@ _EXAMPLES = """examples:
   dropanchor-tag replay recordings/yard --anchor 1            a recording, in real time
   dropanchor-tag replay recordings/yard --speed 10 --tag cart ten times as fast, as the tag "cart"
   dropanchor-tag serial /dev/ttyACM0 --tag cart               a UWB module on a serial port
+  dropanchor-tag mqtt mqtts://broker:8883 --sensor-logger sensor-logger/+
+                                                              phones and others that publish over MQTT
   echo '{"anchor": 1, "range_m": 3.21}' | dropanchor-tag publish --tag cart
 
 `dropanchor-tag COMMAND --help` explains each of them.
@@ -63,6 +66,23 @@ _SERIAL_EXAMPLES = """examples:
 
 The command prints the ids of the anchors; configure them in the site under these names. It continues when the module is
 unplugged and plugged in again. It reports rejected data, with the reason, at most once per second.
+"""
+_MQTT = """Publishes the measurements in the messages of an MQTT broker."""
+_MQTT_EXAMPLES = """examples:
+  dropanchor-tag mqtt mqtt://gateway --decawave --name 022E=yard           tags behind a Decawave or LEAPS gateway
+  dropanchor-tag mqtt wss://broker:8884 --sensor-logger sensor-logger/+    phones with the app Sensor Logger
+  dropanchor-tag mqtt broker --template rules.toml                         anything that sends JSON
+
+rules.toml, for {"device": 7, "anchors": [{"id": "yard", "cm": 321}]} on plant/a/uwb:
+  [[rule]]
+  topic = "plant/+/uwb"
+  tag = "{1}-{device}"
+  kind = "range"
+  each = "anchors"
+  fields = { anchor = "id", range_m = "cm" }
+  scale = { range_m = 0.01 }
+
+It reports what it leaves out, with the reason, at most once per second.
 """
 _SIMULATE = """Publishes the samples of simulated tags that drive around one anchor."""
 _SIMULATE_EXAMPLES = """examples:
@@ -104,6 +124,7 @@ def parser(command: str) -> argparse.ArgumentParser:
         ("simulate", _SIMULATE, _SIMULATE_EXAMPLES),
         ("publish", _PUBLISH, _PUBLISH_EXAMPLES),
         ("serial", _SERIAL, _SERIAL_EXAMPLES),
+        ("mqtt", _MQTT, _MQTT_EXAMPLES),
     ):
         one = commands.add_parser(name, help=summary, description=summary, epilog=examples, formatter_class=_FORMATTER)
         if name == command:

@@ -69,6 +69,18 @@ def spool_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"spool": arguments.spool, "spool_limit_bytes": round(arguments.spool_limit * 1_000_000)}
 
 
+def anchor_names(arguments: argparse.Namespace) -> dict[str, str]:
+    """Return the site's names of anchors, by the ids that a module or a message gives them. Raises ValueError."""
+    return dict(_anchor_name(text) for text in arguments.name)
+
+
+def _anchor_name(text: str) -> tuple[str, str]:
+    called, equals, name = text.partition("=")
+    if not called or not equals or not name:
+        raise ValueError(f"--name {text}: ID=NAME was expected, such as 022E=yard")
+    return called, name
+
+
 def apply_defaults(arguments: argparse.Namespace) -> None:
     """Fill in missing options from the credentials folder, then from the defaults. Raises ValueError."""
     if arguments.credentials is not None:

@@ -22,7 +22,7 @@ def recording(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [[], ["replay"], ["publish"], ["serial"], ["simulate"]])
+@pytest.mark.parametrize("command", [[], ["replay"], ["publish"], ["serial"], ["mqtt"], ["simulate"]])
 def test_the_help_has_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main([*command, "--help"])

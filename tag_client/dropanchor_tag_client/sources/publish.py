@@ -44,7 +44,7 @@ def publish_lines(client: TagClient, lines: BinaryIO, errors: TextIO, *, clock: 
         if line.isspace() and len(line) < _MAX_LINE_BYTES:
             continue
         try:
-            for publish in [_publisher(kind, sample) for kind, sample in samples_of(line, clock)]:
+            for publish in [publisher_of(kind, sample) for kind, sample in samples_of(line, clock)]:
                 publish(client)
         except ValueError as error:
             bad += 1
@@ -84,6 +84,13 @@ def samples_of(line: bytes, clock: str = "utc") -> list[tuple[str, dict[str, Any
 _KINDS = {kind.name: kind for kind in KINDS}
 
 
+def fields_of(kind: str) -> tuple[list[str], list[str]]:
+    """Return the fields that a sample of this kind must have, and those that it may have."""
+    made = _KINDS[kind].sample
+    optional = [name for name in made._fields if name in ("t_ns", *made._field_defaults)]
+    return [name for name in made._fields if name not in optional], optional
+
+
 def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any]]]:
     unknown = value.keys() - {*_KINDS, "version", "clock", "sequence", "boot_id"}
     if unknown:
@@ -100,10 +107,10 @@ def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any
     return samples
 
 
-def _publisher(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], None]:
+def publisher_of(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], None]:
     """What publishes the sample, after all of it has been checked. Raises BadLineError."""
-    made = _KINDS[kind].sample
-    known, needed = {*made._fields}, [n for n in made._fields if n not in ("t_ns", *made._field_defaults)]
+    needed, optional = fields_of(kind)
+    known = {*needed, *optional}
     for name in needed:
         if name not in sample:
             raise BadLineError(f"{kind}: {name} is missing")

@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dropanchor_tag_client.options import (
     add_connection_options,
     add_spool_options,
+    anchor_names,
     opened_client,
     opened_session,
     spool_settings,
@@ -84,7 +85,7 @@ def publish(reader: Reader, reports: Iterator[Arrived], outlet: Outlet, log: Sta
 
 @contextmanager
 def _outlet(arguments: argparse.Namespace, log: StatusLog) -> Iterator[Outlet]:
-    names = dict(_name(text) for text in arguments.name)
+    names = anchor_names(arguments)
     mounted = mounting(arguments.forward, arguments.up)
     with ExitStack() as stack:
         if not arguments.tag_from_id:
@@ -105,12 +106,4 @@ def _check(arguments: argparse.Namespace) -> None:
     if arguments.as_anchor is not None and not arguments.tag_from_id:
         raise ValueError("--as-anchor needs --tag-from-id")
     mounting(arguments.forward, arguments.up)
-    for text in arguments.name:
-        _name(text)
-
-
-def _name(text: str) -> tuple[str, str]:
-    called, equals, name = text.partition("=")
-    if not called or not equals or not name:
-        raise ValueError(f"--name {text}: ID=NAME was expected, such as 022E=yard")
-    return called, name
+    anchor_names(arguments)

@@ -1,0 +1,112 @@
+"""From messages of a broker to the clients of tags. What is left out is counted, and told at most once per second."""
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from dropanchor_schemas.keys import InvalidKeyError
+from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.sources.bridge.broker import Received
+from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Format, Measurement
+from dropanchor_tag_client.sources.bridge.template import matches
+from dropanchor_tag_client.sources.publish import BadLineError, publisher_of
+
+MAX_TAGS = 256
+_SAY_EVERY_S = 1.0
+
+_log = logging.getLogger(__name__)
+
+
+class Bridge:
+    """dropped: what was left out so far, by reason. samples: number of samples that were published."""
+
+    def __init__(
+        self, formats: Iterable[Format], options: Mapping[str, Any], prefix: str, names: Mapping[str, str]
+    ) -> None:
+        """options: of the clients. prefix: of the ids of the tags. names: the site's names of anchors, by their ids."""
+        self.dropped: Counter[Drop] = Counter()
+        self.samples = 0
+        self._formats = tuple(formats)
+        self._options = options
+        self._prefix = prefix
+        self._names = names
+        self._clients: dict[str, TagClient] = {}
+        self._told: Counter[Drop] = Counter()
+        self._last_detail: dict[Drop, str] = {}
+        self._next_s = 0.0
+
+    def take(self, message: Received) -> None:
+        """Publish what a message holds."""
+        for one in self._formats:
+            if any(matches(topic, message.topic) for topic in one.topics):
+                for found in one.parse(message.topic, message.payload, message.t_ns):
+                    self._drop(found) if isinstance(found, Dropped) else self._publish(found)
+
+    def flush(self) -> None:
+        for client in self._clients.values():
+            client.flush()
+
+    def lose(self, total: int) -> None:
+        """Count the messages that came faster than they could be used. total: since the start."""
+        if total > self.dropped[Drop.BACKLOG]:
+            self.dropped[Drop.BACKLOG] = total
+            self._last_detail[Drop.BACKLOG] = "messages came faster than they can be used"
+
+    def tell(self) -> None:
+        """Tell what was left out since the last time, at most once per second."""
+        news = self.dropped - self._told
+        if not news or time.monotonic() < self._next_s:
+            return
+        self._next_s = time.monotonic() + _SAY_EVERY_S
+        self._told = Counter(self.dropped)
+        _log.warning(
+            "left out: %s",
+            "; ".join(
+                f"{reason.value} {count} ({self._last_detail[reason]})" for reason, count in sorted(news.items())
+            ),
+        )
+
+    def summary(self) -> str:
+        counts = ", ".join(f"{reason.value} {count}" for reason, count in sorted(self.dropped.items()))
+        left_out = f"; left out: {counts}" if counts else ""
+        return f"{self.samples} samples of {len(self._clients)} tags published{left_out}"
+
+    def close(self) -> None:
+        for client in self._clients.values():
+            client.close()
+
+    def _publish(self, found: Measurement) -> None:
+        fields = dict(found.fields)
+        if "anchor" in fields:
+            fields["anchor"] = self._names.get(str(fields["anchor"]), fields["anchor"])
+        try:
+            publish = publisher_of(found.kind, fields)
+            client = self._client(self._prefix + found.tag)
+        except BadLineError as error:
+            return self._drop(Dropped(Drop.NOT_UNDERSTOOD, f"tag {found.tag}: {error}"))
+        except InvalidKeyError as error:
+            return self._drop(Dropped(Drop.TAG_INVALID, f"{found.tag!r}: {error}"))
+        if client is None:
+            return self._drop(Dropped(Drop.TOO_MANY_TAGS, f"tag {found.tag} is number {MAX_TAGS + 1}"))
+        try:
+            publish(client)
+        except ValueError as error:  # such as an anchor id that is too long
+            return self._drop(Dropped(Drop.NOT_UNDERSTOOD, f"tag {found.tag}: {error}"))
+        self.samples += 1
+        return None
+
+    def _client(self, tag: str) -> TagClient | None:
+        if tag not in self._clients:
+            if len(self._clients) >= MAX_TAGS:
+                return None
+            client = TagClient(tag, **self._options)
+            client.open()
+            self._clients[tag] = client
+            _log.info("tag %s is heard", tag)
+        return self._clients[tag]
+
+    def _drop(self, dropped: Dropped) -> None:
+        self.dropped[dropped.reason] += 1
+        self._last_detail[dropped.reason] = dropped.detail

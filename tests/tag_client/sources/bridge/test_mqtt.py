@@ -1,0 +1,194 @@
+"""`dropanchor-tag mqtt` with a real broker: what devices publish there becomes samples of tags."""
+
+import base64
+import json
+import struct
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from paho.mqtt.client import Client
+
+from dropanchor_schemas.wire import anchor_number
+from dropanchor_tag_client.cli import main
+from support.commands import start_python
+from support.listening import ReceivedFrames, listening
+from support.mosquitto import mosquitto, needs_mosquitto, self_signed
+from support.sensor_logger import G, recording
+from support.zenoh_router import free_port, wait_until
+
+pytestmark = needs_mosquitto
+
+DISTANCES = base64.b64encode(b"\x01\x01" + struct.pack("<HIB", 0x022E, 7940, 100)).decode()
+RULES = """
+[[rule]]
+topic = "plant/+/uwb"
+tag = "{1}"
+kind = "range"
+fields = { anchor = "id", range_m = "m" }
+"""
+
+
+@contextmanager
+def bridge(endpoint: str, broker: str, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
+    """Run `dropanchor-tag mqtt` until the block ends."""
+    process = start_python("-m", "dropanchor_tag_client", "mqtt", broker, "--connect", endpoint, *arguments)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+
+
+def wait_for_line(process: "subprocess.Popen[str]", text: str) -> str:
+    """Read what the bridge says until this text comes, and return the line."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        if text in line:
+            return line
+    raise AssertionError(f"the bridge ended without saying {text!r}")
+
+
+def publish(client: Client, topic: str, payload: object) -> None:
+    body = payload if isinstance(payload, bytes) else json.dumps(payload)
+    client.publish(topic, body, qos=1).wait_for_publish(10)
+
+
+def ranges(heard: ReceivedFrames) -> list[tuple[str, int, float]]:
+    found = zip(heard.keys, heard.frames, strict=True)
+    return [(key.split("/")[4], one.anchor, round(one.range_m, 3)) for key, frame in found for one in frame.ranges]
+
+
+def test_ranges_of_a_decawave_gateway_and_of_a_template_are_published(router_endpoint: str, tmp_path: Path) -> None:
+    (tmp_path / "rules.toml").write_text(RULES)
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(
+            *(router_endpoint, f"127.0.0.1:{broker.port}", "--decawave", "--template", str(tmp_path / "rules.toml")),
+            *("--name", "022E=yard", "--tag-prefix", "t-"),
+        ) as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        publish(client, "dwm/node/9a28/uplink/data", {"data": DISTANCES})
+        publish(client, "plant/hall/uwb", {"id": 3, "m": 2.5})
+        wait_until(lambda: ("t-hall", 3, 2.5) in ranges(heard))
+    assert ("t-9A28", anchor_number("yard"), 7.94) in ranges(heard)
+
+
+def test_a_phone_publishes_over_websocket_and_its_tag_is_in_the_topic(router_endpoint: str, tmp_path: Path) -> None:
+    sensors = {"gyroscope": lambda _: (0.0, 0.0, 0.5), "totalacceleration": lambda _: (0.0, 0.0, G)}
+    socket = free_port()
+    with (
+        mosquitto(tmp_path, "allow_anonymous true", f"listener {socket} 127.0.0.1", "protocol websockets") as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"ws://127.0.0.1:{socket}", "--sensor-logger", "sensor-logger/+") as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        for body in recording(3, sensors):
+            publish(client, "sensor-logger/cart-1", body)
+        wait_until(lambda: sum(len(frame.imu) for frame in heard.frames) >= 290)
+    assert {key.split("/")[4] for key in heard.keys} == {"cart-1"}
+    assert heard.frames[0].imu[0].acc == pytest.approx((0.0, 0.0, G))
+
+
+def test_bad_payloads_are_named_and_counted_and_harm_no_other_tag(router_endpoint: str, tmp_path: Path) -> None:
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--decawave") as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        for payload in (b"\xff\xfe", b"{", b"[" * 100_000, {"data": "?"}, {"data": None}, 7):
+            publish(client, "dwm/node/bad/uplink/data", payload)
+        publish(client, "dwm/node/9a28/uplink/location", {"position": {"x": 1, "y": 2, "z": 3, "quality": 50}})
+        publish(client, f"dwm/node/{'n' * 90}/uplink/data", {"data": DISTANCES})
+        publish(client, "dwm/node/9a28/uplink/data", {"data": DISTANCES})
+        wait_until(lambda: ranges(heard) == [("9A28", anchor_number("022E"), 7.94)])
+        process.terminate()
+        summary = wait_for_line(process, "samples of")
+    assert summary.strip() == (
+        "1 samples of 1 tags published; left out: not_json 3, not_understood 3, position_only 1, tag_invalid 1"
+    )
+
+
+def test_a_flood_of_bad_payloads_is_told_once_per_second(router_endpoint: str, tmp_path: Path) -> None:
+    with (
+        mosquitto(tmp_path) as broker,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--decawave") as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        for _ in range(2000):
+            client.publish("dwm/node/bad/uplink/data", b"{")
+        publish(client, "dwm/node/bad/uplink/data", b"{")
+        wait_for_line(process, "left out: not_json")
+        process.terminate()
+        _, rest = process.communicate(timeout=30)
+    assert rest.count("left out: not_json") <= 3
+
+
+def test_the_bridge_comes_back_with_the_broker(router_endpoint: str, tmp_path: Path) -> None:
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--decawave") as process,
+    ):
+        wait_for_line(process, "connected")
+        broker.stop()
+        wait_for_line(process, "the connection broke")
+        broker.start()
+        wait_for_line(process, "connected")
+        with broker.publisher() as client:
+            publish(client, "dwm/node/9a28/uplink/data", {"data": DISTANCES})
+            wait_until(lambda: ranges(heard))
+
+
+def test_tls_and_a_password_are_used_and_a_foreign_certificate_is_refused(
+    router_endpoint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DROPANCHOR_MQTT_PASSWORD", "secret")
+    certificate, key = self_signed(tmp_path)
+    (tmp_path / "other").mkdir()
+    foreign, _ = self_signed(tmp_path / "other")
+    passwords = tmp_path / "passwords"
+    subprocess.run(["mosquitto_passwd", "-b", "-c", str(passwords), "secret", "secret"], check=True)
+    options = (f"certfile {certificate}", f"keyfile {key}", f"password_file {passwords}", "allow_anonymous false")
+    with mosquitto(tmp_path, *options) as broker, listening(router_endpoint) as heard:
+        url, user = f"mqtts://127.0.0.1:{broker.port}", ("--mqtt-user", "secret")
+        with bridge(router_endpoint, url, "--decawave", "--mqtt-ca", str(foreign), *user) as process:
+            assert "its certificate is not trusted" in wait_for_line(process, url)
+        with bridge(router_endpoint, url, "--decawave", "--mqtt-ca", str(certificate)) as process:
+            assert "Check --mqtt-user" in wait_for_line(process, "refuses")
+        with (
+            bridge(router_endpoint, url, "--decawave", "--mqtt-ca", str(certificate), *user) as process,
+            broker.publisher(certificate, "secret") as client,
+        ):
+            wait_for_line(process, "connected")
+            publish(client, "dwm/node/9a28/uplink/data", {"data": DISTANCES})
+            wait_until(lambda: ranges(heard))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["localhost"], "--decawave, --sensor-logger TOPIC or --template FILE says so"),
+        (["ftp://localhost", "--decawave"], "mqtt://host:1883 or mqtts://host:8883 was expected"),
+        (["mqtt://localhost:port", "--decawave"], "the broker is"),
+        (["localhost", "--decawave", "--mqtt-ca", "x"], "not an mqtts:// or wss:// address"),
+        (["mqtts://localhost", "--decawave", "--mqtt-ca", "nowhere"], "the certificates cannot be used"),
+        (["localhost", "--decawave", "--mqtt-user", "x"], "DROPANCHOR_MQTT_PASSWORD"),
+        (["localhost", "--decawave", "--name", "x"], "ID=NAME was expected"),
+        (["localhost", "--template", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_an_error_prints_a_message_and_exits_with_code_2(
+    arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["mqtt", *arguments]) == 2
+    assert message in capsys.readouterr().err
