@@ -1,7 +1,16 @@
 """A light client that publishes the raw range and IMU samples of a tag."""
 
+from dropanchor_tag_client.calibration import Calibration, read_calibration
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.credentials import Credentials, read_credentials
 from dropanchor_tag_client.session import ConnectError, SessionSettings
 
-__all__ = ["ConnectError", "Credentials", "SessionSettings", "TagClient", "read_credentials"]
+__all__ = [
+    "Calibration",
+    "ConnectError",
+    "Credentials",
+    "SessionSettings",
+    "TagClient",
+    "read_calibration",
+    "read_credentials",
+]

@@ -14,8 +14,12 @@ from dropanchor_tag_client.session import ConnectError
 
 _FORMATTER = argparse.RawDescriptionHelpFormatter
 _EXTRAS = {
-    "numpy": ("the simulator needs numpy", "numpy"),
+    "numpy": ("this command needs numpy", "numpy"),
     "serial": ("modules on a serial port need pyserial", "pyserial"),
+    "adafruit_extended_bus": ("IMUs on I2C need Adafruit's libraries", "adafruit-extended-bus"),
+    "adafruit_bno055": ("the BNO055 needs Adafruit's library", "adafruit-circuitpython-bno055"),
+    "adafruit_bno08x": ("the BNO085 needs Adafruit's library", "adafruit-circuitpython-bno08x"),
+    "adafruit_icm20x": ("the ICM-20948 needs Adafruit's library", "adafruit-circuitpython-icm20x"),
     "paho": ("MQTT needs paho-mqtt", "paho-mqtt"),
 }
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -84,6 +88,23 @@ rules.toml, for {"device": 7, "anchors": [{"id": "yard", "cm": 321}]} on plant/a
 
 It reports what it leaves out, with the reason, at most once per second.
 """
+_IMU = """Publishes the samples of an IMU chip on I2C."""
+_IMU_EXAMPLES = """examples:
+  dropanchor-tag imu --device bno085 --self-test                find out how the chip is mounted
+  dropanchor-tag imu --device bno085 --tag cart-1 --forward=-y  its axis -y points forward
+  dropanchor-tag imu --device icm20948 --credentials cart-1/    with the folder's calibration, if it has one
+"""
+_CALIBRATE = (
+    """Measures the errors of an IMU and writes them into the folder of its tag, where the other commands find them."""
+)
+_CALIBRATE_EXAMPLES = """examples:
+  dropanchor-tag calibrate cart-1/ --device bno085 --forward=-y
+  my_imu_reader | dropanchor-tag calibrate cart-1/              lines as for publish, x forward, y left, z up
+
+Leave the tag alone for a few seconds: that gives the bias of the gyroscope and the scale of the accelerometer. Then
+turn it through full circles, and swing it in figures of eight, away from iron and motors: that gives the hard and soft
+iron of the magnetometer. A vehicle need only turn. The IMU must be where it will stay in the vehicle.
+"""
 _SIMULATE = """Publishes the samples of simulated tags that drive around one anchor."""
 _SIMULATE_EXAMPLES = """examples:
   dropanchor-tag simulate --tags 5                              five tags, live, until Ctrl-C
@@ -125,6 +146,8 @@ def parser(command: str) -> argparse.ArgumentParser:
         ("publish", _PUBLISH, _PUBLISH_EXAMPLES),
         ("serial", _SERIAL, _SERIAL_EXAMPLES),
         ("mqtt", _MQTT, _MQTT_EXAMPLES),
+        ("imu", _IMU, _IMU_EXAMPLES),
+        ("calibrate", _CALIBRATE, _CALIBRATE_EXAMPLES),
     ):
         one = commands.add_parser(name, help=summary, description=summary, epilog=examples, formatter_class=_FORMATTER)
         if name == command:

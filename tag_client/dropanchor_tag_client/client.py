@@ -31,6 +31,7 @@ from dropanchor_schemas.wire import (
     encode_packed,
 )
 from dropanchor_tag_client.buffer import SampleBuffer, rejection_reason
+from dropanchor_tag_client.calibration import Calibration
 from dropanchor_tag_client.link import TagKeys
 from dropanchor_tag_client.publisher import PlainPublisher, Publisher, recoverable_publisher
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
@@ -65,9 +66,9 @@ class TagClient:
     wait_when_congested: wait for a slow router instead of dropping messages. Do not use this for live data.
     connect_timeout_s: how long `open` waits for the router before it raises ConnectError. With None it waits without a
         limit and logs a warning. An open client always reconnects by itself, and publishing never blocks.
-    spool: a folder for the messages of outages that are longer than the cache, or of a tag that is switched off before
-        the network is back. Then `open` does not wait for the router. It needs the UTC clock.
-    spool_limit_bytes: the oldest messages are deleted beyond this.
+    spool: a folder for the messages of outages that are longer than the cache, or than the process lives. `open` then
+        does not wait for the router. The oldest messages are deleted beyond `spool_limit_bytes`.
+    calibration: of the IMU, applied to its samples. The encoding of the messages says so.
     """
 
     _session: zenoh.Session | None = None
@@ -94,6 +95,7 @@ class TagClient:
         connect_timeout_s: float | None = None,
         spool: str | Path | None = None,
         spool_limit_bytes: int = 100_000_000,
+        calibration: Calibration | None = None,
     ) -> None:
         if not 1 <= batch_samples <= _MAX_BATCH:
             raise ValueError(f"batch_samples is {batch_samples}; 1 to {_MAX_BATCH} was expected")
@@ -104,17 +106,16 @@ class TagClient:
         self.tag = tag
         self.boot_id = int.from_bytes(os.urandom(4), "little") or 1
         self.refused: Counter[Reason] = Counter()
-        self._samples_key = keys.samples_key(site, tag)
-        self._alive_key = keys.tag_alive_key(site, tag)
+        self._keys = TagKeys.of(site, tag)
         self._connect = SessionSettings(connect=connect) if isinstance(connect, str) else connect
         self._packed = encoding == "packed"
+        self._calibration = calibration
         self._boot_clock = clock == "boot"
         self._replay = replay
         self._batch_s = batch_s
         self._cache_messages = cache_messages
         self._wait_when_congested = wait_when_congested
         self._connect_timeout_s = connect_timeout_s
-        self._pose_key = keys.pose_key(site, tag)
         self._spool = None if spool is None else Path(spool, keys.chunk_from_id(site), keys.chunk_from_id(tag))
         self._spool_limit_bytes = spool_limit_bytes
         self._buffer = SampleBuffer(batch_samples)
@@ -134,14 +135,21 @@ class TagClient:
         if self._publisher is not None:
             raise RuntimeError(f"the client of tag {self.tag!r} is already open")
         if self._spool is not None:
-            self._publisher = self._spooling = self._spooling_publisher(self._spool)
+            self._publisher = self._spooling = SpoolingPublisher(
+                Spool(self._spool, self._spool_limit_bytes),
+                self._connect,
+                self._keys,
+                self._declare_publisher,
+                self._cache_messages,
+                "" if self._calibration is None else f";{self._calibration.label}",
+            )
         else:
             if isinstance(self._connect, SessionSettings):
                 self._session = open_session(self._connect, self._connect_timeout_s)
             else:
                 self._session = self._connect
             self._publisher = self._declare_publisher(self._session)
-            self._token = self._session.liveliness().declare_token(self._alive_key)
+            self._token = self._session.liveliness().declare_token(self._keys.alive)
         if self._batch_s is not None:
             self._timer = threading.Thread(target=self._flush_when_due, name=f"flush {self.tag}", daemon=True)
             self._timer.start()
@@ -181,7 +189,8 @@ class TagClient:
         acc: specific force, m/s². gyro: angular rate, rad/s. mag: magnetic field, µT.
         """
         field = None if mag is None else _vector("mag", mag)
-        self._add(ImuSample(self._time(t_ns), _vector("acc", acc), _vector("gyro", gyro), field))
+        sample = ImuSample(self._time(t_ns), _vector("acc", acc), _vector("gyro", gyro), field)
+        self._add(sample if self._calibration is None else self._calibration.applied(sample))
 
     def publish_heading(self, heading_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan) -> None:
         """Publish a heading from the tag's platform, counter-clockwise from east, rad."""
@@ -208,22 +217,15 @@ class TagClient:
         """Return what the spool holds and has lost, None without a spool."""
         return None if self._spooling is None else self._spooling.counts
 
-    def _spooling_publisher(self, folder: Path) -> SpoolingPublisher:
-        return SpoolingPublisher(
-            Spool(folder, self._spool_limit_bytes),
-            self._connect,
-            TagKeys(self._samples_key, self._alive_key, self._pose_key),
-            self._declare_publisher,
-            self._cache_messages,
-        )
-
     def _declare_publisher(self, session: zenoh.Session) -> Publisher:
         encoding = ENCODING_PACKED if self._packed else ENCODING_JSON
+        if self._calibration is not None:
+            encoding += f";{self._calibration.label}"
         if self._cache_messages == 0:
-            return PlainPublisher(session, self._samples_key, encoding, wait_when_congested=self._wait_when_congested)
+            return PlainPublisher(session, self._keys.samples, encoding, wait_when_congested=self._wait_when_congested)
         return recoverable_publisher(
             session,
-            self._samples_key,
+            self._keys.samples,
             encoding,
             cache_messages=self._cache_messages,
             wait_when_congested=self._wait_when_congested,

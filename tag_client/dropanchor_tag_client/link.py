@@ -5,10 +5,11 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import zenoh
 
+from dropanchor_schemas import keys
 from dropanchor_tag_client.session import ConnectError, SessionSettings, open_session
 
 _ATTEMPT_S, _LOG_EVERY_S = 1.0, 60.0
@@ -24,6 +25,10 @@ class TagKeys:
     samples: str
     alive: str
     pose: str
+
+    @classmethod
+    def of(cls, site: str, tag: str) -> Self:
+        return cls(keys.samples_key(site, tag), keys.tag_alive_key(site, tag), keys.pose_key(site, tag))
 
 
 class Link:

@@ -9,6 +9,7 @@ from typing import Any
 
 import zenoh
 
+from dropanchor_tag_client.calibration import Calibration, CalibrationError, read_calibration
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.credentials import read_credentials
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
@@ -69,6 +70,25 @@ def spool_settings(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"spool": arguments.spool, "spool_limit_bytes": round(arguments.spool_limit * 1_000_000)}
 
 
+def add_calibration_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--calibration",
+        metavar="FOLDER",
+        help="folder of the IMU's calibration, from `dropanchor-tag calibrate` (default: the one of --credentials)",
+    )
+
+
+def calibration(arguments: argparse.Namespace) -> Calibration | None:
+    """Return the calibration of the tag's IMU, if the program uses one. Raises CalibrationError."""
+    if "calibration" not in arguments:
+        return None
+    folder = arguments.calibration or arguments.credentials
+    found = None if folder is None else read_calibration(folder)
+    if found is None and arguments.calibration is not None:
+        raise CalibrationError(f"{folder} holds no calibration: `dropanchor-tag calibrate {folder}` makes one")
+    return found
+
+
 def anchor_names(arguments: argparse.Namespace) -> dict[str, str]:
     """Return the site's names of anchors, by the ids that a module or a message gives them. Raises ValueError."""
     return dict(_anchor_name(text) for text in arguments.name)
@@ -118,6 +138,7 @@ def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> I
         connect=session_settings(arguments),
         encoding=arguments.encoding,
         connect_timeout_s=arguments.connect_timeout,
+        calibration=calibration(arguments),
         **spool_settings(arguments),
         **settings,
     )

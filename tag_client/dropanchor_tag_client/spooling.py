@@ -47,10 +47,13 @@ class SpoolingPublisher:
         tag_keys: TagKeys,
         declare: Callable[[zenoh.Session], Any],
         cache_messages: int,
+        encoding_schema: str,
     ) -> None:
-        """declare: declares the publisher in a session. cache_messages: the number of messages that it keeps."""
+        """declare: declares the publisher in a session. cache_messages: the number of messages that it keeps.
+        encoding_schema: what follows the encoding of a message, "" for nothing."""
         self._spool = spool
         self._chunk_messages = max(1, min(_CHUNK_MESSAGES, cache_messages // 6))
+        self._encoding_schema = encoding_schema
         self._condition = threading.Condition()
         self._pending: deque[bytes] = deque()  # to be written to the spool
         self._recent: deque[tuple[float, bytes]] = deque(maxlen=_RECENT_MESSAGES)  # sent at once, and when
@@ -75,7 +78,7 @@ class SpoolingPublisher:
             link = self._linker.link
             if self._is_live and link is not None and link.has_subscriber:
                 self._recent.append((time.monotonic(), payload))
-                link.put(payload, _encoding(payload))
+                link.put(payload, self._encoding(payload))
                 return
             if self._is_live:
                 self._is_live = False
@@ -154,7 +157,7 @@ class SpoolingPublisher:
         self._next_chunk_s = now_s + _CHUNK_S
         messages = self._spool.peek(self._chunk_messages, _CHUNK_BYTES)
         for message in messages:
-            link.put(message, _encoding(message))
+            link.put(message, self._encoding(message))
         if messages and link.has_delivered():
             self._spool.remove(len(messages))
             self._sent += len(messages)
@@ -171,7 +174,6 @@ class SpoolingPublisher:
             self._next_log_s = time.monotonic() + _LOG_EVERY_S
             _log.warning("%s: %s", self._name, text)
 
-
-def _encoding(payload: bytes) -> str:
-    """Return the encoding of a payload, whichever program wrote it."""
-    return ENCODING_JSON if payload.startswith(b"{") else ENCODING_PACKED
+    def _encoding(self, payload: bytes) -> str:
+        """Return the encoding of a payload, whichever program wrote it."""
+        return (ENCODING_JSON if payload.startswith(b"{") else ENCODING_PACKED) + self._encoding_schema

@@ -22,7 +22,9 @@ def recording(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [[], ["replay"], ["publish"], ["serial"], ["mqtt"], ["simulate"]])
+@pytest.mark.parametrize(
+    "command", [[], ["replay"], ["publish"], ["serial"], ["mqtt"], ["imu"], ["calibrate"], ["simulate"]]
+)
 def test_the_help_has_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main([*command, "--help"])

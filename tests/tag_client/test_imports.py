@@ -30,7 +30,7 @@ def test_publishing_loads_neither_numpy_nor_pydantic(encoding: str) -> None:
     assert heavy_in(done.stdout) == set()
 
 
-@pytest.mark.parametrize("source", ["replay", "publish", "serial", "mqtt"])
+@pytest.mark.parametrize("source", ["replay", "publish", "serial", "mqtt", "imu"])
 def test_the_commands_of_live_tags_and_replays_load_neither_of_them(source: str) -> None:
     done = python(
         "-c", f"import sys, dropanchor_tag_client.cli, dropanchor_tag_client.sources.{source}\nprint(*sys.modules)"

@@ -3,12 +3,19 @@
 import argparse
 import json
 import sys
+import time
 from collections.abc import Callable, Iterable
 from typing import Any, BinaryIO, TextIO
 
 from dropanchor_schemas.kinds import KINDS
+from dropanchor_schemas.wire import ImuSample
 from dropanchor_tag_client.client import TagClient
-from dropanchor_tag_client.options import add_connection_options, add_spool_options, opened_client
+from dropanchor_tag_client.options import (
+    add_calibration_option,
+    add_connection_options,
+    add_spool_options,
+    opened_client,
+)
 
 _MAX_LINE_BYTES = 1_000_000
 
@@ -24,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_connection_options(parser)
     add_spool_options(parser)
+    add_calibration_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -50,6 +58,16 @@ def publish_lines(client: TagClient, lines: BinaryIO, errors: TextIO, *, clock: 
             bad += 1
             errors.write(f"line {number}: {error}\n")
     return bad
+
+
+def imu_of(line: bytes) -> list[ImuSample]:
+    """Return the IMU samples of a line, at the time now where they have none. Raises BadLineError."""
+    found = []
+    for kind, sample in samples_of(line):
+        if kind == "imu":
+            given = checked(kind, sample)
+            found.append(ImuSample(given.get("t_ns", time.time_ns()), given["acc"], given["gyro"], given.get("mag")))
+    return found
 
 
 def _lines(lines: BinaryIO) -> Iterable[bytes]:
@@ -109,6 +127,12 @@ def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any
 
 def publisher_of(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], None]:
     """What publishes the sample, after all of it has been checked. Raises BadLineError."""
+    given = checked(kind, sample)
+    return lambda client: getattr(client, f"publish_{kind}")(**given)
+
+
+def checked(kind: str, sample: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a sample as `publish_…` takes them. Raises BadLineError."""
     needed, optional = fields_of(kind)
     known = {*needed, *optional}
     for name in needed:
@@ -116,8 +140,7 @@ def publisher_of(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], Non
             raise BadLineError(f"{kind}: {name} is missing")
     for name in sample.keys() - known:
         raise BadLineError(f"{kind}: there is no field {name!r}; known are {', '.join(sorted(known))}")
-    given = {name: _checked(name, value) for name, value in sample.items() if value is not None or name in needed}
-    return lambda client: getattr(client, f"publish_{kind}")(**given)
+    return {name: _checked(name, value) for name, value in sample.items() if value is not None or name in needed}
 
 
 def _number(name: str, value: Any) -> float:

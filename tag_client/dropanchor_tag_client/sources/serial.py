@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 from dropanchor_tag_client.options import (
+    add_calibration_option,
     add_connection_options,
     add_spool_options,
     anchor_names,
@@ -52,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     imu.add_argument("--up", choices=AXES, default="z", help="the axis that points up (default: %(default)s)")
     add_connection_options(parser)
     add_spool_options(parser)
+    add_calibration_option(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

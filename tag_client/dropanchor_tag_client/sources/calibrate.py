@@ -1,0 +1,102 @@
+"""Calibrate the IMU of a tag: rest, turns and figures of eight, from a chip or from lines on standard input."""
+
+import argparse
+import math
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from dropanchor_schemas.wire import ImuSample
+from dropanchor_tag_client.calibration import Calibration, write_calibration
+from dropanchor_tag_client.sources.axes import mounting
+from dropanchor_tag_client.sources.calibration_fit import NotEnoughError, fit, fit_rest
+from dropanchor_tag_client.sources.imu import add_chip_arguments, opened_readings
+from dropanchor_tag_client.sources.publish import BadLineError, imu_of
+
+_CHECK_S = 2.0
+_LEAST_S = 30.0
+_NS = 1_000_000_000
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the tag, such as that of `dropanchor tag add`")
+    add_chip_arguments(parser, required=False)
+    parser.set_defaults(credentials=None, site=None, connect=None)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Raises ChipError, NotEnoughError, OSError as ValueError."""
+    if arguments.device is None:
+        samples = list(samples_of_lines(sys.stdin.buffer))
+    else:
+        samples = guided(_samples_of_chip(arguments))
+    found = fit(samples)
+    try:
+        path = write_calibration(arguments.folder, found)
+    except OSError as error:
+        raise ValueError(f"{arguments.folder} cannot be written: {error.strerror}") from error
+    sys.stderr.write(f"{path}: {described(found)}\n")
+    return 0
+
+
+def guided(stream: Iterable[ImuSample]) -> list[ImuSample]:
+    """Tell a person what to do, and return the samples once they suffice, or at Ctrl-C."""
+    samples: list[ImuSample] = []
+    said, rests, check_ns = "", False, 0
+    _say("Leave the tag alone.")
+    with suppress(KeyboardInterrupt):
+        for sample in stream:
+            samples.append(sample)
+            if sample.t_ns < check_ns:
+                continue
+            check_ns = sample.t_ns + round(_CHECK_S * _NS)
+            try:
+                if not rests:
+                    fit_rest(samples)
+                    rests = True
+                    _say("Now turn it through full circles, then swing it in figures of eight. Ctrl-C ends.")
+                fit(samples)
+                if sample.t_ns - samples[0].t_ns > _LEAST_S * _NS or all(one.mag is None for one in samples):
+                    break
+            except NotEnoughError as error:
+                if rests and str(error) != said:
+                    said = str(error)
+                    _say(f"{said[0].upper()}{said[1:]}.")
+    return samples
+
+
+def samples_of_lines(lines: BinaryIO) -> Iterator[ImuSample]:
+    """Yield the IMU samples of lines as `publish` takes them. Raises BadLineError with the number of the line."""
+    for number, line in enumerate(lines, start=1):
+        if line.isspace():
+            continue
+        try:
+            yield from imu_of(line)
+        except BadLineError as error:
+            raise BadLineError(f"line {number}: {error}") from None
+
+
+def described(found: Calibration) -> str:
+    """Return a sentence about a calibration."""
+    degrees = ", ".join(f"{math.degrees(value):.2f}" for value in found.gyro_bias_radps)
+    text = f"gyroscope bias {degrees} °/s, accelerometer scale {found.acc_scale:.4f}"
+    if not found.has_mag:
+        return f"{text}, no magnetometer"
+    offset = ", ".join(f"{value:.1f}" for value in found.mag_offset_ut)
+    values = np.linalg.eigvalsh(np.array(found.mag_matrix))
+    return f"{text}, hard iron {offset} µT, soft iron {100 * (values[-1] / values[0] - 1):.0f} %"
+
+
+def _samples_of_chip(arguments: argparse.Namespace) -> Iterator[ImuSample]:
+    mounted = mounting(arguments.forward, arguments.up)
+    for reading in opened_readings(arguments):
+        mag = None if reading.mag is None else mounted.to_body(reading.mag)
+        yield ImuSample(reading.t_ns, mounted.to_body(reading.acc), mounted.to_body(reading.gyro), mag)
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
