@@ -105,6 +105,15 @@ Leave the tag alone for a few seconds: that gives the bias of the gyroscope and 
 turn it through full circles, and swing it in figures of eight, away from iron and motors: that gives the hard and soft
 iron of the magnetometer. A vehicle need only turn. The IMU must be where it will stay in the vehicle.
 """
+_INSTALL = (
+    """Makes a systemd unit of a command, which then runs from the start of the machine and after every failure."""
+)
+_INSTALL_EXAMPLES = """examples:
+  dropanchor-tag install serial /dev/ttyACM0 --tag cart-1 --spool spool     prints the unit
+  dropanchor-tag install --user imu --device bno085 --credentials cart-1    writes it for this user
+
+Passwords belong into /etc/dropanchor/tag.env, or ~/.config/dropanchor/tag.env with --user: DROPANCHOR_PASSWORD=…
+"""
 _SIMULATE = """Publishes the samples of simulated tags that drive around one anchor."""
 _SIMULATE_EXAMPLES = """examples:
   dropanchor-tag simulate --tags 5                              five tags, live, until Ctrl-C
@@ -148,6 +157,7 @@ def parser(command: str) -> argparse.ArgumentParser:
         ("mqtt", _MQTT, _MQTT_EXAMPLES),
         ("imu", _IMU, _IMU_EXAMPLES),
         ("calibrate", _CALIBRATE, _CALIBRATE_EXAMPLES),
+        ("install", _INSTALL, _INSTALL_EXAMPLES),
     ):
         one = commands.add_parser(name, help=summary, description=summary, epilog=examples, formatter_class=_FORMATTER)
         if name == command:

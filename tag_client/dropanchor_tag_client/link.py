@@ -12,8 +12,8 @@ import zenoh
 from dropanchor_schemas import keys
 from dropanchor_tag_client.session import ConnectError, SessionSettings, open_session
 
+LOST_LINK_S = 12.0  # by then, a link that was cut without a word is known to be down: Zenoh's lease is 10 s at most
 _ATTEMPT_S, _LOG_EVERY_S = 1.0, 60.0
-_ANSWER_S = 5.0  # longer than the lease of a link (4 s): a link that was cut is known to be down by then
 
 _log = logging.getLogger(__name__)
 
@@ -53,14 +53,15 @@ class Link:
     def put(self, payload: bytes, encoding: str) -> None:
         self._publisher.put(payload, encoding=encoding)
 
-    def has_delivered(self) -> bool:
-        """Wait until the router has what was put before. Return whether the link held.
+    def delivery(self) -> threading.Event:
+        """Return an event that is set when the router has what was put before, or the link is down.
 
         A query follows the messages on their way, and the router ends it once it has passed them on.
         """
-        for _ in self._session.get(self._pose_key, timeout=_ANSWER_S):
-            pass
-        return self.has_subscriber
+        delivered = threading.Event()
+        ended: Any = zenoh.handlers.Callback(lambda _: None, delivered.set)
+        self._session.get(self._pose_key, ended, timeout=LOST_LINK_S)
+        return delivered
 
     def close(self) -> None:
         self._token.undeclare()

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import zenoh
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
-from dropanchor_tag_client.link import Link, Linker, TagKeys
+from dropanchor_tag_client.link import LOST_LINK_S, Link, Linker, TagKeys
 from dropanchor_tag_client.session import SessionSettings
 from dropanchor_tag_client.spool import Spool
 
 # The service recognises duplicates among the last 1,024 messages of a publisher. What may be sent again stays below.
-_RECENT_S, _RECENT_MESSAGES = 5.0, 500  # a link that was cut without a word is known to be down after 4 s
+_RECENT_MESSAGES = 900
 _CHUNK_MESSAGES, _CHUNK_BYTES, _CHUNK_S = 100, 32_768, 0.1
 _PENDING_MESSAGES = 2_000
 _POLL_S, _SYNC_S, _LOG_EVERY_S = 0.1, 1.0, 10.0
@@ -32,6 +32,14 @@ class SpoolCounts(NamedTuple):
     sent: int
     dropped: int
     damaged: int
+
+
+class _Chunk(NamedTuple):
+    """The oldest messages of the spool. dropped_before: number that the spool had dropped when they were sent."""
+
+    messages: int
+    dropped_before: int
+    delivered: threading.Event
 
 
 class SpoolingPublisher:
@@ -57,6 +65,7 @@ class SpoolingPublisher:
         self._condition = threading.Condition()
         self._pending: deque[bytes] = deque()  # to be written to the spool
         self._recent: deque[tuple[float, bytes]] = deque(maxlen=_RECENT_MESSAGES)  # sent at once, and when
+        self._chunk: _Chunk | None = None  # sent, but still in the spool
         self._is_live = False
         self._close_by_s: float | None = None
         self._sent = self._unwritten = 0
@@ -103,7 +112,7 @@ class SpoolingPublisher:
     def _keep_recent(self) -> None:
         """Send the last messages again: the link may have been down already. The service drops duplicates."""
         _log.warning("%s: the service cannot be reached; messages go to the spool", self._name)
-        since_s = time.monotonic() - _RECENT_S
+        since_s = time.monotonic() - LOST_LINK_S
         self._pending.extend(payload for sent_s, payload in self._recent if sent_s >= since_s)
         self._recent.clear()
 
@@ -115,6 +124,7 @@ class SpoolingPublisher:
         while not self._is_done():
             try:
                 self._write_pending()
+                self._remove_delivered()
                 self._send_chunk()
             except (OSError, zenoh.ZError) as error:
                 self._warn(f"the spool cannot be sent: {error}")
@@ -152,18 +162,31 @@ class SpoolingPublisher:
 
     def _send_chunk(self) -> None:
         link, now_s = self._linker.link, time.monotonic()
-        if link is None or now_s < self._next_chunk_s or not link.has_subscriber:
+        if link is None or self._chunk is not None or now_s < self._next_chunk_s or not link.has_subscriber:
             return
         self._next_chunk_s = now_s + _CHUNK_S
         messages = self._spool.peek(self._chunk_messages, _CHUNK_BYTES)
         for message in messages:
             link.put(message, self._encoding(message))
-        if messages and link.has_delivered():
-            self._spool.remove(len(messages))
-            self._sent += len(messages)
-        self._go_live_when_empty(link)
+        if messages:
+            self._chunk = _Chunk(len(messages), self._spool.dropped, link.delivery())
+        else:
+            self._go_live(link)
 
-    def _go_live_when_empty(self, link: Link) -> None:
+    def _remove_delivered(self) -> None:
+        """Remove the chunk that was sent from the spool, if it was delivered. Else it will be sent again."""
+        chunk, link = self._chunk, self._linker.link
+        if chunk is None or link is None:
+            return
+        if not link.has_subscriber:
+            self._chunk = None
+        elif chunk.delivered.is_set():
+            self._chunk = None
+            if chunk.dropped_before == self._spool.dropped:  # else a part of it is no longer in the spool
+                self._spool.remove(chunk.messages)
+                self._sent += chunk.messages
+
+    def _go_live(self, link: Link) -> None:
         with self._condition:
             if not self._is_live and self._spool.is_empty and not self._pending and link.has_subscriber:
                 self._is_live = True

@@ -23,7 +23,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "command", [[], ["replay"], ["publish"], ["serial"], ["mqtt"], ["imu"], ["calibrate"], ["simulate"]]
+    "command", [[], ["replay"], ["publish"], ["serial"], ["mqtt"], ["imu"], ["calibrate"], ["install"], ["simulate"]]
 )
 def test_the_help_has_examples(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:

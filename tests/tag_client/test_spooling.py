@@ -10,6 +10,7 @@ import pytest
 
 from dropanchor_tag_client import TagClient
 from support.commands import python, start_python
+from support.frozen_link import frozen_link
 from support.listening import ReceivedFrames, listening_with_recovery
 from support.zenoh_router import free_endpoint, router_process, wait_until
 
@@ -22,7 +23,7 @@ with TagClient("a", connect=sys.argv[1], spool=sys.argv[2], cache_messages=60, b
     print(tag.boot_id, flush=True)
     for i in itertools.count():
         tag.publish_range(1, float(i))
-        time.sleep(0.005)
+        time.sleep(float(sys.argv[3]))
 """
 
 
@@ -89,7 +90,7 @@ def test_what_a_closed_tag_could_not_send_is_sent_by_the_next_one(endpoint: str,
 
 
 def test_a_tag_killed_in_an_outage_loses_nothing_that_was_on_disk(endpoint: str, tmp_path: Path) -> None:
-    process = start_python("-c", PUBLISH, endpoint, str(tmp_path))
+    process = start_python("-c", PUBLISH, endpoint, str(tmp_path), "0.005")
     try:
         assert process.stdout is not None
         killed_id = int(process.stdout.readline())
@@ -112,6 +113,27 @@ def test_a_tag_killed_in_an_outage_loses_nothing_that_was_on_disk(endpoint: str,
     of_killed = numbers_of(heard, killed_id)
     assert of_killed == list(range(on_disk // (12 + 32 + 16)))
     assert [frame.boot_id for frame in heard.frames] == [killed_id] * len(of_killed) + [tag.boot_id] * 5
+
+
+def test_what_was_sent_into_a_cut_link_is_sent_again_even_by_the_next_process(endpoint: str, tmp_path: Path) -> None:
+    with router_process(endpoint), listening_with_recovery(endpoint) as heard, frozen_link(endpoint) as link:
+        process = start_python("-c", PUBLISH, link.endpoint, str(tmp_path), "0.02")
+        try:
+            assert process.stdout is not None
+            killed_id = int(process.stdout.readline())
+            wait_until(lambda: len(heard.frames) > 50 and not list(tmp_path.rglob("*.spool")))
+            link.frozen.set()
+            wait_until(lambda: list(tmp_path.rglob("*.spool")))  # the tag has noticed, after the lease
+            time.sleep(0.5)
+        finally:
+            process.kill()
+            process.communicate()
+        with client(endpoint, tmp_path) as tag:
+            publish(tag, range(1))
+            wait_until(lambda: numbers_of(heard, tag.boot_id) == [0])
+    arrived = numbers_of(heard, killed_id)
+    assert arrived == list(range(len(arrived)))
+    assert len(arrived) > 150
 
 
 def test_publishing_does_not_wait_for_the_disk_or_the_router(endpoint: str, tmp_path: Path) -> None:
