@@ -98,6 +98,10 @@ class Spool:
             messages.append(message)
         return messages
 
+    def ends_after(self, count: int) -> bool:
+        """Return whether there is nothing behind the oldest messages, of which `peek` returned this many."""
+        return len(self._loaded) == count and len(self._sizes) <= 1 and self._file is None
+
     def remove(self, count: int) -> None:
         """Remove the oldest messages, which `peek` returned, for good: they do not come back after a power cut."""
         for _ in range(count):

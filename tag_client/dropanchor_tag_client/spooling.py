@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import zenoh
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
-from dropanchor_tag_client.link import LOST_LINK_S, Link, Linker, TagKeys
+from dropanchor_tag_client.link import LOST_LINK_S, Linker, TagKeys
 from dropanchor_tag_client.session import SessionSettings
 from dropanchor_tag_client.spool import Spool
 
@@ -89,9 +89,7 @@ class SpoolingPublisher:
                 self._recent.append((time.monotonic(), payload))
                 link.put(payload, self._encoding(payload))
                 return
-            if self._is_live:
-                self._is_live = False
-                self._keep_recent()
+            self._leave_live()
             if len(self._pending) < _PENDING_MESSAGES:
                 self._pending.append(payload)
             else:
@@ -109,8 +107,11 @@ class SpoolingPublisher:
         self._linker.close()
         self._spool.close()
 
-    def _keep_recent(self) -> None:
+    def _leave_live(self) -> None:
         """Send the last messages again: the link may have been down already. The service drops duplicates."""
+        if not self._is_live:
+            return
+        self._is_live = False
         _log.warning("%s: the service cannot be reached; messages go to the spool", self._name)
         since_s = time.monotonic() - LOST_LINK_S
         self._pending.extend(payload for sent_s, payload in self._recent if sent_s >= since_s)
@@ -135,7 +136,7 @@ class SpoolingPublisher:
         """Wait for something to do. Return whether to end."""
         with self._condition:
             if not self._pending and not self._may_end():
-                self._condition.wait(None if self._is_live else _POLL_S)
+                self._condition.wait(None if self._is_live and self._chunk is None else _POLL_S)
             return self._may_end()
 
     def _may_end(self) -> bool:
@@ -166,12 +167,20 @@ class SpoolingPublisher:
             return
         self._next_chunk_s = now_s + _CHUNK_S
         messages = self._spool.peek(self._chunk_messages, _CHUNK_BYTES)
-        for message in messages:
-            link.put(message, self._encoding(message))
+        with self._condition:
+            is_last = not self._pending and self._spool.ends_after(len(messages))
+            for message in messages:
+                link.put(message, self._encoding(message))
+            if is_last and not self._is_live:
+                self._go_live(messages, now_s)
         if messages:
             self._chunk = _Chunk(len(messages), self._spool.dropped, link.delivery())
-        else:
-            self._go_live(link)
+
+    def _go_live(self, last: list[bytes], now_s: float) -> None:
+        """Send messages at once from now on. The last ones of the spool were just sent."""
+        self._is_live = True
+        self._recent.extend((now_s, message) for message in last)
+        _log.info("%s: connected; %d messages were sent from the spool", self._name, self._sent + len(last))
 
     def _remove_delivered(self) -> None:
         """Remove the chunk that was sent from the spool, if it was delivered. Else it will be sent again."""
@@ -180,17 +189,13 @@ class SpoolingPublisher:
             return
         if not link.has_subscriber:
             self._chunk = None
+            with self._condition:
+                self._leave_live()
         elif chunk.delivered.is_set():
             self._chunk = None
             if chunk.dropped_before == self._spool.dropped:  # else a part of it is no longer in the spool
                 self._spool.remove(chunk.messages)
                 self._sent += chunk.messages
-
-    def _go_live(self, link: Link) -> None:
-        with self._condition:
-            if not self._is_live and self._spool.is_empty and not self._pending and link.has_subscriber:
-                self._is_live = True
-                _log.info("%s: connected; %d messages were sent from the spool", self._name, self._sent)
 
     def _warn(self, text: str) -> None:
         if time.monotonic() >= self._next_log_s:

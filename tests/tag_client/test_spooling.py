@@ -19,7 +19,7 @@ CACHE = 60  # messages, which the outages below exceed
 PUBLISH = """
 import itertools, sys, time
 from dropanchor_tag_client import TagClient
-with TagClient("a", connect=sys.argv[1], spool=sys.argv[2], cache_messages=60, batch_samples=1) as tag:
+with TagClient("a", connect=sys.argv[1], spool=sys.argv[2], cache_messages=int(sys.argv[4]), batch_samples=1) as tag:
     print(tag.boot_id, flush=True)
     for i in itertools.count():
         tag.publish_range(1, float(i))
@@ -90,7 +90,7 @@ def test_what_a_closed_tag_could_not_send_is_sent_by_the_next_one(endpoint: str,
 
 
 def test_a_tag_killed_in_an_outage_loses_nothing_that_was_on_disk(endpoint: str, tmp_path: Path) -> None:
-    process = start_python("-c", PUBLISH, endpoint, str(tmp_path), "0.005")
+    process = start_python("-c", PUBLISH, endpoint, str(tmp_path), "0.005", "60")
     try:
         assert process.stdout is not None
         killed_id = int(process.stdout.readline())
@@ -117,7 +117,7 @@ def test_a_tag_killed_in_an_outage_loses_nothing_that_was_on_disk(endpoint: str,
 
 def test_what_was_sent_into_a_cut_link_is_sent_again_even_by_the_next_process(endpoint: str, tmp_path: Path) -> None:
     with router_process(endpoint), listening_with_recovery(endpoint) as heard, frozen_link(endpoint) as link:
-        process = start_python("-c", PUBLISH, link.endpoint, str(tmp_path), "0.02")
+        process = start_python("-c", PUBLISH, link.endpoint, str(tmp_path), "0.02", "60")
         try:
             assert process.stdout is not None
             killed_id = int(process.stdout.readline())
@@ -134,6 +134,18 @@ def test_what_was_sent_into_a_cut_link_is_sent_again_even_by_the_next_process(en
     arrived = numbers_of(heard, killed_id)
     assert arrived == list(range(len(arrived)))
     assert len(arrived) > 150
+
+
+def test_a_fast_tag_leaves_the_spool_once_it_is_connected(endpoint: str, tmp_path: Path) -> None:
+    with router_process(endpoint), listening_with_recovery(endpoint) as heard:
+        process = start_python("-c", PUBLISH, endpoint, str(tmp_path), "0.002", "600")
+        try:
+            wait_until(lambda: len(heard.frames) > 1000 and not list(tmp_path.rglob("*.spool")))
+        finally:
+            process.kill()
+            process.communicate()
+    arrived = [frame.sequence for frame in heard.frames]
+    assert arrived == list(range(len(arrived)))
 
 
 def test_publishing_does_not_wait_for_the_disk_or_the_router(endpoint: str, tmp_path: Path) -> None:
