@@ -61,8 +61,7 @@ class TagClient:
         old. With batch_s=None no thread watches the time: call `flush`.
     cache_messages: number of messages to keep for a service that missed them. Nothing is lost in an outage of the
         router or the service as long as they cover the gap. 0 publishes without a cache.
-    replay: whether the samples come from a recording, at any speed. The service then counts ages from the current time
-        of the recording.
+    replay: whether the samples come from a recording. The service then counts ages from the time of the recording.
     wait_when_congested: wait for a slow router instead of dropping messages. Do not use this for live data.
     connect_timeout_s: how long `open` waits for the router before it raises ConnectError. With None it waits without a
         limit and logs a warning. An open client always reconnects by itself, and publishing never blocks.
