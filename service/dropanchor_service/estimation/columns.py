@@ -67,6 +67,7 @@ POSE = np.dtype(
         ("t_ns", "i8"),
         ("state", "u1"),
         ("reason", "u1"),
+        ("frame", "u1"),  # Frame
         ("anchor", "i4"),  # of the last range that was fused, -1: none
         ("range", "f8"),  # that range, as measured
         ("x", "f8"),
@@ -133,6 +134,13 @@ class State(IntEnum):
     COASTING = 3
     DEGRADED = 4
     LOST = 5
+
+
+class Frame(IntEnum):
+    """The frame of a pose, in the order of the contract."""
+
+    SITE = 0
+    RELATIVE = 1  # the site frame turned about the anchor by an angle that is not known
 
 
 class StateReason(IntEnum):

@@ -50,6 +50,7 @@ def _write_poses(nodes: Nodes, beliefs: Beliefs, poses: Array) -> int:
         pose = poses[n]
         n += 1
         pose.row, pose.t_ns, pose.anchor, pose.range = node.row, node.t_ns, node.anchor, node.z
+        pose.frame = belief.relative
         pose.state, pose.reason, pose.yaw_rate = belief.state, belief.reason, belief.yaw_rate
         known = belief.hypotheses > 0
         pose.x = belief.x if known else np.nan

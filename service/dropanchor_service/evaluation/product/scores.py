@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
-from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.evaluation.accuracy import Truth, nees, share_of_time, truth_at
 from dropanchor_service.evaluation.replay import Track
 
@@ -62,8 +62,8 @@ class RowScore:
 def score(name: str, track: Track, truth: Truth, anchor: tuple[float, float], no_north: bool) -> TagScore:
     """Compare a track with the truth.
 
-    no_north: the track's frame may be rotated, so the truth is first rotated about the anchor to fit the poses in state
-    tracking, or all poses if there are none.
+    The truth of poses in a frame of the tag's own is first rotated about the anchor to fit those in state tracking, or
+    all of them if there are none. no_north: so is that of poses in the site frame.
     """
     true = np.column_stack(truth_at(truth, track.t))
     found = np.column_stack([track.poses["x"], track.poses["y"]])
@@ -72,9 +72,10 @@ def score(name: str, track: Track, truth: Truth, anchor: tuple[float, float], no
     if not used.any():
         return TagScore(name, math.inf, math.inf, math.inf, math.inf, math.inf, 0.0, 0, 0, math.nan)
     tracking = track.poses["state"] == State.TRACKING
-    if no_north:
-        declared = used & tracking
-        true = rotated_onto(true, found, declared if declared.any() else used, anchor)
+    own = used & (track.poses["frame"] == Frame.RELATIVE)
+    for rotated in (own, used & ~own) if no_north else (own,):
+        declared = rotated & tracking
+        true[rotated] = rotated_onto(true, found, declared if declared.any() else rotated, anchor)[rotated]
     error = found - true
     late = used & (track.t >= (track.t[0] + track.t[-1]) / 2)
     squared = nees(error, track.poses["cov"][:, :2, :2])[used & tracking]

@@ -57,6 +57,7 @@ def _save_position(work: Hypotheses, count: int, row: Row) -> None:
     gap.x, gap.y, gap.var = x, y, position
     gap.speed, gap.course = abs(best[V]), course_of(best)
     gap.yaw, gap.yaw_var = best[YAW], turn
+    gap.relative = 1 - row.heading.in_site_frame
     gap.turn_s = gap.observed_s = 0.0
     gap.fragments = 0
 
@@ -143,7 +144,7 @@ def publish_suspended(row: Row, node: Node, anchors: Anchors, belief: Belief) ->
     belief.cov[0, 0] = belief.cov[1, 1] = variance
     belief.cov[2, 2] = math.pi**2 / 3.0
     belief.p_mode, belief.sigma_pos, belief.sigma_obs = 1.0, math.sqrt(2.0 * variance), math.inf
-    belief.hypotheses = 1
+    belief.hypotheses, belief.relative = 1, gap.relative
     publication.state = LOST if gap.unobserved_s > LOST_AFTER_GAP else DEGRADED
     publication.reason = IMU_MISSING
 

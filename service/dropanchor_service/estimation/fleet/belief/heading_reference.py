@@ -28,6 +28,17 @@ def add_common_rotation(P: Floats, std: float) -> None:
 
 
 @njit(nogil=True)
+def turn_to_yaw(P: Floats) -> None:
+    """Turn bearing and yaw together so that the yaw is exact: the error that it had becomes one of the bearing."""
+    for i in range(N):
+        P[PHI, i] -= P[YAW, i]
+    for i in range(N):
+        P[i, PHI] -= P[i, YAW]
+    for i in range(N):
+        P[YAW, i] = P[i, YAW] = 0.0
+
+
+@njit(nogil=True)
 def adopt_reference(P: Floats, variance: float) -> None:
     """Let yaw count from a reference that agrees with it now.
 

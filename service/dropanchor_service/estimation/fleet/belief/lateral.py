@@ -32,7 +32,7 @@ from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
 BOUND: Final = 3.0  # standard deviations beyond which a sideways increment is a skid or a bump and counts less
 SMOOTH: Final = 0.015  # (m/s)^2/s, roughness of dv above which the sideways axis tells more of jolts than of the course
 RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
-RIGID_BELOW: Final = 0.6  # mean square of its normalised innovation below which a mount is rigid
+RIGID_BELOW: Final = 0.35  # mean square of its normalised innovation below which a mount is rigid
 RIGID_TAU: Final = 5.0  # s
 RIGID_CLIP: Final = 25.0  # most that one innovation counts
 LEAST_VAR: Final = 1e-6  # (m/s)^2

@@ -86,7 +86,7 @@ HEADING: Final = np.dtype(
     [
         ("model", np.uint8),  # of the error of the reference in use
         ("north", np.float64),  # rad, constant error of the reference, learned from a given start heading
-        ("in_site_frame", np.uint8),  # 1: the yaw of the hypotheses counts from east; 0: from an arbitrary zero
+        ("in_site_frame", np.uint8),  # 1: yaw counts from east; 0: the x axis is the first direction of travel
         ("bank_started", np.uint8),
         ("bank_mean", np.float64, (BANK, 3)),  # yaw rad, gyroscope bias rad/s, slow error rad
         ("bank_cov", np.float64, (BANK, 3, 3)),
@@ -117,6 +117,7 @@ GAP: Final = np.dtype(
         ("yaw_var", np.float64),  # rad^2, before the gap
         ("turn_s", np.float64),  # s of turns that were not observed
         ("observed_s", np.float64),  # s since the samples came back
+        ("relative", np.uint8),  # 1: x, y, course and yaw are in the frame of the tag's own
         ("fragments", np.uint8),  # short stretches of samples between gaps since the track was lost
     ]
 )
@@ -199,6 +200,7 @@ BELIEF: Final = np.dtype(
         ("hypotheses", np.int32),
         ("state", np.uint8),
         ("reason", np.uint8),
+        ("relative", np.uint8),  # 1: x, y, course and yaw are in a frame of the tag's own
     ]
 )
 

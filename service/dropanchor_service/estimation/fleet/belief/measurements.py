@@ -17,6 +17,7 @@ from dropanchor_service.estimation.fleet.belief.heading_reference import (
     add_common_rotation,
     add_reference_error,
     adopt_reference,
+    turn_to_yaw,
 )
 from dropanchor_service.estimation.fleet.belief.layout import (
     DRIFTING,
@@ -36,6 +37,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import best_of
+from dropanchor_service.estimation.fleet.belief.start import ADOPT_VAR, choose_model
 from dropanchor_service.estimation.fleet.belief.update import (
     predict_range,
     truncate_speed,
@@ -132,6 +134,8 @@ def _update_misfit(row: Row, y: float, S: float, p_outlier: float) -> None:
 @njit(nogil=True)
 def update_with_heading(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
     """Update the hypotheses with the node's heading. Return their count, which a change of model may raise."""
+    if row.heading.in_site_frame == 0 and not _enter_site_frame(work, count, row, node, t):
+        return count
     if node.heading_kind == MEASURED_HEADING:
         if not is_heading_std_given(row):
             count = _update_heading_model(work, count, row, node, t)
@@ -174,26 +178,34 @@ def _update_heading_model(work: Hypotheses, count: int, row: Row, node: Node, t:
 
 
 @njit(nogil=True)
+def _enter_site_frame(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> bool:
+    """Turn a belief in a frame of the tag's own by the node's heading, if it is good enough. Return whether it was."""
+    if node.heading_kind == ABSOLUTE_HEADING and node.heading_var > ADOPT_VAR:
+        return False
+    choose_model(row, node, t)
+    std = math.sqrt(node.heading_var)
+    for h in range(count):
+        work[h].mean[PHI] += node.heading - work[h].mean[YAW]
+        work[h].mean[YAW] = node.heading
+        turn_to_yaw(work[h].cov)
+        add_common_rotation(work[h].cov, std)
+    row.heading.in_site_frame = 1
+    return True
+
+
+@njit(nogil=True)
 def _adopt_magnetic_heading(work: Hypotheses, count: int, row: Row, node: Node) -> bool:
     """Let yaw count from the magnetometer from now on. Return whether that was done.
 
-    A belief whose yaw had an arbitrary zero is turned as a whole. With a given start the constant error of the
-    magnetometer is not known: it is taken to agree with the yaw of now, and the error of that yaw becomes one of the
-    mounting angle. That waits until the magnetometer is better than the yaw.
+    With a given start the constant error of the magnetometer is not known: it is taken to agree with the yaw of now,
+    and the error of that yaw becomes one of the mounting angle. That waits until the magnetometer is better than the
+    yaw.
     """
     heading, best = row.heading, work[best_of(work, count)]
-    if heading.in_site_frame == 1 and node.heading_var > best.cov[YAW, YAW]:
+    if node.heading_var > best.cov[YAW, YAW]:
         return False
     heading.model = MAGNETOMETER_MODEL
-    std = math.sqrt(node.heading_var)
-    delta = wrap(node.heading - best.mean[YAW])
+    heading.north = wrap(node.heading - best.mean[YAW])
     for h in range(count):
-        if heading.in_site_frame == 0:
-            work[h].mean[YAW] += delta
-            work[h].mean[PHI] += delta
-            add_common_rotation(work[h].cov, std)
-        else:
-            adopt_reference(work[h].cov, node.heading_var)
-    heading.north = delta if heading.in_site_frame == 1 else 0.0
-    heading.in_site_frame = 1
+        adopt_reference(work[h].cov, node.heading_var)
     return True

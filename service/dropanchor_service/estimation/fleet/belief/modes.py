@@ -4,7 +4,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.layout import Anchors, Hypotheses, Pool, Row, Workspace
 from dropanchor_service.estimation.fleet.belief.mixture import normalise
 from dropanchor_service.estimation.fleet.belief.pool import load
-from dropanchor_service.estimation.fleet.belief.summary import add_reference_variance, cluster, fill_positions, moments
+from dropanchor_service.estimation.fleet.belief.summary import cluster, fill_positions, moments, widen_by_reference
 from dropanchor_service.estimation.fleet.compiled import njit
 
 LIGHTEST = 0.01  # weight of a mode that is listed
@@ -37,10 +37,7 @@ def list_modes(row: Row, pool: Pool, anchors: Anchors, space: Workspace, modes: 
         if weight < LIGHTEST:
             return n
         moments(work, count, head, scratch)
-        if row.start.known == 0:
-            add_reference_variance(
-                cov, mean[0], mean[1], (row.settings.reference_std if row.heading.in_site_frame == 1 else 1.8) ** 2
-            )
+        widen_by_reference(row, mean, cov)
         for h in range(count):
             work[h].assigned |= work[h].in_mode
         mode, anchor = modes[n], anchors[row.anchor]

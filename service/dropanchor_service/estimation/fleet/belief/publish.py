@@ -20,22 +20,21 @@ from dropanchor_service.estimation.fleet.belief.states import (
     UNCERTAIN,
 )
 from dropanchor_service.estimation.fleet.belief.summary import (
-    add_reference_variance,
     best_mode,
     spread_over_all,
     spread_over_classes,
+    widen_by_reference,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RANGE, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-UNIFORM_ANGLE_STD: Final = 1.8  # rad, of an angle of which nothing is known
 DOMINANT: Final = 0.9  # weight of a mode above which the others hardly matter
 UNRESOLVED_S: Final = 1.0  # s without a dominant mode after which the row is ambiguous again
 RERESOLVE_AFTER: Final = 3.0  # s without a range after which one mode has to explain the ranges anew
 COASTING_AFTER, RANGES_LOST_AFTER = 1.5, 30.0  # s without a range
 IMU_DEGRADED_AFTER, IMU_LOST_AFTER = 0.5, 10.0  # s that no sensor observed
-SMALL_M, SMALL_SHARE = 1.5, 0.05  # a mode is small below 1.5 m or 5 % of the distance
+SMALL_M, SMALL_SHARE = 1.5, 0.1  # a mode is small below 1.5 m or 10 % of the distance
 LARGE_M, LARGE_SHARE = 3.0, 0.35  # an ellipse is too large for use above 3 m or 35 % of the distance
 MISFIT_LIMIT: Final = 0.5  # mean outlier probability above which the ranges are said to be rejected
 
@@ -54,20 +53,20 @@ def publish(
     r = math.sqrt(mean[0] ** 2 + mean[1] ** 2)
     _update_information(row, node, mean, t)
     belief.sigma_obs = sigma_obs(row.publication.information)
-    _add_reference_error(row, mean, cov)
+    widen_by_reference(row, mean, cov)
     _update_resolved(row, node, p_mode, relative, r, t)
     _set_state(row, relative, _sigma_pos(cov), r, work[head].nlos == 1)
     if row.publication.resolved == 0 or p_mode < DOMINANT:
         spread_over_all(work, count, scratch)
     else:
         spread_over_classes(work, count, head, scratch, t.class_rejected_weight)
-    _add_reference_error(row, mean, cov)
+    widen_by_reference(row, mean, cov)
     for i in range(3):
         for j in range(3):
             belief.cov[i, j] = cov[i, j]
     belief.p_mode = min(p_mode, 1.0)
     belief.sigma_pos = _sigma_pos(cov)
-    belief.hypotheses = count
+    belief.hypotheses, belief.relative = count, 1 - row.heading.in_site_frame
 
 
 @njit(nogil=True)
@@ -84,14 +83,6 @@ def _update_information(row: Row, node: Node, mean: Floats, t: Tuning) -> None:
         information[0, 1] += c * s * weight
         information[1, 0] = information[0, 1]
         information[1, 1] += s * s * weight
-
-
-@njit(nogil=True)
-def _add_reference_error(row: Row, mean: Floats, cov: Floats) -> None:
-    """Widen an ellipse whose start was found: it is known only as well as the heading reference."""
-    if row.start.known == 0:
-        std = row.settings.reference_std if row.heading.in_site_frame == 1 else UNIFORM_ANGLE_STD
-        add_reference_variance(cov, mean[0], mean[1], std**2)
 
 
 @njit(nogil=True)

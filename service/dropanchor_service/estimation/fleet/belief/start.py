@@ -49,7 +49,8 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 MIN_RANGES: Final = 5  # ranges that an unknown start needs at least
 COLLECT_S: Final = 1.0  # s over which it collects them, unless START_RANGES come sooner
-RELATIVE_YAW_VAR: Final = 1e-4  # rad^2, of a yaw that counts from wherever the body pointed first
+RELATIVE_COURSE_VAR: Final = 1e-4  # rad^2, of a course that is the x axis of its frame
+ADOPT_VAR: Final = 0.04  # rad^2, of north below which poses are in the site frame
 REST_SPEED_VAR: Final = 0.01  # (m/s)^2
 
 
@@ -129,7 +130,7 @@ def _bearings(row: Row, t: Tuning) -> int:
 def start_known(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tuning) -> int:
     """Make hypotheses at the given start: one per heading class, or a ring of headings where none is known.
 
-    Return their count.
+    After a gap the start is in the frame in which the tag was. Return their count.
     """
     start, gap = row.start, row.gap
     x, y = start.x - anchor.x, start.y - anchor.y
@@ -151,7 +152,7 @@ def start_known(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tunin
         if start.coarse == 1 and not known:
             turned = wrap(yaw - gap.yaw)
             work[h].log_weight = -0.5 * turned * turned / (gap.yaw_var + unobserved_turn_var(gap.turn_s))
-    row.heading.in_site_frame = 1
+    row.heading.in_site_frame = 0 if start.after_gap == 1 and gap.relative == 1 else 1
     if not is_in_site_frame(node.heading_kind):
         return ring + _add_aligned(work, ring, row, t)
     _, slow, _ = reference_error(row, node.heading_var)
@@ -167,7 +168,7 @@ def _start_ring(
 
     Speeds are forward unless the tag may reverse. The numbers of the tuning keep the count within MAX_HYPOTHESES.
     """
-    at_rest = node.rest == RESTING
+    at_rest, relative = node.rest == RESTING, row.heading.in_site_frame == 0
     signs = 2 if row.settings.reverse_allowed == 1 and not at_rest else 1
     bearings = _bearings(row, t)
     speeds = 1 if at_rest else (t.coarse_speeds if row.start.coarse == 1 else t.start_speeds) // signs
@@ -180,10 +181,10 @@ def _start_ring(
                 _initialise(work, h, row, node, yaw, yaw_var, t)
                 s, P = work[h].mean, work[h].cov
                 s[R], s[PHI] = horizontal, cell * i
-                _spread_ring(P, row, cell)
+                _spread_ring(P, row, cell, relative)
                 s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
                 P[V, V] = REST_SPEED_VAR if at_rest else (speed_cell / 2.0) ** 2
-                if is_in_site_frame(node.heading_kind):
+                if not relative and is_in_site_frame(node.heading_kind):
                     _, slow, _ = reference_error(row, node.heading_var)
                     add_common_rotation(P, slow)
                 h += 1
@@ -191,19 +192,25 @@ def _start_ring(
 
 
 @njit(nogil=True)
-def _spread_ring(P: Floats, row: Row, cell: float) -> None:
+def _spread_ring(P: Floats, row: Row, cell: float, relative: bool) -> None:
     """Fill the covariance of distance and bearing of one cell of the ring.
 
     distance = (measured - bias) / scale, so it shares the error of the bias. An error of the mounting angle turns
-    everything about the anchor: the ring covers the angle between mounting and bearing.
+    everything about the anchor: the ring covers the angle between mounting and bearing. In a frame of the tag's own
+    the course is given instead, and the mounting angle turns only the body.
     """
     settings = row.settings
     bias_var = settings.range_bias_std**2
     P[R, R] = (settings.range_std**2 / 4.0 + bias_var) / settings.range_scale**2
     P[R, RANGE_BIAS] = P[RANGE_BIAS, R] = -bias_var / settings.range_scale
     P[PHI, PHI] = (cell / 2.0) ** 2
-    P[PHI, PHI] += settings.mount_angle_std**2
-    P[PHI, MOUNT] = P[MOUNT, PHI] = settings.mount_angle_std**2
+    mount_var = settings.mount_angle_std**2
+    if relative:
+        P[YAW, YAW] += mount_var
+        P[YAW, MOUNT] = P[MOUNT, YAW] = -mount_var
+    else:
+        P[PHI, PHI] += mount_var
+        P[PHI, MOUNT] = P[MOUNT, PHI] = mount_var
 
 
 @njit(nogil=True)
@@ -228,6 +235,9 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
         row.publication.reason = NO_RANGE
         return 0
     anchor = anchors[row.anchor]
+    north = is_in_site_frame(node.heading_kind)
+    if start.after_gap == 1 and start.known == 0 and row.gap.relative == 1 and north:
+        start.after_gap = 0  # the place before the gap is not one of the site
     if start.known == 1 or start.after_gap == 1:
         return start_known(work, row, anchor, node, t)
     if node.kind == RANGE and node.anchor == row.anchor:
@@ -238,10 +248,22 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
         row.publication.reason = NO_RANGE
         return 0
     slant = float(np.median(start.ranges[: min(start.range_count, START_RANGES)]))
-    choose_model(row, node, t)
-    row.heading.in_site_frame = 1 if is_in_site_frame(node.heading_kind) else 0
-    variance = node.heading_var if row.heading.in_site_frame == 1 else RELATIVE_YAW_VAR
-    return _start_ring(work, row, _horizontal(row, anchor, slant), node, node.heading, variance, t)
+    return _start_unknown(work, row, _horizontal(row, anchor, slant), node, t)
+
+
+@njit(nogil=True)
+def _start_unknown(work: Hypotheses, row: Row, horizontal: float, node: Node, t: Tuning) -> int:
+    """Make a ring of hypotheses in the site frame if north is known, else in a frame of the tag's own.
+
+    The x axis of such a frame is the direction in which the tag travels first. Return their count.
+    """
+    magnetic = node.heading_kind == ABSOLUTE_HEADING
+    if is_in_site_frame(node.heading_kind) and not (magnetic and node.heading_var > ADOPT_VAR):
+        choose_model(row, node, t)
+        row.heading.in_site_frame = 1
+        return _start_ring(work, row, horizontal, node, node.heading, node.heading_var, t)
+    row.heading.in_site_frame = 0
+    return _start_ring(work, row, horizontal, node, -row.settings.mount_angle, RELATIVE_COURSE_VAR, t)
 
 
 @njit(nogil=True)
@@ -258,8 +280,6 @@ def restart_on_ring(work: Hypotheses, count: int, row: Row, node: Node, anchor: 
     """
     best = work[best_of(work, count)]
     yaw, variance = best.mean[YAW], best.cov[YAW, YAW]
-    if uses_heading(row, node):
-        yaw, variance = node.heading - row.heading.north, node.heading_var
     row.start.known = row.start.after_gap = row.start.coarse = 0
     row.publication.resolved = 0
     row.publication.resolved_s = 0.0
@@ -268,4 +288,8 @@ def restart_on_ring(work: Hypotheses, count: int, row: Row, node: Node, anchor: 
     nlos.high_run = nlos.low_run = nlos.widened = 0
     nlos.misfit = nlos.misfit_s = 0.0
     horizontal = _horizontal(row, anchor, start_distance(row, node.z))
+    if row.heading.in_site_frame == 0:
+        return _start_unknown(work, row, horizontal, node, t)
+    if uses_heading(row, node):
+        yaw, variance = node.heading - row.heading.north, node.heading_var
     return _start_ring(work, row, horizontal, node, yaw, variance, t)

@@ -47,6 +47,7 @@ from dropanchor_service.estimation.fleet.belief.nlos import (
     propose_alternatives,
     widen_after_misfit,
 )
+from dropanchor_service.estimation.fleet.belief.placing import place_in_site, tells_rotation
 from dropanchor_service.estimation.fleet.belief.pool import load, mirror, release, store
 from dropanchor_service.estimation.fleet.belief.predict import (
     add_process_noise,
@@ -155,12 +156,15 @@ def _run_node(
     widen_after_misfit(work, count, row, node, t)
     count = expect_los(work, count, row, node.dt_s, t)
     belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
-    if node.kind == RANGE and row.anchor >= 0 and not belief.stuck:
+    if row.heading.in_site_frame == 0 and tells_rotation(row, node):
+        count = place_in_site(work, count, row)
+    used = row.heading.in_site_frame == 1 or not tells_rotation(row, node)
+    if node.kind == RANGE and row.anchor >= 0 and used and not belief.stuck:
         update_with_range(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
         count = propose_alternatives(work, count, row, t)
         close_nlos(work, count, PH, t)
-    if node.kind == BEARING and row.anchor >= 0:
+    if node.kind == BEARING and row.anchor >= 0 and used:
         update_with_bearing(work, count, row, node, anchors, t, scratch, belief)
     if not all_finite(work, count):
         return 0

@@ -73,6 +73,13 @@ def add_reference_variance(cov: Floats, x: float, y: float, variance: float) -> 
 
 
 @njit(nogil=True)
+def widen_by_reference(row: Row, mean: Floats, cov: Floats) -> None:
+    """Widen an ellipse of the site frame whose start was found: it is known only as well as the heading reference."""
+    if row.start.known == 0 and row.heading.in_site_frame == 1:
+        add_reference_variance(cov, mean[0], mean[1], row.settings.reference_std**2)
+
+
+@njit(nogil=True)
 def course_of(s: Floats) -> float:
     """Return the direction of travel, rad."""
     return wrap(s[YAW] + s[MOUNT] + s[SLIP])

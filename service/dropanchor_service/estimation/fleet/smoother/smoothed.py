@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import Array, State, StateReason
+from dropanchor_service.estimation.columns import Array, Frame, State, StateReason
 from dropanchor_service.estimation.fleet.belief.heading_models import reference_error
 from dropanchor_service.estimation.fleet.belief.heading_reference import adopt_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
@@ -30,7 +30,6 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 ITERATIONS = 20
 UNKNOWN_ANGLE = 1.0  # rad, spread of the prior around where a track with unknown start began
 UNKNOWN_SPEED = 2.0  # m/s
-ARBITRARY_YAW = 1.8  # rad, as in `publish`: sd of a uniform angle
 RESOLVED = (State.TRACKING, State.COASTING, State.DEGRADED)
 
 
@@ -52,6 +51,8 @@ def smoothed_poses(engine: TracingEngine, row: int, lag: float | None) -> Array:
     else:
         points, covs = _lagged(nodes, traces, now, engine.anchors, engine.tuning, lag)
         seen = np.searchsorted(nodes["t_ns"], nodes["t_ns"] + round(lag * 1e9) + 1000, side="right") - 1
+    if lag is None:
+        poses["frame"][np.isfinite(points[chosen, 0])] = 1 - now["heading"]["in_site_frame"][0]
     _put(poses, points[chosen], covs[chosen], beliefs[seen[chosen]], now[0], engine.anchors)
     return poses
 
@@ -110,7 +111,9 @@ def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_v
         cov[REFERENCE, :] = cov[:, REFERENCE] = 0.0
     cov[REFERENCE, REFERENCE] = max(cov[REFERENCE, REFERENCE], reference_variance)
     if now["start"]["known"] == 0:
-        mean[[PHI, V, YAW]] = found[[PHI, V, YAW]]
+        mean[[PHI, V]] = found[[PHI, V]]
+        if now["heading"]["in_site_frame"] == 1:  # otherwise the course at the start is the x axis
+            mean[YAW] = found[YAW]
         cov[PHI, PHI] += UNKNOWN_ANGLE**2
         cov[V, V] += UNKNOWN_SPEED**2
         if traces["referred"][0] != now["heading"]["in_site_frame"]:
@@ -123,10 +126,9 @@ def _set_prior(track: Track, traces: Array, origin: int, now: Array, reference_v
 def _put(poses: Array, points: Array, covs: Array, seen: Array, now: Array, anchors: Array) -> None:
     """Put the smoothed numbers into the poses. seen: BELIEF at the end of the data of each."""
     good = np.isfinite(points).all(axis=1) & np.isfinite(covs).all(axis=(1, 2))
-    if now["start"]["known"] == 0:
-        std = float(now["settings"]["reference_std"]) if now["heading"]["in_site_frame"] == 1 else ARBITRARY_YAW
-        for k in np.flatnonzero(good):
-            add_reference_variance(covs[k], points[k, 0], points[k, 1], std**2)
+    for k in np.flatnonzero(good & (poses["frame"] == Frame.SITE)):
+        if now["start"]["known"] == 0:
+            add_reference_variance(covs[k], points[k, 0], points[k, 1], float(now["settings"]["reference_std"]) ** 2)
     anchor = anchors[now["anchor"]]
     poses["x"][good], poses["y"][good] = points[good, 0] + anchor["x"], points[good, 1] + anchor["y"]
     poses["heading"][good], poses["speed"][good] = points[good, 2], points[good, 3]
