@@ -33,6 +33,13 @@ class StateReason(StrEnum):
     HEADING_UNSURE = "heading_unsure"
 
 
+class Frame(StrEnum):
+    """The frame of x, y, heading and covariance."""
+
+    SITE = "site"
+    RELATIVE = "relative"
+
+
 class _Answer(BaseModel):
     model_config = ConfigDict(frozen=True)
 
@@ -57,8 +64,8 @@ class Hypothesis(_Answer):
 
 
 class Pose(_Answer):
-    """The pose of one tag at one time, in the site frame (ENU, metres, x east). Lists of poses round `covariance`,
-    `lat` and `lon` to 9 decimals and all other numbers to 6."""
+    """The pose of one tag at one time, in the site frame (ENU, metres, x east) unless `frame` says otherwise. Lists of
+    poses round `covariance`, `lat` and `lon` to 9 decimals and all other numbers to 6."""
 
     tag: str
     t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")
@@ -68,6 +75,10 @@ class Pose(_Answer):
     state: TrackingState
     reason: StateReason = Field(description="Machine-readable reason of the state.")
     hint: str = Field(description="What an operator can do about it; empty if nothing needs to be done.")
+    frame: Frame = Field(
+        description="`relative`: turned about the anchor by an unknown angle, because north is not known. The x axis "
+        "is then the first direction of travel; distance from the anchor, speed and the shape of the track hold."
+    )
     x: float | None = Field(description="East, m; null while unknown.")
     y: float | None = Field(description="North, m; null while unknown.")
     heading_rad: float | None = Field(description="Counter-clockwise from east.")
@@ -106,6 +117,7 @@ class PoseFrame(_Answer):
     state: list[TrackingState]
     reason: list[StateReason]
     hint: list[str]
+    frame: list[Frame]
     anchor: list[str | None]
     age_s: list[float]
     x: list[float | None]

@@ -89,6 +89,8 @@ def _check_continuous(before: Array, after: Array) -> None:
     gap_s = int(after["t_ns"] - before["t_ns"]) * 1e-9
     if not (_is_known(before) and _is_known(after)):
         raise NoPoseThenError("the position of the tag was not known at that time")
+    if before["frame"] != after["frame"]:
+        raise NoPoseThenError("the frame of the tag's poses changed around that time")
     jump = math.hypot(after["x"] - before["x"], after["y"] - before["y"])
     if jump > MAX_SPEED * gap_s + 3 * math.hypot(before["sigma_pos"], after["sigma_pos"]):
         raise NoPoseThenError(f"the estimate jumped {jump:.1f} m around that time")

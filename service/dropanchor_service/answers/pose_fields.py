@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from dropanchor_schemas.pose import Pose, PoseFrame
-from dropanchor_service.answers.columns import REASONS, STATES, PoseColumns
+from dropanchor_service.answers.columns import FRAMES, REASONS, STATES, PoseColumns
 from dropanchor_service.answers.json_template import INTEGER, NUMBER, QUOTED, TEXT, null_for
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
 from dropanchor_service.estimation.columns import Array, State
@@ -142,6 +142,7 @@ _TABLE: Final = {
     "state": choice(lambda columns: (STATES, columns.poses["state"])),
     "reason": choice(lambda columns: (REASONS, columns.poses["reason"])),
     "hint": choice(lambda columns: (columns.hint_texts, columns.hint)),
+    "frame": choice(lambda columns: (FRAMES, columns.poses["frame"])),
     "x": engine_number("x"),
     "y": engine_number("y"),
     "heading_rad": engine_number("heading"),

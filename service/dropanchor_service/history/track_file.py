@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array, Frame
 
 VERSION = 1
 SLOT_NS = 10_000_000_000
@@ -22,7 +22,7 @@ BUSY_S = 5.0
 # The content of a row beside its key, 66 bytes. At 3 km float32 is exact to 0.2 mm.
 RECORD = np.dtype(
     [
-        *(("state", "u1"), ("reason", "u1"), ("anchor", "<i4")),  # anchor: id in the table of anchors, -1: none
+        *(("state", "u1"), ("reason", "u1"), ("anchor", "<i4")),  # state: bit 7 is the frame; anchor: its id, -1: none
         *((name, "<f4") for name in ("range", "x", "y", "heading", "speed", "yaw_rate")),
         ("cov", "<f4", 6),  # xx, xy, xh, yy, yh, hh
         *((name, "<f4") for name in ("p_mode", "sigma_pos", "sigma_obs")),
@@ -41,6 +41,7 @@ _SAME_IN_POSE = (
     "sigma_pos",
     "sigma_obs",
 )
+_RELATIVE = 0x80  # bit of the state that says that the pose is in a frame of the tag's own
 _UPPER_TRIANGLE = np.triu_indices(3)
 
 _SCHEMA = f"""
@@ -230,6 +231,7 @@ def _records(poses: Array, anchors: Array) -> list[bytes]:
     for name in _SAME_IN_POSE:
         records[name] = poses[name]
     records["anchor"] = anchors
+    records["state"] |= np.where(poses["frame"] == Frame.RELATIVE, _RELATIVE, 0).astype(np.uint8)
     records["cov"] = poses["cov"][:, *_UPPER_TRIANGLE]
     packed, size = records.tobytes(), RECORD.itemsize
     return [packed[start : start + size] for start in range(0, len(packed), size)]
@@ -242,6 +244,8 @@ def _stored(rows: Sequence[tuple[int, bytes]], anchor_names: Mapping[int, str]) 
     poses["t_ns"] = [t_ns for t_ns, _ in rows]
     for name in _SAME_IN_POSE:
         poses[name] = records[name]
+    poses["frame"] = np.where(records["state"] & _RELATIVE, Frame.RELATIVE, Frame.SITE)
+    poses["state"] &= ~np.uint8(_RELATIVE)
     poses["cov"][:, *_UPPER_TRIANGLE] = records["cov"]
     poses["cov"][:, *_UPPER_TRIANGLE[::-1]] = records["cov"]
     return StoredPoses(poses, [anchor_names.get(anchor_id) for anchor_id in records["anchor"].tolist()])

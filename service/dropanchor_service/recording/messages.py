@@ -7,10 +7,10 @@ import numpy as np
 
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.answers.answers import to_json
-from dropanchor_service.answers.columns import REASONS, STATES
+from dropanchor_service.answers.columns import FRAMES, REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.track_pages import ESTIMATED
-from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.recording import schemas
 from dropanchor_service.store.site import SiteDocument
 
@@ -56,9 +56,11 @@ def pose_messages(pose: Array, tag: str, anchor: str | None, document: SiteDocum
         "position": {"x": x, "y": y, "z": 0.0 if settings is None else settings.height_m},
         "orientation": rotation if math.isfinite(heading) else IDENTITY_ROTATION,
     }
-    in_frame = {"timestamp": stamp, "frame_id": FRAME, "pose": placement}
+    relative = pose["frame"] == Frame.RELATIVE
+    frame_id = f"{FRAME}/{tag}" if relative else FRAME  # viewers must not draw it as a place of the site
+    in_frame = {"timestamp": stamp, "frame_id": frame_id, "pose": placement}
     yield topic_of(tag, "pose"), schemas.POSE, to_json(in_frame)
-    if document.site.georeference is not None:
+    if document.site.georeference is not None and not relative:
         yield topic_of(tag, "location"), schemas.LOCATION, to_json({"timestamp": stamp} | _location(pose, document))
 
 
@@ -68,6 +70,7 @@ def _estimate(pose: Array, anchor: str | None) -> dict[str, object]:
         "t_ns": int(pose["t_ns"]),
         "state": STATES[pose["state"]],
         "reason": REASONS[pose["reason"]],
+        "frame": FRAMES[pose["frame"]],
     }
     numbers = {name: float(pose[field]) for name, field in ESTIMATED.items()}
     fields |= {name: value for name, value in numbers.items() if math.isfinite(value)}

@@ -47,6 +47,7 @@ def all_schemas() -> dict[str, Schema]:
             t_ns=_INTEGER,
             state=_TEXT,
             reason=_TEXT,
+            frame=_TEXT,
             anchor=_TEXT,
             covariance=_NINE,
             **dict.fromkeys(ESTIMATED, _NUMBER),

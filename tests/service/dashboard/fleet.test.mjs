@@ -148,3 +148,10 @@ test("a trail holds known positions, breaks at unknown ones, and has a limited l
   trails.prune(new Fleet());
   assert.equal(trails.of("a"), null);
 });
+
+test("a track without north is never a full dot, though it says tracking", () => {
+  const fleet = new Fleet();
+  fleet.apply(frame(["a", "b", "c"], { state: ["tracking", "tracking", "lost"], frame: ["relative", "site", "relative"] }), 0);
+  assert.deepEqual(fleet.names.map((_, row) => fleet.style(row).name), ["turned", "tracking", "lost"]);
+  assert.equal(fleet.style(0).placed, false);
+});

@@ -11,6 +11,7 @@ POSE: dict[str, Any] = {
     "state": "tracking",
     "reason": "resolved",
     "hint": "",
+    "frame": "site",
     "x": 3.2,
     "y": -1.7,
     "heading_rad": 0.61,

@@ -1,6 +1,6 @@
 /** The latest pose of every tag in columns, with one row per tag in the order of their first appearance. */
 
-import { OUT_OF_DATE, STATES, staleness, stateNumber } from "./states.js";
+import { OUT_OF_DATE, STATES, staleness, stateIn } from "./states.js";
 
 /** Columns of numbers; unknown is NaN. Names as in the stream. */
 const NUMBERS = /** @type {const} */ ([
@@ -78,7 +78,7 @@ export class Fleet {
     const rows = this.#rowsOf(frame.tags);
     for (const name of NUMBERS) if (frame[name]) writeNumbers(this.number[name], rows, frame[name]);
     for (const name of VALUES) if (frame[name]) writeValues(this.value[name], rows, frame[name]);
-    if (frame.state) rows.forEach((row, i) => (this.state[row] = stateNumber(frame.state[i])));
+    if (frame.state) rows.forEach((row, i) => (this.state[row] = stateIn(frame.state[i], frame.frame?.[i])));
     if (frame.online) rows.forEach((row, i) => (this.online[row] = frame.online[i] ? 1 : 0));
     if (frame.age_s) rows.forEach((row, i) => (this.poseTime[row] = now_ms - (frame.age_s[i] ?? NaN) * 1000));
   }

@@ -1,11 +1,11 @@
-/** The tracking states in the order of the contract, and how far a pose in each can be trusted. */
+/** The tracking states in the order of the contract, tracking without north, and how far a pose in each can be trusted. */
 
 /**
  * @typedef {object} StateStyle
  * @property {string} name as in the contract
  * @property {string} label
  * @property {string} meaning one sentence for people
- * @property {"disc"|"diamond"|"square"|"ring"|"dotted"|"cross"} shape differs per state, so colour is never needed
+ * @property {"disc"|"diamond"|"triangle"|"square"|"ring"|"dotted"|"cross"} shape differs per state, so colour is never needed
  * @property {boolean} placed whether x and y may be shown as the position of the tag
  * @property {boolean} trusted whether the pose is as good as the service can make it
  */
@@ -18,6 +18,7 @@ export const STATES = Object.freeze([
   { name: "coasting", label: "Coasting", meaning: "No ranges at the moment: predicted from motion alone.", shape: "diamond", placed: true, trusted: false },
   { name: "degraded", label: "Degraded", meaning: "Tracked, but with poor data: the position is rough.", shape: "square", placed: true, trusted: false },
   { name: "lost", label: "Lost", meaning: "The position is no longer known.", shape: "cross", placed: false, trusted: false },
+  { name: "turned", label: "North unknown", meaning: "Tracked, but turned about the anchor by an unknown angle: the dot is not where the tag is.", shape: "triangle", placed: false, trusted: false },
 ]);
 
 /** The style of every tag while no newer pose can arrive, since its state may have changed.
@@ -27,6 +28,7 @@ export const OUT_OF_DATE = Object.freeze({
   shape: "dotted", placed: false, trusted: false,
 });
 
+const LOST = 5;
 const NUMBERS = new Map(STATES.map((state, number) => [state.name, number]));
 
 /**
@@ -34,13 +36,20 @@ const NUMBERS = new Map(STATES.map((state, number) => [state.name, number]));
  * @param {string | null | undefined} name
  */
 export function stateNumber(name) {
-  return NUMBERS.get(name ?? "initialising") ?? STATES.length - 1;
+  return NUMBERS.get(name ?? "initialising") ?? LOST;
 }
 
 /** The states from the most to the least trusted. */
-export const BEST_FIRST = ["tracking", "coasting", "degraded", "ambiguous", "initialising", "lost"].map(stateNumber);
+export const BEST_FIRST = ["tracking", "turned", "coasting", "degraded", "ambiguous", "initialising", "lost"].map(stateNumber);
 
 export const AMBIGUOUS = stateNumber("ambiguous");
+
+/**
+ * Return the number of the state of a pose. One that can be trusted but for its direction from the anchor is "turned".
+ * @param {string | null} name
+ * @param {string | null | undefined} frame
+ */
+export const stateIn = (name, frame) => stateNumber(frame === "relative" && STATES[stateNumber(name)].placed ? "turned" : name);
 
 /** Seconds after which a pose is drawn hollow and fainter, and after which it is even fainter. */
 export const STALE_S = 2;

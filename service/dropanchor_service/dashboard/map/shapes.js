@@ -8,6 +8,8 @@ export function traceMarker(ctx, state, x, y, r) {
   switch (STATES[state].shape) {
     case "diamond":
       return tracePolygon(ctx, [x, y - 1.25 * r, x + 1.25 * r, y, x, y + 1.25 * r, x - 1.25 * r, y]);
+    case "triangle":
+      return tracePolygon(ctx, [x, y - 1.3 * r, x + 1.2 * r, y + r, x - 1.2 * r, y + r]);
     case "square":
       return tracePolygon(ctx, [x - r, y - r, x + r, y - r, x + r, y + r, x - r, y + r]);
     case "cross":
