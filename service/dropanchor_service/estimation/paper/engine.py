@@ -125,11 +125,12 @@ class PaperEngine:
 
 
 def _poses(rows: list[PoseValues]) -> Array:
-    """Return POSE of these values."""
+    """Return POSE of these values. What the engine leaves out is NaN, or 0 where it is a number of a choice."""
     poses = np.zeros(len(rows), POSE)
     for name in POSE.names or ():
+        unknown = np.nan if POSE[name].base.kind == "f" else 0
         for pose, values in zip(poses, rows, strict=True):
-            pose[name] = values.get(name, np.nan)
+            pose[name] = values.get(name, unknown)
     return poses
 
 
