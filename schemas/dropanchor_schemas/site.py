@@ -135,6 +135,11 @@ class TagSettings(_Settings):
         description="Whether the tag's magnetometer is calibrated where it is mounted, to 5 % of the field. Its "
         "heading then counts at once, otherwise after the first turns.",
     )
+    motion: Literal["vehicle", "carried", "auto"] = Field(
+        default="auto",
+        description="What moves the tag: a vehicle, which follows its course, or a person on foot, who may hold the "
+        "tag in any way; auto: a person while the accelerations show steps, otherwise a vehicle.",
+    )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
 
 

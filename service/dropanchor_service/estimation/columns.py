@@ -44,6 +44,7 @@ TAG_SETTINGS = np.dtype(
         ("start_heading", "f8"),  # NaN: not given
         ("start_std", "f8"),
         ("declination", "f8"),  # true minus magnetic north, positive east
+        ("motion", "u1"),
     ]
 )
 
@@ -123,6 +124,14 @@ class HeadingSource(IntEnum):
     AUTO = 0
     IMU = 1
     PLATFORM = 2
+
+
+class Motion(IntEnum):
+    """What moves the tag. AUTO: a person if it shows steps, else a vehicle."""
+
+    AUTO = 0
+    VEHICLE = 1
+    CARRIED = 2
 
 
 class State(IntEnum):

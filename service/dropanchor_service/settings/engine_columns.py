@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dropanchor_schemas.site import Anchor, TagSettings
-from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, default_settings
+from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, Motion, default_settings
 
 
 def anchor_columns(anchors: Sequence[Anchor]) -> Array:
@@ -32,6 +32,7 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["heading_std"] = _or_nan(tag.heading_std_rad)
     columns["magnetometer_calibrated"] = tag.magnetometer_calibrated
     columns["declination"] = declination_rad
+    columns["motion"] = Motion[tag.motion.upper()]
     if tag.start is not None:
         columns["start_known"] = True
         columns["start_x"], columns["start_y"] = tag.start.x, tag.start.y

@@ -1,12 +1,13 @@
 """Settings become columns of an engine, and the chosen engine is created."""
 
 import math
+from typing import Any
 
 import pytest
 
 from dropanchor_schemas import Anchor, StartPose, TagSettings
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.columns import HeadingSource
+from dropanchor_service.estimation.columns import HeadingSource, Motion
 from dropanchor_service.settings.engine_columns import anchor_columns, tag_columns
 from dropanchor_service.settings.sources import load_settings
 
@@ -26,6 +27,13 @@ def test_settings_of_a_tag_become_columns_and_settings_not_given_become_nan() ->
 def test_a_lever_arm_points_forward_and_to_the_left() -> None:
     columns = tag_columns(TagSettings(lever_forward_m=0.6, lever_left_m=-0.2), 0.0)
     assert [columns[name].item() for name in ("lever_x", "lever_y")] == [0.6, -0.2]
+
+
+@pytest.mark.parametrize("motion", list(Motion))
+def test_what_moves_a_tag_becomes_a_column(motion: Motion) -> None:
+    assert tag_columns(TagSettings(), 0.0)["motion"] == Motion.AUTO
+    name: Any = motion.name.lower()
+    assert tag_columns(TagSettings(motion=name), 0.0)["motion"] == motion
 
 
 def test_a_setting_of_zero_is_zero_and_not_nan() -> None:

@@ -92,6 +92,7 @@ TAG_SETTINGS: dict[str, Any] = {
     "heading_source": "auto",
     "heading_std_rad": None,
     "magnetometer_calibrated": False,
+    "motion": "auto",
     "start": {"x": 2.0, "y": 0.5, "heading_rad": None, "std_m": 0.1},
 }
 TAG: dict[str, Any] = {

@@ -47,7 +47,7 @@ class FleetEngine:
         release(self._rows[row], self._pool)
         self._rows[row] = configure_row(settings, self._tuning)
         hard_iron = HARD_IRON_CALIBRATED if settings["magnetometer_calibrated"] else HARD_IRON
-        start_frontend(self._fronts[row], hard_iron, float(settings["declination"]))
+        start_frontend(self._fronts[row], hard_iron, float(settings["declination"]), int(settings["motion"]))
         self._platforms[row] = np.zeros((), PLATFORM)
         self._queue.forget(row)
 

@@ -47,7 +47,7 @@ def test_newcomers_are_listed_with_the_latest_sender_first() -> None:
 def test_settings_are_stored_and_register_a_new_tag() -> None:
     bench = make_api_bench()
     app = bench.app()
-    settings = {"height_m": 1.5, "start": {"x": 1, "y": 2}}
+    settings = {"height_m": 1.5, "motion": "carried", "start": {"x": 1, "y": 2}}
     response = ask(app, "PUT", "/api/v1/tags/new%2Ftag/settings", json=settings)
     assert response.status_code == 200
     assert response.json() == TagSettings.model_validate(settings).model_dump()
@@ -79,6 +79,7 @@ def test_no_more_than_max_tags_are_registered() -> None:
         (b'{"height": 1}', "body.height"),
         (b'{"\\ud800": 1}', "body"),
         (b'{"heading_source": "\\udfff"}', "body.heading_source"),
+        (b'{"motion": "train"}', "body.motion"),
         (b'{"start": {"x": 1}}', "body.start.y"),
         (b'{"start": []}', "body.start"),
         (b"[]", "body"),

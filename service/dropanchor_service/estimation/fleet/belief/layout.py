@@ -21,6 +21,10 @@ ACC_BIAS: Final = 7  # m/s^2, bias of the forward acceleration
 REFERENCE: Final = 8  # rad, error of the heading reference
 RANGE_BIAS: Final = 9  # m, bias of ranges to the primary anchor, as measured
 LEFT_BIAS: Final = 10  # m/s^2, bias of the leftward acceleration
+GAIT_OFFSET: Final = (
+    ACC_BIAS  # rad, of a carried tag, whose accelerations are not used: direction of its steps - course
+)
+STEP_SCALE: Final = LEFT_BIAS  # of a carried tag: log of the speed that its steps give over its speed
 N: Final = 11
 PACKED: Final = N * (N + 1) // 2  # entries of the upper triangle of a covariance
 
@@ -122,6 +126,15 @@ GAP: Final = np.dtype(
     ]
 )
 
+WALK: Final = np.dtype(
+    [
+        ("carried", np.uint8),  # 1: the hypotheses are those of a carried tag
+        ("x", np.float64),  # m, from the anchor, where the tag was before the last steps
+        ("y", np.float64),
+        ("var", np.float64),  # m^2; 0: not known
+    ]
+)
+
 PUBLICATION: Final = np.dtype(
     [
         ("state", np.uint8),
@@ -153,6 +166,7 @@ ROW: Final = np.dtype(
         ("gap", GAP),
         ("publication", PUBLICATION),
         ("stuck", STUCK),
+        ("walk", WALK),
         ("first_slot", np.int32),  # of this row in the pool, -1: none
         ("count", np.int32),  # hypotheses
         ("t_ns", np.int64),

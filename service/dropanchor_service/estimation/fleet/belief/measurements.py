@@ -79,6 +79,17 @@ def update_with_range(
     anchor, primary = anchors[node.anchor], anchors[row.anchor]
     ox, oy, dz = anchor.x - primary.x, anchor.y - primary.y, settings.height - anchor.z
     clear = range_variance(row, node, anchor)
+    power, p, mean, std = t.likelihood_power, t.outlier_probability, t.outlier_mean, t.outlier_std
+    speed_max = settings.speed_max
+    if node.carried == 1:
+        clear *= t.walk_range_factor
+        power, p, mean, std = (
+            t.walk_likelihood_power,
+            t.walk_outlier_probability,
+            t.walk_outlier_mean,
+            t.walk_outlier_std,
+        )
+        speed_max = min(speed_max, t.walk_speed_max)
     best = best_of(work, count)
     y, S, p_outlier = 0.0, 1.0, 0.0
     low = -settings.speed_max if settings.reverse_allowed == 1 else -t.reverse_slack
@@ -88,11 +99,11 @@ def update_with_range(
         variance = clear
         if math.isfinite(node.dv_var):
             variance += settings.range_scale**2 * t.bilinear * P[V, V] * P[SLIP, SLIP] * settings.slip_tau**2
-        update_range(work[h], scratch, e, variance, t)
-        work[h].log_weight += t.likelihood_power * out[0]
+        update_range(work[h], scratch, e, variance, p, mean, std, t)
+        work[h].log_weight += power * out[0]
         if s[R] < 0.0:
             s[R] = NEAREST
-        work[h].log_weight += truncate_speed(s, P, scratch.PH, low, settings.speed_max)
+        work[h].log_weight += truncate_speed(s, P, scratch.PH, low, speed_max)
         if h == best:
             y, S, p_outlier = e, out[1], out[2]
     _update_misfit(row, y, S, p_outlier)

@@ -109,7 +109,7 @@ def _are_close(work: Hypotheses, a: int, b: int, distance: float) -> bool:
     dphi = wrap(work[b].mean[PHI] - work[a].mean[PHI])
     if dr * dr > d2 * P[R, R] + 1e-4 or dv * dv > d2 * P[V, V] + 1e-4 or dphi * dphi > d2 * P[PHI, PHI] + 1e-6:
         return False
-    angle = wrap(work[b].mean[YAW] - work[a].mean[YAW]) + work[b].mean[MOUNT] - work[a].mean[MOUNT] - dphi
+    angle = wrap(wrap(work[b].mean[YAW] - work[a].mean[YAW]) + work[b].mean[MOUNT] - work[a].mean[MOUNT] - dphi)
     return bool(angle * angle <= d2 * angle_variance(P) + 1e-6)
 
 
@@ -123,6 +123,7 @@ def _merge_into(work: Hypotheses, a: int, b: int) -> None:
         d[i] = work[b].mean[i] - work[a].mean[i]
     d[PHI] = wrap(d[PHI])
     d[YAW] = wrap(d[YAW])
+    d[MOUNT] = wrap(d[MOUNT])
     for i in range(N):
         work[a].mean[i] += share * d[i]
         for j in range(N):

@@ -13,6 +13,7 @@ right angles to the course in the middle of the node: only along that course doe
 import math
 from typing import Any
 
+from dropanchor_service.estimation.fleet.belief.carried import fill_carried_noise
 from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
@@ -161,6 +162,8 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     growth[ACC_BIAS] = (t.acc_bias_std**2 + rough_var) * lost
     growth[LEFT_BIAS] = (t.left_bias_std**2 + rough_var) * lost
     growth[RANGE_BIAS] = t.q_range_bias * dt if row.settings.range_bias_std > 0.0 else 0.0
+    if node.carried == 1:
+        fill_carried_noise(decay, growth, dt, row, t)
 
 
 @njit(nogil=True)
@@ -184,11 +187,12 @@ def fill_class_noise(decay: Floats, growth: Floats, node: Node, row: Row, headin
 def add_process_noise(s: Floats, P: Floats, F: Floats, growth: Floats, node: Node, t: Tuning, nlos: int) -> None:
     """Add the process noise of one node to P. F is that of `predict_state`."""
     dt = node.dt_s
-    P[R, R] += t.q_position * dt
-    P[PHI, PHI] += t.q_position * dt / max(s[R], 0.1) ** 2
+    q_position = t.q_position if node.carried == 0 else t.walk_position_q
+    P[R, R] += q_position * dt
+    P[PHI, PHI] += q_position * dt / max(s[R], 0.1) ** 2
     for i in range(2, N):
         P[i, i] += growth[i]
-    if not math.isfinite(node.dv_var):
+    if not math.isfinite(node.dv_var) and node.carried == 0:
         P[V, V] += t.q_speed_no_acc_moving * min(abs(s[V]), 1.0) ** 2 * dt
     if nlos == 1:
         P[RANGE_BIAS, RANGE_BIAS] += t.q_nlos * dt

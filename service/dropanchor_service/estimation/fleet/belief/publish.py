@@ -55,17 +55,19 @@ def publish(
     belief.sigma_obs = sigma_obs(row.publication.information)
     widen_by_reference(row, mean, cov)
     _update_resolved(row, node, p_mode, relative, r, t)
-    _set_state(row, relative, _sigma_pos(cov), r, work[head].nlos == 1)
-    if row.publication.resolved == 0 or p_mode < DOMINANT:
+    undecided = node.stepping == 1 and row.walk.carried == 0
+    _set_state(row, undecided, relative, _sigma_pos(cov), r, work[head].nlos == 1)
+    if row.publication.resolved == 0 or p_mode < DOMINANT or row.walk.carried == 1:
         spread_over_all(work, count, scratch)
     else:
         spread_over_classes(work, count, head, scratch, t.class_rejected_weight)
     widen_by_reference(row, mean, cov)
+    spread = t.walk_spread if row.walk.carried == 1 else 1.0
     for i in range(3):
         for j in range(3):
-            belief.cov[i, j] = cov[i, j]
+            belief.cov[i, j] = spread * cov[i, j]
     belief.p_mode = min(p_mode, 1.0)
-    belief.sigma_pos = _sigma_pos(cov)
+    belief.sigma_pos = math.sqrt(spread) * _sigma_pos(cov)
     belief.hypotheses, belief.relative = count, 1 - row.heading.in_site_frame
 
 
@@ -113,7 +115,7 @@ def _update_resolved(row: Row, node: Node, p_mode: float, relative: float, r: fl
 
 
 @njit(nogil=True)
-def _set_state(row: Row, relative: float, sigma: float, r: float, nlos: bool) -> None:
+def _set_state(row: Row, undecided: bool, relative: float, sigma: float, r: float, nlos: bool) -> None:
     """Set state and reason of the publication. The first condition that holds decides."""
     publication, unobserved_s = row.publication, row.gap.unobserved_s
     if row.since_range_s > RANGES_LOST_AFTER:
@@ -129,6 +131,8 @@ def _set_state(row: Row, relative: float, sigma: float, r: float, nlos: bool) ->
     elif sigma > max(LARGE_M, LARGE_SHARE * r):
         # A mode that is small without the rotation about the anchor lacks only the heading.
         publication.state, publication.reason = AMBIGUOUS, HEADING_UNSURE if _is_small(relative, r) else UNCERTAIN
+    elif undecided:  # whether it is carried
+        publication.state, publication.reason = AMBIGUOUS, UNCERTAIN
     elif row.nlos.misfit > MISFIT_LIMIT or nlos:
         publication.state, publication.reason = DEGRADED, RANGES_REJECTED
     else:

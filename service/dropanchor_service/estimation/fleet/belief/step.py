@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from dropanchor_service.estimation.fleet.belief.carried import follow_motion, update_with_steps
 from dropanchor_service.estimation.fleet.belief.gap import (
     accumulate_gap,
     is_stuck,
@@ -112,7 +113,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
 def _max_hypotheses(row: Row, t: Tuning) -> int:
     """Return how many hypotheses the row may have now."""
     if row.publication.resolved == 1:
-        return t.tracking_hypotheses
+        return t.tracking_hypotheses if row.walk.carried == 0 else t.walk_hypotheses
     return t.coarse_hypotheses if row.start.coarse == 1 else MAX_HYPOTHESES
 
 
@@ -130,6 +131,8 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floa
             count = merge(work, count, t.merge_distance if moving else t.merge_distance_at_rest, t.merge_light)
         if moving:  # only a motion makes a wide angle non-linear
             angle = t.coarse_split_angle if row.start.coarse == 1 else t.split_angle
+            if row.walk.carried == 1:
+                angle = t.walk_split_angle
             count = split(work, count, angle, SPLIT_DEPTH)
         count = keep_heaviest(work, count, _max_hypotheses(row, t))
     if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
@@ -144,6 +147,7 @@ def _run_node(
 ) -> int:
     """Predict and update a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
     PH = scratch.PH
+    count = follow_motion(work, count, row, node, t)
     if node.rest == RESTING and refutes_standstill(work[best_of(work, count)], t):
         node.rest = MOVING
     _predict_all(work, count, row, node, t, scratch)
@@ -152,6 +156,8 @@ def _run_node(
     if node.rest != MOVING:
         for h in range(count):
             work[h].log_weight += update_standstill(work[h].mean, work[h].cov, PH, node, t)
+    if node.carried == 1:
+        count = update_with_steps(work, count, node, t, scratch)
     row.since_range_s += node.dt_s
     widen_after_misfit(work, count, row, node, t)
     count = expect_los(work, count, row, node.dt_s, t)
@@ -190,6 +196,8 @@ def _reset_row(row: Row, pool: Pool) -> None:
     row.nlos.misfit = 0.0
     row.nlos.misfit_s = 0.0
     row.nlos.widened = 0
+    row.walk.carried = 0
+    row.walk.var = 0.0
 
 
 @njit(nogil=True)

@@ -97,16 +97,18 @@ def project(P: Floats, H: Floats, PH: Floats) -> float:
 
 
 @njit(nogil=True)
-def update_range(one: Hypothesis, scratch: Scratch, e: float, variance: float, t: Tuning) -> None:
+def update_range(
+    one: Hypothesis, scratch: Scratch, e: float, variance: float, p: float, mean: float, std: float, t: Tuning
+) -> None:
     """Update one hypothesis with the innovation e of a range, m, whose H is in scratch.
 
-    p(e) = (1 - p) N(e; 0, S) + p (N(e - mean; 0, S + sd^2) + floor): an outlier is too long, by `outlier_mean` or so.
+    p(e) = (1 - p) N(e; 0, S) + p (N(e - mean; 0, S + std^2) + floor): an outlier is too long, by `mean` or so.
     scratch.out receives (log likelihood, S, probability of an outlier).
     """
     S = project(one.cov, scratch.H, scratch.PH) + variance
-    wide = S + t.outlier_std**2
-    inside = (1.0 - t.outlier_probability) * gaussian(e, S)
-    outside = t.outlier_probability * (gaussian(e - t.outlier_mean, wide) + t.outlier_floor)
+    wide = S + std**2
+    inside = (1.0 - p) * gaussian(e, S)
+    outside = p * (gaussian(e - mean, wide) + t.outlier_floor)
     beta = inside / (inside + outside)
     update_pda(one.mean, one.cov, scratch.PH, S, e, beta)
     scratch.out[0] = math.log(inside + outside)
@@ -183,6 +185,8 @@ def update_standstill(s: Floats, P: Floats, PH: Floats, node: Node, t: Tuning) -
     """
     if node.rest == RESTING:
         update_component(s, P, PH, V, 0.0, t.rest_std**2)
+    if node.carried == 1:
+        return 0.0
     if node.gyro_bias_var > 0.0:
         if P[GYRO_BIAS, GYRO_BIAS] > 1.001 * node.gyro_bias_var:
             update_component(s, P, PH, GYRO_BIAS, 0.0, pseudo_measurement_variance(P[GYRO_BIAS, GYRO_BIAS], node))

@@ -109,8 +109,13 @@ def predict_attitude(a: Attitude, dt: float, gyro: Array, rest: bool) -> None:
 
 
 @njit(cache=True, nogil=True)
-def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: bool, roughness: float) -> None:
-    """Correct with one accelerometer sample, m/s^2. roughness: its variance within tenths of a second, (m/s^2)^2."""
+def correct_tilt(
+    a: Attitude, dt: float, ax: float, ay: float, az: float, rest: bool, roughness: float, tau: float = TAU
+) -> None:
+    """Correct with one accelerometer sample, m/s^2. roughness: its variance within tenths of a second, (m/s^2)^2.
+
+    tau: s, under motion.
+    """
     n = math.sqrt(ax * ax + ay * ay + az * az)
     if n < 1.0 or dt == 0.0:
         return
@@ -123,7 +128,7 @@ def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: 
     if rest or SETTLE < a.age < TAU:
         a.age = max(a.age, SETTLED)  # from now on the tilt is known, and a deviation is motion
     ux, uy, uz = up_in_body(a.q)
-    k = weight * dt / (min(a.age, TAU_REST if rest else TAU) + dt)
+    k = weight * dt / (min(a.age, TAU_REST if rest else tau) + dt)
     s = 1.0 / n
     ex, ey, ez = s * (ay * uz - az * uy), s * (az * ux - ax * uz), s * (ax * uy - ay * ux)
     if a.age >= SETTLED and not rest:
@@ -132,7 +137,7 @@ def correct_tilt(a: Attitude, dt: float, ax: float, ay: float, az: float, rest: 
         ex, ey, ez = scale * ex, scale * ey, scale * ez
     rotate_by(a.q, k * ex, k * ey, k * ez)
     if a.age > TAU:
-        ki = weight * dt / (TAU * TAU_BIAS)
+        ki = weight * dt / (tau * TAU_BIAS)
         a.bias[0] -= ki * ex
         a.bias[1] -= ki * ey
         a.bias[2] -= ki * ez

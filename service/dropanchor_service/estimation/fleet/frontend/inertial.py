@@ -26,6 +26,19 @@ from dropanchor_service.estimation.fleet.frontend.attitude import (
     yaw_of,
     yaw_rate_of,
 )
+from dropanchor_service.estimation.fleet.frontend.carrying import (
+    AUTO,
+    CARRYING,
+    VEHICLE,
+    add_carried_sample,
+    carried_rate,
+    carried_yaw,
+    decide_motion,
+    fill_carried_node,
+    start_carrying,
+    tilt_tau,
+    yaw_of_carried,
+)
 from dropanchor_service.estimation.fleet.frontend.magnetometer import (
     MAGNETOMETER,
     north_of,
@@ -64,6 +77,7 @@ FRONTEND = np.dtype(
         ("standstill", STANDSTILL),
         ("magnetometer", MAGNETOMETER),
         ("preintegration", PREINTEGRATION),
+        ("carrying", CARRYING),
         ("hard_iron", "f8"),  # prior sd of the magnetometer's hard iron, in units of the field
         ("declination", "f8"),  # rad, of magnetic north, positive east
         ("t_imu", "i8"),  # ns, of the last IMU sample
@@ -90,13 +104,14 @@ HEADING_FLOOR = 2e-4  # rad^2: tilt and mounting, 0.8 deg
 
 
 @njit(cache=True, nogil=True)
-def start_frontend(f: Frontend, hard_iron: float, declination: float) -> None:
+def start_frontend(f: Frontend, hard_iron: float, declination: float, motion: int = AUTO) -> None:
     """Reset the front-end.
 
     hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
-    declination: rad, true minus magnetic north, positive east.
+    declination: rad, true minus magnetic north, positive east. motion: the setting.
     """
     f.running = 0
+    f.carrying.motion = motion
     f.t_node = 0
     f.absolute = 0
     f.hard_iron = hard_iron
@@ -131,6 +146,7 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     f.magnetometer.count = 0.0
     f.magnetometer.sum_m[:] = 0.0
     f.magnetometer.sum_R[:] = 0.0
+    start_carrying(f.carrying, a.gravity, f.carrying.motion)
     if math.isfinite(acc[0] + acc[1] + acc[2]):
         level_attitude(a.q, acc[0], acc[1], acc[2])
     f.t_imu = t_ns
@@ -175,7 +191,7 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
     if is_frozen(f, dt, acc, gyro):
         return
     f.t_imu = t_ns
-    a, s, p = f.attitude, f.standstill, f.preintegration
+    a, s, p, c = f.attitude, f.standstill, f.preintegration, f.carrying
     if dt > GAP:
         lose_yaw_over_gap(f, dt)
         a.gyro[:] = gyro
@@ -187,13 +203,16 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
     else:
         s.quiet = 0.0
         p.no_acc_s += dt
-    update_gyro_bias(s, dt, gyro, a.bias)
-    rest = s.quiet > CONFIRM
+    if c.carried == 0:  # the hand of somebody who stands turns slowly, which is no bias
+        update_gyro_bias(s, dt, gyro, a.bias)
+    rest = s.quiet > CONFIRM and c.carried == 0
     predict_attitude(a, dt, gyro, rest)
     if heard:
-        correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var)
+        correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
         add_acceleration(p, dt, a.q, acc, a.gravity, s.acc_var)
-    p.yaw_rate = 0.0 if rest else yaw_rate_of(a)
+        if c.motion != VEHICLE:
+            add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)
+    p.yaw_rate = 0.0 if rest else carried_rate(a) if c.carried == 1 else yaw_rate_of(a)
     update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron)
 
 
@@ -246,6 +265,19 @@ def fill_gyro_bias(f: Frontend, node: Node) -> None:
 
 
 @njit(cache=True, nogil=True)
+def yaw_now(f: Frontend) -> float:
+    """Return the yaw, rad, as it is told for what moves the tag. A change of that is no turn."""
+    c, q = f.carrying, f.attitude.q
+    was_carried, yaw = c.carried, yaw_of(q)
+    decide_motion(c, q, yaw)
+    if c.carried == 1:
+        return yaw_of_carried(c, q)
+    if was_carried == 1:
+        f.preintegration.yaw_end = wrap(f.preintegration.yaw_end + yaw - carried_yaw(c, q))
+    return yaw
+
+
+@njit(cache=True, nogil=True)
 def close_node(f: Frontend, t_ns: int, node: Node) -> None:
     """End a node at t_ns, not before the last IMU sample or node, and begin the next.
 
@@ -258,9 +290,11 @@ def close_node(f: Frontend, t_ns: int, node: Node) -> None:
         return
     ahead = (t_ns - f.t_imu) * 1e-9
     f.t_node = t_ns
-    psi = end_node(f.preintegration, yaw_of(f.attitude.q), ahead, dt, node)
+    yaw = yaw_now(f)
+    psi = end_node(f.preintegration, yaw, ahead, dt, node)
     accumulate_drift(f, dt, node.dyaw)
     node.dt_s = dt
+    fill_carried_node(f.carrying, yaw, f.standstill.acc_var, node)
     fill_gyro_bias(f, node)
     fill_heading(f, psi, ahead, node)
     node.rest = RESTING if at_rest(f.standstill) and ahead < GAP else MOVING

@@ -49,6 +49,14 @@ NODE: Final = np.dtype(
         ("z_std", np.float64),  # m or rad; NaN: the tag's setting
         ("unobserved_s", np.float64),  # s of the interval that neither the IMU nor the platform's heading observed
         ("lag_s", np.float64),  # s by which the measurement is older than the end of the interval
+        ("carried", np.uint8),  # 1: a person carries the tag; what follows is then filled
+        ("stepping", np.uint8),  # 1: steps have begun, and may turn out to be those of a person
+        ("stands", np.uint8),  # 1: no step for a while, and calm
+        ("walked", np.float64),  # m since the person last stood; also of a tag that is not yet known to be carried
+        ("step_speed", np.float64),  # m/s, from the steps; 0: none
+        ("gait_angle", np.float64),  # rad, direction of the steps minus body yaw
+        ("gait_coherence", np.float64),  # 0 to 1; 0: there is no such angle
+        ("turned", np.float64),  # rad, of a quick turn that has just ended; 0: none
     ]
 )
 

@@ -20,29 +20,16 @@ from typing import Final
 import numpy as np
 
 from dropanchor_service.estimation.fleet.angles import wrap
-from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
-from dropanchor_service.estimation.fleet.belief.lateral import (
-    BOUND,
-    is_lateral_known,
-    is_rigid,
-    lateral_residual,
-    lateral_variance,
-)
+from dropanchor_service.estimation.fleet.belief.carried import widen_at_change
 from dropanchor_service.estimation.fleet.belief.layout import (
-    EXACT,
-    GYRO_BIAS,
     PHI,
-    PLATFORM_MODEL,
     RANGE_BIAS,
-    REFERENCE,
-    YAW,
     Anchors,
     Floats,
     N,
     R,
     Row,
     Rows,
-    V,
 )
 from dropanchor_service.estimation.fleet.belief.measurements import range_variance
 from dropanchor_service.estimation.fleet.belief.predict import (
@@ -52,21 +39,14 @@ from dropanchor_service.estimation.fleet.belief.predict import (
     predict_covariance,
     predict_state,
 )
-from dropanchor_service.estimation.fleet.belief.start import uses_heading
-from dropanchor_service.estimation.fleet.belief.update import (
-    gaussian,
-    predict_range,
-    project,
-    pseudo_measurement_variance,
-    update_pda,
-)
+from dropanchor_service.estimation.fleet.belief.update import gaussian, predict_range, project
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, RANGE, Node, Nodes
+from dropanchor_service.estimation.fleet.smoother.inertial import measure, update_inertial
 from dropanchor_service.estimation.fleet.smoother.products import apply, dot, multiply
 from dropanchor_service.estimation.fleet.smoother.track import Track
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-BOUND_STD: Final = 0.05  # m/s, softness of the bounds on the speed
 BEARING_STD: Final = 0.1  # rad, of a bearing whose std is not told
 NLOS_STD: Final = 1.1  # m, of a range offset that appears or goes: the outlier's mean and spread
 CONVERGED: Final = 1e-3  # m
@@ -81,8 +61,16 @@ def noise_of(node: Node, row: Row, heading_class: int, t: Tuning, decay: Floats,
 
 @njit(nogil=True)
 def _predict(
-    track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, scratch: tuple[Floats, Floats, Floats]
+    track: Track,
+    k: int,
+    nodes: Nodes,
+    row: Row,
+    heading_class: int,
+    t: Tuning,
+    scratch: tuple[Floats, Floats, Floats],
 ) -> None:
+    node = nodes[k]
+    changes = node.carried != nodes[k - 1].carried
     growth, s, A = scratch
     F, decay, m, P = track.F[k], track.decay[k], track.mean[k], track.cov[k]
     noise_of(node, row, heading_class, t, decay, growth)
@@ -100,54 +88,8 @@ def _predict(
     add_process_noise(s, P, F, growth, node, t, track.nlos[k])
     if track.nlos[k] != track.nlos[k - 1]:
         P[RANGE_BIAS, RANGE_BIAS] += NLOS_STD**2
-
-
-@njit(nogil=True)
-def _measure(track: Track, k: int, H: Floats, e: float, variance: float) -> None:
-    """Fuse z = h + noise; e = z - h(reference), H = dh/dx there."""
-    m, P, n = track.mean[k], track.cov[k], track.used[k]
-    PH = track.PH[k, n]
-    S = project(P, H, PH) + variance
-    for i in range(N):
-        e -= H[i] * (m[i] - track.reference[k, i])
-    track.H[k, n], track.S[k, n], track.e[k, n] = H, S, e
-    track.used[k] += 1
-    update_pda(m, P, PH, S, e, 1.0)
-
-
-@njit(nogil=True)
-def _component(track: Track, k: int, index: int, z: float, variance: float, H: Floats) -> None:
-    H[:] = 0.0
-    H[index] = 1.0
-    _measure(track, k, H, z - track.reference[k, index], variance)
-
-
-@njit(nogil=True)
-def _inertial(track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, H: Floats) -> None:
-    """Fuse heading, sideways acceleration, standstill and the bounds on the speed."""
-    s = track.reference[k]
-    if is_lateral_known(node) and is_rigid(row):
-        e = -lateral_residual(s, node, H)
-        _measure(track, k, H, e, max(lateral_variance(s, node, row, row.settings.slip_std), e * e / BOUND**2))
-    if uses_heading(row, node) and (row.heading.model != PLATFORM_MODEL or heading_class == EXACT):
-        white, _, _ = class_reference_error(row, heading_class, node.heading_var, t)
-        H[:] = 0.0
-        H[YAW] = H[REFERENCE] = 1.0
-        _measure(track, k, H, wrap(node.heading - row.heading.north - s[YAW] - s[REFERENCE]), white)
-    if node.rest == RESTING:
-        _component(track, k, V, 0.0, t.rest_std**2, H)
-    if node.rest == RESTING and node.gyro_bias_var > 0.0:
-        prior = track.cov[k, GYRO_BIAS, GYRO_BIAS]
-        if prior > 1.001 * node.gyro_bias_var:
-            _component(track, k, GYRO_BIAS, 0.0, pseudo_measurement_variance(prior, node), H)
-    elif node.rest != MOVING and node.dt_s > 0.0:
-        variance = node.dyaw_var / node.dt_s**2 + t.rest_gyro_std**2
-        _component(track, k, GYRO_BIAS, node.dyaw / node.dt_s, variance, H)
-    low = -row.settings.speed_max if row.settings.reverse_allowed == 1 else -t.reverse_slack
-    if s[V] < low:
-        _component(track, k, V, low, BOUND_STD**2, H)
-    elif s[V] > row.settings.speed_max:
-        _component(track, k, V, row.settings.speed_max, BOUND_STD**2, H)
+    if changes:
+        widen_at_change(P, t)
 
 
 @njit(nogil=True)
@@ -187,7 +129,7 @@ def _range(track: Track, k: int, node: Node, row: Row, anchors: Anchors, t: Tuni
     clear = track.share[k, 0] / variance
     long = track.share[k, 1] / (variance + t.outlier_std**2)
     if clear + long > 1e-6:
-        _measure(track, k, H, e - t.outlier_mean * long / (clear + long), 1.0 / (clear + long))
+        measure(track, k, H, e - t.outlier_mean * long / (clear + long), 1.0 / (clear + long))
     return likelihood
 
 
@@ -201,7 +143,7 @@ def _bearing(track: Track, k: int, node: Node, row: Row, anchors: Anchors, H: Fl
     H[R] = (dx * sn - dy * c) / d2
     H[PHI] = s[R] * (dx * c + dy * sn) / d2
     std = node.z_std if math.isfinite(node.z_std) and node.z_std > 0.0 else BEARING_STD
-    _measure(track, k, H, wrap(node.z - math.atan2(dy, dx)), std * std)
+    measure(track, k, H, wrap(node.z - math.atan2(dy, dx)), std * std)
 
 
 @njit(nogil=True)
@@ -216,11 +158,11 @@ def forward(
         node = nodes[k]
         if follow:
             track.reference[k - 1] = track.mean[k - 1]
-        _predict(track, k, node, row, heading_class, t, scratch)
+        _predict(track, k, nodes, row, heading_class, t, scratch)
         if follow:
             track.reference[k] = track.mean[k]
         track.used[k] = 0
-        _inertial(track, k, node, row, heading_class, t, H)
+        update_inertial(track, k, node, row, heading_class, t, H)
         if node.kind == RANGE:
             likelihood += _range(track, k, node, row, anchors, t, follow, H)
         elif node.kind == BEARING:

@@ -1,0 +1,125 @@
+"""Steps of a walking person, from the size of the acceleration, and the speed that they give.
+
+x is |a|, high-passed (TAU_HIGH) and low-passed (two poles at TAU_LOW). A step is a peak of x from which x has fallen by
+`reversal`, and that came at least MIN_INTERVAL after the one before. With the height W of a peak above the
+lowest point before it and the time T since the last peak, a step has (Kim 2004)
+
+    length = STEP_LENGTH W^(1/3),   speed = sum of lengths / sum of T, both with forgetting.
+
+A person walks when REGULAR_STEPS steps of at least MIN_SWING came at similar intervals.
+"""
+
+import math
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+
+from dropanchor_service.estimation.fleet.compiled import njit
+
+GAIT: Final = np.dtype(
+    [
+        ("slow", "f8"),  # m/s^2, slow mean of |a|
+        ("low", "f8", 2),  # m/s^2, the two poles
+        ("seen_s", "f8"),
+        ("falling", "u1"),  # 1: x has turned back from its last peak
+        ("peak", "f8"),  # m/s^2, highest x since the last trough
+        ("trough", "f8"),  # m/s^2, lowest x since the last peak
+        ("swing", "f8"),  # m/s^2, mean W of the last steps
+        ("since_peak_s", "f8"),  # since the highest x, which may become a step
+        ("since_step_s", "f8"),  # since the last step's peak
+        ("interval", "f8"),  # s, mean of the last steps
+        ("regular", "i4"),  # steps in a row at similar intervals
+        ("length_sum", "f8"),  # m, with forgetting
+        ("time_sum", "f8"),  # s
+        ("walked", "f8"),  # m since the person last stood
+    ]
+)
+Gait: TypeAlias = Any  # a record of GAIT
+
+TAU_HIGH = 1.5  # s
+TAU_LOW = 0.04  # s, of each of two poles: 2.6 Hz together
+MIN_INTERVAL, MAX_INTERVAL = 0.28, 1.2  # s
+REVERSAL, REVERSAL_SHARE = 0.6, 0.35  # m/s^2, and of the mean swing
+MIN_SWING = 2.5  # m/s^2, of a step that counts as walking
+SIMILAR = 0.35  # relative deviation of an interval from the mean
+REGULAR_STEPS = 3
+FORGET = 1.5  # s of steps in the mean speed
+STEP_LENGTH = 0.362  # m per (m/s^2)^(1/3)
+
+
+@njit(cache=True, nogil=True)
+def start_gait(g: Gait, size: float) -> None:
+    """Start with the size of one acceleration, m/s^2."""
+    g.slow = size
+    g.low[:] = 0.0
+    g.seen_s = 0.0
+    g.falling = 1
+    g.peak = g.trough = 0.0
+    g.swing = 0.0
+    g.since_peak_s = 0.0
+    g.since_step_s = MAX_INTERVAL
+    g.interval = 0.0
+    g.regular = 0
+    g.length_sum = g.time_sum = g.walked = 0.0
+
+
+@njit(cache=True, nogil=True)
+def add_step_sample(g: Gait, dt: float, size: float) -> bool:
+    """Take the size of one acceleration, m/s^2. Return whether it completes a step."""
+    g.seen_s += dt
+    g.slow += dt / (min(g.seen_s, TAU_HIGH) + dt) * (size - g.slow)
+    k = dt / (TAU_LOW + dt)
+    g.low[0] += k * (size - g.slow - g.low[0])
+    g.low[1] += k * (g.low[0] - g.low[1])
+    x = g.low[1]
+    g.since_step_s += dt
+    g.since_peak_s += dt
+    if g.since_step_s > MAX_INTERVAL:
+        g.regular = 0
+        g.length_sum = g.time_sum = g.walked = 0.0
+    reversal = max(REVERSAL, REVERSAL_SHARE * g.swing)
+    if g.falling == 0:
+        if x > g.peak:
+            g.peak, g.since_peak_s = x, 0.0
+        elif x < g.peak - reversal:
+            g.falling = 1
+            step = _end_step(g)
+            g.trough = x
+            return step
+    else:
+        if x < g.trough:
+            g.trough = x
+        elif x > g.trough + reversal:
+            g.falling = 0
+            g.peak, g.since_peak_s = x, 0.0
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _end_step(g: Gait) -> bool:
+    """Count the highest point as a step, unless it came too soon after the one before."""
+    interval = g.since_step_s - g.since_peak_s
+    if interval < MIN_INTERVAL:
+        return False
+    swing = g.peak - g.trough
+    if interval > MAX_INTERVAL:
+        g.regular, g.interval, g.swing = 0, 0.0, swing
+    else:
+        first = g.interval == 0.0
+        similar = swing > MIN_SWING and (first or abs(interval - g.interval) < SIMILAR * g.interval)
+        g.regular = g.regular + 1 if similar else 0
+        g.interval = interval if first else g.interval + 0.3 * (interval - g.interval)
+        g.swing += 0.3 * (swing - g.swing)
+        kept = math.exp(-interval / FORGET)
+        length = STEP_LENGTH * swing ** (1.0 / 3.0)
+        g.walked += length
+        g.length_sum = g.length_sum * kept + length
+        g.time_sum = g.time_sum * kept + interval
+    g.since_step_s = g.since_peak_s
+    return True
+
+
+@njit(cache=True, nogil=True)
+def step_speed(g: Gait) -> float:
+    """Return the speed of the last steps, m/s."""
+    return g.length_sum / g.time_sum if g.time_sum > 0.0 else 0.0

@@ -1,0 +1,175 @@
+"""A tag in a hand: what its steps teach, how it may be held, and when it is taken for carried."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import Motion
+from dropanchor_service.estimation.fleet.belief.carried import (
+    follow_motion,
+    update_gait_angle,
+    update_step_speed,
+    update_with_steps,
+)
+from dropanchor_service.estimation.fleet.belief.layout import (
+    GAIT_OFFSET,
+    MOUNT,
+    PHI,
+    ROW,
+    SLIP,
+    STEP_SCALE,
+    YAW,
+    N,
+    R,
+    V,
+    make_workspace,
+)
+from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.fleet.tuning import Tuning
+from dropanchor_service.evaluation.product.rows import selected, simulated_rows
+from dropanchor_service.evaluation.product.runs import TagRun, sources, tag_run
+from dropanchor_service.evaluation.product.work import Result, run_row, run_tags
+from support.belief import STATE, hypothesis_of, node_of
+
+SEEDS = range(5910, 5918)
+T = Tuning()
+
+
+def covariance() -> Any:
+    A = np.random.default_rng(3).standard_normal((N, N)) * 0.05
+    return A @ A.T + np.diag(np.full(N, 1e-3))
+
+
+def kalman(s: Any, P: Any, h: Any, e: float, variance: float) -> tuple[Any, Any]:
+    """Return the textbook Joseph form."""
+    K = P @ h / (h @ P @ h + variance)
+    L = np.eye(N) - np.outer(K, h)
+    return s + K * e, L @ P @ L.T + variance * np.outer(K, K)
+
+
+def walking_state() -> Any:
+    s = STATE.copy()
+    s[V], s[MOUNT], s[SLIP], s[GAIT_OFFSET], s[STEP_SCALE] = 1.3, 0.4, 0.1, -0.2, 0.08
+    return s
+
+
+def test_the_speed_of_the_steps_is_the_kalman_filter_of_speed_times_scale() -> None:
+    s, P, h = walking_state(), covariance(), np.zeros(N)
+    h[V], h[STEP_SCALE] = math.exp(0.08), 1.3 * math.exp(0.08)
+    z, e = 1.5, 1.5 - 1.3 * math.exp(0.08)
+    expected = kalman(s, P, h, e, max(T.step_speed_share * z, T.step_speed_std) ** 2)
+    one, scratch = hypothesis_of(s, P)
+    update_step_speed(one, scratch, z, T.record()[0])
+    np.testing.assert_allclose(one["mean"], expected[0], atol=1e-12)
+    np.testing.assert_allclose(one["cov"], expected[1], atol=1e-12)
+
+
+def test_the_direction_of_the_steps_turns_the_course_towards_it_and_prefers_who_walks_there() -> None:
+    ahead, scratch = hypothesis_of(walking_state(), covariance())
+    likely = update_gait_angle(ahead, scratch, 0.4, T.record()[0])
+    assert ahead["mean"][MOUNT] > 0.4
+    across, scratch = hypothesis_of(walking_state(), covariance())
+    assert update_gait_angle(across, scratch, 0.3 + math.pi / 2, T.record()[0]) < likely - 1.0
+
+
+def row_of_a_walk(walked: float) -> tuple[Any, Any, Any]:
+    """A row whose tag stood at (10, 0), its one hypothesis there, and a node after so many metres of steps."""
+    row, work, node = np.zeros(1, ROW)[0], make_workspace()[0]["hypotheses"], node_of()
+    row["publication"]["resolved"] = 1
+    row["settings"]["mount_angle_std"] = 0.5
+    row["walk"]["x"], row["walk"]["var"] = 10.0, 0.01
+    work[0]["mean"][:] = 0.0
+    work[0]["mean"][R] = 10.0
+    work[0]["cov"][:] = np.eye(N) * 0.01
+    work[0]["log_weight"] = 0.0
+    node["carried"], node["walked"] = 1, walked
+    return row, work, node
+
+
+def test_a_device_that_is_picked_up_may_be_held_in_any_way_and_its_carrier_is_where_the_steps_led() -> None:
+    row, work, node = row_of_a_walk(2.0)
+    count = follow_motion(work, 1, row, node, T.record()[0])
+    assert count == T.grips
+    mount = work["mean"][:count, MOUNT]
+    np.testing.assert_allclose(np.sort(mount % (2 * math.pi)), 2 * math.pi * np.arange(count) / count, atol=1e-9)
+    assert mount[work["log_weight"][:count].argmax()] == 0.0
+    r, phi = work["mean"][:count, R], work["mean"][:count, PHI]
+    np.testing.assert_allclose(r * np.cos(phi), 10.0 + 2.0 * np.cos(mount), atol=1e-9)
+    np.testing.assert_allclose(r * np.sin(phi), 2.0 * np.sin(mount), atol=1e-9)
+
+
+def test_a_known_mounting_angle_is_kept() -> None:
+    row, work, node = row_of_a_walk(1.0)
+    row["settings"]["mount_angle_std"] = 0.02
+    assert follow_motion(work, 1, row, node, T.record()[0]) == 1
+    assert work["mean"][0, MOUNT] == 0.0
+
+
+def test_bumps_of_a_fast_vehicle_are_no_steps() -> None:
+    row, work, node = row_of_a_walk(1.0)
+    work["mean"][0, V] = 5.0
+    assert follow_motion(work, 1, row, node, T.record()[0]) == 1
+    assert (row["walk"]["carried"], node["carried"]) == (0, 0)
+
+
+def test_after_a_quick_turn_the_device_may_have_turned_and_not_its_carrier() -> None:
+    _, work, node = row_of_a_walk(0.0)
+    node["turned"] = 1.5
+    scratch = make_workspace()[0]["scratch"]
+    assert update_with_steps(work, 1, node, T.record()[0], scratch) == 2
+    course = work["mean"][:2, YAW] + work["mean"][:2, MOUNT]
+    assert course[0] - course[1] == pytest.approx(1.5)
+    assert work["log_weight"][1] == pytest.approx(T.device_turn_log_prior)
+
+
+def runs_of(name: str, motion: Motion = Motion.AUTO) -> tuple[Any, list[TagRun]]:
+    (row,) = selected(simulated_rows(), [name])
+    runs = [tag_run(row, one) for one in sources(row, SEEDS)]
+    for run in runs:
+        run.settings["motion"] = motion
+    return row, runs
+
+
+def result_of(name: str) -> Result:
+    return run_row(*runs_of(name))
+
+
+def carried(name: str, motion: Motion) -> Any:
+    """Whether each tag is taken for carried at the end."""
+    engine = FleetEngine()
+    run_tags(engine, runs_of(name, motion)[1])
+    return engine.state()["rows"]["walk"]["carried"] == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "motion", "expected"),
+    [
+        ("walk-hand/6-axis/nothing/known", Motion.AUTO, True),
+        ("walk-pocket/6-axis/nothing/known", Motion.AUTO, True),
+        ("walk-hand/6-axis/nothing/known", Motion.VEHICLE, False),
+        ("M5/9-axis/nothing/known", Motion.AUTO, False),
+        ("forklift/9-axis/nothing/known", Motion.AUTO, False),
+        ("rolling/9-axis/nothing/known", Motion.CARRIED, True),
+    ],
+)
+def test_steps_or_the_setting_decide_whether_a_tag_is_carried(name: str, motion: Motion, expected: bool) -> None:
+    assert (carried(name, motion) == expected).all()
+
+
+def test_without_steps_auto_gives_the_poses_of_a_vehicle_to_the_last_bit() -> None:
+    tracks = [
+        run_tags(FleetEngine(), runs_of("C5/9-axis/nothing/known", motion)[1])[0]
+        for motion in (Motion.AUTO, Motion.VEHICLE)
+    ]
+    for auto, vehicle in zip(*tracks, strict=True):
+        assert auto.poses.tobytes() == vehicle.poses.tobytes()
+
+
+@pytest.mark.parametrize(("carry", "limit"), [("hand", 3.0), ("turned", 6.0)])
+def test_a_walk_is_followed_and_the_ellipse_holds_the_truth_while_tracking(carry: str, limit: float) -> None:
+    score = result_of(f"walk-{carry}/6-axis/nothing/known").score
+    assert score.rmse[0] < limit
+    assert score.coverage >= 0.93
+    assert score.tracking_share > 0.25
