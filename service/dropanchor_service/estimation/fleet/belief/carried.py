@@ -106,14 +106,18 @@ def _become_carried(one: Hypothesis, node: Node, t: Tuning) -> None:
 
 @njit(nogil=True)
 def widen_common_mount(P: Floats, row: Row) -> None:
-    """Widen the mounting angle to that of anybody's device, and with it the bearing of a ring."""
+    """Widen the mounting angle to that of anybody's device, and with it the bearing of a ring.
+
+    In a frame of the tag's own the course is given, so the yaw takes the error instead of the bearing.
+    """
     more = RING_MOUNT_STD**2 - row.settings.mount_angle_std**2
     if row.settings.mount_angle_std < MOUNT_KNOWN:
         return
+    other, sign = (PHI, 1.0) if row.heading.in_site_frame == 1 else (YAW, -1.0)
     P[MOUNT, MOUNT] += more
-    P[PHI, PHI] += more
-    P[PHI, MOUNT] += more
-    P[MOUNT, PHI] = P[PHI, MOUNT]
+    P[other, other] += more
+    P[other, MOUNT] += sign * more
+    P[MOUNT, other] = P[other, MOUNT]
 
 
 @njit(nogil=True)
