@@ -120,7 +120,11 @@ class TagSettings(_Settings):
     speed_max_mps: Positive | None = Field(
         default=None, description="Top speed of the tag; null: unknown, the engine's default."
     )
-    reverse_allowed: StrictBool = Field(default=False, description="Whether the tag may move backwards.")
+    reverse_allowed: StrictBool = Field(
+        default=False,
+        description="Whether the tag moves backwards as often as ahead. If false, the engine fleet still finds out when "
+        "a tag with an accelerometer reverses after a stop.",
+    )
     heading_source: Literal["auto", "imu", "platform"] = Field(
         default="auto",
         description="Source of the heading; auto: the IMU if the tag sends IMU samples, otherwise the platform.",

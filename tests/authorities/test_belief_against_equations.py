@@ -23,7 +23,6 @@ from dropanchor_service.estimation.fleet.belief.predict import predict_covarianc
 from dropanchor_service.estimation.fleet.belief.update import (
     predict_range,
     project,
-    refutes_standstill,
     truncate_speed,
     update_bearing,
     update_heading,
@@ -135,13 +134,6 @@ def kalman(s: Any, P: Any, h: Any, e: float, variance: float) -> tuple[Any, Any]
     K = P @ h / (h @ P @ h + variance)
     L = np.eye(N) - np.outer(K, h)
     return s + K * e, L @ P @ L.T + variance * np.outer(K, K)
-
-
-@pytest.mark.parametrize(("speed", "std", "rolls"), [(2.0, 0.1, True), (2.0, 1.0, False), (0.2, 0.01, False)])
-def test_a_speed_that_is_known_not_to_be_zero_refutes_a_standstill(speed: float, std: float, rolls: bool) -> None:
-    s, P = STATE.copy(), covariance()
-    s[V], P[V, V] = speed, std**2
-    assert refutes_standstill(hypothesis_of(s, P)[0], Tuning()) is rolls
 
 
 def test_a_heading_update_is_the_kalman_filter() -> None:

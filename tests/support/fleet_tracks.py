@@ -39,10 +39,11 @@ def drive(seed: int, legs: int = 4, turns: float = 1.0, range_std: float = 0.1, 
     middle, mean_v = yaw[:-1] + w[:-1] * DT / 2, (v[:-1] + v[1:]) / 2
     x = 10.0 + np.concatenate([[0.0], np.cumsum(mean_v * np.cos(middle)) * DT])
     y = np.concatenate([[0.0], np.cumsum(mean_v * np.sin(middle)) * DT])
-    return Drive(_sense(rng, x, y, yaw, v, range_std, row), x, y, v)
+    return Drive(sense(rng, x, y, yaw, v, range_std, row), x, y, v)
 
 
-def _sense(rng: Any, x: Any, y: Any, yaw: Any, v: Any, range_std: float, row: int) -> Any:
+def sense(rng: Any, x: Any, y: Any, yaw: Any, v: Any, range_std: float, row: int) -> Any:
+    """Return NODE (n,) of this motion: noisy yaw increments, accelerations, headings and ranges to the origin."""
     n = len(x)
     nodes = np.zeros(n, NODE)
     nodes["row"], nodes["t_ns"], nodes["dt_s"] = row, (np.arange(n) * DT * 1e9).astype(np.int64), DT

@@ -7,6 +7,7 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
+from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RANGE_STD = 0.1  # m
@@ -50,7 +51,7 @@ def configure_row(columns: Array, tuning: Tuning) -> Array:
     start["speed_std"] = START_SPEED_STD
     row["first_slot"] = -1
     row["anchor"] = -1
-    row["lateral_misfit"] = 0.0
+    row["quiet_share"] = QUIET_START
     return row
 
 

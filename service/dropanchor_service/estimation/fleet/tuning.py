@@ -69,6 +69,7 @@ class Tuning(NamedTuple):
     rest_gyro_std: float = 0.003  # rad/s
     misfit_s: float = 3.0
     reverse_slack: float = 0.05  # m/s
+    reverse_log_prior: float = -4.5  # log prior of driving off in the other direction
     start_bearings: int = 36
     start_speeds: int = 5
     start_speed_max: float = 5.0

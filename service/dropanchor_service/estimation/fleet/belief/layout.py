@@ -174,6 +174,9 @@ ROW: Final = np.dtype(
         ("faults", np.uint8),  # how often the numbers were not finite
         ("since_reduction_s", np.float64),  # s since the mixture was last merged and split
         ("since_range_s", np.float64),
+        ("stood_s", np.float64),  # s of rest until now
+        ("since_turnabout_s", np.float64),  # s since a tag that reversed was last offered to drive ahead
+        ("quiet_share", np.float64),  # share of the time in certain motion in which the IMU looked like rest
         ("since_class_check_s", np.float64),
         ("lateral_misfit", np.float64),  # mean square of the sideways innovation of a rigid mount, in its variance
         ("lever_rate", np.float64),  # rad/s, mean yaw rate of the last node
@@ -186,6 +189,7 @@ POOL_SLOT: Final = np.dtype(
         ("next", np.int32),
         ("heading_class", np.int32),  # EXACT, OWN_ERROR or DRIFTING
         ("nlos", np.int32),  # 1: there is no line of sight now, so ranges are too long
+        ("reverse", np.int32),  # 1: the tag moves backwards since it last stood
         ("free", np.int32),  # in slot 0: how many slots are free
         ("log_weight", np.float64),
         ("los_bias", np.float64),  # m, range bias before the line of sight was lost
@@ -223,6 +227,7 @@ WORKING_HYPOTHESIS: Final = np.dtype(
         ("log_weight", np.float64),
         ("heading_class", np.int32),
         ("nlos", np.int32),
+        ("reverse", np.int32),
         ("los_bias", np.float64),
         ("los_bias_var", np.float64),
         ("mean", np.float64, (N,)),

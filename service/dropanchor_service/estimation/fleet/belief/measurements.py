@@ -92,7 +92,6 @@ def update_with_range(
         speed_max = min(speed_max, t.walk_speed_max)
     best = best_of(work, count)
     y, S, p_outlier = 0.0, 1.0, 0.0
-    low = -settings.speed_max if settings.reverse_allowed == 1 else -t.reverse_slack
     for h in range(count):
         s, P = work[h].mean, work[h].cov
         e = node.z - predict_range(s, ox, oy, dz, node.lag_s, settings.range_scale, settings.range_bias, H)
@@ -103,7 +102,9 @@ def update_with_range(
         work[h].log_weight += power * out[0]
         if s[R] < 0.0:
             s[R] = NEAREST
-        work[h].log_weight += truncate_speed(s, P, scratch.PH, low, speed_max)
+        low = -settings.speed_max if settings.reverse_allowed == 1 or work[h].reverse == 1 else -t.reverse_slack
+        high = speed_max if work[h].reverse == 0 else t.reverse_slack
+        work[h].log_weight += truncate_speed(s, P, scratch.PH, low, high)
         if h == best:
             y, S, p_outlier = e, out[1], out[2]
     _update_misfit(row, y, S, p_outlier)

@@ -100,7 +100,11 @@ def angle_variance(P: Floats) -> float:
 @njit(nogil=True)
 def _are_close(work: Hypotheses, a: int, b: int, distance: float) -> bool:
     """Return whether r, v, phi and that angle are each within `distance` standard deviations of the heavier one, a."""
-    if work[a].heading_class != work[b].heading_class or work[a].nlos != work[b].nlos:
+    if (
+        work[a].heading_class != work[b].heading_class
+        or work[a].nlos != work[b].nlos
+        or work[a].reverse != work[b].reverse
+    ):
         return False
     P = work[a].cov
     d2 = distance * distance

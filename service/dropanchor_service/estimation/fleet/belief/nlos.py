@@ -126,7 +126,7 @@ def widen_after_misfit(work: Hypotheses, count: int, row: Row, node: Node, t: Tu
 
 @njit(nogil=True)
 def contradicts_ranges(work: Hypotheses, count: int, row: Row, t: Tuning) -> bool:
-    """Return whether the track is wrong: ranges stay outliers, or only a detour of metres would explain them.
+    """Return whether the track is wrong: ranges stay outliers, or only a long detour would explain them.
 
     A lost line of sight makes a range longer by a metre or so. A track that has gone wrong needs a larger extra bias
     as it moves away from the tag, and would take it for the path of the signal for ever.

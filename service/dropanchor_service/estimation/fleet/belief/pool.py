@@ -48,6 +48,7 @@ def load(row: Row, pool: Pool, work: Hypotheses) -> None:
         work[h].log_weight = stored.log_weight
         work[h].heading_class = stored.heading_class
         work[h].nlos = stored.nlos
+        work[h].reverse = stored.reverse
         work[h].los_bias = stored.los_bias
         work[h].los_bias_var = stored.los_bias_var
         k = 0
@@ -69,6 +70,7 @@ def store(row: Row, pool: Pool, work: Hypotheses, count: int) -> None:
         stored.log_weight = work[h].log_weight
         stored.heading_class = work[h].heading_class
         stored.nlos = work[h].nlos
+        stored.reverse = work[h].reverse
         stored.los_bias = work[h].los_bias
         stored.los_bias_var = work[h].los_bias_var
         k = 0

@@ -58,6 +58,7 @@ from dropanchor_service.estimation.fleet.belief.predict import (
     predict_state,
 )
 from dropanchor_service.estimation.fleet.belief.publish import publish
+from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_turnabout
 from dropanchor_service.estimation.fleet.belief.start import (
     collect_start,
     is_in_site_frame,
@@ -65,9 +66,9 @@ from dropanchor_service.estimation.fleet.belief.start import (
     uses_heading,
 )
 from dropanchor_service.estimation.fleet.belief.states import FAULT, INITIALISING
-from dropanchor_service.estimation.fleet.belief.update import refutes_standstill, update_standstill
+from dropanchor_service.estimation.fleet.belief.update import update_standstill
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, RESTING, Node, Nodes
+from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
 REDUCE_EVERY: Final = 0.1  # s between merging and splitting
@@ -142,39 +143,55 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floa
 
 
 @njit(nogil=True)
-def _run_node(
-    work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch, belief: Belief
-) -> int:
-    """Predict and update a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
-    PH = scratch.PH
+def _follow_motion_of(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
+    """Predict all hypotheses over the node, and fuse its heading, rest and steps. Return their count."""
     count = follow_motion(work, count, row, node, t)
-    if node.rest == RESTING and refutes_standstill(work[best_of(work, count)], t):
-        node.rest = MOVING
+    judge_standstill(work[best_of(work, count)], row, node, t)
+    count = offer_turnabout(work, count, row, node, t)
     _predict_all(work, count, row, node, t, scratch)
     if is_in_site_frame(node.heading_kind):
         count = update_with_heading(work, count, row, node, t, scratch)
     if node.rest != MOVING:
         for h in range(count):
-            work[h].log_weight += update_standstill(work[h].mean, work[h].cov, PH, node, t)
+            work[h].log_weight += update_standstill(work[h].mean, work[h].cov, scratch.PH, node, t)
     if node.carried == 1:
         count = update_with_steps(work, count, node, t, scratch)
+    return count
+
+
+@njit(nogil=True)
+def _fuse_measurement(
+    work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch, belief: Belief
+) -> int:
+    """Fuse the node's range or bearing, unless only a frame of the site gives it a meaning. Return the count."""
+    if row.heading.in_site_frame == 0 and tells_rotation(row, node):
+        count = place_in_site(work, count, row)
+        if row.heading.in_site_frame == 0:
+            return count
+    if node.kind == RANGE and row.anchor >= 0 and not belief.stuck:
+        update_with_range(work, count, row, node, anchors, t, scratch, belief)
+        row.since_range_s = 0.0
+        count = propose_alternatives(work, count, row, t)
+        close_nlos(work, count, scratch.PH, t)
+    if node.kind == BEARING and row.anchor >= 0:
+        update_with_bearing(work, count, row, node, anchors, t, scratch, belief)
+    return count
+
+
+@njit(nogil=True)
+def _run_node(
+    work: Hypotheses, count: int, row: Row, node: Node, anchors: Anchors, t: Tuning, scratch: Scratch, belief: Belief
+) -> int:
+    """Predict and update a row that has hypotheses. Return their count, 0 where the numbers are not finite."""
+    count = _follow_motion_of(work, count, row, node, t, scratch)
     row.since_range_s += node.dt_s
     widen_after_misfit(work, count, row, node, t)
     count = expect_los(work, count, row, node.dt_s, t)
     belief.stuck = is_stuck(row, node, work[best_of(work, count)].mean[V])
-    if row.heading.in_site_frame == 0 and tells_rotation(row, node):
-        count = place_in_site(work, count, row)
-    used = row.heading.in_site_frame == 1 or not tells_rotation(row, node)
-    if node.kind == RANGE and row.anchor >= 0 and used and not belief.stuck:
-        update_with_range(work, count, row, node, anchors, t, scratch, belief)
-        row.since_range_s = 0.0
-        count = propose_alternatives(work, count, row, t)
-        close_nlos(work, count, PH, t)
-    if node.kind == BEARING and row.anchor >= 0 and used:
-        update_with_bearing(work, count, row, node, anchors, t, scratch, belief)
+    count = _fuse_measurement(work, count, row, node, anchors, t, scratch, belief)
     if not all_finite(work, count):
         return 0
-    count = _reduce_mixture(work, count, row, node, PH, t)
+    count = _reduce_mixture(work, count, row, node, scratch.PH, t)
     for h in range(count):
         mirror(work[h].cov)
     return count

@@ -22,7 +22,6 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import RESTING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-ROLLING_SPEED, ROLLING_SIGMAS = 0.3, 4.0  # m/s and standard deviations from which a speed refutes a standstill
 BEARING_OUTLIER = 0.05  # probability that a bearing says nothing
 ASYMPTOTIC = -8.0  # standard deviations beyond which erfc has no digits left
 HALF_LOG_TWO_PI = 0.9189385332
@@ -165,16 +164,6 @@ def update_component(s: Floats, P: Floats, PH: Floats, index: int, z: float, var
 def pseudo_measurement_variance(prior: float, node: Node) -> float:
     """Return the variance of a measurement of the gyroscope's bias that turns a larger prior into gyro_bias_var."""
     return float(prior * node.gyro_bias_var / (prior - node.gyro_bias_var))
-
-
-@njit(nogil=True)
-def refutes_standstill(one: Hypothesis, t: Tuning) -> bool:
-    """Return whether the tag rolls: its speed is far from zero, and no deceleration was felt.
-
-    A smooth ride at constant speed looks like standstill to accelerometer and gyroscope.
-    """
-    speed, variance = one.mean[V], one.cov[V, V] + t.rest_std**2
-    return bool(abs(speed) > ROLLING_SPEED and speed * speed > ROLLING_SIGMAS**2 * variance)
 
 
 @njit(nogil=True)

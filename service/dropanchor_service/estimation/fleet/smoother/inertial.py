@@ -31,6 +31,7 @@ from dropanchor_service.estimation.fleet.smoother.track import Track
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 BOUND_STD: Final = 0.05  # m/s, softness of the bounds on the speed
+BACKWARDS: Final = 0.2  # m/s
 
 
 @njit(nogil=True)
@@ -88,7 +89,8 @@ def update_inertial(track: Track, k: int, node: Node, row: Row, heading_class: i
 @njit(nogil=True)
 def _bound_speed(track: Track, k: int, row: Row, t: Tuning, H: Floats) -> None:
     s = track.reference[k]
-    low = -row.settings.speed_max if row.settings.reverse_allowed == 1 else -t.reverse_slack
+    backwards = s[V] < -BACKWARDS or row.settings.reverse_allowed == 1  # the filter has decided that it drives so
+    low = -row.settings.speed_max if backwards else -t.reverse_slack
     if s[V] < low:
         _component(track, k, V, low, BOUND_STD**2, H)
     elif s[V] > row.settings.speed_max:

@@ -1,0 +1,72 @@
+"""A rest that is a smooth ride, and a tag that reverses though nobody said that it might."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import State, default_settings
+from dropanchor_service.estimation.fleet.belief.layout import N, V
+from dropanchor_service.estimation.fleet.belief.pool import make_pool
+from dropanchor_service.estimation.fleet.belief.standing import judge_standstill
+from dropanchor_service.estimation.fleet.configure import configure_row
+from dropanchor_service.estimation.fleet.frontend.node import MOVING, RESTING
+from dropanchor_service.estimation.fleet.tuning import Tuning
+from support.belief import STATE, hypothesis_of, node_of
+from support.fleet_tracks import DT, Drive, rows_of, run, sense
+
+
+def judged(speed: float, std: float, quiet_share: float | None = None) -> int:
+    """Return what a node of rest is after it was judged by this speed, m/s."""
+    rows = np.zeros(1, configure_row(default_settings(), Tuning()).dtype)
+    rows[0] = configure_row(default_settings(), Tuning())
+    if quiet_share is not None:
+        rows[0]["quiet_share"] = quiet_share
+    s, P = STATE.copy(), np.diag(np.full(N, 1e-4))
+    s[V], P[V, V] = speed, std**2
+    node = node_of()
+    node["rest"] = RESTING
+    judge_standstill(hypothesis_of(s, P)[0], rows[0], node, Tuning())
+    return int(node["rest"])
+
+
+@pytest.mark.parametrize(
+    ("speed", "std", "rest"),
+    [(2.0, 0.1, MOVING), (2.0, 2.0, RESTING), (0.05, 0.05, RESTING), (0.5, 0.1, MOVING), (0.5, 0.4, RESTING)],
+)
+def test_a_speed_that_is_far_from_zero_refutes_a_rest(speed: float, std: float, rest: int) -> None:
+    assert judged(speed, std) == rest
+
+
+def test_a_tag_that_rides_without_vibration_needs_less_to_refute_a_rest() -> None:
+    assert judged(0.4, 0.17, quiet_share=0.005) == RESTING
+    assert judged(0.4, 0.17, quiet_share=0.9) == MOVING
+
+
+def there_and_back(seed: int) -> Drive:
+    """Return a drive ahead, with a bend, a stop of 2 s, and back in another bend."""
+    rng = np.random.default_rng(seed)
+    v = np.concatenate(
+        [np.zeros(11), np.full(80, 1.5), np.zeros(20), np.full(60, -1.0), np.zeros(20), np.full(60, 1.2)]
+    )
+    w = np.concatenate([np.zeros(50), np.full(20, 0.4), np.zeros(41), np.full(60, 0.25), np.zeros(80)])
+    smooth = np.convolve(np.concatenate([np.zeros(4), v]), np.full(5, 0.2), "valid")
+    yaw = rng.uniform(-np.pi, np.pi) + np.concatenate([[0.0], np.cumsum(w[:-1]) * DT])
+    middle, mean_v = yaw[:-1] + w[:-1] * DT / 2, (smooth[:-1] + smooth[1:]) / 2
+    x = 10.0 + np.concatenate([[0.0], np.cumsum(mean_v * np.cos(middle)) * DT])
+    y = np.concatenate([[0.0], np.cumsum(mean_v * np.sin(middle)) * DT])
+    nodes = sense(rng, x, y, yaw, smooth, 0.1, 0)
+    nodes["rest"] = np.where((np.abs(smooth) < 1e-9) & (np.arange(len(x)) > 1), RESTING, MOVING)
+    return Drive(nodes, x, y, smooth)
+
+
+def test_a_tag_that_reverses_after_a_stop_is_followed_though_nobody_said_that_it_may() -> None:
+    errors: list[Any] = []
+    for seed in range(3000, 3008):
+        d = there_and_back(seed)
+        beliefs = run(rows_of(1, known=True), make_pool(512), d.nodes)
+        errors.append(np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y).max())
+        assert beliefs["speed"][150] == pytest.approx(-1.0, abs=0.3)
+        assert beliefs["speed"][-1] == pytest.approx(1.2, abs=0.3)
+        assert beliefs["state"][-1] == State.TRACKING
+    assert np.median(errors) < 0.6
