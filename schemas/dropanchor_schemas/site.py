@@ -122,8 +122,8 @@ class TagSettings(_Settings):
     )
     reverse_allowed: StrictBool = Field(
         default=False,
-        description="Whether the tag moves backwards as often as ahead. If false, the engine fleet still finds out when "
-        "a tag with an accelerometer reverses after a stop.",
+        description="Whether the tag moves backwards as often as ahead. If false, the engine fleet finds out by itself "
+        "when a tag with an accelerometer reverses after a stop.",
     )
     heading_source: Literal["auto", "imu", "platform"] = Field(
         default="auto",

@@ -1,4 +1,4 @@
-"""What the sideways acceleration tells: the mounting angle and the speed.
+"""Update a hypothesis with the sideways acceleration, which tells the mounting angle and the speed.
 
 What travels along its course turns its velocity by as much as its course turns. With w = dyaw - b_g dt,
 c = mount + slip + w/2, the increments f = dv_forward cos c + dv_left sin c - b_a dt along the course in the middle of
@@ -34,8 +34,8 @@ SMOOTH: Final = 0.015  # (m/s)^2/s, roughness of dv above which the sideways axi
 RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
 RIGID_BELOW: Final = 0.35  # mean square of its normalised innovation below which a mount is rigid
 RIGID_TAU: Final = 5.0  # s
-RIGID_CLIP: Final = 25.0  # most that one innovation counts
-LEAST_VAR: Final = 1e-6  # (m/s)^2
+RIGID_CLIP: Final = 25.0  # limit of what one innovation counts
+MIN_VAR: Final = 1e-6  # (m/s)^2
 SHARE: Final = 0.05  # of the increment, error of scale and timing: the body turns while a sharp turn is integrated
 
 
@@ -69,7 +69,7 @@ def lateral_variance(s: Floats, node: Node, row: Row, slip_std: float) -> float:
     """Return the variance of that increment, (m/s)^2. A change of the slip is an increment of velocity, too."""
     shared_var = SHARE**2 * (node.dv_forward**2 + node.dv_left**2)
     slip_var = slip_std**2 * 2.0 * node.dt_s / row.settings.slip_tau
-    return float(node.dv_var + s[V] * s[V] * (node.dyaw_var + slip_var) + shared_var + LEAST_VAR)
+    return float(node.dv_var + s[V] * s[V] * (node.dyaw_var + slip_var) + shared_var + MIN_VAR)
 
 
 @njit(nogil=True)

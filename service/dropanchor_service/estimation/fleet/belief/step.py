@@ -71,8 +71,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.tuning import Tuning, TuningRecord
 
-REDUCE_EVERY: Final = 0.1  # s between merging and splitting
-CHECK_CLASSES_EVERY: Final = 2.0  # s
+REDUCE_EVERY, CHECK_CLASSES_EVERY = 0.1, 2.0  # s between merging and splitting, between looking at heading classes
 SPLIT_DEPTH: Final = 6.0  # log weight below the best at which a hypothesis is not split
 
 
