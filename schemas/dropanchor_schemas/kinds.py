@@ -1,7 +1,7 @@
 """The kinds of samples: the one place that lists them. This module needs only the standard library.
 
 The codecs, the ingest, the counters and the recording take what they need to know about a kind from `KINDS`. To add a
-kind, add its sample class, its row of `KINDS` and its list in `Frame`.
+kind, add its sample class, its row of `SCALARS` and its list in `Frame`.
 """
 
 import math

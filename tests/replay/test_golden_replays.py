@@ -10,6 +10,7 @@ import pytest
 from replay.outputs import COLUMNS, REPLAYS, read_expected, replay
 
 TOLERANCE = 1e-6  # absolute, in m, rad and their squares; and relative, for variances of thousands of m²
+REWRITE = "PYTHONPATH=tests .venv/bin/python -m replay.rewrite"
 
 
 @pytest.mark.parametrize(("name", "engine"), REPLAYS)
@@ -17,5 +18,5 @@ def test_a_replay_gives_the_poses_that_are_written_down(name: str, engine: str) 
     expected, given = read_expected(name, engine), replay(name, engine)
     assert len(given) == len(expected)
     for column, was, now in zip(COLUMNS, zip(*expected, strict=True), zip(*given, strict=True), strict=True):
-        message = f"{column} of {name} with the engine {engine}: if that is meant, run `python -m replay.rewrite`"
+        message = f"{column} of {name} with the engine {engine}: if that is meant, run `{REWRITE}`"
         np.testing.assert_allclose(now, was, rtol=TOLERANCE, atol=TOLERANCE, err_msg=message)

@@ -154,6 +154,8 @@ def main(arguments: list[str]) -> int:
         return 2
     found = list(problems(ROOT, sorted(PAGES.glob("*.md"))))
     sys.stderr.writelines(f"{problem}\n" for problem in found)
+    if found:
+        sys.stderr.write("service/docs/results/README.md names the command that measures each page\n")
     return 1 if found else 0
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from dropanchor_service.evaluation import results
 from dropanchor_service.evaluation.results import Measured, NoPlaceError, main, problems, write
 
 PAGE = "# Results\n\n<!-- results speed -->\n<!-- end speed -->\n\nWhat it means.\n"
@@ -87,6 +88,18 @@ def test_the_code_of_the_page_counts_and_so_does_its_removal(root: Path) -> None
 def test_the_command_checks_and_does_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 2
     assert "--check" in capsys.readouterr().err
+
+
+def test_the_command_says_where_to_find_how_to_measure_an_outdated_table(
+    root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(results, "ROOT", root)
+    monkeypatch.setattr(results, "PAGES", root)
+    measure(root)
+    assert main(["--check"]) == 0
+    (root / "code.py").write_text(CODE.replace("2 * x", "3 * x"))
+    assert main(["--check"]) == 1
+    assert "results/README.md names the command" in capsys.readouterr().err
 
 
 def test_a_page_without_a_place_is_an_error(root: Path) -> None:
