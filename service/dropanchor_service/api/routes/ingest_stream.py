@@ -67,14 +67,14 @@ class _Connections:
 
 
 class _Acknowledgements:
-    """Of one connection."""
+    """Write the acknowledgements of one connection."""
 
     def __init__(self, answers: Answers, tag: str, started_ns: int) -> None:
         self._answers = answers
         self._tag = tag
         self._started_ns = started_ns
         self._messages = 0
-        self._looked_s = float("-inf")
+        self._state_s = float("-inf")
         self._state: tuple[str | None, str] = (None, "")
 
     def greeting(self) -> str:
@@ -85,7 +85,7 @@ class _Acknowledgements:
         return self._json(count_samples(payload, encoding))
 
     def _json(self, found: int | Rejection) -> str:
-        self._look()
+        self._refresh_state()
         rejection = found if isinstance(found, Rejection) else None
         return SamplesAcknowledged(
             message=self._messages,
@@ -99,19 +99,19 @@ class _Acknowledgements:
             hint=self._state[1],
         ).model_dump_json()
 
-    def _look(self) -> None:
-        """Read the state of the tag where the known one is too old."""
+    def _refresh_state(self) -> None:
+        """Read the state of the tag again if the last reading is too old."""
         now_s = time.monotonic()
-        if now_s - self._looked_s < STATE_S:
+        if now_s - self._state_s < STATE_S:
             return
-        self._looked_s = now_s
+        self._state_s = now_s
         tag = self._answers.tags.find(self._tag)
         pose = None if tag is None else self._answers.pose_of(tag)
         self._state = (None, "") if pose is None else (pose["state"], pose["hint"])
 
 
 class _Stream:
-    """What the connections share."""
+    """Serve all connections."""
 
     def __init__(
         self,
@@ -139,7 +139,7 @@ class _Stream:
             await socket.send_text(acknowledgements.greeting())
             async for payload, encoding in _messages(socket):
                 await self._wait_for_turn(client)
-                self._refuse_at_the_end(identity)
+                self._require_open(identity)
                 self._receive(tag, payload, encoding)
                 await socket.send_text(acknowledgements.of(payload, encoding))
 
@@ -157,14 +157,14 @@ class _Stream:
             raise _ClosedError(UNAUTHENTICATED, f"Not accepted: {error}.") from error
 
     async def _wait_for_turn(self, client: str) -> None:
-        """Take messages no faster than the limit of the client allows: it has to wait, but loses nothing."""
+        """Wait until the rate limit of the client allows another message. Nothing is lost."""
         if self._rate_limiter is None or (self._authenticator is None and client == LOOPBACK):
             return
         while wait_s := self._rate_limiter.wait_s(client):
             await asyncio.sleep(wait_s)
 
-    def _refuse_at_the_end(self, identity: Identity | None) -> None:
-        """Raise _ClosedError once the key is no longer valid, or once what is taken would not be used any more."""
+    def _require_open(self, identity: Identity | None) -> None:
+        """Raise _ClosedError once the service stops or the key is no longer valid."""
         if self._stopping.is_set():
             raise _ClosedError(RESTART, "The service stops. Connect again and send this message again.")
         if (

@@ -17,6 +17,7 @@ from dropanchor_service.answers.pose_at_time import NoPoseThenError, TooFarAhead
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
     AtTime,
     LastInnovations,
@@ -26,7 +27,6 @@ from dropanchor_service.api.routes.parameters import (
     id_of,
     json_response,
 )
-from dropanchor_service.store.tags import Tag
 
 PIECE_BYTES = 400_000  # larger writes are copied repeatedly while the kernel does not accept all of them
 
@@ -67,7 +67,7 @@ def poses_router(answers: Answers) -> APIRouter:
         | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.INVALID_REQUEST),
     )
     async def explain_pose(tag: TagId, query: Annotated[LastInnovations, Query()]) -> Response:
-        explanation = explanation_of(answers, _known(answers, tag), query.last)
+        explanation = explanation_of(answers, known_tag(answers, tag), query.last)
         if explanation is None:
             raise _no_pose_yet(answers, tag)
         return json_response(explanation)
@@ -118,22 +118,15 @@ async def _in_pieces(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[byte
         await asyncio.sleep(0)
 
 
-def _known(answers: Answers, name: str) -> Tag:
-    tag = answers.tags.find(name)
-    if tag is None:
-        raise ProblemError(Kind.UNKNOWN_TAG, f"Tag {name!r} has neither sent messages nor been configured.")
-    return tag
-
-
 def _no_pose_yet(answers: Answers, name: str) -> ProblemError:
-    hint = answers.hint_of(_known(answers, name))
+    hint = answers.hint_of(known_tag(answers, name))
     return ProblemError(
         Kind.NO_POSE_YET, f"Tag {name!r} has no pose, because no range of it has been used yet. {hint}".rstrip()
     )
 
 
 def _pose_of(answers: Answers, name: str) -> Answer:
-    pose = answers.pose_of(_known(answers, name))
+    pose = answers.pose_of(known_tag(answers, name))
     if pose is None:
         raise _no_pose_yet(answers, name)
     return pose

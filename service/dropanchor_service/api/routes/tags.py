@@ -12,6 +12,7 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
 
@@ -61,7 +62,7 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         responses=example_response(examples.TAG) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag(tag: TagId) -> Response:
-        return json_response(next(_statuses(answers, [_known(answers, tag)])))
+        return json_response(next(_statuses(answers, [known_tag(answers, tag)])))
 
     @router.get(
         "/tags/{tag}/settings",
@@ -71,7 +72,7 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag_settings(tag: TagId) -> Response:
-        return json_response(answers.site.tag_settings(_known(answers, tag).name).model_dump())
+        return json_response(answers.site.tag_settings(known_tag(answers, tag).name).model_dump())
 
     @router.put(
         "/tags/{tag}/settings",
@@ -100,13 +101,6 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         return json_response(settings.model_dump())
 
     return router
-
-
-def _known(answers: Answers, name: str) -> Tag:
-    tag = answers.tags.find(name)
-    if tag is None:
-        raise ProblemError(Kind.UNKNOWN_TAG, f"Tag {name!r} has neither sent messages nor been configured.")
-    return tag
 
 
 def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:

@@ -15,6 +15,7 @@ from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.known_tag import unknown_tag
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.history.tracks import Tracks
 
@@ -111,7 +112,7 @@ def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> T
 def _require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
     """Raise ProblemError when neither this process nor the stored history has seen the tag."""
     if answers.tags.find(tag) is None and not tracks.has_tag(tag):
-        raise ProblemError(Kind.UNKNOWN_TAG, f"Tag {tag!r} has neither sent messages nor been configured.")
+        raise unknown_tag(tag)
 
 
 def _link(query: dict[str, Any], form: str) -> str:
