@@ -70,7 +70,7 @@ class SpoolingPublisher:
         self._close_by_s: float | None = None
         self._sent = self._unwritten = 0
         self._unsynced = False
-        self._told_dropped = 0
+        self._logged_dropped = 0
         self._sync_s = self._next_log_s = self._next_chunk_s = 0.0
         self._name = tag_keys.samples
         self._linker = Linker(connect, tag_keys, declare, self._wake)
@@ -154,9 +154,9 @@ class SpoolingPublisher:
             except OSError as error:
                 self._unwritten += 1
                 self._warn(f"a message could not be written to the spool: {error}; free some space")
-        if self._spool.dropped > self._told_dropped:
-            self._told_dropped = self._spool.dropped
-            self._warn(f"the spool was full: its oldest {self._told_dropped} messages were deleted so far")
+        if self._spool.dropped > self._logged_dropped:
+            self._logged_dropped = self._spool.dropped
+            self._warn(f"the spool was full: its oldest {self._logged_dropped} messages were deleted so far")
         if self._unsynced and time.monotonic() >= self._sync_s:
             self._spool.sync()
             self._unsynced, self._sync_s = False, time.monotonic() + _SYNC_S

@@ -13,11 +13,11 @@ from dropanchor_tag_client.options import (
     opened_client,
 )
 from dropanchor_tag_client.sources.axes import AXES, Mounting, UpAxis, direction, mounting
-from dropanchor_tag_client.sources.bridge.teller import say_seldom
 from dropanchor_tag_client.sources.chips import CHIPS, Readings, open_chip
 from dropanchor_tag_client.sources.self_test import self_test
+from dropanchor_tag_client.sources.throttled_log import throttled_log
 
-_TELL_S = 10.0
+_LOG_INTERVAL_S = 10.0
 
 
 def add_chip_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Raises ChipError, ConnectError, ValueError. Runs until it is interrupted."""
     mounted = mounting(arguments.forward, arguments.up)
     if arguments.tag is None and not arguments.self_test:
-        raise ValueError("whose IMU is this? --tag says so, or --credentials")
+        raise ValueError("no tag was given: add --tag or --credentials")
     readings = opened_readings(arguments)
     if arguments.self_test:
         options = self_test(readings, arguments.rate, _print)
@@ -63,22 +63,22 @@ def run(arguments: argparse.Namespace) -> int:
 def opened_readings(arguments: argparse.Namespace) -> Readings:
     """Return the readings of the chip that the options name. Raises ChipError."""
     opened = partial(open_chip, arguments.device, arguments.bus, arguments.address)
-    return Readings(opened, arguments.rate, say_seldom())
+    return Readings(opened, arguments.rate, throttled_log())
 
 
 def publish(readings: Readings, client: TagClient, mounted: Mounting) -> None:
-    """Publish whatever the chip measures, for ever."""
-    up_axis, say, tell_s = UpAxis(), say_seldom(), time.monotonic() + _TELL_S
-    told = 0
+    """Publish every reading of the chip until the program is interrupted."""
+    up_axis, log, next_log_s = UpAxis(), throttled_log(), time.monotonic() + _LOG_INTERVAL_S
+    logged = 0
     for reading in readings:
         mag = None if reading.mag is None else mounted.to_body(reading.mag)
         client.publish_imu(mounted.to_body(reading.acc), mounted.to_body(reading.gyro), mag, t_ns=reading.t_ns)
         up = up_axis.add(reading.acc)
         if up is not None and mounted.up != direction(up):
-            say(f"gravity says that axis {up} of the chip points up: start again with --up={up}")
-        if time.monotonic() > tell_s and readings.dropped.total() > told:
-            told, tell_s = readings.dropped.total(), time.monotonic() + _TELL_S
-            say(f"{client.sent.samples} samples published{_left_out(readings)}")
+            log(f"gravity says that axis {up} of the chip points up: start again with --up={up}")
+        if time.monotonic() > next_log_s and readings.dropped.total() > logged:
+            logged, next_log_s = readings.dropped.total(), time.monotonic() + _LOG_INTERVAL_S
+            log(f"{client.sent.samples} samples published{_left_out(readings)}")
 
 
 def _left_out(readings: Readings) -> str:

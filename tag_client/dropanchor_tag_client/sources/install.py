@@ -33,7 +33,7 @@ WantedBy={target}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--user", action="store_true", help="write the unit for this user; without it, print one")
-    parser.add_argument("--unit", metavar="NAME", help="of the unit (default: dropanchor-tag-<tag>)")
+    parser.add_argument("--unit", metavar="NAME", help="name of the unit (default: dropanchor-tag-<tag>)")
     parser.add_argument("words", nargs=argparse.REMAINDER, metavar="COMMAND …", help=f"one of {', '.join(_COMMANDS)}")
     parser.set_defaults(credentials=None, site=None, connect=None)
 
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Raises ValueError. Exits with code 2 where the command itself is wrong."""
     words = [word for word in arguments.words if word != "--"]
     if not words or words[0] not in _COMMANDS:
-        raise ValueError(f"install what? A command with its options was expected: {', '.join(_COMMANDS)}")
+        raise ValueError(f"no command was given: add one of {', '.join(_COMMANDS)} with its options")
     given = parser(words[0]).parse_args(words)
     name = f"{arguments.unit or _name(given)}.service"
     if not arguments.user:

@@ -18,8 +18,8 @@ from dropanchor_tag_client.sources.bridge.decawave import Decawave
 from dropanchor_tag_client.sources.bridge.measurement import Format
 from dropanchor_tag_client.sources.bridge.pipe import Bridge
 from dropanchor_tag_client.sources.bridge.sensor_logger import SensorLogger
-from dropanchor_tag_client.sources.bridge.teller import say_seldom
 from dropanchor_tag_client.sources.bridge.template import Template
+from dropanchor_tag_client.sources.throttled_log import throttled_log
 
 PASSWORD_VARIABLE = "DROPANCHOR_MQTT_PASSWORD"
 _FLUSH_S = 0.1
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Raises BrokerError, TemplateError, ConnectError, ValueError. Runs until it is interrupted."""
     formats, names = _formats(arguments), anchor_names(arguments)
     topics = tuple(topic for one in formats for topic in one.topics)
-    broker = Broker(_settings(arguments), topics, say_seldom())
+    broker = Broker(_settings(arguments), topics, throttled_log())
     with opened_session(arguments) as session:
         options = {"site": arguments.site, "connect": session, "encoding": arguments.encoding, "batch_s": None}
         bridge = Bridge(formats, options | spool_settings(arguments), arguments.tag_prefix, names)
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def forward(broker: Broker, bridge: Bridge) -> None:
-    """Publish whatever comes, for ever."""
+    """Publish the measurements of every message until the program is interrupted."""
     flush_s = 0.0
     while True:
         message = broker.receive(_FLUSH_S)
@@ -79,8 +79,8 @@ def forward(broker: Broker, bridge: Bridge) -> None:
         if time.monotonic() >= flush_s:
             flush_s = time.monotonic() + _FLUSH_S
             bridge.flush()
-            bridge.lose(broker.lost)
-            bridge.tell()
+            bridge.count_lost(broker.lost)
+            bridge.log_dropped()
 
 
 def _formats(arguments: argparse.Namespace) -> list[Format]:
@@ -90,7 +90,7 @@ def _formats(arguments: argparse.Namespace) -> list[Format]:
     if arguments.sensor_logger is not None:
         formats.append(SensorLogger(arguments.sensor_logger))
     if not formats:
-        raise ValueError("what do the messages mean? --decawave, --sensor-logger TOPIC or --template FILE says so")
+        raise ValueError("no format was given: add --decawave, --sensor-logger TOPIC or --template FILE")
     return formats
 
 

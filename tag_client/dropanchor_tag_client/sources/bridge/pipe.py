@@ -1,4 +1,4 @@
-"""From messages of a broker to the clients of tags. What is left out is counted, and told at most once per second."""
+"""Publish the measurements in messages of a broker. What is left out is counted, and logged at most once per second."""
 
 import logging
 import time
@@ -14,13 +14,16 @@ from dropanchor_tag_client.sources.bridge.template import matches
 from dropanchor_tag_client.sources.publish import BadLineError, publisher_of
 
 MAX_TAGS = 256
-_SAY_EVERY_S = 1.0
+_LOG_INTERVAL_S = 1.0
 
 _log = logging.getLogger(__name__)
 
 
 class Bridge:
-    """dropped: what was left out so far, by reason. samples: number of samples that were published."""
+    """Send each measurement to the client of its tag.
+
+    dropped: what was left out so far, by reason. samples: number of samples that were published.
+    """
 
     def __init__(
         self, formats: Iterable[Format], options: Mapping[str, Any], prefix: str, names: Mapping[str, str]
@@ -33,7 +36,7 @@ class Bridge:
         self._prefix = prefix
         self._names = names
         self._clients: dict[str, TagClient] = {}
-        self._told: Counter[Drop] = Counter()
+        self._logged: Counter[Drop] = Counter()
         self._last_detail: dict[Drop, str] = {}
         self._next_s = 0.0
 
@@ -48,19 +51,19 @@ class Bridge:
         for client in self._clients.values():
             client.flush()
 
-    def lose(self, total: int) -> None:
+    def count_lost(self, total: int) -> None:
         """Count the messages that came faster than they could be used. total: since the start."""
         if total > self.dropped[Drop.BACKLOG]:
             self.dropped[Drop.BACKLOG] = total
             self._last_detail[Drop.BACKLOG] = "messages came faster than they can be used"
 
-    def tell(self) -> None:
-        """Tell what was left out since the last time, at most once per second."""
-        news = self.dropped - self._told
+    def log_dropped(self) -> None:
+        """Log what was left out since the last time, at most once per second."""
+        news = self.dropped - self._logged
         if not news or time.monotonic() < self._next_s:
             return
-        self._next_s = time.monotonic() + _SAY_EVERY_S
-        self._told = Counter(self.dropped)
+        self._next_s = time.monotonic() + _LOG_INTERVAL_S
+        self._logged = Counter(self.dropped)
         _log.warning(
             "left out: %s",
             "; ".join(

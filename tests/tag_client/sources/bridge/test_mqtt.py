@@ -177,7 +177,7 @@ def test_tls_and_a_password_are_used_and_a_foreign_certificate_is_refused(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["localhost"], "--decawave, --sensor-logger TOPIC or --template FILE says so"),
+        (["localhost"], "add --decawave, --sensor-logger TOPIC or --template FILE"),
         (["ftp://localhost", "--decawave"], "mqtt://host:1883 or mqtts://host:8883 was expected"),
         (["mqtt://localhost:port", "--decawave"], "the broker is"),
         (["localhost", "--decawave", "--mqtt-ca", "x"], "not an mqtts:// or wss:// address"),
