@@ -18,18 +18,20 @@ from dropanchor_tag_client.sources.imu import add_chip_arguments, opened_reading
 from dropanchor_tag_client.sources.publish import BadLineError, imu_of
 
 _CHECK_S = 2.0
-_LEAST_S = 30.0
+_MIN_DURATION_S = 30.0
 _NS = 1_000_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="of the tag, such as that of `dropanchor tag add`")
+    parser.add_argument(
+        "folder", type=Path, metavar="FOLDER", help="folder of the tag, such as the one from `dropanchor tag add`"
+    )
     add_chip_arguments(parser, required=False)
     parser.set_defaults(credentials=None, site=None, connect=None)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Raises ChipError, NotEnoughError, OSError as ValueError."""
+    """Calibrate and write the file. Raises ChipError, NotEnoughError, BadLineError, and ValueError for the folder."""
     if arguments.device is None:
         samples = list(samples_of_lines(sys.stdin.buffer))
     else:
@@ -44,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def guided(stream: Iterable[ImuSample]) -> list[ImuSample]:
-    """Tell a person what to do, and return the samples once they suffice, or at Ctrl-C."""
+    """Guide a person through the motions. Return the samples once they suffice, or at Ctrl-C."""
     samples: list[ImuSample] = []
     said, rests, check_ns = "", False, 0
     _say("Leave the tag alone.")
@@ -60,7 +62,7 @@ def guided(stream: Iterable[ImuSample]) -> list[ImuSample]:
                     rests = True
                     _say("Now turn it through full circles, then swing it in figures of eight. Ctrl-C ends.")
                 fit(samples)
-                if sample.t_ns - samples[0].t_ns > _LEAST_S * _NS or all(one.mag is None for one in samples):
+                if sample.t_ns - samples[0].t_ns > _MIN_DURATION_S * _NS or all(one.mag is None for one in samples):
                     break
             except NotEnoughError as error:
                 if rests and str(error) != said:

@@ -14,7 +14,7 @@ _BNO085_INTERVAL_US = 10_000
 _RETRY_S, _MAX_RETRY_S = 0.5, 5.0
 _FAILURES = 20  # readings in a row that fail before the chip is opened again
 _STUCK_S = 2.0  # after which readings that do not change at all are no measurements
-_BUS_SPEED_HINT = "check the wiring, the address (i2cdetect -y 1 lists them) and that I2C is switched on"
+_NO_ANSWER_HINT = "check the wiring, the address (i2cdetect -y 1 lists them) and that I2C is switched on"
 
 
 class ChipError(ValueError):
@@ -43,7 +43,7 @@ class Chip(Protocol):
 
 
 class Reading(NamedTuple):
-    """In the axes of the chip. mag: None where it has not been measured anew."""
+    """A reading in the axes of the chip. mag: None if the chip has no new value."""
 
     t_ns: int
     acc: Vector
@@ -82,14 +82,17 @@ def open_chip(device: str, bus: int, address: int | None) -> Chip:
     except ModuleNotFoundError:
         raise
     except Exception as error:  # the libraries raise many kinds where no chip answers
-        raise ChipError(f"{device} on I2C bus {bus} does not answer: {error}; {_BUS_SPEED_HINT}") from error
+        raise ChipError(f"{device} on I2C bus {bus} does not answer: {error}; {_NO_ANSWER_HINT}") from error
 
 
 class Readings:
-    """Read a chip at a rate, for ever. dropped: what was left out so far, by reason."""
+    """Read a chip at a fixed rate, and open it again when it fails.
+
+    dropped: number of readings that were left out so far, by reason.
+    """
 
     def __init__(self, opened: Callable[[], Chip], rate_hz: float, say: Callable[[str], None]) -> None:
-        """opened: opens the chip. Raises ChipError when that fails at first."""
+        """opened: opens the chip. say: shows a sentence to a person. Raises ChipError when the chip does not answer."""
         self.dropped: Counter[Drop] = Counter()
         self._opened = opened
         self._period_s = 1.0 / rate_hz
