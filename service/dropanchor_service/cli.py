@@ -20,15 +20,16 @@ _COMMANDS = {
     "key": "manage API keys of the REST interface",
     "record": "record the samples and poses of a service, and download the files",
     "replay": "run an engine on a recording, offline",
+    "foxglove": "show the poses of a running service live in Foxglove or Lichtblick",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }
 _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service provides their poses over Zenoh and REST.
 """
-_EVALUATION = ("matplotlib", "scipy", "sympy")
-_EVALUATION_IS_MISSING = """\
-This needs the extra 'evaluation': pip install 'dropanchor-service[evaluation]' (in a clone: make install)"""
+_EXTRAS = {"matplotlib": "evaluation", "scipy": "evaluation", "sympy": "evaluation", "foxglove": "foxglove"}
+_EXTRA_IS_MISSING = """\
+This needs the extra '{0}': pip install 'dropanchor-service[{0}]' (in a clone: make install)"""
 _EPILOG = """\
 examples:
   dropanchor demo                          run the service with simulated tags and watch them in a browser
@@ -44,9 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except ModuleNotFoundError as error:
-        if error.name not in _EVALUATION:
+        if error.name not in _EXTRAS:
             raise
-        print(_EVALUATION_IS_MISSING, file=sys.stderr)
+        print(_EXTRA_IS_MISSING.format(_EXTRAS[error.name]), file=sys.stderr)
         return 2
 
 

@@ -49,19 +49,20 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
 
 
 @pytest.mark.parametrize(
-    ("missing", "command"),
+    ("missing", "extra", "command"),
     [
-        ("matplotlib", ["evaluate", "paper"]),
-        ("scipy", ["evaluate", "recordings"]),
-        ("sympy", ["evaluate", "paper"]),
-        ("matplotlib", ["replay", "a folder", "--plot=track.png"]),
+        ("matplotlib", "evaluation", ["evaluate", "paper"]),
+        ("scipy", "evaluation", ["evaluate", "recordings"]),
+        ("sympy", "evaluation", ["evaluate", "paper"]),
+        ("matplotlib", "evaluation", ["replay", "a folder", "--plot=track.png"]),
+        ("foxglove", "foxglove", ["foxglove"]),
     ],
 )
-def test_a_command_that_needs_the_extra_says_how_to_install_it(missing: str, command: list[str]) -> None:
+def test_a_command_that_needs_an_extra_says_how_to_install_it(missing: str, extra: str, command: list[str]) -> None:
     ended = python("-c", without(missing) + COMMAND, *command)
     assert ended.returncode == 2
     assert ended.stderr.splitlines() == [
-        "This needs the extra 'evaluation': pip install 'dropanchor-service[evaluation]' (in a clone: make install)"
+        f"This needs the extra '{extra}': pip install 'dropanchor-service[{extra}]' (in a clone: make install)"
     ]
 
 

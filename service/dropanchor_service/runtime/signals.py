@@ -33,6 +33,10 @@ class Interrupt:
                 return self._event.is_set()
         return True
 
+    def wait_for(self, seconds: float) -> bool:
+        """Wait for a signal at most so long. Return whether one came."""
+        return self._event.wait(seconds)
+
     def on_signal(self, number: int, _frame: FrameType | None) -> None:
         """Handle a signal."""
         if self._event.is_set():
