@@ -21,13 +21,21 @@ _COMMANDS = {
     "record": "record the samples and poses of a service, and download the files",
     "replay": "run an engine on a recording, offline",
     "foxglove": "show the poses of a running service live in Foxglove or Lichtblick",
+    "ros2": "make a robot with ROS 2 a tag, and publish its pose to ROS",
     "evaluate": "run the experiments of the paper, or the engines on real recordings",
 }
 _DESCRIPTION = """\
 Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service provides their poses over Zenoh and REST.
 """
-_EXTRAS = {"matplotlib": "evaluation", "scipy": "evaluation", "sympy": "evaluation", "foxglove": "foxglove"}
+_EXTRAS = {
+    "matplotlib": "evaluation",
+    "scipy": "evaluation",
+    "sympy": "evaluation",
+    "foxglove": "foxglove",
+    "rosbags": "ros2",
+    "xxhash": "ros2",
+}
 _EXTRA_IS_MISSING = """\
 This needs the extra '{0}': pip install 'dropanchor-service[{0}]' (in a clone: make install)"""
 _EPILOG = """\

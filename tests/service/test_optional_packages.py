@@ -56,6 +56,8 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
         ("sympy", "evaluation", ["evaluate", "paper"]),
         ("matplotlib", "evaluation", ["replay", "a folder", "--plot=track.png"]),
         ("foxglove", "foxglove", ["foxglove"]),
+        ("rosbags", "ros2", ["ros2", "--tag=cart"]),
+        ("xxhash", "ros2", ["ros2", "--tag=cart"]),
     ],
 )
 def test_a_command_that_needs_an_extra_says_how_to_install_it(missing: str, extra: str, command: list[str]) -> None:

@@ -1,1 +1,1 @@
-"""Poses of a running service in the formats of other systems. Pure: no sockets."""
+"""Poses and samples in the formats of other systems. Pure: no sockets."""

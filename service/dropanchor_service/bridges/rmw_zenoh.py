@@ -1,0 +1,72 @@
+"""How ROS 2 nodes with rmw_zenoh name topics, announce themselves and number messages.
+
+Source: docs/design.md, liveliness_utils.cpp and attachment_helpers.cpp of ros2/rmw_zenoh, from Jazzy on.
+"""
+
+import struct
+from typing import NamedTuple
+
+from xxhash import xxh3_128_digest
+
+_ATTACHMENT = struct.Struct("<qqB16s")  # sequence number, source timestamp in ns UTC, length of the gid, gid
+_GID_BYTES = 16
+_DEPTH = 10
+_QOS = f"::,{_DEPTH}:,:,:,,"  # reliable, volatile, keep last; no deadline, lifespan or lease
+
+
+class RosType(NamedTuple):
+    """A message type. name: such as `sensor_msgs/msg/Imu`. type_hash: `RIHS01_…`."""
+
+    name: str
+    type_hash: str
+
+    @property
+    def dds_name(self) -> str:
+        package, kind, name = self.name.split("/")
+        return f"{package}::{kind}::dds_::{name}_"
+
+
+class Attachment(NamedTuple):
+    """What accompanies every message. rmw_zenoh drops messages without it."""
+
+    sequence: int
+    t_ns: int
+    gid: bytes
+
+    def packed(self) -> bytes:
+        return _ATTACHMENT.pack(self.sequence, self.t_ns, _GID_BYTES, self.gid)
+
+
+def attachment_from(data: bytes) -> Attachment | None:
+    """Return the attachment, None if it has another form."""
+    if len(data) != _ATTACHMENT.size:
+        return None
+    sequence, t_ns, length, gid = _ATTACHMENT.unpack(data)
+    return Attachment(sequence, t_ns, gid) if length == _GID_BYTES else None
+
+
+def topic_key(domain: int, topic: str, of: RosType) -> str:
+    """Return the key of the messages of a topic."""
+    return f"{domain}/{topic.strip('/')}/{of.dds_name}/{of.type_hash}"
+
+
+def topic_keys_of_any_version(domain: int, topic: str, of: RosType) -> str:
+    """Return the key expression of a topic's messages of this type, whatever its fields are."""
+    return f"{domain}/{topic.strip('/')}/{of.dds_name}/*"
+
+
+def node_token(domain: int, session: str, node: str) -> str:
+    """Return the liveliness key of a node. session: the Zenoh id. The node has the id 0 and no namespace."""
+    return f"@ros2_lv/{domain}/{session}/0/0/NN/%/%/{node}"
+
+
+def topic_token(domain: int, session: str, node: str, entity: int, role: str, topic: str, of: RosType) -> str:
+    """Return the liveliness key of a publisher (role `MP`) or subscription (`MS`). entity: its id in the session."""
+    name = "%" + topic.strip("/").replace("/", "%")
+    place = f"@ros2_lv/{domain}/{session}/0/{entity}/{role}/%/%/{node}"
+    return f"{place}/{name}/{of.dds_name}/{of.type_hash}/{_QOS}"
+
+
+def gid_of(token: str) -> bytes:
+    """Return the identity of an entity: XXH3 of its liveliness key, the low 64 bits first, each half little-endian."""
+    return xxh3_128_digest(token.encode())[::-1]

@@ -1,0 +1,130 @@
+"""Read and write the ROS 2 messages that matter here, as CDR. The types are those of ROS 2 Jazzy."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
+
+from dropanchor_schemas.wire import ImuSample, RangeSample, anchor_number
+from dropanchor_service.bridges.frames import frame_id
+from dropanchor_service.bridges.rmw_zenoh import RosType
+
+Json = Mapping[str, Any]
+
+UNKNOWN_VARIANCE = 1e6  # of z, roll and pitch, which are not estimated
+USABLE_STATES = ("tracking", "coasting", "degraded")
+_X, _Y, _YAW = 0, 1, 5  # rows of the 6 × 6 covariances of ROS
+
+
+class UnusableError(ValueError):
+    """The message holds no sample. The text names why."""
+
+
+class RosMessages:
+    """The message types, and the conversions."""
+
+    def __init__(self) -> None:
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self.imu = self._type("sensor_msgs/msg/Imu")
+        self.range = self._type("sensor_msgs/msg/Range")
+        self.pose = self._type("geometry_msgs/msg/PoseWithCovarianceStamped")
+        self.odometry = self._type("nav_msgs/msg/Odometry")
+        self.tf = self._type("tf2_msgs/msg/TFMessage")
+
+    def imu_sample(self, cdr: bytes, t_ns: int) -> ImuSample:
+        """Return the sample of a sensor_msgs/Imu. t_ns: its time if it has no stamp. Raises UnusableError."""
+        message = self._read(cdr, self.imu)
+        for covariance in (message.angular_velocity_covariance, message.linear_acceleration_covariance):
+            if covariance[0] == -1.0:  # by definition of the message
+                raise UnusableError("an IMU message without gyroscope or accelerometer")
+        acc, gyro = message.linear_acceleration, message.angular_velocity
+        if not all(map(math.isfinite, (acc.x, acc.y, acc.z, gyro.x, gyro.y, gyro.z))):
+            raise UnusableError("an IMU message that is not finite")
+        return ImuSample(_time_ns(message, t_ns), (acc.x, acc.y, acc.z), (gyro.x, gyro.y, gyro.z), None)
+
+    def range_sample(self, cdr: bytes, t_ns: int, anchor: str) -> RangeSample:
+        """Return the sample of a sensor_msgs/Range. t_ns: its time if it has no stamp. Raises UnusableError."""
+        message = self._read(cdr, self.range)
+        if not math.isfinite(message.range):  # infinite means: too close, or nothing there
+            raise UnusableError("a range that is not finite")
+        has_limits = message.max_range > message.min_range
+        if has_limits and not message.min_range <= message.range <= message.max_range:
+            raise UnusableError("a range outside min_range and max_range")
+        std_m = math.sqrt(message.variance) if message.variance > 0 else math.nan
+        return RangeSample(_time_ns(message, t_ns), anchor_number(anchor), message.range, std_m)
+
+    def pose_cdr(self, pose: Json, height_m: float) -> bytes:
+        """Return the geometry_msgs/PoseWithCovarianceStamped of a usable pose (JSON of `Pose`)."""
+        return self._write(self.pose, header=self._header(pose), pose=self._pose_with_covariance(pose, height_m))
+
+    def odometry_cdr(self, pose: Json, height_m: float, child_frame: str) -> bytes:
+        """Return the nav_msgs/Odometry of a usable pose with a speed. The covariance of the twist is 0: unknown."""
+        twist = self._make(
+            "geometry_msgs/msg/Twist",
+            linear=self._make("geometry_msgs/msg/Vector3", x=pose["speed_mps"], y=0.0, z=0.0),
+            angular=self._make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=pose["yaw_rate_radps"]),
+        )
+        return self._write(
+            self.odometry,
+            header=self._header(pose),
+            child_frame_id=child_frame,
+            pose=self._pose_with_covariance(pose, height_m),
+            twist=self._make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=np.zeros(36)),
+        )
+
+    def tf_cdr(self, pose: Json, height_m: float, child_frame: str) -> bytes:
+        """Return the tf2_msgs/TFMessage of a usable pose."""
+        place = self._make("geometry_msgs/msg/Vector3", x=pose["x"], y=pose["y"], z=height_m)
+        transform = self._make("geometry_msgs/msg/Transform", translation=place, rotation=self._rotation(pose))
+        stamped = self._make(
+            "geometry_msgs/msg/TransformStamped",
+            header=self._header(pose),
+            child_frame_id=child_frame,
+            transform=transform,
+        )
+        return self._write(self.tf, transforms=[stamped])
+
+    def _pose_with_covariance(self, pose: Json, height_m: float) -> Any:
+        point = self._make("geometry_msgs/msg/Point", x=pose["x"], y=pose["y"], z=height_m)
+        placed = self._make("geometry_msgs/msg/Pose", position=point, orientation=self._rotation(pose))
+        covariance = np.diag([0.0, 0.0, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, UNKNOWN_VARIANCE, 0.0])
+        covariance[np.ix_([_X, _Y, _YAW], [_X, _Y, _YAW])] = pose["covariance"]
+        return self._make("geometry_msgs/msg/PoseWithCovariance", pose=placed, covariance=covariance.reshape(-1))
+
+    def _rotation(self, pose: Json) -> Any:
+        half_rad = pose["heading_rad"] / 2
+        return self._make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=math.sin(half_rad), w=math.cos(half_rad))
+
+    def _header(self, pose: Json) -> Any:
+        sec, nanosec = divmod(pose["t_ns"], 1_000_000_000)
+        stamp = self._make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
+        return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id(pose))
+
+    def _type(self, name: str) -> RosType:
+        return RosType(name, self._store.hash_rihs01(name))
+
+    def _make(self, name: str, **fields: Any) -> Any:
+        return self._store.types[name](**fields)
+
+    def _write(self, of: RosType, **fields: Any) -> bytes:
+        return bytes(self._store.serialize_cdr(self._make(of.name, **fields), of.name))
+
+    def _read(self, cdr: bytes, of: RosType) -> Any:
+        try:
+            return self._store.deserialize_cdr(cdr, of.name)
+        except SerdeError as error:
+            raise UnusableError(f"a damaged {of.name}") from error
+
+
+def is_usable(pose: Json) -> bool:
+    """Return whether a robot may act on the pose. ROS messages cannot say that it is lost or ambiguous."""
+    needed = ("x", "y", "heading_rad", "covariance")
+    return pose["state"] in USABLE_STATES and all(pose[name] is not None for name in needed)
+
+
+def _time_ns(message: Any, t_ns: int) -> int:
+    stamp = message.header.stamp
+    return stamp.sec * 1_000_000_000 + stamp.nanosec or t_ns

@@ -1,0 +1,254 @@
+"""`dropanchor ros2`: a robot with ROS 2 and rmw_zenoh as a tag, without a ROS installation."""
+
+import argparse
+import os
+import re
+import sys
+import time
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import ExitStack
+from functools import partial
+from threading import Event, Thread
+from typing import Any
+from urllib.parse import quote
+
+from dropanchor_service.bridges.frames import tag_frame_id
+from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
+from dropanchor_service.commands.options import positive
+from dropanchor_service.commands.rest import KEY_VARIABLE, RefusedError, asked
+from dropanchor_service.commands.ros_node import RosNode
+from dropanchor_service.runtime.signals import interrupts
+from dropanchor_tag_client import TagClient
+from dropanchor_tag_client.options import add_connection_options, apply_defaults, opened_client, opened_session
+from dropanchor_tag_client.session import ConnectError
+from dropanchor_tag_client.sources.axes import AXES, Mounting, mounting
+
+DESCRIPTION = f"""\
+Makes a robot with ROS 2 a tag. Its nodes must use rmw_zenoh (RMW_IMPLEMENTATION=rmw_zenoh_cpp, ROS 2 Jazzy or newer).
+Reads sensor_msgs/Imu and sensor_msgs/Range, and publishes the tag's pose as geometry_msgs/PoseWithCovarianceStamped,
+nav_msgs/Odometry and TF. If the service requires an API key for poses, set the environment variable {KEY_VARIABLE}.
+"""
+EPILOG = """\
+published topics (with --namespace dropanchor), while the state is tracking, coasting or degraded:
+  /dropanchor/pose       geometry_msgs/PoseWithCovarianceStamped   in the frame site
+  /dropanchor/odometry   nav_msgs/Odometry                         while speed and yaw rate are known
+  /tf                    tf2_msgs/TFMessage                        from site to --child-frame; --no-tf: not
+
+A pose that is not in the site's frame is in the frame site/TAG.
+
+examples:
+  dropanchor ros2 --tag cart --imu /imu/data --range /uwb/range=1
+  dropanchor ros2 --tag cart --imu /imu/data --forward=-y --range /uwb/left=1 --range /uwb/right=2
+  dropanchor ros2 --tag cart --namespace cart/dropanchor --child-frame cart/base_link     poses only
+  dropanchor ros2 --credentials cart/ --url https://yard.example:8080 --ros-connect tcp/127.0.0.1:7447
+"""
+EXIT_ERROR = 2
+
+Json = Mapping[str, Any]
+
+ROS_CONNECT = "tcp/127.0.0.1:7447"
+DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
+_NAME = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+_NODE = "dropanchor"
+_TAKE_S = 0.1
+_REPORT_S = 1.0
+_SETTINGS_S = 5.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--tag", help="id of the tag (default: the one of --credentials)")
+    ros = parser.add_argument_group("ROS 2")
+    ros.add_argument(
+        "--ros-connect", default=ROS_CONNECT, metavar="ENDPOINT", help="router of the ROS nodes (default: %(default)s)"
+    )
+    ros.add_argument(
+        "--domain",
+        type=int,
+        default=int(os.environ.get(DOMAIN_VARIABLE) or 0),
+        help=f"ROS domain (default: {DOMAIN_VARIABLE}, or 0)",
+    )
+    ros.add_argument("--imu", type=_topic, metavar="TOPIC", help="read sensor_msgs/Imu from this topic")
+    ros.add_argument("--forward", choices=AXES, default="x", help="axis of the IMU that points forward (default: x)")
+    ros.add_argument("--up", choices=AXES, default="z", help="axis of the IMU that points up (default: z)")
+    ros.add_argument(
+        "--range",
+        type=_range_topic,
+        action="append",
+        default=[],
+        metavar="TOPIC=ANCHOR",
+        help="read sensor_msgs/Range to this anchor from this topic; may be repeated",
+    )
+    ros.add_argument("--namespace", type=_topic, default="dropanchor", help="of the published topics (%(default)s)")
+    ros.add_argument("--child-frame", metavar="FRAME", help="frame that moves with the tag (default: tag/TAG)")
+    ros.add_argument("--no-tf", action="store_true", help="do not publish TF: something else does")
+    ros.add_argument("--max-hz", type=positive, default=20, metavar="HZ", help="poses per second (default: 20)")
+    add("--url", default="http://127.0.0.1:8080", help="URL of the service, for poses (default: %(default)s)")
+    add_connection_options(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Bridge until Ctrl-C or SIGTERM. Return 0, or 2 on an error."""
+    try:
+        apply_defaults(arguments)
+        if arguments.tag is None:
+            raise ValueError("which tag is the robot? --tag says so, or --credentials")
+        mounted = mounting(arguments.forward, arguments.up)
+        with ExitStack() as stack:
+            node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))), arguments.domain, _NODE)
+            reads = arguments.imu or arguments.range
+            client = stack.enter_context(opened_client(arguments, arguments.tag)) if reads else None
+            _bridge(arguments, node, client, mounted)
+    except (ConnectError, ValueError, OSError) as error:
+        _say(str(error))
+        return EXIT_ERROR
+    return 0
+
+
+def _ros_options(arguments: argparse.Namespace) -> argparse.Namespace:
+    """Return the connection options for the router of the ROS nodes, which knows no credentials of ours."""
+    without = dict.fromkeys(("ca", "cert", "key", "user"))
+    return argparse.Namespace(connect=arguments.ros_connect, connect_timeout=arguments.connect_timeout, **without)
+
+
+def _bridge(arguments: argparse.Namespace, node: RosNode, client: TagClient | None, mounted: Mounting) -> None:
+    messages, stop = RosMessages(), Event()
+    poses = Thread(target=PoseOutput(arguments, node, messages).run, args=(stop,), name="poses")
+    with interrupts() as interrupt:
+        samples = None if client is None else SampleInput(arguments, node, messages, client, mounted)
+        poses.start()
+        try:
+            _say(f"ready: domain {arguments.domain} at {arguments.ros_connect}, tag {arguments.tag}")
+            while not interrupt.wait_for(0.0 if samples else _TAKE_S):
+                if samples:
+                    samples.take()
+        finally:
+            stop.set()
+            poses.join()
+            if samples:
+                _say(samples.summary())
+
+
+class SampleInput:
+    """Turns messages of the configured topics into samples of the tag."""
+
+    def __init__(
+        self,
+        arguments: argparse.Namespace,
+        node: RosNode,
+        messages: RosMessages,
+        client: TagClient,
+        mounted: Mounting,
+    ) -> None:
+        self._node = node
+        self._messages = messages
+        self._client = client
+        self._mounted = mounted
+        self._rejected: Counter[str] = Counter()
+        self._told: Counter[str] = Counter()
+        self._tell_s = 0.0
+        if arguments.imu:
+            node.subscribe(arguments.imu, messages.imu, self._imu)
+        for topic, anchor in arguments.range:
+            node.subscribe(topic, messages.range, partial(self._range, anchor))
+
+    def take(self) -> None:
+        """Publish the sample of the next message, if one comes soon. Say now and then what was left out."""
+        received = self._node.take(_TAKE_S)
+        if received is not None:
+            try:
+                if not received.has_known_fields:
+                    raise UnusableError("a message whose type has other fields than in ROS 2 Jazzy")
+                received.handle(received.cdr, received.t_ns)
+            except UnusableError as error:
+                self._rejected[str(error)] += 1
+        if time.monotonic() >= self._tell_s and self._rejected != self._told:
+            self._tell_s = time.monotonic() + _REPORT_S
+            for reason, count in (self._rejected - self._told).items():
+                _say(f"left out {count} × {reason}")
+            self._told = self._rejected.copy()
+
+    def summary(self) -> str:
+        """Return what became of all messages."""
+        left_out = [f"{count} × {reason}" for reason, count in sorted(self._rejected.items())]
+        left_out += [f"{count} × {reason}" for reason, count in sorted(self._client.refused.items())]
+        left_out += [f"{self._node.lost} that came too fast"] if self._node.lost else []
+        return f"{self._client.sent.samples} samples sent; left out: {', '.join(left_out) or 'none'}"
+
+    def _imu(self, cdr: bytes, t_ns: int) -> None:
+        sample = self._messages.imu_sample(cdr, t_ns)
+        acc, gyro = self._mounted.to_body(sample.acc), self._mounted.to_body(sample.gyro)
+        self._client.publish_imu(acc, gyro, t_ns=sample.t_ns)
+
+    def _range(self, anchor: str, cdr: bytes, t_ns: int) -> None:
+        sample = self._messages.range_sample(cdr, t_ns, anchor)
+        self._client.publish_range(anchor, sample.range_m, t_ns=sample.t_ns, std_m=sample.std_m)
+
+
+class PoseOutput:
+    """Publishes each new pose of the tag to ROS."""
+
+    def __init__(self, arguments: argparse.Namespace, node: RosNode, messages: RosMessages) -> None:
+        self._arguments = arguments
+        self._messages = messages
+        self._child_frame = arguments.child_frame or tag_frame_id(arguments.tag)
+        self._pose = node.publisher(f"{arguments.namespace}/pose", messages.pose)
+        self._odometry = node.publisher(f"{arguments.namespace}/odometry", messages.odometry)
+        self._tf = None if arguments.no_tf else node.publisher("tf", messages.tf)
+        self._t_ns = 0
+        self._height_m = 0.0
+        self._settings_s = 0.0
+        self._away = False
+
+    def run(self, stop: Event) -> None:
+        """Ask the service until `stop` is set. Say once that it is away, and once that it is back."""
+        while not stop.is_set():
+            began_s = time.monotonic()
+            try:
+                self.update()
+                if self._away:
+                    _say("the service answers again")
+                self._away = False
+            except RefusedError as error:
+                if not self._away:
+                    _say(f"{error}. Still trying.")
+                self._away = True
+            took_s = time.monotonic() - began_s
+            stop.wait(max(1 / self._arguments.max_hz - took_s, took_s, 1.0 if self._away else 0.0))
+
+    def update(self) -> None:
+        """Publish the latest pose if it is new and usable. Raises RefusedError."""
+        tag = quote(self._arguments.tag, safe="")
+        for pose in asked(self._arguments, "GET", f"/poses?tags={tag}")["poses"]:
+            if time.monotonic() >= self._settings_s:
+                self._height_m = asked(self._arguments, "GET", f"/tags/{tag}")["settings"]["height_m"]
+                self._settings_s = time.monotonic() + _SETTINGS_S
+            if pose["t_ns"] != self._t_ns and is_usable(pose):
+                self._t_ns = pose["t_ns"]
+                self._publish(pose)
+
+    def _publish(self, pose: Json) -> None:
+        self._pose(self._messages.pose_cdr(pose, self._height_m))
+        if pose["speed_mps"] is not None and pose["yaw_rate_radps"] is not None:
+            self._odometry(self._messages.odometry_cdr(pose, self._height_m, self._child_frame))
+        if self._tf is not None:
+            self._tf(self._messages.tf_cdr(pose, self._height_m, self._child_frame))
+
+
+def _topic(text: str) -> str:
+    if not _NAME.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a ROS name, such as /imu/data")
+    return text
+
+
+def _range_topic(text: str) -> tuple[str, str]:
+    topic, _, anchor = text.partition("=")
+    if not anchor:
+        raise argparse.ArgumentTypeError(f"{text!r}: TOPIC=ANCHOR was expected, such as /uwb/range=1")
+    return _topic(topic), anchor
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"dropanchor ros2: {text}\n")
+    sys.stderr.flush()

@@ -1,0 +1,96 @@
+"""A ROS 2 node on a Zenoh session, as other nodes with rmw_zenoh see it."""
+
+import time
+from collections.abc import Callable
+from queue import Empty, Full, Queue
+from typing import NamedTuple
+
+import zenoh
+
+from dropanchor_service.bridges.rmw_zenoh import (
+    Attachment,
+    RosType,
+    attachment_from,
+    gid_of,
+    node_token,
+    topic_key,
+    topic_keys_of_any_version,
+    topic_token,
+)
+
+_QUEUED_MESSAGES = 10_000
+
+
+class Received(NamedTuple):
+    """A message of a subscription. t_ns: when it was sent, or received if it does not say."""
+
+    cdr: bytes
+    t_ns: int
+    has_known_fields: bool
+    handle: Callable[[bytes, int], None]
+
+
+class RosNode:
+    """Publishes and subscribes under one name. lost: number of messages that came faster than they were taken.
+
+    Close the session to end the node.
+    """
+
+    def __init__(self, session: zenoh.Session, domain: int, name: str) -> None:
+        self.lost = 0
+        self._session = session
+        self._domain = domain
+        self._name = name
+        self._entities = 0
+        self._queue: Queue[Received] = Queue(_QUEUED_MESSAGES)
+        self._kept: list[object] = [self._declare(node_token(domain, self._id, name))]
+
+    def publisher(self, topic: str, of: RosType) -> Callable[[bytes], None]:
+        """Announce a publisher, and return the function that publishes a CDR message."""
+        gid = gid_of(self._announce("MP", topic, of))
+        publisher = self._session.declare_publisher(
+            topic_key(self._domain, topic, of), congestion_control=zenoh.CongestionControl.DROP
+        )
+        sequence = 0
+
+        def publish(cdr: bytes) -> None:
+            nonlocal sequence
+            sequence += 1
+            publisher.put(cdr, attachment=Attachment(sequence, time.time_ns(), gid).packed())
+
+        return publish
+
+    def subscribe(self, topic: str, of: RosType, handle: Callable[[bytes, int], None]) -> None:
+        """Announce a subscription. `take` calls `handle` with the CDR and the time of each message."""
+        self._announce("MS", topic, of)
+
+        def receive(sample: zenoh.Sample) -> None:  # on a thread of Zenoh: it must not block
+            attached = None if sample.attachment is None else attachment_from(sample.attachment.to_bytes())
+            t_ns = time.time_ns() if attached is None else attached.t_ns
+            known = str(sample.key_expr).endswith(f"/{of.type_hash}")
+            try:
+                self._queue.put_nowait(Received(sample.payload.to_bytes(), t_ns, known, handle))
+            except Full:
+                self.lost += 1
+
+        self._kept.append(self._session.declare_subscriber(topic_keys_of_any_version(self._domain, topic, of), receive))
+
+    def take(self, timeout_s: float) -> Received | None:
+        """Return the next message, None if none comes in time."""
+        try:
+            return self._queue.get(timeout=timeout_s)
+        except Empty:
+            return None
+
+    @property
+    def _id(self) -> str:
+        return str(self._session.info.zid())
+
+    def _announce(self, role: str, topic: str, of: RosType) -> str:
+        self._entities += 1
+        token = topic_token(self._domain, self._id, self._name, self._entities, role, topic, of)
+        self._kept.append(self._declare(token))
+        return token
+
+    def _declare(self, token: str) -> zenoh.LivelinessToken:
+        return self._session.liveliness().declare_token(token)

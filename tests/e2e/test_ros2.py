@@ -1,0 +1,201 @@
+"""A robot with ROS 2 is a tag: its samples become poses, and its poses are ROS messages.
+
+The robot has its own router, and its own writer and reader of CDR."""
+
+import signal
+import struct
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import hypot, pi
+from threading import Event, Thread
+
+import pytest
+
+from dropanchor_service.cli import main
+from support.ros2 import IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, Robot, imu_cdr, range_cdr, read_pose
+from support.service import Running, command, environment, running_service, settings_file
+from support.vibration import shaken_acc, shaken_gyro
+from support.zenoh_router import connected_session, free_endpoint, running_router, wait_until
+
+TAG, DOMAIN, SPEED_MPS = "cart", 7, 1.0
+OPTIONS = ("--imu=/imu/data", "--forward=y", "--range=/uwb/range=7", "--namespace=cart/dropanchor")
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+    config = settings_file(tmp_path_factory.mktemp("site"), [TAG])
+    config.write_text(config.read_text().replace(f'[tags."{TAG}"]', f'[tags."{TAG}"]\nheight_m = 0.2'))
+    with running_service("--config", str(config)) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def ros_router() -> Iterator[str]:
+    endpoint = free_endpoint()
+    with running_router(endpoint):
+        yield endpoint
+
+
+@contextmanager
+def running_bridge(service: Running, ros_router: str, *arguments: str) -> Iterator[list[str]]:
+    """Run `dropanchor ros2` until the block ends. Yield the lines on stderr, which are complete after it."""
+    places = ("--url", service.url, "--connect", service.zenoh, "--ros-connect", ros_router, "--domain", str(DOMAIN))
+    said: list[str] = []
+    words = command("ros2", "--tag", TAG, *places, *arguments)
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, env=environment()) as process:
+        assert process.stderr is not None
+        reader = Thread(target=said.extend, args=(process.stderr,))
+        reader.start()
+        try:
+            wait_until(lambda: any("ready" in line for line in said) or process.poll() is not None)
+            yield said
+        finally:
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(30) == 0, said
+            reader.join()
+
+
+def drive(robot: Robot, stop: Event) -> None:
+    """Go north past the anchor from (10, -20). The y axis of the IMU points forward, and some messages are unusable."""
+    began_s = time.monotonic()
+    count = 0
+    while not stop.wait(0.02):
+        now_ns = time.time_ns()
+        forward, left, up = shaken_acc()
+        gyro_forward, gyro_left, gyro_up = shaken_gyro()
+        robot.publish("imu/data", IMU, imu_cdr(now_ns, (-left, forward, up), (-gyro_left, gyro_forward, gyro_up)))
+        if count % 5 == 0:
+            distance_m = hypot(10.0, -20.0 + SPEED_MPS * (time.monotonic() - began_s))
+            robot.publish("uwb/range", RANGE, range_cdr(now_ns, distance_m))
+            robot.publish("uwb/range", RANGE, range_cdr(now_ns, float("inf")))
+        count += 1
+
+
+def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(service: Running, ros_router: str) -> None:
+    with connected_session(ros_router) as session, running_bridge(service, ros_router, *OPTIONS) as said:
+        robot, stop = Robot(session, DOMAIN), Event()
+        keys = [
+            robot.subscribe("cart/dropanchor/pose", POSE),
+            robot.subscribe("cart/dropanchor/odometry", ODOMETRY),
+            robot.subscribe("tf", TF),
+        ]
+        driving = Thread(target=drive, args=(robot, stop))
+        driving.start()
+        try:
+            wait_until(lambda: all(len(robot.received[key]) >= 10 for key in keys), 90.0)
+        finally:
+            stop.set()
+            driving.join()
+        pose, odometry, tf = (robot.received[key] for key in keys)
+
+        reader = CdrReader(pose[-1][0])
+        t_ns, frame = reader.stamp_and_frame()
+        place, heading, covariance = read_pose(reader)
+        reader.end()
+        stored = service.get(f"/api/v1/tags/{TAG}/pose?at={t_ns}")
+        assert frame == "site"
+        assert hypot(place[0] - stored["x"], place[1] - stored["y"]) < 0.05
+        assert place[2] == 0.2
+        assert heading == pytest.approx(stored["heading_rad"], abs=0.05)
+        assert covariance[0] == pytest.approx(stored["covariance"][0][0], rel=0.2)
+
+        reader = CdrReader(odometry[-1][0])
+        assert reader.stamp_and_frame()[1] == "site"
+        assert reader.text() == f"tag/{TAG}"
+        read_pose(reader)
+        twist = reader.take("d", 6)
+        assert reader.take("d", 36) == [0.0] * 36
+        reader.end()
+        assert twist[0] == pytest.approx(SPEED_MPS, abs=0.5)
+        assert twist[1:5] == [0.0] * 4
+
+        reader = CdrReader(tf[-1][0])
+        assert reader.take("I") == [1]
+        assert (reader.stamp_and_frame()[1], reader.text()) == ("site", f"tag/{TAG}")
+        assert hypot(*reader.take("d", 3)) < 40.0
+        assert hypot(*reader.take("d", 4)) == pytest.approx(1.0)
+        reader.end()
+
+        attachments = [struct.unpack("<qqB16s", attachment) for _, attachment in pose]
+        first = attachments[0][0]
+        assert [sequence for sequence, *_ in attachments] == list(range(first, first + len(attachments)))
+        assert {(length, gid) for _, _, length, gid in attachments} == {(16, attachments[0][3])}
+        assert abs(attachments[-1][1] - t_ns) < 60 * 10**9
+        assert abs(heading - pi / 2) < 0.7
+    assert any("a range that is not finite" in line for line in said)
+    assert "samples sent" in said[-1]
+
+
+def test_the_node_announces_itself_and_its_topics_while_it_runs(service: Running, ros_router: str) -> None:
+    with connected_session(ros_router) as session:
+        robot = Robot(session, DOMAIN)
+        with running_bridge(service, ros_router, *OPTIONS):
+            tokens = robot.tokens()
+            ids = {token.split("/")[2] for token in tokens}
+            assert len(ids) == 1
+            (zid,) = ids
+            place = f"@ros2_lv/{DOMAIN}/{zid}/0"
+            named = {token.replace(place, "").partition("/%/%/dropanchor")[2] for token in tokens}
+            assert named == {
+                "",
+                f"/%imu%data/{IMU}/::,10:,:,:,,",
+                f"/%uwb%range/{RANGE}/::,10:,:,:,,",
+                f"/%cart%dropanchor%pose/{POSE}/::,10:,:,:,,",
+                f"/%cart%dropanchor%odometry/{ODOMETRY}/::,10:,:,:,,",
+                f"/%tf/{TF}/::,10:,:,:,,",
+            }
+            assert f"{place}/0/NN/%/%/dropanchor" in tokens
+            assert sum("/MS/" in token for token in tokens) == 2
+            assert sum("/MP/" in token for token in tokens) == 3
+        wait_until(lambda: not robot.tokens())
+
+
+def test_damaged_and_foreign_messages_are_named_and_harm_nothing(service: Running, ros_router: str) -> None:
+    with connected_session(ros_router) as session, running_bridge(service, ros_router, *OPTIONS) as said:
+        robot = Robot(session, DOMAIN)
+        wait_until(lambda: len(robot.tokens()) == 6)
+        now_ns = time.time_ns()
+        whole = range_cdr(now_ns, 3.0)
+        old = RANGE.replace("b42b", "0000")
+        for _ in range(3):
+            robot.publish("uwb/range", RANGE, whole[:-3])
+            robot.publish("uwb/range", RANGE, b"")
+            robot.publish("uwb/range", old, whole)
+            robot.publish("imu/data", IMU, imu_cdr(now_ns, (0, 0, 9.8), (0, 0, 0), covariance=-1.0))
+            session.put(f"{DOMAIN}/uwb/range/{RANGE}", range_cdr(now_ns, 200.0))
+        robot.publish("imu/data", IMU, imu_cdr(0, (0, 0, 9.8), (0, 0, 0)), t_ns=now_ns)
+        wait_until(lambda: sum("left out" in line for line in said) >= 4 and "outside" in "".join(said))
+        before = service.get(f"/api/v1/tags/{TAG}")["samples"].get("imu", 0)
+        robot.publish("imu/data", IMU, imu_cdr(0, (0, 0, 9.8), (0, 0, 0)))
+        wait_until(lambda: service.get(f"/api/v1/tags/{TAG}")["samples"].get("imu", 0) > before)
+    assert "2 samples sent" in said[-1]
+    for reason in (
+        "6 × a damaged sensor_msgs/msg/Range",
+        "3 × a message whose type has other fields than in ROS 2 Jazzy",
+        "3 × an IMU message without gyroscope or accelerometer",
+        "3 × a range outside min_range and max_range",
+    ):
+        assert reason in said[-1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ([], "which tag is the robot?"),
+        (["--tag=cart", "--forward=z"], "must be different axes"),
+        (["--tag=cart", "--ros-connect=nonsense"], "nonsense"),
+        (["--tag=cart", "--connect-timeout=0.5", f"--ros-connect={free_endpoint()}"], "Cannot connect to"),
+    ],
+)
+def test_what_cannot_start_says_why(arguments: list[str], expected: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["ros2", *arguments]) == 2
+    assert expected in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [["--imu=/im u"], ["--range=/uwb/range"], ["--range=/9=1"]])
+def test_a_bad_topic_is_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["ros2", "--tag=cart", *arguments])
+    assert "was expected" in (said := capsys.readouterr().err) or "not a ROS name" in said

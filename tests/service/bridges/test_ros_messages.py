@@ -1,0 +1,91 @@
+"""ROS messages against a reader and a writer of CDR that were written apart from them."""
+
+from contextlib import suppress
+from math import isnan, pi
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
+from support.ros2 import HEADER, IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, imu_cdr, range_cdr, read_pose
+
+T_NS = 1_800_000_000_123_456_789
+COVARIANCE = [[0.1, 0.02, 0.03], [0.02, 0.4, 0.05], [0.03, 0.05, 0.6]]
+MESSAGES = RosMessages()
+
+
+def pose(**fields: Any) -> dict[str, Any]:
+    known = {"x": 1.0, "y": -2.0, "heading_rad": -3 * pi / 4, "covariance": COVARIANCE}
+    return {"tag": "cart", "t_ns": T_NS, "state": "tracking", "speed_mps": 1.5, "yaw_rate_radps": 0.25} | known | fields
+
+
+def test_the_types_have_the_names_and_hashes_of_ros_2_jazzy() -> None:
+    types = (MESSAGES.imu, MESSAGES.range, MESSAGES.pose, MESSAGES.odometry, MESSAGES.tf)
+    assert [f"{of.dds_name}/{of.type_hash}" for of in types] == [IMU, RANGE, POSE, ODOMETRY, TF]
+
+
+def test_a_pose_has_the_covariance_of_x_y_and_yaw_in_their_places() -> None:
+    reader = CdrReader(MESSAGES.pose_cdr(pose(), 0.5))
+    assert reader.stamp_and_frame() == (T_NS, "site")
+    place, heading, covariance = read_pose(reader)
+    reader.end()
+    assert place == [1.0, -2.0, 0.5]
+    assert heading == pytest.approx(-3 * pi / 4)
+    matrix = np.array(covariance).reshape(6, 6)
+    np.testing.assert_array_equal(matrix[np.ix_([0, 1, 5], [0, 1, 5])], COVARIANCE)
+    np.testing.assert_array_equal(matrix[2:5, 2:5], np.diag([1e6, 1e6, 1e6]))
+    assert not matrix[np.ix_([0, 1, 5], [2, 3, 4])].any()
+
+
+def test_odometry_moves_in_the_frame_of_the_tag() -> None:
+    reader = CdrReader(MESSAGES.odometry_cdr(pose(), 0.5, "cart/base_link"))
+    assert (reader.stamp_and_frame()[1], reader.text()) == ("site", "cart/base_link")
+    read_pose(reader)
+    assert reader.take("d", 6) == [1.5, 0.0, 0.0, 0.0, 0.0, 0.25]
+    assert reader.take("d", 36) == [0.0] * 36
+    reader.end()
+
+
+def test_a_pose_in_a_frame_of_its_own_is_never_published_in_the_frame_of_the_site() -> None:
+    relative = pose(frame="relative")
+    assert CdrReader(MESSAGES.pose_cdr(relative, 0.0)).stamp_and_frame()[1] == "site/cart"
+    assert CdrReader(MESSAGES.odometry_cdr(relative, 0.0, "base")).stamp_and_frame()[1] == "site/cart"
+    reader = CdrReader(MESSAGES.tf_cdr(relative, 0.0, "base"))
+    assert reader.take("I") == [1]
+    assert reader.stamp_and_frame()[1] == "site/cart"
+
+
+@pytest.mark.parametrize(
+    "fields", [{"state": "lost"}, {"state": "ambiguous"}, {"x": None}, {"heading_rad": None}, {"covariance": None}]
+)
+def test_a_robot_gets_no_pose_that_it_must_not_act_on(fields: dict[str, Any]) -> None:
+    assert is_usable(pose())
+    assert not is_usable(pose(**fields))
+
+
+def test_samples_have_the_values_and_the_stamp_of_their_message() -> None:
+    imu = MESSAGES.imu_sample(imu_cdr(T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), 5)
+    assert imu == (T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), None)
+    distance = MESSAGES.range_sample(range_cdr(T_NS, 3.5, variance=0.0625), 5, "7")
+    assert distance == (T_NS, 7, 3.5, 0.25)
+
+
+def test_a_message_without_stamp_or_variance_has_the_time_of_its_sending_and_an_unknown_deviation() -> None:
+    sample = MESSAGES.range_sample(range_cdr(0, 3.5, variance=0.0), T_NS, "yard")
+    assert sample.t_ns == T_NS
+    assert isnan(sample.std_m)
+
+
+def test_a_sensor_without_limits_may_report_any_range() -> None:
+    assert MESSAGES.range_sample(range_cdr(T_NS, 3.5, max_range=0.0), 0, "7").range_m == 3.5
+
+
+@given(st.binary(max_size=400) | st.binary(max_size=400).map(lambda body: HEADER + body))
+def test_any_bytes_are_a_sample_or_unusable(cdr: bytes) -> None:
+    with suppress(UnusableError):
+        assert len(MESSAGES.imu_sample(cdr, T_NS).acc) == 3
+    with suppress(UnusableError):
+        assert MESSAGES.range_sample(cdr, T_NS, "7").anchor == 7
