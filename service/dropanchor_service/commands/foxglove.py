@@ -30,7 +30,7 @@ topics:
   /tag/TAG/pose          the pose of a tag                                                  for the panel 3D
   /tag/TAG/estimate      state, reason, speed, accuracy and the rest of a pose              for Plot and Table
 
-A pose that is not in the site's frame is in the frame site/TAG: choose that as the display frame to see it.
+A pose whose frame is `relative` (north is unknown) is in site/TAG: choose that as the display frame to see it.
 
 examples:
   dropanchor foxglove
@@ -46,7 +46,7 @@ MAX_TAG_TOPICS = 100  # tags with topics of their own; viewers get slow with tho
 
 Json = Mapping[str, Any]
 
-_TEXTS = ("state", "reason", "hint", "anchor")
+_TEXTS = ("state", "reason", "hint", "frame", "anchor")
 _NUMBERS = ("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "age_s")
 _ACCURACIES = ("p_mode", "sigma_pos_m", "sigma_obs_m", "range_m")
 ESTIMATE_SCHEMA = {

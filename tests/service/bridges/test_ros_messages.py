@@ -18,7 +18,7 @@ MESSAGES = RosMessages()
 
 
 def pose(**fields: Any) -> dict[str, Any]:
-    known = {"x": 1.0, "y": -2.0, "heading_rad": -3 * pi / 4, "covariance": COVARIANCE}
+    known = {"frame": "site", "x": 1.0, "y": -2.0, "heading_rad": -3 * pi / 4, "covariance": COVARIANCE}
     return {"tag": "cart", "t_ns": T_NS, "state": "tracking", "speed_mps": 1.5, "yaw_rate_radps": 0.25} | known | fields
 
 
