@@ -194,8 +194,23 @@ def test_what_cannot_start_says_why(arguments: list[str], expected: str, capsys:
     assert expected in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("arguments", [["--imu=/im u"], ["--range=/uwb/range"], ["--range=/9=1"]])
-def test_a_bad_topic_is_refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("argument", "expected"),
+    [
+        ("--imu=/im u", "not a ROS name"),
+        ("--range=/uwb/range", "TOPIC=ANCHOR was expected"),
+        ("--range=/9=1", "not a ROS name"),
+        (f"--range=/uwb/range={'7' * 65}", "no id of an anchor"),
+    ],
+)
+def test_a_bad_topic_is_refused(argument: str, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["ros2", "--tag=cart", *arguments])
-    assert "was expected" in (said := capsys.readouterr().err) or "not a ROS name" in said
+        main(["ros2", "--tag=cart", argument])
+    assert expected in capsys.readouterr().err
+
+
+def test_a_bad_domain_is_refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "seven")
+    with pytest.raises(SystemExit):
+        main(["ros2", "--tag=cart"])
+    assert "invalid int value: 'seven'" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from threading import Event, Thread
 from typing import Any
 from urllib.parse import quote
 
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.bridges.frames import tag_frame_id
 from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
 from dropanchor_service.commands.options import positive
@@ -66,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ros.add_argument(
         "--domain",
         type=int,
-        default=int(os.environ.get(DOMAIN_VARIABLE) or 0),
+        default=os.environ.get(DOMAIN_VARIABLE) or "0",
         help=f"ROS domain (default: {DOMAIN_VARIABLE}, or 0)",
     )
     ros.add_argument("--imu", type=_topic, metavar="TOPIC", help="read sensor_msgs/Imu from this topic")
@@ -246,6 +247,10 @@ def _range_topic(text: str) -> tuple[str, str]:
     topic, _, anchor = text.partition("=")
     if not anchor:
         raise argparse.ArgumentTypeError(f"{text!r}: TOPIC=ANCHOR was expected, such as /uwb/range=1")
+    try:
+        chunk_from_id(anchor)
+    except InvalidKeyError as error:
+        raise argparse.ArgumentTypeError(f"{anchor!r} is no id of an anchor: {error}") from error
     return _topic(topic), anchor
 
 
