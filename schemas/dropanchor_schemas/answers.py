@@ -3,6 +3,7 @@
 from pydantic import BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.site import Anchor, TagSettings
+from dropanchor_schemas.tag_health import Care, TagHealth
 
 
 class _Answer(BaseModel):
@@ -23,6 +24,8 @@ class TagStatus(_Answer):
         description="What an operator can do about rejected data, for example add a missing anchor to the site; empty "
         "if nothing needs to be done."
     )
+    health: TagHealth | None = Field(description="What the tag has reported about itself; null if nothing.")
+    needs_care: list[Care] = Field(description="What a person should do for the tag; empty if nothing.")
     settings: TagSettings
 
 
@@ -30,6 +33,13 @@ class SamplesReceived(_Answer):
     """What was taken in. Admission, duplicates and the values of samples are judged later: see the tag's counters."""
 
     samples: int = Field(description="Samples in the payload.")
+
+
+class HealthReceived(_Answer):
+    """What was taken in of a tag's health. Whether the tag is admitted is judged later: see the tag's counters."""
+
+    values: int = Field(description="Values that are used.")
+    absurd: list[str] = Field(description="Names of values that are not used, because no tag can measure them.")
 
 
 class SamplesAcknowledged(_Answer):

@@ -11,9 +11,10 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.pose import Pose, PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor
+from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER, MAX_PAYLOAD_BYTES
 
-_MODELS: tuple[type[BaseModel], ...] = (SamplesMessage, Pose, PoseFrame, Anchor)
+_MODELS: tuple[type[BaseModel], ...] = (SamplesMessage, TagHealthMessage, Pose, PoseFrame, Anchor)
 _PARAMETERS = {
     "site": "Id of the site; `default` unless the settings say otherwise.",
     "tag": "Id of the tag.",
@@ -64,6 +65,12 @@ def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
             "Liveliness token of a tag: present means online.",
             {"kind": "liveliness"},
         ),
+        "health": (
+            _readable(keys.health_key("{site}", "{tag}")),
+            ["health"],
+            "What a tag says about itself: battery, temperature, firmware. Optional.",
+            {"kind": "put", "put": "about once a minute"},
+        ),
         "pose": (
             _readable(keys.pose_key("{site}", "{tag}")),
             ["pose"],
@@ -112,7 +119,7 @@ def _channel(address: str, messages: list[str], description: str, zenoh: dict[st
 
 def _operations() -> dict[str, Any]:
     """Return the operations of the service: it receives the tags' messages and sends poses."""
-    received = ("samples", "tagAlive")
+    received = ("samples", "tagAlive", "health")
     sent = ("pose", "poses", "anchor", "serviceAlive")
     return {
         f"{action}{name[0].upper()}{name[1:]}": {"action": action, "channel": {"$ref": f"#/channels/{name}"}}
@@ -135,6 +142,7 @@ def _messages() -> dict[str, Any]:
                 "description": "The README of dropanchor-schemas describes the layout byte by byte.",
             },
         },
+        "health": _json_message(TagHealthMessage, "The values that the tag knows; the others are left out."),
         "pose": _json_message(Pose, "One pose with its state, reason and covariance."),
         "poseFrame": _json_message(PoseFrame, "Entry i of every column belongs to tag i."),
         "anchor": _json_message(Anchor, "One anchor in the site frame."),

@@ -11,11 +11,13 @@ from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseFrame, PoseList
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, Site, TagSettings
+from dropanchor_schemas.tag_health import TagHealthMessage
 
 FOLDER = Path(__file__).parent / "json"
 ASYNCAPI = "asyncapi.json"
 MODELS: dict[str, type[BaseModel]] = {
     "samples": SamplesMessage,
+    "health": TagHealthMessage,
     "pose": Pose,
     "poses": PoseList,
     "pose_frame": PoseFrame,

@@ -26,6 +26,9 @@ class Reason(StrEnum):
     HEADING_ABSURD = "heading_absurd"
     BEARING_ABSURD = "bearing_absurd"
     STD_INVALID = "std_invalid"
+    NO_HEALTH = "no_health"
+    HEALTH_ABSURD = "health_absurd"
+    HEALTH_TOO_OFTEN = "health_too_often"
     ANCHOR_UNKNOWN = "anchor_unknown"
     LATE = "late"
     RANGE_STUCK = "range_stuck"
@@ -56,7 +59,7 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
         "zenoh-pico sends it, is accepted too)",
     ),
     Reason.PAYLOAD_EMPTY: Explanation("message", "the payload is empty"),
-    Reason.PAYLOAD_TOO_LARGE: Explanation("message", "more than 65,536 bytes"),
+    Reason.PAYLOAD_TOO_LARGE: Explanation("message", "more than 65,536 bytes; for health, 1,024"),
     Reason.HEADER_TRUNCATED: Explanation("message", "packed, shorter than the 32-byte header"),
     Reason.VERSION_UNKNOWN: Explanation("message", "the version is not 1"),
     Reason.FLAGS_UNKNOWN: Explanation("message", "a flag bit other than bits 0 and 1 is set"),
@@ -73,6 +76,11 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.HEADING_ABSURD: Explanation("sample", "an angle of hundreds of turns"),
     Reason.BEARING_ABSURD: Explanation("sample", "an angle of hundreds of turns"),
     Reason.STD_INVALID: Explanation("sample", "a standard deviation that is negative, zero or absurd"),
+    Reason.NO_HEALTH: Explanation("message", "the message about a tag's health has no values"),
+    Reason.HEALTH_ABSURD: Explanation(
+        "value", "a value of a tag's health that no tag can measure; the others are used"
+    ),
+    Reason.HEALTH_TOO_OFTEN: Explanation("message", "the tag reports its health more than five times in a second"),
     Reason.ANCHOR_UNKNOWN: Explanation("sample", "an anchor that the site does not have"),
     Reason.LATE: Explanation("sample", "older than the samples that the estimator can still go back to"),
     Reason.RANGE_STUCK: Explanation("sample", "the radio repeats this range although the tag moves"),

@@ -98,12 +98,12 @@ def decode_json(payload: bytes) -> Frame | Rejection:
     try:
         message = SamplesMessage.model_validate_json(payload)
     except ValidationError as error:
-        return _unknown_version(payload) or _rejection(error)
+        return unknown_version(payload) or rejection_of(error)
     frame = _frame(message)
     return frame if len(frame) else Rejection(Reason.NO_SAMPLES, "the message holds no samples")
 
 
-def _unknown_version(payload: bytes) -> Rejection | None:
+def unknown_version(payload: bytes) -> Rejection | None:
     """Return the rejection of a payload of another version, or None if the version is not the problem."""
     try:
         message = json.loads(payload)
@@ -115,7 +115,8 @@ def _unknown_version(payload: bytes) -> Rejection | None:
     return Rejection(Reason.VERSION_UNKNOWN, f"version {version}, this decoder knows {VERSION}")
 
 
-def _rejection(error: ValidationError) -> Rejection:
+def rejection_of(error: ValidationError) -> Rejection:
+    """Return the rejection of a payload that does not match its model."""
     first = error.errors(include_input=False, include_url=False)[0]
     if first["type"] == "json_invalid":
         return Rejection(Reason.JSON_SYNTAX, first["msg"])

@@ -12,7 +12,7 @@ from typing import Self
 import zenoh
 from pydantic import ValidationError
 
-from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.keys import health_key, samples_key
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
@@ -30,6 +30,7 @@ from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
+from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.persistence import Persistence
 from dropanchor_service.runtime.clock import UtcClock
@@ -37,7 +38,7 @@ from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
@@ -75,11 +76,12 @@ class Service:
         self.clock = UtcClock()
         self.tags = TagTable()
         self.latest = LatestPoses()
+        health = HealthTable()
         pending_tags = PendingTags(settings.max_tags)
         self.site = _site_store(settings)
         self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
         self.answers = Answers(
-            self.site, self.tags, self.latest, self.clock.now_ns, self._persistence.tracks, pending_tags
+            self.site, self.tags, self.latest, self.clock.now_ns, self._persistence.tracks, pending_tags, health
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         engine = GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics)
@@ -96,6 +98,7 @@ class Service:
             self.clock,
             observers=self._persistence.observers,
             reorder_ns=round(settings.ingest.reorder_ms * 1e6),
+            health=health,
         )
         self._checkpoints = self._checkpointer(engine)
         self._thread = IngestThread(
@@ -107,6 +110,7 @@ class Service:
         )
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
+        self.metrics.register(HealthGauges(self.tags, health, self.clock.now_ns))
         self.metrics.register(
             FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )
@@ -233,6 +237,9 @@ class Service:
         """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
         self._on_live(samples_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
 
+    def _receive_health(self, tag: str, payload: bytes, encoding: str) -> None:
+        self._ingest.health.put(health_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
+
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         app = create_app(
             self.answers,
@@ -242,6 +249,7 @@ class Service:
             registry=self.metrics.registry,
             stopping=self._stopping,
             receive=self._receive,
+            receive_health=self._receive_health,
             max_tags=self._settings.max_tags,
             endpoints=endpoints_of(self._settings.zenoh, self._credentials),
             credentials=self._credentials,

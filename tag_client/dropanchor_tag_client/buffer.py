@@ -1,9 +1,11 @@
 """The buffer of samples that the client sends in its next message."""
 
 import math
+from collections.abc import Sequence
 
+from dropanchor_schemas.keys import MAX_ID_LENGTH
 from dropanchor_schemas.kinds import KIND_OF, Frame, ImuSample, Sample
-from dropanchor_schemas.wire import MAX_T_NS, Reason, anchor_number
+from dropanchor_schemas.wire import MAX_T_NS, Reason, Vector, anchor_number
 
 # Packed payloads count microseconds in 32 bits (4,294 s). This limit stays far below that.
 _MAX_SPAN_NS = 60_000_000_000
@@ -54,3 +56,17 @@ def rejection_reason(sample: Sample) -> Reason | None:
     if not all(abs(value) <= _MAX_FLOAT32 for value in values):
         return Reason.NOT_FINITE
     return Reason.STD_INVALID if abs(std) > _MAX_FLOAT32 else None
+
+
+def number_of(anchor: int | str) -> int:
+    """Return the number of an anchor in packed payloads. Raises ValueError if the id cannot be one."""
+    if isinstance(anchor, str) and len(anchor) > MAX_ID_LENGTH:
+        raise ValueError(f"an anchor id has at most {MAX_ID_LENGTH} characters")
+    return anchor_number(anchor)
+
+
+def vector(name: str, values: Sequence[float]) -> Vector:
+    """Return three components as floats. Raises ValueError for another number of them."""
+    if len(values) != 3:
+        raise ValueError(f"{name} has three components, not {len(values)}")
+    return float(values[0]), float(values[1]), float(values[2])

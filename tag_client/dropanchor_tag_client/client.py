@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from operator import index
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, NamedTuple, Self
+from typing import Literal, NamedTuple, Self, Unpack
 
 import zenoh
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.health import encode_health
 from dropanchor_schemas.kinds import Sample
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
@@ -25,15 +26,14 @@ from dropanchor_schemas.wire import (
     ImuSample,
     RangeSample,
     Reason,
-    Vector,
-    anchor_number,
     encode_json,
     encode_packed,
 )
-from dropanchor_tag_client.buffer import SampleBuffer, rejection_reason
+from dropanchor_tag_client.buffer import SampleBuffer, number_of, rejection_reason, vector
 from dropanchor_tag_client.calibration import Calibration
+from dropanchor_tag_client.health import HealthValues, reportable
 from dropanchor_tag_client.link import TagKeys
-from dropanchor_tag_client.publisher import PlainPublisher, Publisher, recoverable_publisher
+from dropanchor_tag_client.publisher import Publisher, declare_publisher
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
 from dropanchor_tag_client.spool import Spool
 from dropanchor_tag_client.spooling import SpoolCounts, SpoolingPublisher
@@ -173,7 +173,7 @@ class TagClient:
         self, anchor: int | str, range_m: float, *, t_ns: int | None = None, std_m: float = math.nan
     ) -> None:
         """Publish one two-way range to an anchor, m."""
-        self._add(RangeSample(self._time(t_ns), _anchor_number(anchor), float(range_m), float(std_m)), anchor)
+        self._add(RangeSample(self._time(t_ns), number_of(anchor), float(range_m), float(std_m)), anchor)
 
     def publish_imu(
         self,
@@ -187,8 +187,8 @@ class TagClient:
 
         acc: specific force, m/s². gyro: angular rate, rad/s. mag: magnetic field, µT.
         """
-        field = None if mag is None else _vector("mag", mag)
-        sample = ImuSample(self._time(t_ns), _vector("acc", acc), _vector("gyro", gyro), field)
+        field = None if mag is None else vector("mag", mag)
+        sample = ImuSample(self._time(t_ns), vector("acc", acc), vector("gyro", gyro), field)
         self._add(sample if self._calibration is None else self._calibration.applied(sample))
 
     def publish_heading(self, heading_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan) -> None:
@@ -199,7 +199,19 @@ class TagClient:
         self, anchor: int | str, bearing_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan
     ) -> None:
         """Publish the bearing of the tag, seen from the anchor, counter-clockwise from east, rad."""
-        self._add(BearingSample(self._time(t_ns), _anchor_number(anchor), float(bearing_rad), float(std_rad)), anchor)
+        self._add(BearingSample(self._time(t_ns), number_of(anchor), float(bearing_rad), float(std_rad)), anchor)
+
+    def publish_health(self, **values: Unpack[HealthValues]) -> bool:
+        """Report what is known about the tag, and what its spool holds. Return whether it could be sent.
+
+        About once a minute is enough; `Upkeep` does it. Values that no tag can measure are counted in `refused`.
+        """
+        with self._condition:
+            report, session = reportable(values, self.spool_counts, self.refused), self.session
+            if session is None or not report:
+                return False
+            session.put(self._keys.health, encode_health(report), encoding=ENCODING_JSON)
+        return True
 
     def flush(self) -> None:
         """Send all buffered samples now."""
@@ -212,6 +224,13 @@ class TagClient:
         return self._sent
 
     @property
+    def session(self) -> zenoh.Session | None:
+        """Return the session of the open client; with a spool, None until it is connected."""
+        if self._publisher is None:
+            return None
+        return self._session if self._spooling is None else self._spooling.session
+
+    @property
     def spool_counts(self) -> SpoolCounts | None:
         """Return what the spool holds and has lost, None without a spool."""
         return None if self._spooling is None else self._spooling.counts
@@ -220,9 +239,7 @@ class TagClient:
         encoding = ENCODING_PACKED if self._packed else ENCODING_JSON
         if self._calibration is not None:
             encoding += f";{self._calibration.label}"
-        if self._cache_messages == 0:
-            return PlainPublisher(session, self._keys.samples, encoding, wait_when_congested=self._wait_when_congested)
-        return recoverable_publisher(
+        return declare_publisher(
             session,
             self._keys.samples,
             encoding,
@@ -286,15 +303,3 @@ class TagClient:
                     self._send()
                 else:
                     self._condition.wait(None if left_s == math.inf else left_s)
-
-
-def _anchor_number(anchor: int | str) -> int:
-    if isinstance(anchor, str) and len(anchor) > keys.MAX_ID_LENGTH:
-        raise ValueError(f"an anchor id has at most {keys.MAX_ID_LENGTH} characters")
-    return anchor_number(anchor)
-
-
-def _vector(name: str, values: Sequence[float]) -> Vector:
-    if len(values) != 3:
-        raise ValueError(f"{name} has three components, not {len(values)}")
-    return float(values[0]), float(values[1]), float(values[2])

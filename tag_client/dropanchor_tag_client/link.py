@@ -20,15 +20,21 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class TagKeys:
-    """The keys of a tag: of its samples, its liveliness token and its pose."""
+    """The keys of a tag: of its samples, its liveliness token, its pose and its health."""
 
     samples: str
     alive: str
     pose: str
+    health: str
 
     @classmethod
     def of(cls, site: str, tag: str) -> Self:
-        return cls(keys.samples_key(site, tag), keys.tag_alive_key(site, tag), keys.pose_key(site, tag))
+        return cls(
+            keys.samples_key(site, tag),
+            keys.tag_alive_key(site, tag),
+            keys.pose_key(site, tag),
+            keys.health_key(site, tag),
+        )
 
 
 class Link:
@@ -37,7 +43,7 @@ class Link:
     def __init__(
         self, session: zenoh.Session, tag_keys: TagKeys, declare: Callable[[zenoh.Session], Any], *, owned: bool
     ) -> None:
-        self._session = session
+        self.session = session
         self._pose_key = tag_keys.pose
         self._owned = owned
         self._publisher = declare(session)
@@ -60,7 +66,7 @@ class Link:
         """
         delivered = threading.Event()
         ended: Any = zenoh.handlers.Callback(lambda _: None, delivered.set)
-        self._session.get(self._pose_key, ended, timeout=LOST_LINK_S)
+        self.session.get(self._pose_key, ended, timeout=LOST_LINK_S)
         return delivered
 
     def close(self) -> None:
@@ -68,7 +74,7 @@ class Link:
         self._matching.undeclare()
         self._publisher.undeclare()
         if self._owned:
-            self._session.close()
+            self.session.close()
 
 
 class Linker:

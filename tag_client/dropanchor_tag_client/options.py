@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import zenoh
@@ -12,7 +13,10 @@ import zenoh
 from dropanchor_tag_client.calibration import Calibration, CalibrationError, read_calibration
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.credentials import read_credentials
+from dropanchor_tag_client.health import HealthValues
+from dropanchor_tag_client.host import host_health, program
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
+from dropanchor_tag_client.upkeep import Upkeep
 
 PASSWORD_VARIABLE = "DROPANCHOR_PASSWORD"
 
@@ -131,7 +135,10 @@ def session_settings(arguments: argparse.Namespace) -> SessionSettings:
 
 @contextmanager
 def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> Iterator[TagClient]:
-    """Open the client of a tag for the duration of the `with` block. Ctrl-C while it connects exits immediately."""
+    """Open the client of a tag for the duration of the `with` block, and report its health meanwhile.
+
+    The tag is the machine that this program runs on, unless it replays. Ctrl-C while it connects exits immediately.
+    """
     client = TagClient(
         tag,
         site=arguments.site,
@@ -144,10 +151,18 @@ def opened_client(arguments: argparse.Namespace, tag: str, **settings: Any) -> I
     )
     with _interruptible():
         client.open()
+    health = partial(_health, settings.get("replay", False))
     try:
-        yield client
+        with Upkeep([client], health):
+            yield client
     finally:
         client.close()
+
+
+def _health(replay: bool) -> HealthValues:
+    values = HealthValues() if replay else host_health()
+    values["firmware"] = program()
+    return values
 
 
 @contextmanager

@@ -14,10 +14,15 @@ class Publisher(Protocol):
     def undeclare(self) -> Any: ...
 
 
-def recoverable_publisher(
+def declare_publisher(
     session: zenoh.Session, key: str, encoding: str, *, cache_messages: int, wait_when_congested: bool
 ) -> Publisher:
-    """Return a publisher that keeps its last messages, so that a subscriber can fetch the ones it missed."""
+    """Return a publisher that keeps its last messages, so that a subscriber can fetch the ones it missed.
+
+    cache_messages: how many; with 0 nothing is declared, so that a session holds thousands of tags.
+    """
+    if cache_messages == 0:
+        return PlainPublisher(session, key, encoding, wait_when_congested=wait_when_congested)
     return zenoh.ext.declare_advanced_publisher(
         session,
         key,

@@ -1,6 +1,7 @@
 """A publisher that keeps messages on disk while nobody can receive them, and sends them later in their order."""
 
 import logging
+import re
 import threading
 import time
 from collections import deque
@@ -9,7 +10,7 @@ from typing import Any, NamedTuple
 
 import zenoh
 
-from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
+from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER
 from dropanchor_tag_client.link import LOST_LINK_S, Linker, TagKeys
 from dropanchor_tag_client.session import SessionSettings
 from dropanchor_tag_client.spool import Spool
@@ -26,12 +27,14 @@ _log = logging.getLogger(__name__)
 
 class SpoolCounts(NamedTuple):
     """waiting_bytes: on disk. sent: messages sent from the spool. dropped: messages that were deleted or not written,
-    because the spool or the disk was full. damaged: places in the files that held no valid message."""
+    because the spool or the disk was full. damaged: places in the files that held no valid message. oldest_ns: UTC of
+    the oldest message that is being sent from the spool, None if there is none."""
 
     waiting_bytes: int
     sent: int
     dropped: int
     damaged: int
+    oldest_ns: int | None = None
 
 
 class _Chunk(NamedTuple):
@@ -71,6 +74,7 @@ class SpoolingPublisher:
         self._sent = self._unwritten = 0
         self._unsynced = False
         self._logged_dropped = 0
+        self._oldest_ns: int | None = None
         self._sync_s = self._next_log_s = self._next_chunk_s = 0.0
         self._name = tag_keys.samples
         self._linker = Linker(connect, tag_keys, declare, self._wake)
@@ -78,9 +82,17 @@ class SpoolingPublisher:
         self._thread.start()
 
     @property
+    def session(self) -> zenoh.Session | None:
+        """Return the session, None before the first connection."""
+        link = self._linker.link
+        return None if link is None else link.session
+
+    @property
     def counts(self) -> SpoolCounts:
         spool = self._spool
-        return SpoolCounts(spool.used_bytes, self._sent, spool.dropped + self._unwritten, spool.damaged)
+        return SpoolCounts(
+            spool.used_bytes, self._sent, spool.dropped + self._unwritten, spool.damaged, self._oldest_ns
+        )
 
     def put(self, payload: bytes) -> None:
         with self._condition:
@@ -174,6 +186,7 @@ class SpoolingPublisher:
             if is_last and not self._is_live:
                 self._go_live(messages, now_s)
         if messages:
+            self._oldest_ns = first_ns(messages[0])
             self._chunk = _Chunk(len(messages), self._spool.dropped, link.delivery())
 
     def _go_live(self, last: list[bytes], now_s: float) -> None:
@@ -196,6 +209,8 @@ class SpoolingPublisher:
             if chunk.dropped_before == self._spool.dropped:  # else a part of it is no longer in the spool
                 self._spool.remove(chunk.messages)
                 self._sent += chunk.messages
+            if self._spool.is_empty:
+                self._oldest_ns = None
 
     def _warn(self, text: str) -> None:
         if time.monotonic() >= self._next_log_s:
@@ -205,3 +220,10 @@ class SpoolingPublisher:
     def _encoding(self, payload: bytes) -> str:
         """Return the encoding of a payload, whichever program wrote it."""
         return (ENCODING_JSON if payload.startswith(b"{") else ENCODING_PACKED) + self._encoding_schema
+
+
+def first_ns(payload: bytes) -> int | None:
+    """Return the time of the first sample in a payload of ours, packed or JSON."""
+    if payload.startswith(b"{"):
+        return min(map(int, re.findall(rb'"t_ns":(\d+)', payload)), default=None)
+    return int(HEADER.unpack_from(payload)[7]) if len(payload) >= HEADER.size else None

@@ -37,6 +37,7 @@ class ApiBench:
     now_ns: int = T_NS
     recorder: Recorder | None = None
     received: list[tuple[str, bytes, str]] = field(default_factory=list)
+    received_health: list[tuple[str, bytes, str]] = field(default_factory=list)
 
     def move(self, *names: str, **fields: Any) -> None:
         """Give each named tag a new pose: tracked, of the time `now_ns`, with the given fields of POSE."""
@@ -69,6 +70,7 @@ class ApiBench:
             registry=self.registry,
             stopping=self.stopping,
             receive=lambda *message: self.received.append(message),
+            receive_health=lambda *message: self.received_health.append(message),
             recorder=self.recorder,
             max_tags=max_tags,
             dashboard=dashboard,

@@ -22,7 +22,7 @@ from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.sources import load_settings
-from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
 
 
 @dataclass
@@ -74,6 +74,7 @@ class IngestBench:
         self.metrics = Metrics()
         self.tags = TagTable()
         self.latest = LatestPoses()
+        self.health = HealthTable()
         self.pending_tags = PendingTags(settings.max_tags)
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
         self.buffer = MessageBuffer(capacity)
@@ -89,6 +90,7 @@ class IngestBench:
             self.latest,
             self.metrics,
             self.clock,
+            health=self.health,
         )
 
     def service_state(self) -> ServiceState:

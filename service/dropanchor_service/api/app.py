@@ -11,6 +11,7 @@ from prometheus_client import CollectorRegistry
 from dropanchor_schemas.answers import Problem, SamplesAcknowledged
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
+from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import OPEN_PATHS, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
@@ -21,6 +22,7 @@ from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import DashboardMount
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.ingest import ingest_router
+from dropanchor_service.api.routes.ingest_health import ingest_health_router
 from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
@@ -45,6 +47,7 @@ def create_app(
     registry: CollectorRegistry,
     stopping: Event,
     receive: Receive,
+    receive_health: Receive,
     impaired: Impaired = list,
     recorder: Recorder | None = None,
     max_tags: int = 20_000,
@@ -57,10 +60,11 @@ def create_app(
     """Return the application with all routes and middleware.
 
     ready: returns whether the service can do its work, and the reasons when it cannot. impaired: returns what else does
-    not work. stopping: ends the streams when set. receive: takes samples that come over HTTP. recorder: None when there
-    is no folder for recordings. dashboard: the folder of the page; None for no page. endpoints: those of the Zenoh
-    router, as configured. credentials: those of the tags; None when they need none. authenticator: None when every
-    client may do everything. rate_limiter: limits the requests of each client; None for no limit.
+    not work. stopping: ends the streams when set. receive, receive_health: take samples and health that come over HTTP.
+    recorder: None when there is no folder for recordings. dashboard: the folder of the page; None for no page.
+    endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
+    authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
+    no limit.
     """
     app = FastAPI(
         title="Dropanchor",
@@ -83,6 +87,7 @@ def create_app(
         site_router(answers.site),
         connect_router(answers.site, endpoints, credentials),
         ingest_router(receive),
+        ingest_health_router(receive_health),
         ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
         recordings_router(recorder),
         health_router(ready, impaired),
@@ -101,7 +106,13 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
         document = get_openapi(
             title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
         )
-        for model in (PoseFrame, Problem, SamplesAcknowledged, SamplesMessage):  # of no route, or not its only model
+        for model in (
+            PoseFrame,
+            Problem,
+            SamplesAcknowledged,
+            SamplesMessage,
+            TagHealthMessage,
+        ):  # of no route, or not its only model
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
             document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
         _add_access(document)

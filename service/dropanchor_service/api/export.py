@@ -25,6 +25,7 @@ def text() -> str:
         registry=CollectorRegistry(),
         stopping=Event(),
         receive=lambda _tag, _payload, _encoding: None,
+        receive_health=lambda _tag, _payload, _encoding: None,
         dashboard=None,
     )
     return json.dumps(app.openapi(), indent=2, ensure_ascii=False) + "\n"

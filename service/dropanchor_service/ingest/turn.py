@@ -13,20 +13,22 @@ from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import Message, MessageBuffer, UnregisteredMessage
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.health import HealthIntake
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.samples import SampleReader
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
-from dropanchor_service.store import LatestPoses, SiteStore, Tag, TagTable
+from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, Tag, TagTable
 
 MESSAGES_PER_TURN = 1000
 
 
 class Ingest:
-    """The path of a message from the buffer to the stored pose. Owned by one thread, except for `announce`.
+    """The path of a message from the buffer to the stored pose. Owned by one thread.
 
+    Any thread may call `announce` and `health.put`.
     reorder_ns: time that a message waits for those that its publisher numbered before it.
     """
 
@@ -43,8 +45,10 @@ class Ingest:
         clock: UtcClock,
         observers: Observers = NO_OBSERVERS,
         reorder_ns: int = 250_000_000,
+        health: HealthTable | None = None,
     ) -> None:
         self._rejections = Rejections(tags, metrics)
+        self.health = HealthIntake(admission, tags, health or HealthTable(), self._rejections)
         self._reader = SampleReader(site, tags, engine, self._rejections, publishers, reorder_ns)
         self._buffer = buffer
         self._admission = admission
@@ -75,6 +79,7 @@ class Ingest:
         self._admission.review()
         while self._announced:
             self._admission.admit(self._announced.popleft())
+        self.health.turn()
         kept = list(self._register_new_tags())
         fresh, unregistered = self._buffer.drain(limit, self._clock.now_ns())
         self._count_shed()

@@ -8,12 +8,14 @@ from collections.abc import Iterable
 from typing import Any
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.health import MAX_HEALTH_BYTES
 
 SERVICE, READER, ROUTER = "service", "reader", "router"
 ROLES = (SERVICE, READER, ROUTER)
 """Common names that are reserved: no tag may use them."""
 
 MAX_SAMPLES_BYTES = 16_384  # 50 samples take about 8 kB as JSON
+_OVERHEAD_BYTES = 1_024
 
 _RECOVERY = ["query", "declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
 _EVERYTHING = [
@@ -52,16 +54,23 @@ def access_control(site: str, tags: Iterable[str]) -> Section:
 
 
 def low_pass_filter(site: str) -> list[Section]:
-    """Return the section `low_pass_filter`, which limits the size of sample messages."""
+    """Return the section `low_pass_filter`, which limits the size of the messages of tags."""
     samples = keys.all_tags(site, "samples")
     return [
+        {
+            "id": "health",
+            "flows": ["ingress"],
+            "messages": ["put", "delete"],
+            "key_exprs": [keys.all_tags(site, "health")],
+            "size_limit": MAX_HEALTH_BYTES + _OVERHEAD_BYTES,
+        },
         {
             "id": "samples",
             "flows": ["ingress"],
             "messages": ["put", "delete", "query", "reply"],
             "key_exprs": [samples, f"{samples}/@adv/**"],
             "size_limit": MAX_SAMPLES_BYTES,
-        }
+        },
     ]
 
 
@@ -71,6 +80,7 @@ def _tag(site: str, tag: str) -> list[Section]:
     own = [samples, f"{samples}/@adv/**"]
     return [
         _rule(f"{tag}: puts its samples", "ingress", ["put"], own),
+        _rule(f"{tag}: reports its health", "ingress", ["put"], [keys.health_key(site, tag)]),
         _rule(f"{tag}: declares its liveliness", "ingress", ["liveliness_token"], [alive, f"{samples}/@adv/**"]),
         _rule(f"{tag}: answers from its cache", "ingress", ["declare_queryable", "reply"], own),
         _rule(

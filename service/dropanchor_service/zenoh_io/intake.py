@@ -1,4 +1,4 @@
-"""Receives samples and liveliness over Zenoh. Callbacks store what they get and return; they never call Zenoh.
+"""Receives samples, liveliness and health over Zenoh. Callbacks store what they get and return; they never call Zenoh.
 
 Samples are read from a channel and not by a callback. A callback needs the interpreter lock for every message, and can
 wait 5 ms for it while another thread computes. Live messages would then queue in the router, which drops them.
@@ -24,6 +24,8 @@ from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.channel import drain
 
 CHANNEL_LENGTH = 2**14  # messages between Zenoh's receive thread and ours
+HEALTH_CHANNEL_LENGTH = 2**12  # reports; a flood of them loses the oldest and delays no samples
+HEALTH_GATHER_S = 0.1
 GATHER_S = 0.005  # how long to collect messages before processing them together
 
 
@@ -67,9 +69,16 @@ class ZenohIntake:
             zenoh.handlers.Callback(self._on_token, indirect=False),
             history=True,
         )
-        self._declared = [misses, samples, tokens]
-        self._thread = threading.Thread(target=self._receive_all, args=(samples.handler,), name="samples", daemon=True)
-        self._thread.start()
+        health = self._session.declare_subscriber(
+            keys.all_tags(self._site, "health"), zenoh.handlers.RingChannel(HEALTH_CHANNEL_LENGTH)
+        )
+        self._declared = [misses, samples, tokens, health]
+        self._threads = [
+            threading.Thread(target=self._receive_all, args=(samples.handler,), name="samples", daemon=True),
+            threading.Thread(target=self._receive_health, args=(health.handler,), name="health", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
         self._caches.start(self._catch_up)
         return self
 
@@ -79,7 +88,8 @@ class ZenohIntake:
         self._caches.stop()
         for declared in self._declared:
             declared.undeclare()
-        self._thread.join(1.0)
+        for thread in self._threads:
+            thread.join(1.0)
 
     def _receive_all(self, samples: Any) -> None:
         """Pass on messages until the subscriber is undeclared."""
@@ -90,6 +100,12 @@ class ZenohIntake:
         now_ns = self._clock.now_ns()
         encoding = payload_encoding(str(message.encoding))
         self._catch_up.on_live(str(message.key_expr), bytes(message.payload), encoding, now_ns)
+
+    def _receive_health(self, reports: Any) -> None:
+        """Pass on health until the subscriber is undeclared."""
+        for report in drain(reports, HEALTH_GATHER_S):
+            encoding = payload_encoding(str(report.encoding)).partition(";")[0]
+            self._ingest.health.put(str(report.key_expr), bytes(report.payload), encoding, self._clock.now_ns())
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)

@@ -20,6 +20,7 @@ from dropanchor_tag_client.sources.bridge.pipe import Bridge
 from dropanchor_tag_client.sources.bridge.sensor_logger import SensorLogger
 from dropanchor_tag_client.sources.bridge.template import Template
 from dropanchor_tag_client.sources.throttled_log import throttled_log
+from dropanchor_tag_client.upkeep import Upkeep
 
 PASSWORD_VARIABLE = "DROPANCHOR_MQTT_PASSWORD"
 _FLUSH_S = 0.1
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         options = {"site": arguments.site, "connect": session, "encoding": arguments.encoding, "batch_s": None}
         bridge = Bridge(formats, options | spool_settings(arguments), arguments.tag_prefix, names)
         try:
-            with broker.connected():
+            with broker.connected(), Upkeep(bridge.clients):
                 forward(broker, bridge)
         finally:
             bridge.close()

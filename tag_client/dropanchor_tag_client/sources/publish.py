@@ -10,6 +10,7 @@ from typing import Any, BinaryIO, TextIO
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import ImuSample
 from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.health import HealthValues
 from dropanchor_tag_client.options import (
     add_calibration_option,
     add_connection_options,
@@ -96,14 +97,19 @@ def samples_of(line: bytes, clock: str = "utc") -> list[tuple[str, dict[str, Any
     for kind in KINDS:
         if kind.value in value:
             return [(kind.name, value)]
+    if value.keys() & _HEALTH:
+        return [("health", value)]
     raise BadLineError(f"none of {', '.join([*(kind.value for kind in KINDS), *_KINDS])} is there")
 
 
 _KINDS = {kind.name: kind for kind in KINDS}
+_HEALTH = sorted(HealthValues.__annotations__)
 
 
 def fields_of(kind: str) -> tuple[list[str], list[str]]:
-    """Return the fields that a sample of this kind must have, and those that it may have."""
+    """Return the fields that a sample of this kind must have, and those that it may have. The kind may be "health"."""
+    if kind == "health":
+        return [], _HEALTH
     made = _KINDS[kind].sample
     optional = [name for name in made._fields if name in ("t_ns", *made._field_defaults)]
     return [name for name in made._fields if name not in optional], optional
@@ -164,6 +170,12 @@ def _anchor(name: str, value: Any) -> int | str:
     return value
 
 
+def _text(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise BadLineError(f"{name} is {value!r}, a text was expected")
+    return value
+
+
 def _time(name: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise BadLineError(f"{name} is {value!r}, an integer was expected")
@@ -176,6 +188,7 @@ _CHECKS: dict[str, Callable[[str, Any], Any]] = {
     "mag": _vector,
     "anchor": _anchor,
     "t_ns": _time,
+    "firmware": _text,
 }
 
 

@@ -22,6 +22,7 @@ from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
 from dropanchor_tag_client.sources.modules.outlet import ManyTags, OneTag, Outlet
 from dropanchor_tag_client.sources.modules.reader import Reader
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
+from dropanchor_tag_client.upkeep import Upkeep
 
 _FLUSH_S = 0.1
 
@@ -99,6 +100,7 @@ def _outlet(arguments: argparse.Namespace, log: StatusLog) -> Iterator[Outlet]:
         options |= spool_settings(arguments)
         many = ManyTags(arguments.tag or "", options, arguments.as_anchor, names, mounted, log)
         stack.callback(many.close)
+        stack.enter_context(Upkeep(many.clients))
         yield many
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dropanchor_tag_client.client import TagClient
+from dropanchor_tag_client.host import program
 from dropanchor_tag_client.options import add_connection_options, opened_session
 from dropanchor_tag_client.simulator.live import YARD, Delivery, deliveries, simulation, tag_name
 from dropanchor_tag_client.simulator.perturbations import PERTURBATIONS, perturbed
@@ -16,6 +17,7 @@ from dropanchor_tag_client.simulator.ranging import AnchorPlace
 from dropanchor_tag_client.simulator.recording import write_recording
 from dropanchor_tag_client.simulator.scenarios import SCENARIOS
 from dropanchor_tag_client.simulator.sensors import PRESETS, SensorModels, preset
+from dropanchor_tag_client.upkeep import Upkeep
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,6 +88,7 @@ def _publish(arguments: argparse.Namespace, models: SensorModels) -> int:
             )
             for index in range(arguments.tags)
         ]
+        stack.enter_context(Upkeep(clients, lambda: {"firmware": program()}))
         publish_live(clients, arguments.scenario, arguments.seed, models, arguments.duration)
     return 0
 

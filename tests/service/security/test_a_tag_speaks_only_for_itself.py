@@ -16,6 +16,7 @@ from support.secured import SecuredSite, secured_site
 from support.zenoh_router import wait_until
 
 SITE = "default"
+HEALTH_OF_B = keys.health_key(SITE, "b")
 OF_B, POSE_OF_B, POSE_OF_A = keys.samples_key(SITE, "b"), keys.pose_key(SITE, "b"), keys.pose_key(SITE, "a")
 CACHES = f"{keys.all_tags(SITE, 'samples')}/@adv/**"
 ALL_REPLIES: dict[str, Any] = {
@@ -48,12 +49,14 @@ class World:
         self.service, self.reader = enter(site.session("service")), enter(site.session("reader"))
         self.a = enter(site.session("a"))
         self.samples, self.alive, self.poses, self.stolen = Received(), Received(), Received(), Received()
+        self.health = Received()
         recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
         self._kept: list[object] = [
             zenoh.ext.declare_advanced_subscriber(
                 self.service, keys.all_tags(SITE, "samples"), self.samples, recovery=recovery
             ),
             self.service.liveliness().declare_subscriber(keys.everything(SITE), self.alive, history=True),
+            self.service.declare_subscriber(keys.all_tags(SITE, "health"), self.health),
             self.service.declare_queryable(keys.all_tags(SITE, "pose"), _answers(b"from the service")),
             self.reader.declare_subscriber(keys.all_tags(SITE, "pose"), self.poses),
             self.reader.declare_subscriber(keys.poses_key(SITE), self.poses),
@@ -68,6 +71,7 @@ class World:
         """Send permitted messages and wait until they arrive, and with them whatever was sent before."""
         self.b.publish_range(1, 1.0)
         self.b.flush()
+        self.b.publish_health(firmware="b")
         own = keys.samples_key(SITE, "a")
         mark = str(time.monotonic_ns()).encode()
 
@@ -103,6 +107,7 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
     a, samples, alive, poses, stolen = world.a, world.samples, world.alive, world.poses, world.stolen
     a.put(OF_B, b"spoofed")
     a.delete(OF_B)
+    a.put(HEALTH_OF_B, b"{}")
     a.put(POSE_OF_B, b"forged")
     a.put(POSE_OF_A, b"forged")
     a.put(keys.poses_key(SITE), b"forged")
@@ -112,6 +117,7 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
     ]
     subscribers = [
         a.declare_subscriber(OF_B, stolen),
+        a.declare_subscriber(HEALTH_OF_B, stolen),
         a.declare_subscriber(keys.all_tags(SITE, "pose"), stolen),
         a.liveliness().declare_subscriber(keys.all_tags(SITE, "alive"), stolen, history=True),
     ]
@@ -124,6 +130,8 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
     return {
         "puts samples of b": lambda: samples.has(OF_B, b"spoofed"),
         "deletes samples of b": lambda: samples.has(OF_B, kind="DELETE"),
+        "reports the health of b": lambda: world.health.has(HEALTH_OF_B, b"{}"),
+        "receives the health of b": lambda: stolen.has(HEALTH_OF_B),
         "puts the pose of b": lambda: poses.has(POSE_OF_B, b"forged"),
         "puts its own pose": lambda: poses.has(POSE_OF_A, b"forged"),
         "puts the frame of all poses": lambda: poses.has(keys.poses_key(SITE), b"forged"),
@@ -173,6 +181,15 @@ def test_a_tag_reads_its_own_pose_and_its_cache_answers_the_service(tmp_path: Pa
         world.exchange()
         assert query_payloads(world.a, POSE_OF_A) == [b"from the service"]
         assert len(query_payloads(world.service, f"{CACHES}?_max=10", **ALL_REPLIES)) == 1
+
+
+def test_a_tag_reports_its_own_health(tmp_path: Path) -> None:
+    site = secured_site(tmp_path / "security", "a", "b")
+    with ExitStack() as stack:
+        stack.enter_context(site.router())
+        world = World(site, stack)
+        world.exchange()
+        wait_until(lambda: world.health.has(HEALTH_OF_B))
 
 
 def test_a_revoked_tag_and_one_without_a_certificate_are_refused(tmp_path: Path) -> None:

@@ -1,16 +1,18 @@
 """Lines of JSON on standard input become samples; bad lines are named, and stop nothing."""
 
 import io
+import json
 import time
 
 import pytest
 
+from dropanchor_schemas import keys
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.sources.publish import publish_lines
 from support.commands import python, start_python
 from support.listening import ReceivedFrames, listening
-from support.zenoh_router import wait_until
+from support.zenoh_router import connected_session, wait_until
 
 T = 1_760_000_000_000_000_000
 
@@ -87,6 +89,25 @@ def test_every_kind_of_bad_line_is_named_and_the_good_ones_between_are_sent(rout
         assert len(line) < 300
     assert heard.ranges() == [1.5] * len(BAD_LINES)
     assert not client.refused
+
+
+def test_a_line_about_the_tag_is_reported_as_its_health(router_endpoint: str) -> None:
+    lines = b'{"battery_fraction": 0.5, "firmware": "1.2"}\n{"firmware": 1}\n{"battery_v": "3"}\n'
+    heard: list[bytes] = []
+    key, errors = keys.health_key("default", "a"), io.StringIO()
+    with (
+        connected_session(router_endpoint) as session,
+        session.declare_subscriber(key, lambda message: heard.append(bytes(message.payload))),
+        TagClient("a", connect=router_endpoint) as tag,
+    ):
+        list(session.get("nobody/answers", timeout=1.0))
+        assert publish_lines(tag, io.BytesIO(lines), errors) == 2
+        wait_until(lambda: heard)
+    assert [json.loads(payload) for payload in heard] == [{"version": 1, "battery_fraction": 0.5, "firmware": "1.2"}]
+    assert errors.getvalue().splitlines() == [
+        "line 2: firmware is 1, a text was expected",
+        "line 3: battery_v is '3', a number was expected",
+    ]
 
 
 def test_a_message_with_one_bad_sample_publishes_none_of_it(router_endpoint: str) -> None:

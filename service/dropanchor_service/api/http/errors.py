@@ -44,6 +44,7 @@ class Kind(Enum):
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")
     SAMPLES_REJECTED = (422, "The samples cannot be decoded")
+    HEALTH_REJECTED = (422, "The health of the tag cannot be decoded")
     TOO_MANY_REQUESTS = (429, "Too many requests")
     INTERNAL = (500, "An internal error occurred")
     NOT_SAVED = (503, "The change could not be saved")

@@ -86,7 +86,7 @@ def _add_samples_route(router: APIRouter, receive: Receive) -> None:
         openapi_extra={"requestBody": {"required": True, "content": _SAMPLES_BODY}},
     )
     async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
-        tag, payload = _tag(request, query), await request.body()
+        tag, payload = tag_of(request, query), await request.body()
         encoding = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         receive(tag, payload, encoding)  # what cannot be decoded is counted there too
         samples = count_samples(payload, encoding)
@@ -111,7 +111,7 @@ def _add_sensor_logger_route(router: APIRouter, phones: SensorLoggerIntake) -> N
         },
     )
     async def ingest_sensor_logger(request: Request, query: Annotated[OfPhone, Query()]) -> Response:
-        tag, body = _tag(request, query), await request.body()
+        tag, body = tag_of(request, query), await request.body()
         try:
             posted = await run_in_threadpool(phones.post, tag, body, query.signs)
         except PhoneError as error:
@@ -126,7 +126,7 @@ def _phone_error() -> dict[str, Any]:
     return {"description": "A sentence that the app shows.", "content": {"text/plain": {"schema": {"type": "string"}}}}
 
 
-def _tag(request: Request, query: OfTag) -> str:
+def tag_of(request: Request, query: OfTag) -> str:
     """Return the tag that a request speaks for: that of its key, or without credentials the one it names."""
     own: str | None = getattr(request.state, "tag", None)
     if own is not None and query.tag not in (None, own):

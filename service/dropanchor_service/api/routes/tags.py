@@ -10,6 +10,7 @@ from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
 from dropanchor_schemas.keys import InvalidKeyError, refuse_pattern
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
+from dropanchor_service.answers.care import care_of, health_answer
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
@@ -106,7 +107,7 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
 def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
     """Yield the `TagStatus` of each tag."""
     default = TagSettings().model_dump()
-    configured = answers.site.tags
+    configured, now_ns = answers.site.tags, answers.now_ns()
     for tag in tags:
         first, last, messages, samples, rejected = answers.tags.counts(tag.row).item()
         yield {
@@ -118,5 +119,7 @@ def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
             "samples": {kind: count for kind, count in zip(KINDS, samples.tolist(), strict=True) if count},
             "rejected": {name: count for name, count in zip(_REASON_NAMES, rejected.tolist(), strict=True) if count},
             "hint": answers.hint_of(tag),
+            "health": health_answer(answers.health.of(tag.row), now_ns),
+            "needs_care": care_of(tag, answers.health, now_ns),
             "settings": configured[tag.name].model_dump() if tag.name in configured else default,
         }

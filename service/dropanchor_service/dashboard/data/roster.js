@@ -13,7 +13,22 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {Record<string, number>} samples by kind
  * @property {Record<string, number>} rejected by reason
  * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
+ * @property {Health | null} health what the tag reports about itself
+ * @property {{reason: string, hint: string}[]} needs_care what a person should do for the tag
  * @property {{height_m: number}} settings
+ */
+
+/**
+ * @typedef {object} Health as in the contract; every value may be missing
+ * @property {number} age_s
+ * @property {number} [battery_fraction]
+ * @property {number} [battery_v]
+ * @property {number} [temperature_c]
+ * @property {string} [firmware]
+ * @property {number} [rssi_dbm]
+ * @property {number} [spool_bytes]
+ * @property {number} [spool_oldest_s]
+ * @property {number} [lost_messages]
  */
 
 export class Roster {
@@ -28,6 +43,18 @@ export class Roster {
   /** @param {string} tag */
   of(tag) {
     return this.#statuses.get(tag) ?? null;
+  }
+
+  /** Return whether a person should do something for a tag. @param {string} tag */
+  needsCare(tag) {
+    return (this.of(tag)?.needs_care.length ?? 0) > 0;
+  }
+
+  /** Return how many tags need care. */
+  get careCount() {
+    let count = 0;
+    for (const tag of this.#statuses.keys()) if (this.needsCare(tag)) count++;
+    return count;
   }
 
   /** Return the height of a tag above the plane of the site in m. @param {string} tag */

@@ -7,8 +7,15 @@ export class Choice extends EventTarget {
   #selected = null;
   #follow = false;
   #text = "";
+  #onlyCare = false;
   /** @type {Set<number>} */
   hiddenStates = new Set();
+
+  /** @param {(tag: string) => boolean} needsCare */
+  constructor(needsCare = () => false) {
+    super();
+    this.needsCare = needsCare;
+  }
 
   get selected() {
     return this.#selected;
@@ -48,19 +55,31 @@ export class Choice extends EventTarget {
     this.#changed();
   }
 
+  /** Whether only tags that need care are shown. */
+  get onlyCare() {
+    return this.#onlyCare;
+  }
+
+  set onlyCare(only) {
+    this.#onlyCare = only;
+    this.#changed();
+  }
+
   showAll() {
     this.#text = "";
+    this.#onlyCare = false;
     this.hiddenStates.clear();
     this.#changed();
   }
 
   get isFiltered() {
-    return this.#text !== "" || this.hiddenStates.size > 0;
+    return this.#text !== "" || this.#onlyCare || this.hiddenStates.size > 0;
   }
 
   /** @param {import("../data/fleet.js").Fleet} fleet @param {number} row */
   shows(fleet, row) {
     if (this.hiddenStates.size > 0 && this.hiddenStates.has(fleet.state[row])) return false;
+    if (this.#onlyCare && !this.needsCare(fleet.names[row])) return false;
     return this.#text === "" || fleet.names[row].toLowerCase().includes(this.#text);
   }
 

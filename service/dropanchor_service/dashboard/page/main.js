@@ -1,5 +1,6 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
+import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
 import { Connection } from "../data/connection.js";
@@ -23,11 +24,12 @@ const byId = (id) => /** @type {T} */ (document.getElementById(id));
 const fleet = new Fleet();
 const trails = new Trails();
 const roster = new Roster(fleet);
-const choice = new Choice();
+const choice = new Choice((tag) => roster.needsCare(tag));
 const connection = new Connection();
 const evidence = new Evidence();
 const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choice, evidence);
 const chips = new StateChips(byId("chips"), fleet, choice);
+const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
@@ -94,6 +96,7 @@ function updatePanels() {
   if (document.hidden) return;
   table.update();
   chips.update();
+  care.update();
   detail.update();
   notices.update();
   byId("crowd").hidden = !map.stats.density;

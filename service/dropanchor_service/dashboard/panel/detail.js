@@ -4,6 +4,7 @@ import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
 import { UNKNOWN, age, compass, fixed, metres, percent, sigma, turnRate, words } from "../data/format.js";
 import { AMBIGUOUS } from "../data/states.js";
+import { healthTexts } from "./care.js";
 import { Plots } from "./plots.js";
 import { symbol } from "../map/symbols.js";
 
@@ -44,6 +45,7 @@ export class Detail {
     if (this.fleet.hasPose(row)) this.evidence.request(this.fleet.names[row]);
     this.#head(row);
     this.#numbers(row);
+    this.#health(this.fleet.names[row]);
     this.#hypotheses(row);
     if (!this.#explanation) this.#explain();
   }
@@ -109,6 +111,23 @@ export class Detail {
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
   }
 
+  /** @param {string} tag */
+  #health(tag) {
+    const status = this.roster.of(tag);
+    fillList(this.#part("care"), (status?.needs_care ?? []).map(({ hint }) => hint));
+    const box = this.#part("health");
+    const texts = status?.health ? healthTexts(status.health) : [];
+    box.hidden = texts.length === 0;
+    if (box.dataset.shown === JSON.stringify(texts)) return;
+    box.dataset.shown = JSON.stringify(texts);
+    box.replaceChildren(...texts.map(([term, text]) => {
+      const pair = document.createElement("div");
+      pair.append(Object.assign(document.createElement("dt"), { textContent: term }));
+      pair.append(Object.assign(document.createElement("dd"), { textContent: text }));
+      return pair;
+    }));
+  }
+
   /** @param {number} row */
   #hypotheses(row) {
     const list = this.#part("hypotheses");
@@ -137,8 +156,12 @@ function hypothesisLine(ghost) {
 /** @param {HTMLElement} list @param {string} title @param {Record<string, number> | undefined} byName */
 function countsInto(list, title, byName) {
   const counts = Object.entries(byName ?? {}).sort((a, b) => b[1] - a[1]);
-  list.hidden = counts.length === 0;
-  const texts = list.hidden ? [] : [title, ...counts.map(([name, count]) => `${words(name)} ${count.toLocaleString("en")}`)];
+  fillList(list, counts.length === 0 ? [] : [title, ...counts.map(([name, count]) => `${words(name)} ${count.toLocaleString("en")}`)]);
+}
+
+/** @param {HTMLElement} list @param {string[]} texts */
+function fillList(list, texts) {
+  list.hidden = texts.length === 0;
   if (list.textContent === texts.join("")) return;
   list.replaceChildren(...texts.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
 }

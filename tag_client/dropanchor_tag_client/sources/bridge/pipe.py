@@ -40,6 +40,11 @@ class Bridge:
         self._last_detail: dict[Drop, str] = {}
         self._next_s = 0.0
 
+    @property
+    def clients(self) -> Iterable[TagClient]:
+        """Return a view of the clients, which grows with them."""
+        return self._clients.values()
+
     def take(self, message: Received) -> None:
         """Publish what a message holds."""
         for one in self._formats:
@@ -97,7 +102,7 @@ class Bridge:
             publish(client)
         except ValueError as error:  # such as an anchor id that is too long
             return self._drop(Dropped(Drop.NOT_UNDERSTOOD, f"tag {found.tag}: {error}"))
-        self.samples += 1
+        self.samples += found.kind != "health"
         return None
 
     def _client(self, tag: str) -> TagClient | None:

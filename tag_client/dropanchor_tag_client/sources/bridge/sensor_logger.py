@@ -55,6 +55,8 @@ class SensorLogger:
         recording = self._recording(tag, str(message.get("sessionId")))
         for found in recording.add(message.get("messageId"), message.get("payload", [])):
             yield Measurement(tag, "imu", found) if isinstance(found, dict) else found
+        if (level := _battery_level(message.get("payload", []))) is not None:
+            yield Measurement(tag, "health", {"battery_fraction": level})
 
     def _recording(self, tag: str, session_id: str) -> "_Recording":
         recording = self._recordings.pop((tag, session_id), None) or _Recording()
@@ -153,3 +155,13 @@ class _Recording:
         for name, readings in self._readings.items():
             if name != GYROSCOPE and readings and readings[0].t_ns < before_ns:
                 del readings[: bisect_left(readings, before_ns, key=lambda reading: reading.t_ns)]
+
+
+def _battery_level(payload: list[Any]) -> float | None:
+    """Return the last charge of the phone's battery in a message, None if there is none."""
+    for reading in reversed(payload):
+        values = reading.get("values") if isinstance(reading, dict) and reading.get("name") == "battery" else None
+        level = values.get("batteryLevel") if isinstance(values, dict) else None
+        if isinstance(level, int | float) and not isinstance(level, bool):
+            return float(level)
+    return None

@@ -1,6 +1,6 @@
 """Publish the reports of a module: as one tag, or as every tag that the module names."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 from dropanchor_tag_client.client import TagClient
@@ -103,6 +103,11 @@ class ManyTags:
     def flush(self) -> None:
         for client in self._clients.values():
             client.flush()
+
+    @property
+    def clients(self) -> Iterable[TagClient]:
+        """Return a view of the clients, which grows with them."""
+        return self._clients.values()
 
     def close(self) -> None:
         for client in self._clients.values():

@@ -125,6 +125,21 @@ def test_every_gyroscope_reading_of_a_phone_becomes_a_sample_once() -> None:
     assert {one.tag for one in found if isinstance(one, Measurement)} == {"cart"}
 
 
+def test_the_battery_of_a_phone_is_reported_as_its_health() -> None:
+    phone = SensorLogger("sensor-logger")
+
+    def found_in(values: object) -> list[Measurement | Dropped]:
+        reading = {"name": "battery", "time": 1, "values": values}
+        message = {"messageId": 1, "sessionId": "s", "deviceId": "p", "payload": [reading]}
+        return [found for found in phone.parse("sensor-logger", json.dumps(message).encode(), 0) if found[0] == "p"]
+
+    assert found_in({"batteryLevel": 0.53, "batteryState": "unplugged"}) == [
+        Measurement("p", "health", {"battery_fraction": 0.53})
+    ]
+    for values in ({"batteryLevel": True}, {"batteryLevel": "full"}, {}, [0.5]):
+        assert found_in(values) == []
+
+
 def test_the_readings_of_a_phone_are_interpolated() -> None:
     phone = SensorLogger("sensor-logger")
     readings = [

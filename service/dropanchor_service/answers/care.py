@@ -1,0 +1,53 @@
+"""Find the tags that need a person, and say what to do for them."""
+
+from typing import Any
+
+from dropanchor_service.store import HealthTable, Tag
+from dropanchor_service.store.health import HealthRecord
+
+BATTERY_LOW = 0.2
+SPOOL_RISES = 3  # reports in a row
+NO_CONTACT_S = 300.0
+REASONS = ("battery_low", "firmware_differs", "spool_growing", "no_contact")
+
+
+def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | None:
+    """Return the `TagHealth` of a record."""
+    if record is None:
+        return None
+    return {"age_s": _age_s(record.received_ns, now_ns)} | dict(record.values)
+
+
+def care_of(tag: Tag, health: HealthTable, now_ns: int) -> list[dict[str, str]]:
+    """Return a `Care` for everything that a person should do for the tag."""
+    record = health.of(tag.row)
+    hints = {} if record is None else _of_values(record, health.majority_firmware)
+    last_ns = max(tag.last_heard_ns or 0, 0 if record is None or tag.last_heard_ns else record.received_ns)
+    if last_ns and _age_s(last_ns, now_ns) > NO_CONTACT_S:
+        hints["no_contact"] = _no_contact(tag.online, _age_s(last_ns, now_ns))
+    return [{"reason": reason, "hint": hint} for reason, hint in hints.items()]
+
+
+def _of_values(record: HealthRecord, majority: str | None) -> dict[str, str]:
+    hints = {}
+    values = record.values
+    if values.get("battery_fraction", 1.0) < BATTERY_LOW:
+        hints["battery_low"] = f"The battery is at {values['battery_fraction']:.0%}: charge it."
+    firmware = values.get("firmware")
+    if None not in (firmware, majority) and firmware != majority:
+        hints["firmware_differs"] = f"Runs firmware {firmware}, most tags run {majority}: update it."
+    if record.spool_rises >= SPOOL_RISES:
+        megabytes = values["spool_bytes"] / 1e6
+        hints["spool_growing"] = f"Its spool grows ({megabytes:.1f} MB wait): its network is too slow for its data."
+    return hints
+
+
+def _no_contact(online: bool, age_s: float) -> str:
+    minutes = f"{age_s / 60:.0f} minutes" if age_s < 7200 else f"{age_s / 3600:.0f} hours"
+    if online:
+        return f"Connected, but has sent no samples for {minutes}: check its sensors."
+    return f"Has sent nothing for {minutes}: check its power and its network."
+
+
+def _age_s(t_ns: int, now_ns: int) -> float:
+    return max(0.0, (now_ns - t_ns) * 1e-9)

@@ -1,0 +1,50 @@
+/** The number of tags that need care, as a chip that filters, and what the selected tag reports about itself. */
+
+import { age, counted, fixed, percent } from "../data/format.js";
+
+/** @typedef {import("../data/roster.js").Health} Health */
+
+export class CareChip {
+  /** @param {HTMLButtonElement} button @param {HTMLElement} count @param {import("../data/roster.js").Roster} roster
+   * @param {import("../page/choice.js").Choice} choice */
+  constructor(button, count, roster, choice) {
+    this.button = button;
+    this.count = count;
+    this.roster = roster;
+    this.choice = choice;
+    button.addEventListener("click", () => (choice.onlyCare = !choice.onlyCare));
+    choice.addEventListener("change", () => this.update());
+    this.update();
+  }
+
+  update() {
+    const tags = this.roster.careCount;
+    this.button.hidden = tags === 0 && !this.choice.onlyCare;
+    this.button.setAttribute("aria-pressed", String(this.choice.onlyCare));
+    const text = tags.toLocaleString("en");
+    if (this.count.textContent !== text) this.count.textContent = text;
+  }
+}
+
+/** Return what a tag reports about itself, as terms and values for people. @param {Health} health @returns {[string, string][]} */
+export function healthTexts(health) {
+  const { battery_fraction, battery_v, temperature_c, rssi_dbm, firmware, spool_bytes, spool_oldest_s, lost_messages } = health;
+  /** @type {[string, (string | null)[]][]} */
+  const texts = [
+    ["Battery", [unless(battery_fraction, percent), unless(battery_v, (volts) => `${fixed(volts, 2)} V`)]],
+    ["Temperature", [unless(temperature_c, (value) => `${fixed(value, 0)} °C`)]],
+    ["Signal", [unless(rssi_dbm, (value) => `${fixed(value, 0)} dBm`)]],
+    ["Firmware", [firmware ?? null]],
+    ["Spool", [unless(spool_bytes, megabytes), spool_bytes ? unless(spool_oldest_s, (value) => `since ${age(value)}`) : null]],
+    ["Lost", [lost_messages ? counted(lost_messages, "message") : null]],
+    ["Reported", [`${age(health.age_s)} ago`]],
+  ];
+  return texts.map(([term, parts]) => /** @type {[string, string]} */ ([term, parts.filter((part) => part !== null).join(" · ")]))
+    .filter(([, text]) => text !== "");
+}
+
+/** @param {number} bytes */
+const megabytes = (bytes) => (bytes === 0 ? "empty" : `${fixed(bytes / 1e6, 1)} MB`);
+
+/** @template T @param {T | undefined | null} value @param {(value: T) => string} format */
+const unless = (value, format) => (value === undefined || value === null ? null : format(value));

@@ -1,0 +1,50 @@
+"""Gauges of what the tags report about themselves. There is none per tag: a fleet has thousands."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from dropanchor_service.answers.care import REASONS, care_of
+from dropanchor_service.store import HealthTable, TagTable
+
+_EXTREMES: tuple[tuple[str, str, Callable[[Sequence[float]], float], str], ...] = (
+    (
+        "dropanchor_battery_fraction_min",
+        "battery_fraction",
+        min,
+        "Charge of the emptiest battery; NaN if none is known.",
+    ),
+    ("dropanchor_tag_temperature_celsius_max", "temperature_c", max, "Temperature of the hottest tag; NaN if unknown."),
+    ("dropanchor_rssi_dbm_min", "rssi_dbm", min, "Signal of the tag with the weakest network link; NaN if unknown."),
+    ("dropanchor_spool_bytes", "spool_bytes", sum, "Messages that wait on the disks of all tags; NaN if unknown."),
+)
+
+
+class HealthGauges(Collector):
+    """Gauges that are read from the store at every scrape."""
+
+    def __init__(self, tags: TagTable, health: HealthTable, now_ns: Callable[[], int]) -> None:
+        self._tags = tags
+        self._health = health
+        self._now_ns = now_ns
+
+    def collect(self) -> Iterable[Metric]:
+        now_ns, tags = self._now_ns(), self._tags.all()
+        reasons = Counter(care["reason"] for tag in tags for care in care_of(tag, self._health, now_ns))
+        needing = GaugeMetricFamily(
+            "dropanchor_tags_needing_care", "Tags that need a person, by reason.", labels=["reason"]
+        )
+        for reason in REASONS:
+            needing.add_metric([reason], reasons[reason])
+        yield needing
+        yield from self._extremes([record.values for tag in tags if (record := self._health.of(tag.row))])
+
+    def _extremes(self, values: Sequence[Mapping[str, Any]]) -> Iterable[Metric]:
+        yield GaugeMetricFamily("dropanchor_tags_reporting_health", "Tags that have reported health.", len(values))
+        for name, field, choose, text in _EXTREMES:
+            known = [one[field] for one in values if field in one]
+            yield GaugeMetricFamily(name, text, choose(known) if known else math.nan)

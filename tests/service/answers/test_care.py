@@ -1,0 +1,82 @@
+"""A tag needs care for reasons that a person can do something about, and the answer says what."""
+
+from typing import Any
+
+import numpy as np
+
+from dropanchor_service.answers.care import NO_CONTACT_S, SPOOL_RISES, care_of
+from dropanchor_service.store import HealthTable, Tag, TagTable
+
+S = 1_000_000_000
+NOW_NS = 1_800_000_000 * S
+
+
+class Fleet:
+    """Tags that report health and send samples."""
+
+    def __init__(self) -> None:
+        self.tags = TagTable()
+        self.health = HealthTable()
+
+    def report(self, name: str, **values: Any) -> None:
+        self.health.record(self.tags.register(name).row, values, NOW_NS)
+
+    def tag(self, name: str) -> Tag:
+        return self.tags.register(name)
+
+    def care(self, name: str, after_s: float = 0.0) -> dict[str, str]:
+        found = care_of(self.tag(name), self.health, NOW_NS + round(after_s * S))
+        return {care["reason"]: care["hint"] for care in found}
+
+
+def test_a_tag_that_has_reported_nothing_or_only_good_values_needs_no_care() -> None:
+    fleet = Fleet()
+    assert fleet.care("silent") == {}
+    fleet.report("a", battery_fraction=0.2, firmware="1", spool_bytes=0)
+    assert fleet.care("a") == {}
+
+
+def test_a_low_battery_needs_care() -> None:
+    fleet = Fleet()
+    fleet.report("a", battery_fraction=0.19)
+    assert fleet.care("a") == {"battery_low": "The battery is at 19%: charge it."}
+
+
+def test_firmware_needs_care_while_it_differs_from_that_of_more_than_half_of_the_fleet() -> None:
+    fleet = Fleet()
+    fleet.report("a", firmware="1.0")
+    fleet.report("b", firmware="1.1")
+    assert fleet.care("a") == fleet.care("b") == {}
+    fleet.report("c", firmware="1.1")
+    assert set(fleet.care("a")) == {"firmware_differs"}
+    assert "1.0" in fleet.care("a")["firmware_differs"]
+    assert fleet.care("b") == {}
+    fleet.report("a", firmware="1.1")
+    assert fleet.care("a") == {}
+
+
+def test_a_spool_needs_care_when_it_grows_from_report_to_report() -> None:
+    fleet = Fleet()
+    for i in range(SPOOL_RISES):
+        assert fleet.care("a") == {}
+        fleet.report("a", spool_bytes=1_000_000 * (i + 1))
+        fleet.report("a", temperature_c=20.0)
+    assert "3.0 MB" in fleet.care("a")["spool_growing"]
+    fleet.report("a", spool_bytes=2_000_000)
+    assert fleet.care("a") == {}
+
+
+def test_a_tag_without_contact_needs_care_and_the_hint_says_whether_it_is_connected() -> None:
+    fleet = Fleet()
+    fleet.tags.count_messages(np.array([fleet.tag("a").row]), NOW_NS)
+    assert fleet.care("a", NO_CONTACT_S - 1.0) == {}
+    assert "check its power" in fleet.care("a", NO_CONTACT_S + 1.0)["no_contact"]
+    fleet.tags.set_online("a", True)
+    assert "check its sensors" in fleet.care("a", NO_CONTACT_S + 1.0)["no_contact"]
+
+
+def test_a_tag_that_has_only_reported_health_is_without_contact_once_that_ends() -> None:
+    fleet = Fleet()
+    fleet.report("a", battery_fraction=0.5)
+    assert fleet.care("a", NO_CONTACT_S - 1.0) == {}
+    assert set(fleet.care("a", NO_CONTACT_S + 1.0)) == {"no_contact"}

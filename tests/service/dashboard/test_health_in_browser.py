@@ -1,0 +1,37 @@
+"""The page shows what tags report about themselves, counts those that need care, and shows only these on demand."""
+
+import time
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from service.dashboard.place import Place
+from support.browser import watched_page
+
+pytestmark = pytest.mark.browser
+
+
+def test_tags_that_need_care_are_counted_and_filtered_and_the_panel_says_what_they_need(
+    chromium: Browser, place: Place
+) -> None:
+    place.move("empty", "full", x=1.0, y=2.0)
+    tags, health = place.bench.answers.tags, place.bench.answers.health
+    now_ns = time.time_ns()
+    health.record(tags.register("full").row, {"battery_fraction": 0.93, "firmware": "2.0"}, now_ns)
+    with watched_page(chromium, place.url) as watched:
+        page = watched.page
+        expect(page.locator("tr[data-tag]:visible")).to_have_count(2)
+        expect(page.locator("#care")).to_be_hidden()
+        health.record(tags.register("empty").row, {"battery_fraction": 0.08, "rssi_dbm": -82.0}, now_ns)
+        chip = page.locator("#care")
+        expect(chip).to_have_text("Needs care 1", timeout=10_000)
+        chip.click()
+        expect(page.locator("tr[data-tag]:visible")).to_have_count(1)
+        page.locator("tr[data-tag='empty']").click()
+        expect(page.locator("[data-part='care']")).to_have_text("The battery is at 8%: charge it.")
+        expect(page.locator("[data-part='health']")).to_contain_text("8 %")
+        expect(page.locator("[data-part='health']")).to_contain_text("−82 dBm")
+        page.locator("#show-all").click()
+        page.locator("tr[data-tag='full']").click()
+        expect(page.locator("[data-part='care']")).to_be_hidden()
+        expect(page.locator("[data-part='health']")).to_contain_text("2.0")
