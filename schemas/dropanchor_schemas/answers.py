@@ -2,12 +2,19 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.site import Anchor, TagSettings
+from dropanchor_schemas.site import Anchor, RemoteSettings, TagSettings
 from dropanchor_schemas.tag_health import Care, TagHealth
 
 
 class _Answer(BaseModel):
     model_config = ConfigDict(frozen=True)
+
+
+class RemoteSettingsStatus(_Answer):
+    """What the service has set for the program of a tag, and what the program says that it applies."""
+
+    wanted: RemoteSettings
+    acknowledged: RemoteSettings | None = Field(description="null: the program has acknowledged no settings.")
 
 
 class TagStatus(_Answer):
@@ -26,6 +33,7 @@ class TagStatus(_Answer):
     )
     health: TagHealth | None = Field(description="What the tag has reported about itself; null if nothing.")
     needs_care: list[Care] = Field(description="What a person should do for the tag; empty if nothing.")
+    remote_settings: RemoteSettingsStatus
     settings: TagSettings
 
 

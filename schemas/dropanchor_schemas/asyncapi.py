@@ -10,11 +10,11 @@ from pydantic import BaseModel
 from dropanchor_schemas import keys
 from dropanchor_schemas.pose import Pose, PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
-from dropanchor_schemas.site import Anchor
+from dropanchor_schemas.site import Anchor, RemoteSettings
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER, MAX_PAYLOAD_BYTES
 
-_MODELS: tuple[type[BaseModel], ...] = (SamplesMessage, TagHealthMessage, Pose, PoseFrame, Anchor)
+_MODELS: tuple[type[BaseModel], ...] = (SamplesMessage, TagHealthMessage, Pose, PoseFrame, Anchor, RemoteSettings)
 _PARAMETERS = {
     "site": "Id of the site; `default` unless the settings say otherwise.",
     "tag": "Id of the tag.",
@@ -71,6 +71,12 @@ def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
             "What a tag says about itself: battery, temperature, firmware. Optional.",
             {"kind": "put", "put": "about once a minute"},
         ),
+        "settings": (
+            _readable(keys.settings_key("{site}", "{tag}")),
+            ["settings"],
+            "What the program of a tag should apply. It acknowledges it in its health.",
+            {"kind": ["queryable", "put"], "put": "on change"},
+        ),
         "pose": (
             _readable(keys.pose_key("{site}", "{tag}")),
             ["pose"],
@@ -120,7 +126,7 @@ def _channel(address: str, messages: list[str], description: str, zenoh: dict[st
 def _operations() -> dict[str, Any]:
     """Return the operations of the service: it receives the tags' messages and sends poses."""
     received = ("samples", "tagAlive", "health")
-    sent = ("pose", "poses", "anchor", "serviceAlive")
+    sent = ("settings", "pose", "poses", "anchor", "serviceAlive")
     return {
         f"{action}{name[0].upper()}{name[1:]}": {"action": action, "channel": {"$ref": f"#/channels/{name}"}}
         for action, names in (("receive", received), ("send", sent))
@@ -143,6 +149,7 @@ def _messages() -> dict[str, Any]:
             },
         },
         "health": _json_message(TagHealthMessage, "The values that the tag knows; the others are left out."),
+        "settings": _json_message(RemoteSettings, "What is null is up to the program."),
         "pose": _json_message(Pose, "One pose with its state, reason and covariance."),
         "poseFrame": _json_message(PoseFrame, "Entry i of every column belongs to tag i."),
         "anchor": _json_message(Anchor, "One anchor in the site frame."),

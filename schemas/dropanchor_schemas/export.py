@@ -10,7 +10,7 @@ from dropanchor_schemas import asyncapi
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseFrame, PoseList
 from dropanchor_schemas.samples import SamplesMessage
-from dropanchor_schemas.site import Anchor, Site, TagSettings
+from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.tag_health import TagHealthMessage
 
 FOLDER = Path(__file__).parent / "json"
@@ -22,6 +22,7 @@ MODELS: dict[str, type[BaseModel]] = {
     "poses": PoseList,
     "pose_frame": PoseFrame,
     "explanation": Explanation,
+    "remote_settings": RemoteSettings,
     "site": Site,
     "anchor": Anchor,
     "tag_settings": TagSettings,

@@ -55,6 +55,10 @@ def health_key(site: str, tag: str) -> str:
     return f"{_tag_prefix(site, tag)}/health"
 
 
+def settings_key(site: str, tag: str) -> str:
+    return f"{_tag_prefix(site, tag)}/settings"
+
+
 def pose_key(site: str, tag: str) -> str:
     return f"{_tag_prefix(site, tag)}/pose"
 
@@ -72,7 +76,7 @@ def service_alive_key(site: str, service: str) -> str:
 
 
 def all_tags(site: str, leaf: str) -> str:
-    """Return the key expression of `leaf` ("samples", "alive", "health" or "pose") of every tag of the site."""
+    """Return the key expression of `leaf` (such as "samples" or "pose") of every tag of the site."""
     return f"{_site_prefix(site)}/tag/*/{leaf}"
 
 

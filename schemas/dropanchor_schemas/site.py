@@ -6,6 +6,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic.config import JsonDict
 
 from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_schemas.remote import MAX_BATCH_S, MAX_IMU_HZ, MIN_BATCH_S, MIN_IMU_HZ
 from dropanchor_schemas.wire import anchor_number
 
 
@@ -145,6 +146,17 @@ class TagSettings(_Settings):
         "tag in any way; auto: a person while the accelerations show steps, otherwise a vehicle.",
     )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
+
+
+class RemoteSettings(_Settings):
+    """What the service sets in the program of a tag, while it runs."""
+
+    batch_s: Annotated[FiniteFloat, Field(ge=MIN_BATCH_S, le=MAX_BATCH_S), _NumberOnly] | None = Field(
+        default=None, description="How long samples wait for others in a message; null: as the program says."
+    )
+    imu_hz: Annotated[FiniteFloat, Field(ge=MIN_IMU_HZ, le=MAX_IMU_HZ), _NumberOnly] | None = Field(
+        default=None, description="IMU samples per second at most, by means of more; null: as the IMU gives them."
+    )
 
 
 class Site(_Settings):

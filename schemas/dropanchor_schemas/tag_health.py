@@ -6,6 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dropanchor_schemas.health import LIMITS, MAX_FIRMWARE_LENGTH, MAX_HEALTH_BYTES, is_absurd
 from dropanchor_schemas.samples import rejection_of, unknown_version
+from dropanchor_schemas.site import RemoteSettings
 from dropanchor_schemas.wire import ENCODING_JSON, Reason, Rejection
 
 
@@ -55,6 +56,9 @@ class TagHealthMessage(_Values):
     )
 
     version: int = Field(default=1, ge=1, le=1, description="Version of this schema; decoders reject others.")
+    settings: RemoteSettings | None = Field(
+        default=None, description="What the tag's program applies of the settings that the service has for it."
+    )
 
 
 class TagHealth(_Values):

@@ -46,6 +46,7 @@ from dropanchor_service.zenoh_io.intake import ZenohIntake
 from dropanchor_service.zenoh_io.link import ZenohLink
 from dropanchor_service.zenoh_io.publishers import ZenohPoses
 from dropanchor_service.zenoh_io.queryables import ZenohAnswers
+from dropanchor_service.zenoh_io.remote_settings import ZenohRemoteSettings
 
 HTTP_STOP_S = 1.5
 
@@ -208,6 +209,7 @@ class Service:
             self._intake(session),
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),
+            ZenohRemoteSettings(session, self.site, self.metrics),
         ]
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:

@@ -16,7 +16,7 @@ class SampleBuffer:
     """Collect samples into a frame. Not thread-safe: the owner holds a lock."""
 
     def __init__(self, max_samples: int) -> None:
-        self._max_samples = max_samples
+        self.max_samples = max_samples
         self._frame = Frame()
         self._first_ns = 0
 
@@ -25,7 +25,7 @@ class SampleBuffer:
 
     @property
     def is_full(self) -> bool:
-        return len(self._frame) >= self._max_samples
+        return len(self._frame) >= self.max_samples
 
     def accepts(self, t_ns: int) -> bool:
         """Return whether a sample of this time fits into the same message as the buffered samples."""

@@ -6,8 +6,6 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import Sequence
-from operator import index
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, NamedTuple, Self, Unpack
@@ -20,20 +18,19 @@ from dropanchor_schemas.kinds import Sample
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
     ENCODING_PACKED,
-    BearingSample,
     Frame,
-    HeadingSample,
     ImuSample,
-    RangeSample,
     Reason,
     encode_json,
     encode_packed,
 )
-from dropanchor_tag_client.buffer import SampleBuffer, number_of, rejection_reason, vector
+from dropanchor_tag_client.buffer import SampleBuffer, rejection_reason
 from dropanchor_tag_client.calibration import Calibration
 from dropanchor_tag_client.health import HealthValues, reportable
 from dropanchor_tag_client.link import TagKeys
 from dropanchor_tag_client.publisher import Publisher, declare_publisher
+from dropanchor_tag_client.remote import Decimator, RemoteSettings
+from dropanchor_tag_client.sample_methods import SampleMethods
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
 from dropanchor_tag_client.spool import Spool
 from dropanchor_tag_client.spooling import SpoolCounts, SpoolingPublisher
@@ -51,7 +48,7 @@ class Sent(NamedTuple):
     payload_bytes: int
 
 
-class TagClient:
+class TagClient(SampleMethods):
     """Publish the raw samples of one tag. Use the client as a context manager. All methods are thread-safe.
 
     connect: the endpoint of the router; `SessionSettings` (TLS, password); or an open session, which several tags of
@@ -75,6 +72,9 @@ class TagClient:
     _spooling: SpoolingPublisher | None = None
     _token: zenoh.LivelinessToken | None = None
     _timer: threading.Thread | None = None
+    _decimator: Decimator | None = None
+    wanted: RemoteSettings | None = None
+    _applied: RemoteSettings | None = None
     _due_s = math.inf
     _sent = Sent(0, 0, 0)
 
@@ -111,7 +111,8 @@ class TagClient:
         self._calibration = calibration
         self._boot_clock = clock == "boot"
         self._replay = replay
-        self._batch_s = batch_s
+        self._batch_s = self._own_batch_s = batch_s
+        self._batch_samples = batch_samples
         self._cache_messages = cache_messages
         self._wait_when_congested = wait_when_congested
         self._connect_timeout_s = connect_timeout_s
@@ -169,49 +170,31 @@ class TagClient:
         if self._session is not None and isinstance(self._connect, SessionSettings):
             self._session.close()
 
-    def publish_range(
-        self, anchor: int | str, range_m: float, *, t_ns: int | None = None, std_m: float = math.nan
-    ) -> None:
-        """Publish one two-way range to an anchor, m."""
-        self._add(RangeSample(self._time(t_ns), number_of(anchor), float(range_m), float(std_m)), anchor)
-
-    def publish_imu(
-        self,
-        acc: Sequence[float],
-        gyro: Sequence[float],
-        mag: Sequence[float] | None = None,
-        *,
-        t_ns: int | None = None,
-    ) -> None:
-        """Publish one IMU sample; body frame x forward, y left, z up.
-
-        acc: specific force, m/s². gyro: angular rate, rad/s. mag: magnetic field, µT.
-        """
-        field = None if mag is None else vector("mag", mag)
-        sample = ImuSample(self._time(t_ns), vector("acc", acc), vector("gyro", gyro), field)
-        self._add(sample if self._calibration is None else self._calibration.applied(sample))
-
-    def publish_heading(self, heading_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan) -> None:
-        """Publish a heading from the tag's platform, counter-clockwise from east, rad."""
-        self._add(HeadingSample(self._time(t_ns), float(heading_rad), float(std_rad)))
-
-    def publish_bearing(
-        self, anchor: int | str, bearing_rad: float, *, t_ns: int | None = None, std_rad: float = math.nan
-    ) -> None:
-        """Publish the bearing of the tag, seen from the anchor, counter-clockwise from east, rad."""
-        self._add(BearingSample(self._time(t_ns), number_of(anchor), float(bearing_rad), float(std_rad)), anchor)
-
     def publish_health(self, **values: Unpack[HealthValues]) -> bool:
         """Report what is known about the tag, and what its spool holds. Return whether it could be sent.
 
         About once a minute is enough; `Upkeep` does it. Values that no tag can measure are counted in `refused`.
         """
         with self._condition:
-            report, session = reportable(values, self.spool_counts, self.refused), self.session
+            report, session = reportable(values, self.spool_counts, self._applied, self.refused), self.session
             if session is None or not report:
                 return False
             session.put(self._keys.health, encode_health(report), encoding=ENCODING_JSON)
         return True
+
+    def apply(self, settings: RemoteSettings) -> None:
+        """Apply what the service sets for this tag; what is None is as the program said.
+
+        A message still has at most 50 samples. A client without a batch time is flushed by its program, so that the
+        service cannot change it.
+        """
+        with self._condition:
+            self.wanted = settings
+            batch_s = None if self._own_batch_s is None else settings.batch_s
+            self._batch_s = self._own_batch_s if batch_s is None else batch_s
+            self._buffer.max_samples = self._batch_samples if batch_s is None else _MAX_BATCH
+            self._decimator = None if settings.imu_hz is None else Decimator(settings.imu_hz)
+            self._applied = RemoteSettings(batch_s, settings.imu_hz)
 
     def flush(self) -> None:
         """Send all buffered samples now."""
@@ -222,6 +205,11 @@ class TagClient:
     def sent(self) -> Sent:
         """Return what the client has sent since it was created."""
         return self._sent
+
+    @property
+    def settings_key(self) -> str:
+        """Return the key where the service has settings for this tag."""
+        return self._keys.settings
 
     @property
     def session(self) -> zenoh.Session | None:
@@ -247,11 +235,6 @@ class TagClient:
             wait_when_congested=self._wait_when_congested,
         )
 
-    def _time(self, t_ns: int | None) -> int:
-        if t_ns is not None:
-            return index(t_ns)
-        return time.monotonic_ns() if self._boot_clock else time.time_ns()
-
     def _add(self, sample: Sample, anchor: int | str | None = None) -> None:
         with self._condition:
             if self._publisher is None:
@@ -259,6 +242,11 @@ class TagClient:
             if reason := rejection_reason(sample):
                 self._refuse(reason)
                 return
+            if self._decimator is not None and isinstance(sample, ImuSample):
+                mean = self._decimator.add(sample)
+                if mean is None:
+                    return
+                sample = mean
             if not self._buffer.accepts(sample.t_ns):
                 self._send()
             self._buffer.add(sample, anchor)

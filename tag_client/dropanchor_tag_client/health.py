@@ -6,6 +6,7 @@ from typing import Any, TypedDict
 
 from dropanchor_schemas.health import MAX_FIRMWARE_LENGTH, is_absurd
 from dropanchor_schemas.wire import Reason
+from dropanchor_tag_client.remote import RemoteSettings
 from dropanchor_tag_client.spooling import SpoolCounts
 
 
@@ -19,9 +20,13 @@ class HealthValues(TypedDict, total=False):
     firmware: str
 
 
-def reportable(given: HealthValues, spool: SpoolCounts | None, refused: Counter[Reason]) -> dict[str, Any]:
-    """Return what a report contains: the given values that a tag can have measured, and what its spool holds."""
-    values: dict[str, Any] = {**given, **_of_spool(spool)}
+def reportable(
+    given: HealthValues, spool: SpoolCounts | None, settings: RemoteSettings | None, refused: Counter[Reason]
+) -> dict[str, Any]:
+    """Return what a report contains: the given values that a tag can have measured, what its spool holds, and the
+    settings of the service that are applied."""
+    applied = {} if settings is None else {"settings": settings._asdict()}
+    values: dict[str, Any] = {**given, **_of_spool(spool), **applied}
     if "firmware" in values:
         values["firmware"] = values["firmware"][:MAX_FIRMWARE_LENGTH]
     absurd = [name for name, value in values.items() if is_absurd(name, value)]

@@ -20,12 +20,13 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class TagKeys:
-    """The keys of a tag: of its samples, its liveliness token, its pose and its health."""
+    """The keys of a tag: of its samples, its liveliness token, its pose, its health and its settings."""
 
     samples: str
     alive: str
     pose: str
     health: str
+    settings: str
 
     @classmethod
     def of(cls, site: str, tag: str) -> Self:
@@ -34,6 +35,7 @@ class TagKeys:
             keys.tag_alive_key(site, tag),
             keys.pose_key(site, tag),
             keys.health_key(site, tag),
+            keys.settings_key(site, tag),
         )
 
 

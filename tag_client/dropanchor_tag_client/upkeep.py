@@ -1,25 +1,29 @@
-"""Look after open clients beside their samples: report their health once a minute."""
+"""Look after open clients beside their samples: report their health, and apply what the service sets for them."""
 
 import logging
 import threading
 import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
+from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import zenoh
 
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.health import HealthValues
+from dropanchor_tag_client.remote import parse
 
 PERIOD_S = 60.0
 _POLL_S = 1.0
+_ANSWER_S = 5.0
 
 _log = logging.getLogger(__name__)
 
 
 class Upkeep:
-    """Report the health of clients while the block runs: `with TagClient("cart") as tag, Upkeep([tag]): …`.
+    """Report the health of clients and follow their remote settings: `with TagClient("cart") as tag, Upkeep([tag]): …`.
 
     clients: open clients of one or many tags. values: returns what is known about the tags, by the names of
     `TagClient.publish_health`; each client adds what its spool holds. A client that is not connected yet reports as
@@ -36,7 +40,8 @@ class Upkeep:
         self._values = values
         self._period_s = period_s
         self._due_s: dict[TagClient, float] = {}
-        self._stop = threading.Event()
+        self._subscribers: dict[TagClient, Any] = {}
+        self._received: SimpleQueue[tuple[TagClient, bytes] | None] = SimpleQueue()  # None: stop
         self._thread = threading.Thread(target=self._run, name="upkeep", daemon=True)
 
     def __enter__(self) -> Self:
@@ -46,18 +51,51 @@ class Upkeep:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._stop.set()
+        self._received.put(None)
         self._thread.join()
+        for subscriber in self._subscribers.values():
+            subscriber.undeclare()
 
     def _run(self) -> None:
-        while not self._stop.wait(min(_POLL_S, self._period_s)):
-            now_s = time.monotonic()
-            due = [client for client in list(self._clients) if self._due_s.get(client, 0.0) <= now_s]
-            values = self._values() if due else HealthValues()
-            for client in due:
-                if client.session is not None:
-                    self._due_s[client] = now_s + self._period_s
-                    self._report(client, values)
+        while True:
+            with suppress(Empty):
+                received = self._received.get(timeout=min(_POLL_S, self._period_s))
+                if received is None:
+                    return
+                self._apply(*received)
+            self._visit()
+
+    def _visit(self) -> None:
+        now_s = time.monotonic()
+        due = [client for client in list(self._clients) if self._due_s.get(client, 0.0) <= now_s]
+        values = self._values() if due else HealthValues()
+        for client in due:
+            if client.session is not None:
+                self._due_s[client] = now_s + self._period_s
+                self._report(client, values)
+                self._ask(client, client.session)
+
+    def _ask(self, client: TagClient, session: zenoh.Session) -> None:
+        """Ask for the settings of a tag, also after changes that it missed; the answer comes to `_received`."""
+
+        def on_message(message: zenoh.Sample) -> None:
+            self._received.put((client, bytes(message.payload)))
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                on_message(reply.ok)
+
+        if client not in self._subscribers:
+            self._subscribers[client] = session.declare_subscriber(client.settings_key, on_message)
+        session.get(client.settings_key, on_reply, timeout=_ANSWER_S)
+
+    def _apply(self, client: TagClient, payload: bytes) -> None:
+        settings = parse(payload)
+        if settings is None or settings == client.wanted:
+            return
+        client.apply(settings)
+        _log.info("tag %s: the service sets %s", client.tag, settings)
+        self._report(client, HealthValues())
 
     def _report(self, client: TagClient, values: HealthValues) -> None:
         try:

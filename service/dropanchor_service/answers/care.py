@@ -15,7 +15,8 @@ def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | 
     """Return the `TagHealth` of a record."""
     if record is None:
         return None
-    return {"age_s": _age_s(record.received_ns, now_ns)} | dict(record.values)
+    values = {name: value for name, value in record.values.items() if name != "settings"}
+    return {"age_s": _age_s(record.received_ns, now_ns)} | values
 
 
 def care_of(tag: Tag, health: HealthTable, now_ns: int) -> list[dict[str, str]]:

@@ -26,6 +26,7 @@ from dropanchor_service.api.routes.ingest_health import ingest_health_router
 from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
+from dropanchor_service.api.routes.remote_settings import remote_settings_router
 from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
@@ -82,6 +83,7 @@ def create_app(
     for router in (
         poses_router(answers),
         tags_router(answers, max_tags),
+        remote_settings_router(answers),
         track_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),

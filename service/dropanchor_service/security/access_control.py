@@ -76,6 +76,7 @@ def low_pass_filter(site: str) -> list[Section]:
 
 def _tag(site: str, tag: str) -> list[Section]:
     samples, alive, pose = keys.samples_key(site, tag), keys.tag_alive_key(site, tag), keys.pose_key(site, tag)
+    to_tag = [pose, keys.settings_key(site, tag), keys.all_anchors(site)]
     all_samples = keys.all_tags(site, "samples")
     own = [samples, f"{samples}/@adv/**"]
     return [
@@ -86,8 +87,8 @@ def _tag(site: str, tag: str) -> list[Section]:
         _rule(
             f"{tag}: receives queries to its cache", "egress", _RECOVERY, [all_samples, f"{all_samples}/@adv/**", *own]
         ),
-        _rule(f"{tag}: requests its pose", "ingress", ["query", "declare_subscriber"], [pose, keys.all_anchors(site)]),
-        _rule(f"{tag}: receives its pose", "egress", ["put", "reply"], [pose, keys.all_anchors(site)]),
+        _rule(f"{tag}: requests its pose and settings", "ingress", ["query", "declare_subscriber"], to_tag),
+        _rule(f"{tag}: receives its pose and settings", "egress", ["put", "reply"], to_tag),
     ]
 
 

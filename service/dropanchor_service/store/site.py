@@ -7,7 +7,7 @@ from threading import Lock
 
 from pydantic import BaseModel, ConfigDict
 
-from dropanchor_schemas.site import Anchor, Site, TagSettings
+from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.atomic_file import write_atomically
 
@@ -23,6 +23,7 @@ class SiteDocument(BaseModel):
 
     site: Site
     tags: dict[str, TagSettings] = {}
+    remote: dict[str, RemoteSettings] = {}
 
 
 class SiteStore:
@@ -129,6 +130,21 @@ class SiteStore:
         """Replace the settings of the tag and save them. Raises OSError."""
         with self._lock:
             self._replace(self._document.model_copy(update={"tags": self.tags | {tag: settings}}))
+
+    def remote_settings(self, tag: str) -> RemoteSettings:
+        """Return what the program of the tag should apply."""
+        return self._document.remote.get(tag, RemoteSettings())
+
+    def set_remote(self, tag: str, settings: RemoteSettings, expected: RemoteSettings | None = None) -> bool:
+        """Replace what the program of the tag should apply, and save it. Raises OSError.
+
+        Return False, and change nothing, when the current settings are not the expected ones.
+        """
+        with self._lock:
+            if expected is not None and expected != self.remote_settings(tag):
+                return False
+            self._replace(self._document.model_copy(update={"remote": self._document.remote | {tag: settings}}))
+            return True
 
     def _replace(self, document: SiteDocument) -> None:
         """Save first, then apply: a restart never loses an acknowledged change. Raises OSError."""

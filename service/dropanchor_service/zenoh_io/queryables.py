@@ -1,4 +1,4 @@
-"""Answers to Zenoh queries: `…/tag/*/pose` and `…/anchor/*`, also with wildcards over many.
+"""Answers to Zenoh queries: `…/tag/*/pose`, `…/tag/*/settings` and `…/anchor/*`, also with wildcards over many.
 
 A queryable that raises leaves its client without any reply, so every unexpected error becomes an error reply.
 """
@@ -44,6 +44,7 @@ class ZenohAnswers:
         for key, find in (
             (keys.all_tags(self._site, "pose"), self.poses),
             (keys.all_anchors(self._site), self.anchors),
+            (keys.all_tags(self._site, "settings"), self.settings),
         ):
             self._declared.append(self._session.declare_queryable(key, self._answering(find)))
         alive = keys.service_alive_key(self._site, self._service_id)
@@ -110,6 +111,16 @@ class ZenohAnswers:
         if not found and "*" not in str(key_expr):
             raise QueryError(f"anchor {str(key_expr).rpartition('/')[2]!r} is unknown")
         yield from found
+
+    def settings(self, key_expr: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
+        """Yield what the programs of all tags that match should apply. A tag of which nothing is known is one."""
+        _refuse_parameters(parameters)
+        name = _single_tag(str(key_expr))
+        names = list(self._answers.site.document.remote) if name is None else [name]
+        for one in names:
+            key = keys.settings_key(self._site, one)
+            if key_expr.includes(key):
+                yield key, to_json(self._answers.site.remote_settings(one).model_dump())
 
     def _answering(self, find: Callable[[zenoh.KeyExpr, str], Iterator[Reply]]) -> Callable[[zenoh.Query], None]:
         def answer(query: zenoh.Query) -> None:

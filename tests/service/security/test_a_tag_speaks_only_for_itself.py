@@ -16,7 +16,7 @@ from support.secured import SecuredSite, secured_site
 from support.zenoh_router import wait_until
 
 SITE = "default"
-HEALTH_OF_B = keys.health_key(SITE, "b")
+HEALTH_OF_B, SETTINGS_OF_B = keys.health_key(SITE, "b"), keys.settings_key(SITE, "b")
 OF_B, POSE_OF_B, POSE_OF_A = keys.samples_key(SITE, "b"), keys.pose_key(SITE, "b"), keys.pose_key(SITE, "a")
 CACHES = f"{keys.all_tags(SITE, 'samples')}/@adv/**"
 ALL_REPLIES: dict[str, Any] = {
@@ -49,7 +49,7 @@ class World:
         self.service, self.reader = enter(site.session("service")), enter(site.session("reader"))
         self.a = enter(site.session("a"))
         self.samples, self.alive, self.poses, self.stolen = Received(), Received(), Received(), Received()
-        self.health = Received()
+        self.health, self.settings = Received(), Received()
         recovery = zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
         self._kept: list[object] = [
             zenoh.ext.declare_advanced_subscriber(
@@ -57,6 +57,8 @@ class World:
             ),
             self.service.liveliness().declare_subscriber(keys.everything(SITE), self.alive, history=True),
             self.service.declare_subscriber(keys.all_tags(SITE, "health"), self.health),
+            self.service.declare_subscriber(keys.all_tags(SITE, "settings"), self.settings),
+            self.service.declare_queryable(keys.all_tags(SITE, "settings"), _answers(b"settings", SETTINGS_OF_B)),
             self.service.declare_queryable(keys.all_tags(SITE, "pose"), _answers(b"from the service")),
             self.reader.declare_subscriber(keys.all_tags(SITE, "pose"), self.poses),
             self.reader.declare_subscriber(keys.poses_key(SITE), self.poses),
@@ -83,10 +85,10 @@ class World:
         wait_until(passed)
 
 
-def _answers(payload: bytes) -> Callable[[zenoh.Query], None]:
+def _answers(payload: bytes, otherwise: str = POSE_OF_B) -> Callable[[zenoh.Query], None]:
     def answer(query: zenoh.Query) -> None:
         with query:
-            key = POSE_OF_B if "*" in str(query.key_expr) else str(query.key_expr)
+            key = otherwise if "*" in str(query.key_expr) else str(query.key_expr)
             query.reply(key.replace("/@adv", ""), payload)
 
     return answer
@@ -108,6 +110,7 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
     a.put(OF_B, b"spoofed")
     a.delete(OF_B)
     a.put(HEALTH_OF_B, b"{}")
+    a.put(SETTINGS_OF_B, b"forged")
     a.put(POSE_OF_B, b"forged")
     a.put(POSE_OF_A, b"forged")
     a.put(keys.poses_key(SITE), b"forged")
@@ -131,6 +134,8 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
         "puts samples of b": lambda: samples.has(OF_B, b"spoofed"),
         "deletes samples of b": lambda: samples.has(OF_B, kind="DELETE"),
         "reports the health of b": lambda: world.health.has(HEALTH_OF_B, b"{}"),
+        "changes the settings of b": lambda: world.settings.has(SETTINGS_OF_B, b"forged"),
+        "queries the settings of b": lambda: b"settings" in query_payloads(a, SETTINGS_OF_B, **all_targets),
         "receives the health of b": lambda: stolen.has(HEALTH_OF_B),
         "puts the pose of b": lambda: poses.has(POSE_OF_B, b"forged"),
         "puts its own pose": lambda: poses.has(POSE_OF_A, b"forged"),
@@ -183,13 +188,22 @@ def test_a_tag_reads_its_own_pose_and_its_cache_answers_the_service(tmp_path: Pa
         assert len(query_payloads(world.service, f"{CACHES}?_max=10", **ALL_REPLIES)) == 1
 
 
-def test_a_tag_reports_its_own_health(tmp_path: Path) -> None:
+def test_a_tag_reports_its_own_health_and_reads_its_own_settings(tmp_path: Path) -> None:
     site = secured_site(tmp_path / "security", "a", "b")
     with ExitStack() as stack:
         stack.enter_context(site.router())
         world = World(site, stack)
         world.exchange()
         wait_until(lambda: world.health.has(HEALTH_OF_B))
+        own, received = keys.settings_key(SITE, "a"), Received()
+        world.keep(world.a.declare_subscriber(own, received))
+        assert query_payloads(world.a, own) == [b"settings"]
+
+        def passed() -> bool:
+            world.service.put(own, b"new")
+            return received.has(own, b"new")
+
+        wait_until(passed)
 
 
 def test_a_revoked_tag_and_one_without_a_certificate_are_refused(tmp_path: Path) -> None:

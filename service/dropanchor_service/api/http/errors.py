@@ -41,6 +41,7 @@ class Kind(Enum):
     SITE_ID_FIXED = (409, "The site's id cannot change while the service runs")
     ANCHOR_ID_DIFFERS = (409, "The id in the body differs from the id in the path")
     TAGS_FULL = (409, "The service has reached its limit of tags")
+    CHANGED_MEANWHILE = (412, "The resource is not the expected one")
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")
     SAMPLES_REJECTED = (422, "The samples cannot be decoded")

@@ -96,6 +96,10 @@ TAG_SETTINGS: dict[str, Any] = {
     "start": {"x": 2.0, "y": 0.5, "heading_rad": None, "std_m": 0.1},
 }
 HEALTH: dict[str, Any] = {"battery_fraction": 0.15, "temperature_c": 24.5, "firmware": "1.4.2", "rssi_dbm": -61.0}
+REMOTE_SETTINGS: dict[str, Any] = {
+    "wanted": {"batch_s": 0.5, "imu_hz": 50.0},
+    "acknowledged": {"batch_s": 0.5, "imu_hz": 50.0},
+}
 TAG: dict[str, Any] = {
     "tag": "tag-1",
     "online": True,
@@ -107,6 +111,7 @@ TAG: dict[str, Any] = {
     "hint": "",
     "health": HEALTH | {"age_s": 12.5},
     "needs_care": [{"reason": "battery_low", "hint": "The battery is at 15%: charge it."}],
+    "remote_settings": REMOTE_SETTINGS,
     "settings": TAG_SETTINGS,
 }
 TAG_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "tags": [TAG]}

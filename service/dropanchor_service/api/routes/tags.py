@@ -104,6 +104,15 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     return router
 
 
+def remote_answer(answers: Answers, tag: Tag) -> Answer:
+    """Return the `RemoteSettingsStatus` of a tag."""
+    health = answers.health.of(tag.row)
+    return {
+        "wanted": answers.site.remote_settings(tag.name).model_dump(),
+        "acknowledged": None if health is None else health.values.get("settings"),
+    }
+
+
 def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
     """Yield the `TagStatus` of each tag."""
     default = TagSettings().model_dump()
@@ -121,5 +130,6 @@ def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
             "hint": answers.hint_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),
             "needs_care": care_of(tag, answers.health, now_ns),
+            "remote_settings": remote_answer(answers, tag),
             "settings": configured[tag.name].model_dump() if tag.name in configured else default,
         }
