@@ -2,7 +2,6 @@
 
 import json
 import logging
-from statistics import fmean
 from typing import Any, NamedTuple
 
 from dropanchor_schemas.kinds import ImuSample, Vector
@@ -70,5 +69,5 @@ def _mean(samples: list[ImuSample]) -> ImuSample:
 
 
 def _mean_vector(vectors: list[Vector]) -> Vector:
-    x, y, z = (fmean(component) for component in zip(*vectors, strict=True))
+    x, y, z = (sum(component) / len(vectors) for component in zip(*vectors, strict=True))
     return x, y, z
