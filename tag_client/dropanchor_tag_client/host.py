@@ -2,18 +2,18 @@
 
 import re
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 
 from dropanchor_tag_client.health import HealthValues
 
 ROOT = Path("/")
+VERSION = "0.1.0"  # as in pyproject.toml; importlib.metadata would load three megabytes
 _RSSI = re.compile(r"^\s*\w+:\s+\S+\s+\S+\s+(-\d+)\.?\s", re.MULTILINE)
 
 
 def program() -> str:
     """Return the name and the version of this program, as the firmware of its tags."""
-    return f"dropanchor-tag {version('dropanchor-tag-client')}"
+    return f"dropanchor-tag {VERSION}"
 
 
 def host_health(root: Path = ROOT) -> HealthValues:
