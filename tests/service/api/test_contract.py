@@ -30,13 +30,15 @@ EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
 
 BEYOND_THE_SCHEMA = {
     "get_track": [positive_data_acceptance],
+    "patch_remote_settings": [positive_data_acceptance],
     "put_site": [positive_data_acceptance],
     "ingest_health": [positive_data_acceptance],
     "ingest_samples": [positive_data_acceptance],
     "ingest_sensor_logger": [positive_data_acceptance, negative_data_rejection],
 }
 """Rules that a schema cannot express: `from` and `to` are at most 31 days apart; each anchor is listed once; without
-credentials a request names the tag; a message holds a sample or a value. And that Sensor Logger's 499 is a refusal."""
+credentials a request names the tag; a message holds a sample or a value; `If-Match` is the
+current tag of a resource. And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(str.isprintable)
