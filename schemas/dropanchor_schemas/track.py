@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import TrackingState
+from dropanchor_schemas.pose import Frame, TrackingState
 
 
 class _Answer(BaseModel):
@@ -15,6 +15,7 @@ class TrackPose(_Answer):
     t_ns: int = Field(description="UTC, ns: the time of the pose.")
     state: TrackingState
     reason: str = Field(description="Machine-readable reason of the state.")
+    frame: Frame = Field(description="`relative`: turned about the anchor by an unknown angle.")
     x: float | None = Field(description="East, m; null if it was unknown.")
     y: float | None = Field(description="North, m.")
     heading_rad: float | None

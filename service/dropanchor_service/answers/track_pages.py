@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_service.answers.columns import REASONS, STATES
+from dropanchor_service.answers.columns import FRAMES, REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
-from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.track_file import StoredPoses
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.site import SiteStore
@@ -78,13 +78,15 @@ def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
         "t_ns": poses["t_ns"].tolist(),
         "state": [STATES[state] for state in poses["state"].tolist()],
         "reason": [REASONS[reason] for reason in poses["reason"].tolist()],
+        "frame": [FRAMES[frame] for frame in poses["frame"].tolist()],
         **{name: _short(poses[field]).tolist() for name, field in ESTIMATED.items()},
         "covariance": [cov if finite else None for cov, finite in zip(covariances, known, strict=True)],
         "anchor": list(stored.anchors),
     }
     origin = site.site.georeference
     if origin is not None:
-        lat, lon = lat_lon(origin, poses["x"], poses["y"])
+        in_site = poses["frame"] == Frame.SITE
+        lat, lon = lat_lon(origin, *(np.where(in_site, poses[axis], np.nan) for axis in ("x", "y")))
         columns["lat"], columns["lon"] = np.round(lat, 9).tolist(), np.round(lon, 9).tolist()
     return columns
 

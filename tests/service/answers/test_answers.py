@@ -10,8 +10,8 @@ import pytest
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.answers.answers import Answers, to_json
-from dropanchor_service.answers.columns import HINTS, REASONS, ellipse_95
-from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, State, StateReason
+from dropanchor_service.answers.columns import HINTS, REASONS, RELATIVE_HINT, ellipse_95
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, Frame, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
 T_NS = 1_800_000_000_000_000_000
@@ -125,6 +125,19 @@ def test_a_list_holds_all_tags_with_a_pose_or_the_chosen_ones() -> None:
     assert [pose.tag for pose in everyone.poses] == ["a", "c"]
     assert [pose["tag"] for pose in answers.pose_list(tags[1:])["poses"]] == ["c"]
     assert answers.pose_list([])["poses"] == []
+
+
+def test_a_pose_without_north_says_so_and_has_no_place_on_earth() -> None:
+    answers = make_answers(Site(georeference=Georeference(lat=50, lon=8)))
+    for name in "ab":
+        answers.tags.register(name)
+    answers.latest.write(np.concatenate([make_pose(0, frame=Frame.RELATIVE), make_pose(1)]), NO_MODES)
+    relative, placed = PoseList.model_validate_json(to_json(answers.pose_list())).poses
+    assert (relative.frame, placed.frame) == ("relative", "site")
+    assert (relative.hint, placed.hint) == (RELATIVE_HINT, "")
+    assert relative.x == 3.0
+    assert (relative.lat, relative.lon) == (None, None)
+    assert placed.lat is not None
 
 
 def test_a_frame_has_one_entry_per_tag_in_every_column() -> None:

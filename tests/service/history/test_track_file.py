@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.estimation.columns import POSE, Array
+from dropanchor_service.estimation.columns import POSE, Array, Frame, State
 from dropanchor_service.history.track_file import TrackFileError, TrackReader, TrackWriter
 
 SECOND = 1_000_000_000
@@ -40,6 +40,17 @@ def test_poses_are_read_in_order_of_time_with_their_anchors(tmp_path: Path) -> N
     assert found.anchors == [None, "Süd", "7"]
     np.testing.assert_array_equal(found.poses["cov"][1], poses(0)["cov"][0])
     assert np.isnan(found.poses["speed"]).all()
+    writer.close()
+
+
+def test_a_pose_keeps_its_state_and_its_frame(tmp_path: Path) -> None:
+    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+    made = poses(0, 1)
+    made["state"], made["frame"] = [State.TRACKING, State.DEGRADED], [Frame.RELATIVE, Frame.SITE]
+    writer.insert(made, ["a", "a"], [None, None])
+    found = reader.poses("a", T_NS, T_NS + 60 * SECOND, 10).poses
+    assert found["state"].tolist() == [State.TRACKING, State.DEGRADED]
+    assert found["frame"].tolist() == [Frame.RELATIVE, Frame.SITE]
     writer.close()
 
 

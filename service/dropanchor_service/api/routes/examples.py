@@ -60,6 +60,7 @@ POSE_FRAME: dict[str, Any] = {
     "state": ["tracking", "initialising"],
     "reason": ["resolved", "no_heading"],
     "hint": ["", "There is no heading yet: the tag must send IMU samples or a platform heading."],
+    "frame": ["site", "site"],
     "anchor": ["1", "1"],
     "age_s": [0.042, 0.05],
     "x": [3.2, None],
@@ -142,7 +143,7 @@ TRACK: dict[str, Any] = {
         {
             name: POSE[name]
             for name in (
-                *("t_ns", "state", "reason", "x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "p_mode"),
+                *("t_ns", "state", "reason", "frame", "x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "p_mode"),
                 *("sigma_pos_m", "sigma_obs_m", "range_m", "covariance", "anchor", "lat", "lon"),
             )
         }

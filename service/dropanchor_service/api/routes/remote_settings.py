@@ -12,8 +12,9 @@ from dropanchor_schemas.site import RemoteSettings
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
-from dropanchor_service.api.routes.tags import known_tag, remote_answer
+from dropanchor_service.api.routes.tags import remote_answer
 from dropanchor_service.store import Tag
 
 _PATCH = {
