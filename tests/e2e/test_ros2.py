@@ -132,6 +132,7 @@ def test_the_node_announces_itself_and_its_topics_while_it_runs(service: Running
     with connected_session(ros_router) as session:
         robot = Robot(session, DOMAIN)
         with running_bridge(service, ros_router, *OPTIONS):
+            wait_until(lambda: len(robot.tokens()) == 6)
             tokens = robot.tokens()
             ids = {token.split("/")[2] for token in tokens}
             assert len(ids) == 1
