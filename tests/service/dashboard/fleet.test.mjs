@@ -5,6 +5,7 @@ import { Choice, countStates } from "../../../service/dropanchor_service/dashboa
 import { Fleet } from "../../../service/dropanchor_service/dashboard/data/fleet.js";
 import { follow } from "../../../service/dropanchor_service/dashboard/data/motion.js";
 import { Order } from "../../../service/dropanchor_service/dashboard/data/order.js";
+import { hasGhosts } from "../../../service/dropanchor_service/dashboard/map/draw_tags.js";
 import { isFilled } from "../../../service/dropanchor_service/dashboard/map/shapes.js";
 import { STATES, staleness, stateNumber } from "../../../service/dropanchor_service/dashboard/data/states.js";
 import { Trails } from "../../../service/dropanchor_service/dashboard/data/trails.js";
@@ -154,4 +155,12 @@ test("a track without north is never a full dot, though it says tracking", () =>
   fleet.apply(frame(["a", "b", "c"], { state: ["tracking", "tracking", "lost"], frame: ["relative", "site", "relative"] }), 0);
   assert.deepEqual(fleet.names.map((_, row) => fleet.style(row).name), ["turned", "tracking", "lost"]);
   assert.equal(fleet.style(0).placed, false);
+});
+
+test("the hypotheses of a tag without north are no places of the map", () => {
+  const fleet = new Fleet();
+  const ghost = [{ weight: 1, x: 1, y: 2, heading_rad: 0, speed_mps: 0 }];
+  const both = { state: ["ambiguous", "ambiguous"], frame: ["relative", "site"], hypotheses: [ghost, ghost] };
+  fleet.apply(frame(["a", "b"], both), 0);
+  assert.deepEqual([0, 1].map((row) => hasGhosts(fleet, row)), [false, true]);
 });

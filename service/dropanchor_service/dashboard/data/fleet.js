@@ -9,7 +9,7 @@ const NUMBERS = /** @type {const} */ ([
 ]);
 
 /** Columns of values that are stored as received; unknown is null. */
-const VALUES = /** @type {const} */ (["reason", "hint", "anchor", "hypotheses"]);
+const VALUES = /** @type {const} */ (["reason", "hint", "frame", "anchor", "hypotheses"]);
 
 /**
  * @typedef {object} Hypothesis
@@ -45,8 +45,8 @@ export class Fleet {
   drawnY = new Float32Array(0);
   /** @type {Record<typeof NUMBERS[number], Float32Array>} */
   number = /** @type {any} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(0)])));
-  /** @type {{reason: (string|null)[], hint: (string|null)[], anchor: (string|null)[], hypotheses: (Hypothesis[]|null)[]}} */
-  value = { reason: [], hint: [], anchor: [], hypotheses: [] };
+  /** @type {{reason: (string|null)[], hint: (string|null)[], frame: (string|null)[], anchor: (string|null)[], hypotheses: (Hypothesis[]|null)[]}} */
+  value = { reason: [], hint: [], frame: [], anchor: [], hypotheses: [] };
 
   /** @param {string | null} name @returns {number} −1: no such tag */
   row(name) {
@@ -66,6 +66,11 @@ export class Fleet {
   /** 0 fresh, 1 stale, 2 old. @param {number} row @param {number} now_ms @returns {0 | 1 | 2} */
   staleness(row, now_ms) {
     return this.current ? staleness(this.age(row, now_ms)) : 2;
+  }
+
+  /** Return whether a pose is turned about the anchor by an unknown angle, so that it is no place of the map. @param {number} row */
+  isTurned(row) {
+    return this.value.frame[row] === "relative";
   }
 
   /** @param {number} row */

@@ -28,7 +28,7 @@ export function drawEllipses(scene) {
 
 /** Return whether a tag has an ellipse. One with an unknown position has it only while it is selected. @param {Scene} scene @param {number} row */
 const hasEllipse = ({ fleet, selected }, row) =>
-  STATES[fleet.state[row]].placed || (row === selected && !hasGhosts(fleet, row));
+  STATES[fleet.state[row]].placed || (row === selected && !hasGhosts(fleet, row) && !fleet.isTurned(row));
 
 /** @param {CanvasRenderingContext2D} ctx @param {string} colour @param {boolean} trusted @param {number} alpha */
 function paintEllipses(ctx, colour, trusted, alpha) {

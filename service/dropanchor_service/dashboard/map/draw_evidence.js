@@ -46,7 +46,7 @@ function drawRecentRange({ ctx, view, palette, fleet, roster, anchors, selected 
 /** Draw a wedge of one standard deviation to either side of the heading. @param {Scene} scene @param {number} sigma rad */
 function drawWedge({ ctx, view, palette, fleet, selected }, sigma) {
   const heading = fleet.number.heading_rad[selected];
-  if (!(sigma < MAX_SIGMA) || Number.isNaN(heading) || hasGhosts(fleet, selected)) return;
+  if (!(sigma < MAX_SIGMA) || Number.isNaN(heading) || hasGhosts(fleet, selected) || fleet.isTurned(selected)) return;
   const [x, y] = [view.screenX(fleet.drawnX[selected]), view.screenY(fleet.drawnY[selected])];
   ctx.beginPath();
   ctx.moveTo(x, y);

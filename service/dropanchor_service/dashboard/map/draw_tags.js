@@ -28,9 +28,9 @@ export function drawMarkers(scene) {
   scene.ctx.globalAlpha = 1;
 }
 
-/** Return whether the tag is drawn as its hypotheses instead of one dot. @param {import("../data/fleet.js").Fleet} fleet
+/** Return whether the tag is drawn as its hypotheses instead of one dot. Without north these are no places of the map. @param {import("../data/fleet.js").Fleet} fleet
  * @param {number} row */
-export const hasGhosts = (fleet, row) => fleet.state[row] === AMBIGUOUS && !!fleet.value.hypotheses[row]?.length;
+export const hasGhosts = (fleet, row) => fleet.state[row] === AMBIGUOUS && !fleet.isTurned(row) && !!fleet.value.hypotheses[row]?.length;
 
 /** @param {Scene} scene @param {{state: number, stale: number}} group @param {number[]} rows @param {number} radius */
 function paintMarkers({ ctx, view, palette, fleet }, group, rows, radius) {
