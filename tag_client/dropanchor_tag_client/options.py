@@ -93,6 +93,17 @@ def calibration(arguments: argparse.Namespace) -> Calibration | None:
     return found
 
 
+def add_anchor_name_option(parser: argparse.ArgumentParser, source: str) -> None:
+    """Add --name. source: who calls anchors by ids of its own, such as "the module calls"."""
+    parser.add_argument(
+        "--name",
+        action="append",
+        default=[],
+        metavar="ID=NAME",
+        help=f"the site's NAME of the anchor that {source} ID; may be given several times",
+    )
+
+
 def anchor_names(arguments: argparse.Namespace) -> dict[str, str]:
     """Return the site's names of anchors, by the ids that a module or a message gives them. Raises ValueError."""
     return dict(_anchor_name(text) for text in arguments.name)

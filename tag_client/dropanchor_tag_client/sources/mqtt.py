@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 from dropanchor_tag_client.options import (
+    add_anchor_name_option,
     add_connection_options,
     add_spool_options,
     anchor_names,
@@ -37,13 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument("--template", type=Path, action="append", default=[], metavar="FILE", help="rules in TOML")
     parser.add_argument("--tag-prefix", default="", help="what to put before the ids of the tags, such as cart-")
-    parser.add_argument(
-        "--name",
-        action="append",
-        default=[],
-        metavar="ID=NAME",
-        help="the site's NAME of the anchor that the messages call ID; may be given several times",
-    )
+    add_anchor_name_option(parser, "the messages call")
     broker = parser.add_argument_group("broker")
     broker.add_argument("--mqtt-user", help=f"user name; the password comes from the variable {PASSWORD_VARIABLE}")
     broker.add_argument("--mqtt-ca", metavar="PEM", help="authority that signed the broker's certificate")

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 
 from dropanchor_tag_client.options import (
+    add_anchor_name_option,
     add_calibration_option,
     add_connection_options,
     add_spool_options,
@@ -35,13 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--baud", type=int, help="baud rate (default: as the module is delivered)")
     parser.add_argument("--start", metavar="COMMAND", help="what to send to a module that reports nothing")
-    parser.add_argument(
-        "--name",
-        action="append",
-        default=[],
-        metavar="ID=NAME",
-        help="the site's NAME of the anchor that the module calls ID; may be given several times",
-    )
+    add_anchor_name_option(parser, "the module calls")
     gateway = parser.add_argument_group("when the module is an anchor")
     gateway.add_argument(
         "--tag-from-id", action="store_true", help="publish each tag that it reports under its own id, after --tag"

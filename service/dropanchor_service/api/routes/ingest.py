@@ -72,6 +72,11 @@ def ingest_router(receive: Receive) -> APIRouter:
     return router
 
 
+def encoding_of(request: Request) -> str:
+    """Return the media type of the body, without its parameters."""
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
 def _add_samples_route(router: APIRouter, receive: Receive) -> None:
     @router.post(
         "/ingest/samples",
@@ -87,7 +92,7 @@ def _add_samples_route(router: APIRouter, receive: Receive) -> None:
     )
     async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
         tag, payload = tag_of(request, query), await request.body()
-        encoding = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        encoding = encoding_of(request)
         receive(tag, payload, encoding)  # what cannot be decoded is counted there too
         samples = count_samples(payload, encoding)
         if isinstance(samples, Rejection):

@@ -10,7 +10,7 @@ from dropanchor_schemas.tag_health import decode_health
 from dropanchor_schemas.wire import ENCODING_JSON, Rejection
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.ingest import OfTag, tag_of
+from dropanchor_service.api.routes.ingest import OfTag, encoding_of, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.phones.sensor_logger_intake import Receive
 
@@ -34,7 +34,7 @@ def ingest_health_router(receive: Receive) -> APIRouter:
     )
     async def ingest_health(request: Request, query: Annotated[OfTag, Query()]) -> Response:
         tag, payload = tag_of(request, query), await request.body()
-        encoding = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        encoding = encoding_of(request)
         receive(tag, payload, encoding)  # what cannot be decoded is counted there too
         report = decode_health(payload, encoding)
         if isinstance(report, Rejection):
