@@ -9,7 +9,8 @@ from websockets.sync.client import connect
 from dropanchor_schemas.answers import SamplesAcknowledged
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
 from dropanchor_service.cli import main
-from support.sensor_logger import G, recording
+from support import phyphox
+from support.sensor_logger import G, message, recording
 from support.service import Running, running_service, settings_file, straight_north
 from support.zenoh_router import free_port, wait_until
 
@@ -20,6 +21,7 @@ SENSORS = {
     "magnetometer": lambda _: (0.0, 20.0, -40.0),
 }
 PHONE, SAMPLES = "/api/v1/ingest/sensor-logger", "/api/v1/ingest/samples"
+PHYPHOX = "/api/v1/ingest/phyphox"
 
 
 def ranges(seconds: int, start_ns: int) -> list[bytes]:
@@ -51,6 +53,38 @@ def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(tmp_pa
     assert status["rejected"]["late"] < 300
     assert pose["anchor"] == "7"
     assert pose["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000
+
+
+def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(tmp_path: Path) -> None:
+    config, seconds = settings_file(tmp_path, ["anna"]), 20
+    start_ns = time.time_ns() - seconds * 1_000_000_000
+    sensors: dict[str, phyphox.Value] = {
+        "gyroscope": lambda _: (0.0, 0.0, 0.0),
+        "accelerometer": lambda _: (0.0, 0.0, G),
+        "magnetometer": lambda _: (0.0, 20.0, -40.0),
+    }
+    batches = list(phyphox.recording(seconds, sensors, start_ns * 1e-9, interval_s=1.0))
+    with running_service("--config", str(config)) as service:
+        for batch, distances in zip([*batches, batches[3]], [*ranges(seconds, start_ns), None], strict=True):
+            assert service.ask("POST", f"{PHYPHOX}?tag=anna", content=batch).status_code == 200
+            if distances is not None:
+                json = {"content-type": ENCODING_JSON}
+                service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
+        wait_until(lambda: samples(service, {}) == {"imu": 100 * seconds - 1, "range": 10 * seconds})
+        assert service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000
+        assert service.ask("POST", f"{PHYPHOX}?tag=anna", content=b"{").status_code == 422
+        wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"].get("json_syntax") == 1)
+
+
+def test_the_empty_battery_of_a_phone_over_http_is_told(tmp_path: Path) -> None:
+    config = settings_file(tmp_path, ["anna"])
+    with running_service("--config", str(config)) as service:
+        battery = {"name": "battery", "time": time.time_ns(), "values": {"batteryLevel": 0.12}}
+        assert service.ask("POST", f"{PHONE}?tag=anna", content=message(0, [battery])).status_code == 200
+        wait_until(lambda: service.get("/api/v1/tags/anna")["health"] is not None)
+        status = service.get("/api/v1/tags/anna")
+        assert status["health"]["battery_fraction"] == 0.12
+        assert [care["reason"] for care in status["needs_care"]] == ["battery_low"]
 
 
 def test_a_message_that_is_sent_again_over_a_web_socket_counts_as_a_duplicate_and_is_used_once(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from dropanchor_service.api.routes.dashboard import DashboardMount
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
+from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
 from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
@@ -31,7 +32,7 @@ from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
-from dropanchor_service.phones.sensor_logger_intake import Receive
+from dropanchor_service.phones.intake import Receive
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
@@ -88,7 +89,8 @@ def create_app(
         stream_router(answers, stopping),
         site_router(answers.site),
         connect_router(answers.site, endpoints, credentials),
-        ingest_router(receive),
+        ingest_router(receive, receive_health),
+        ingest_phyphox_router(receive, receive_health),
         ingest_health_router(receive_health),
         ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
         recordings_router(recorder),

@@ -8,6 +8,7 @@ import segno
 
 from dropanchor_service.commands.options import positive
 from dropanchor_service.commands.security import add_folder_option
+from dropanchor_service.phones.phyphox_experiment import link_of
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import SCOPES, Scope
@@ -22,6 +23,7 @@ EPILOG = """\
 examples:
   dropanchor key add dashboard --scope read
   dropanchor key add anna-phone --tag anna --url https://yard.example:8080
+  dropanchor key add anna-phone --tag anna --url https://yard.example:8080 --phyphox
   dropanchor key list
   dropanchor key revoke dashboard
   curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
@@ -37,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     allowed.add_argument("--scope", choices=SCOPES, default="read", help="what the key allows (default: %(default)s)")
     allowed.add_argument("--tag", help="allow only to send the samples of this tag")
     add.add_argument("--url", metavar="URL", help="print the link that makes a phone this tag, and its QR code")
+    add.add_argument(
+        "--phyphox", action="store_true", help="with --url: print the code that the app phyphox scans instead"
+    )
     add.add_argument("--days", type=positive, metavar="N", help="days until the key expires (default: never)")
     revoke = actions.add_parser("revoke", help="revoke a key")
     revoke.add_argument("name", metavar="NAME")
@@ -60,13 +65,15 @@ def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
     """Add a key. Only the key goes to standard output, so that a script can read it."""
     if arguments.url is not None:
         _refuse_url(arguments.url, arguments.tag)
+    elif arguments.phyphox:
+        raise ApiKeyError("--phyphox needs --url: the address at which the phone reaches the service")
     if arguments.tag is None:
         print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
     else:
         secret = keys.add_for_tag(arguments.name, arguments.tag, arguments.days)
         print(secret)
         if arguments.url is not None:
-            _show_link(tag_page_link(arguments.url, arguments.tag, secret))
+            _show_link(arguments.url, arguments.tag, secret, arguments.phyphox)
     sys.stderr.write("The key above is shown once. Send it as: Authorization: Bearer KEY\n")
 
 
@@ -84,9 +91,13 @@ def _refuse_url(url: str, tag: str | None) -> None:
         raise ApiKeyError(f"--url {url}: give the address of the page, such as https://yard.example:8080")
 
 
-def _show_link(link: str) -> None:
-    """Print the QR code of a link and the link. Whoever sees them can send samples of the tag."""
+def _show_link(url: str, tag: str, secret: str, phyphox: bool) -> None:
+    """Print a QR code and its link. Whoever sees them can send samples of the tag."""
+    link = link_of(url, tag, secret) if phyphox else tag_page_link(url, tag, secret)
     segno.make(link, error="l").terminal(out=sys.stderr, border=2, compact=True)
+    if phyphox:
+        sys.stderr.write(f"In phyphox, tap + and scan the code, or open on the phone: {link}\n")
+        return
     sys.stderr.write(f"Scan the code with the phone, or open: {link}\n")
     if not link.startswith("https:"):
         sys.stderr.write("Phones give their motion to pages over https:// only.\n")

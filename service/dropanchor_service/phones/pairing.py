@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_schemas.wire import ImuSample, Vector
-from dropanchor_service.phones.sensor_logger import GRAVITY, GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
+from dropanchor_service.phones.readings import GRAVITY, GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
 from dropanchor_service.phones.streams import Array, Stream, no_readings
 
 MAX_GAP_NS = 250_000_000  # between two readings that are interpolated

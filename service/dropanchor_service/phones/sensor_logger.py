@@ -6,34 +6,29 @@ with UTC in ns. https://github.com/tszheichoi/awesome-sensor-logger/blob/main/PU
 """
 
 import json
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dropanchor_schemas.wire import MAX_T_NS
+from dropanchor_service.phones.readings import SENSORS, PhoneError, is_measurement
 from dropanchor_service.phones.streams import Stream, make_stream
 
-TOTAL, LINEAR, GRAVITY = "totalacceleration", "accelerometer", "gravity"
-GYROSCOPE, MAGNETOMETER = "gyroscope", "magnetometer"
-SENSORS = (TOTAL, LINEAR, GRAVITY, GYROSCOPE, MAGNETOMETER)
+BATTERY = "battery"
 MAX_SESSION_ID = 128
 MAX_MESSAGE_ID = 2**53
-MAX_VALUE = 1e6
-
-
-class PhoneError(ValueError):
-    """A message that cannot be used. The text is a sentence for the person who holds the phone."""
 
 
 class Message(NamedTuple):
-    """One batch. streams: by sensor, those of SENSORS that it has. damaged: readings of them that make no sense."""
+    """One batch. streams: by sensor, those of SENSORS that it has. damaged: readings of them that make no sense.
+    battery_fraction: the last charge of the battery in the batch; 1 is full."""
 
     session_id: str
     message_id: int
     streams: Mapping[str, Stream]
     damaged: int
+    battery_fraction: float | None = None
 
 
 def parse(body: bytes) -> Message | None:
@@ -50,7 +45,7 @@ def parse(body: bytes) -> Message | None:
     if not payload:
         return None
     streams, damaged = _streams(payload)
-    return Message(_session_id(message), _message_id(message), streams, damaged)
+    return Message(_session_id(message), _message_id(message), streams, damaged, _battery_fraction(payload))
 
 
 def _session_id(message: dict[str, Any]) -> str:
@@ -98,6 +93,16 @@ def _time(value: Any) -> int:
 def _vector(values: Any) -> tuple[float, float, float]:
     """Raises KeyError, ValueError or TypeError."""
     x, y, z = float(values["x"]), float(values["y"]), float(values["z"])
-    if not all(math.isfinite(value) and abs(value) <= MAX_VALUE for value in (x, y, z)):
+    if not is_measurement(x, y, z):
         raise ValueError("no measurement")
     return x, y, z
+
+
+def _battery_fraction(payload: list[Any]) -> float | None:
+    """Return the last charge of the phone's battery in a batch, None without one. -1: the phone does not know it."""
+    for reading in reversed(payload):
+        values = reading.get("values") if isinstance(reading, dict) and reading.get("name") == BATTERY else None
+        level = values.get("batteryLevel") if isinstance(values, dict) else None
+        if isinstance(level, int | float) and not isinstance(level, bool) and 0.0 <= level <= 1.0:
+            return float(level)
+    return None

@@ -1,4 +1,4 @@
-"""One recording of a phone: its messages in their order, each once."""
+"""One recording of Sensor Logger: its messages in the order of their numbers, each once."""
 
 from typing import NamedTuple
 
@@ -75,10 +75,15 @@ class Session:
         return min(self._waiting) if gives_up else None
 
     def _taken(self, paired: list[Paired], duplicate: bool = False) -> Taken:
-        return Taken(
-            [sample for part in paired for sample in part.samples],
-            sum(part.unpaired for part in paired),
-            next((part.problem for part in reversed(paired)), ""),
-            duplicate,
-            len(self._waiting),
-        )
+        return taken_of(paired, len(self._waiting), duplicate)
+
+
+def taken_of(paired: list[Paired], waiting: int, duplicate: bool) -> Taken:
+    """Return what became of a message whose readings were paired like this."""
+    return Taken(
+        [sample for part in paired for sample in part.samples],
+        sum(part.unpaired for part in paired),
+        next((part.problem for part in reversed(paired)), ""),
+        duplicate,
+        waiting,
+    )

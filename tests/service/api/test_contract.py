@@ -33,6 +33,9 @@ BEYOND_THE_SCHEMA = {
     "patch_remote_settings": [positive_data_acceptance],
     "put_site": [positive_data_acceptance],
     "ingest_health": [positive_data_acceptance],
+    "get_phyphox_code": [positive_data_acceptance],
+    "get_phyphox_experiment": [positive_data_acceptance],
+    "ingest_phyphox": [positive_data_acceptance, negative_data_rejection],
     "ingest_samples": [positive_data_acceptance],
     "ingest_sensor_logger": [positive_data_acceptance, negative_data_rejection],
 }

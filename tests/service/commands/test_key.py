@@ -44,6 +44,15 @@ def test_the_code_holds_the_link_with_the_key_after_the_hash(
     assert ApiKeys(folder).identify(secret).tag == "anna's cart"
 
 
+def test_the_code_for_phyphox_loads_the_experiment(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert add(folder, "phone", "--tag", "anna's cart", "--url", "https://yard.example:8080/base/", "--phyphox") == 0
+    printed = capsys.readouterr()
+    secret = printed.out.strip()
+    link = f"phyphox://yard.example:8080/base/api/v1/ingest/phyphox?tag=anna%27s%20cart&token={secret}"
+    assert scanned(printed.err) == link
+    assert f"open on the phone: {link}\n" in printed.err
+
+
 def test_a_link_without_https_says_that_phones_give_no_motion(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert add(folder, "phone", "--tag", "anna", "--url", "http://localhost:8080") == 0
     assert "https:// only" in capsys.readouterr().err
@@ -53,6 +62,7 @@ def test_a_link_without_https_says_that_phones_give_no_motion(folder: Path, caps
     ("words", "sentence"),
     [
         (["--url", "https://yard.example"], "--url needs --tag"),
+        (["--tag", "anna", "--phyphox"], "--phyphox needs --url"),
         (["--tag", "anna", "--url", "yard.example:8080"], "give the address of the page"),
         (["--tag", "anna", "--url", "https://yard.example/#x"], "give the address of the page"),
     ],

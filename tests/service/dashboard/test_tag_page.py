@@ -7,7 +7,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from threading import Event
 
+import numpy as np
 import pytest
+import zxingcpp
 from playwright.sync_api import Browser
 
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, anchor_number, decode_packed
@@ -269,6 +271,29 @@ def test_the_page_shows_the_state_of_the_tag_and_the_offset_of_its_clock(chromiu
         sent = page.counts()["sent"]
         page.wait_for(f"counts.sent > {sent + 20}")
     assert abs(service.frames()[-1].imu[-1].t_ns - time.time_ns() - ahead_ns) < 2e9
+
+
+PIXELS = """(image) => {
+    const { naturalWidth: width, naturalHeight: height } = image;
+    const canvas = Object.assign(document.createElement("canvas"), { width, height });
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    const red = context.getImageData(0, 0, width, height).data.filter((_, index) => index % 4 === 0);
+    return { width, red: Array.from(red) };
+}"""
+
+
+def test_the_page_offers_the_experiment_for_phyphox(chromium: Browser, service: Service) -> None:
+    with service.running(), tag_page(chromium, service.link) as page:
+        page.page.locator("#phyphox summary").click()
+        page.page.locator("#phyphox-code").wait_for(state="visible")
+        link = page.page.locator("#phyphox-link").get_attribute("href")
+        pixels = page.page.locator("#phyphox-code").evaluate(PIXELS)
+        assert page.errors == []
+    address = f"127.0.0.1:{service.port}/api/v1/ingest/phyphox?tag=anna&token={service.anna}"
+    assert link == f"phyphox://{address}"
+    [found] = zxingcpp.read_barcodes(np.array(pixels["red"], np.uint8).reshape(-1, pixels["width"]))
+    assert found.text == link
 
 
 def test_after_stop_nothing_more_is_taken_and_the_rest_is_sent(chromium: Browser, service: Service) -> None:

@@ -16,7 +16,8 @@ from dropanchor_service.security.identity import Scope as AccessScope
 
 OPEN_PATHS = ("/api/v1/health/live", "/api/v1/health/ready", "/api/v1/openapi.json")
 INGEST = "/api/v1/ingest/"
-SENSOR_LOGGER = f"{INGEST}sensor-logger"
+KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
+"""Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
 _SITE = "/api/v1/site"
 _HOW_TO_AUTHENTICATE = (
@@ -54,7 +55,7 @@ class Access:
     async def _authenticate(self, request: Request) -> tuple[Identity | None, Response | None]:
         if self._authenticator is None:
             return None, None
-        secret = _secret(request)
+        secret = secret_of(request)
         if not secret:
             return None, _unauthenticated(request, f"This request needs credentials. {_HOW_TO_AUTHENTICATE}")
         try:
@@ -112,9 +113,9 @@ def bearer_of(connection: HTTPConnection) -> str:
     return secret.strip() if scheme.lower() == "bearer" else ""
 
 
-def _secret(request: Request) -> str:
-    """Return the key or token of a request; empty without one. Sensor Logger may put it into the URL."""
-    in_url = request.query_params.get("token", "") if request.scope["path"] == SENSOR_LOGGER else ""
+def secret_of(request: Request) -> str:
+    """Return the key or token of a request; empty without one. Apps of phones may put it into the URL."""
+    in_url = request.query_params.get("token", "") if request.scope["path"] in KEY_IN_URL else ""
     return bearer_of(request) or in_url
 
 

@@ -17,10 +17,11 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Reason, Reje
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import example_response, json_response
+from dropanchor_service.phones.intake import PhoneIntake, Receive
 from dropanchor_service.phones.pairing import Signs
-from dropanchor_service.phones.sensor_logger import PhoneError
-from dropanchor_service.phones.sensor_logger_intake import Receive, SensorLoggerIntake
-from dropanchor_service.phones.session import WAIT_S
+from dropanchor_service.phones.readings import PhoneError
+from dropanchor_service.phones.sensor_logger import Message, parse
+from dropanchor_service.phones.session import WAIT_S, Session
 
 PHONE_ERROR = 499
 """The one status of which Sensor Logger shows the text."""
@@ -54,10 +55,15 @@ class OfTag(BaseModel):
     )
 
 
-class OfPhone(OfTag):
-    """The query of a route that takes what a phone's app sends."""
+class OfApp(OfTag):
+    """The query of a route for a phone's app."""
 
     token: str | None = Field(default=None, description="The tag's key, where the app cannot set a header.")
+
+
+class OfSensorLogger(OfApp):
+    """The query of the route for Sensor Logger."""
+
     signs: Signs = Field(
         default=Signs.AUTO,
         description="Which way accelerations point: as on Android or, without standardised units and frames, on iOS; "
@@ -65,10 +71,10 @@ class OfPhone(OfTag):
     )
 
 
-def ingest_router(receive: Receive) -> APIRouter:
+def ingest_router(receive: Receive, receive_health: Receive) -> APIRouter:
     router = APIRouter(tags=["ingest"])
     _add_samples_route(router, receive)
-    _add_sensor_logger_route(router, SensorLoggerIntake(receive))
+    _add_sensor_logger_route(router, PhoneIntake(receive, receive_health, parse, Session))
     return router
 
 
@@ -100,7 +106,7 @@ def _add_samples_route(router: APIRouter, receive: Receive) -> None:
         return json_response({"samples": samples}, status=202)
 
 
-def _add_sensor_logger_route(router: APIRouter, phones: SensorLoggerIntake) -> None:
+def _add_sensor_logger_route(router: APIRouter, phones: PhoneIntake[Message]) -> None:
     @router.post(
         "/ingest/sensor-logger",
         operation_id="ingest_sensor_logger",
@@ -115,7 +121,7 @@ def _add_sensor_logger_route(router: APIRouter, phones: SensorLoggerIntake) -> N
             "requestBody": {"required": True, "content": {"application/json": {"schema": _SENSOR_LOGGER_BODY}}}
         },
     )
-    async def ingest_sensor_logger(request: Request, query: Annotated[OfPhone, Query()]) -> Response:
+    async def ingest_sensor_logger(request: Request, query: Annotated[OfSensorLogger, Query()]) -> Response:
         tag, body = tag_of(request, query), await request.body()
         try:
             posted = await run_in_threadpool(phones.post, tag, body, query.signs)

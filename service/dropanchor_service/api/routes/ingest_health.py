@@ -12,7 +12,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.ingest import OfTag, encoding_of, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.phones.sensor_logger_intake import Receive
+from dropanchor_service.phones.intake import Receive
 
 _BODY = {ENCODING_JSON: {"schema": {"$ref": "#/components/schemas/TagHealthMessage"}, "example": examples.HEALTH}}
 

@@ -22,7 +22,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest import count_samples
-from dropanchor_service.phones.sensor_logger_intake import Receive
+from dropanchor_service.phones.intake import Receive
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 
 PROTOCOL = "dropanchor.samples"

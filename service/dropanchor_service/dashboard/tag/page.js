@@ -4,6 +4,7 @@ import { OUT_OF_DATE, STATES } from "../data/states.js";
 import { fixed, UNKNOWN } from "../data/format.js";
 import { installTheme } from "../page/theme.js";
 import { remember, remembered, takeFromAddress } from "./link.js";
+import { phyphoxCode, phyphoxLink } from "./phyphox.js";
 import { hasSerial } from "./serial.js";
 import { ThisTag } from "./tag.js";
 
@@ -88,7 +89,21 @@ async function open(name, key) {
   byId("form").hidden = true;
   byId("live").hidden = false;
   byId("uwb").hidden = !hasSerial();
+  byId("phyphox").addEventListener("toggle", () => showPhyphox(name, key));
   show(tag);
+}
+
+/** @param {string} name @param {string} key */
+async function showPhyphox(name, key) {
+  /** @type {HTMLAnchorElement} */ (byId("phyphox-link")).href = phyphoxLink(name, key);
+  const code = /** @type {HTMLImageElement} */ (byId("phyphox-code"));
+  try {
+    code.src = await phyphoxCode(name, key);
+    code.hidden = false;
+    write("phyphox-problem", "");
+  } catch (error) {
+    write("phyphox-problem", `The code cannot be shown: ${/** @type {Error} */ (error).message}`);
+  }
 }
 
 function ask() {

@@ -6,11 +6,12 @@ import random
 
 import pytest
 
-from dropanchor_schemas.wire import ENCODING_PACKED, Frame, ImuSample, decode_packed
+from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, decode_packed
+from dropanchor_service.phones.intake import BATTERY_S, SESSIONS_PER_TAG, PhoneIntake
 from dropanchor_service.phones.pairing import Signs
-from dropanchor_service.phones.sensor_logger import PhoneError
-from dropanchor_service.phones.sensor_logger_intake import SESSIONS_PER_TAG, SensorLoggerIntake
-from dropanchor_service.phones.session import MAX_WAITING, WAIT_S
+from dropanchor_service.phones.readings import PhoneError
+from dropanchor_service.phones.sensor_logger import parse
+from dropanchor_service.phones.session import MAX_WAITING, WAIT_S, Session
 from support.sensor_logger import T_NS, G, Value, Vector, message, reading, recording
 
 
@@ -20,10 +21,17 @@ class Phones:
     def __init__(self) -> None:
         self.now_s = 0.0
         self.frames: list[Frame] = []
-        self.intake = SensorLoggerIntake(self._receive, lambda: self.now_s)
+        self.counted: list[bytes] = []
+        self.health: list[tuple[str, bytes, str]] = []
+        self.intake = PhoneIntake(
+            self._receive, lambda *report: self.health.append(report), parse, Session, lambda: self.now_s
+        )
 
     def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
-        assert (tag, encoding) == ("anna", ENCODING_PACKED)
+        assert tag == "anna"
+        if encoding == ENCODING_JSON:
+            self.counted.append(payload)
+            return
         frame = decode_packed(payload)
         assert isinstance(frame, Frame)
         self.frames.append(frame)
@@ -173,10 +181,11 @@ def test_times_as_text_and_values_beside_them_are_understood() -> None:
         (json.dumps({"messageId": 2**60, "sessionId": "a", "payload": [1]}).encode(), "messageId is not"),
     ],
 )
-def test_what_is_no_message_is_refused_with_a_sentence(body: bytes, sentence: str) -> None:
+def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, sentence: str) -> None:
     phones = Phones()
     with pytest.raises(PhoneError, match=sentence):
         phones.post(body)
+    assert phones.counted == [body]
 
 
 @pytest.mark.parametrize(
@@ -201,3 +210,22 @@ def test_a_damaged_reading_is_counted_and_harms_no_other(damage: dict[str, objec
     bad = [reading("gyroscope", T_NS + 1, (0, 0, 0)) | damage, 17, {"name": ["gyroscope"]}]
     posted = phones.intake.post("anna", message(0, [*bad, *good]), Signs.AUTO)
     assert (posted.samples, posted.damaged) == (1, 1)
+
+
+def test_the_charge_of_the_battery_is_reported_when_it_changes_and_now_and_then() -> None:
+    phones = Phones()
+
+    def post(number: int, *levels: object) -> None:
+        batteries = [{"name": "battery", "time": T_NS, "values": {"batteryLevel": level}} for level in levels]
+        t_ns = T_NS + number * 10_000_000
+        motion = [reading("gyroscope", t_ns, (0, 0, 0)), reading("totalacceleration", t_ns, (0, 0, G))]
+        phones.post(message(number, [*batteries, *motion]))
+
+    for number, levels in enumerate([(0.9, 0.8), (0.8,), (0.79,), (), (-1,), ("full",), (True,)]):
+        post(number, *levels)
+    post(2, 0.5)  # a repeated message tells nothing
+    phones.now_s = BATTERY_S
+    post(7, 0.79)
+    reports = [json.loads(payload)["battery_fraction"] for _, payload, _ in phones.health]
+    assert reports == [0.8, 0.79, 0.79]
+    assert {(tag, encoding) for tag, _, encoding in phones.health} == {("anna", ENCODING_JSON)}

@@ -1,0 +1,191 @@
+"""Recordings of phyphox from posted messages to samples: every reading once, in order, with the right time."""
+
+import json
+import math
+import random
+
+import pytest
+
+from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, decode_packed
+from dropanchor_service.phones.intake import PhoneIntake
+from dropanchor_service.phones.phyphox import parse
+from dropanchor_service.phones.phyphox_session import PhyphoxSession
+from dropanchor_service.phones.readings import PhoneError
+from dropanchor_service.phones.session import MAX_WAITING, WAIT_S
+from support.phyphox import Value, event, message, recording
+from support.sensor_logger import G, Vector
+
+START_S = 1_800_000_000.125
+START_NS = 1_800_000_000_125_000_000
+START = [event("START", 0.0, START_S)]
+
+
+class Phone:
+    """An intake, and what it put out for one tag."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.frames: list[Frame] = []
+        self.counted: list[bytes] = []
+        self.intake = PhoneIntake(self._receive, lambda *_: None, parse, lambda _: PhyphoxSession(), lambda: self.now_s)
+
+    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
+        assert tag == "anna"
+        if encoding == ENCODING_JSON:
+            self.counted.append(payload)
+            return
+        frame = decode_packed(payload)
+        assert isinstance(frame, Frame)
+        self.frames.append(frame)
+
+    def post(self, body: bytes) -> int:
+        return self.intake.post("anna", body).samples
+
+    @property
+    def samples(self) -> list[ImuSample]:
+        return [sample for frame in self.frames for sample in frame.imu]
+
+
+def turning(t: float) -> Vector:
+    return 0.0, 0.0, math.sin(t)
+
+
+SENSORS: dict[str, Value] = {
+    "gyroscope": turning,
+    "accelerometer": lambda _: (0.0, 1.0, G),
+    "magnetometer": lambda _: (20.0, 0.0, -40.0),
+}
+
+
+def at_rest(*times: float) -> dict[str, list[tuple[float, Vector]]]:
+    return {
+        "gyroscope": [(t, (0.0, 0.0, 0.0)) for t in times],
+        "accelerometer": [(t, (0.0, 0.0, G)) for t in times],
+    }
+
+
+def test_ten_minutes_at_100_hz_out_of_order_and_repeated_lose_no_reading_and_use_none_twice() -> None:
+    phone, chance = Phone(), random.Random(5)
+    messages = list(recording(600, SENSORS, START_S))
+    places = [(index + chance.uniform(0.0, 5.0), body) for index, body in enumerate(messages)]
+    places += [(index + chance.uniform(0.0, 9.0), body) for index, body in list(enumerate(messages))[::7]]
+    for _, body in sorted(places, key=lambda place: place[0]):
+        phone.post(body)
+        phone.now_s += 0.175  # 3,429 messages in 600 s
+    times = [sample.t_ns for sample in phone.samples]
+    assert times == [
+        START_NS + (index + 1) * 10_000_000 for index in range(59_999)
+    ]  # the last one has no acceleration after it
+    for sample in phone.samples[::997]:
+        assert sample.acc == pytest.approx((1.0, 0.0, G), rel=1e-6)
+        assert sample.mag == pytest.approx((0.0, -20.0, -40.0), rel=1e-6)
+        assert sample.gyro[2] == pytest.approx(turning((sample.t_ns - START_NS) * 1e-9)[2], abs=1e-6)
+    assert [frame.sequence for frame in phone.frames] == list(range(len(phone.frames)))
+
+
+def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
+    phone = Phone()
+    [body] = recording(0.2, SENSORS, START_S)
+    assert phone.post(body) > 0
+    before = len(phone.samples)
+    assert phone.intake.post("anna", body).duplicate
+    assert len(phone.samples) == before
+
+
+def test_messages_that_overlap_give_every_reading_once() -> None:
+    phone = Phone()
+    times = [round(0.01 * index, 3) for index in range(1, 61)]
+    for begin in (0, 10, 20, 30):
+        phone.post(message(START, START_S, at_rest(*times[begin : begin + 30])))
+    assert [round((sample.t_ns - START_NS) * 1e-9, 3) for sample in phone.samples] == times
+
+
+def test_a_message_that_never_comes_is_given_up_after_a_while_and_used_when_it_comes_after_all() -> None:
+    phone = Phone()
+    first, second, third = recording(0.6, SENSORS, START_S)
+    phone.post(first)
+    assert phone.intake.post("anna", third).waiting == 1
+    phone.intake.release_overdue()
+    assert len(phone.samples) <= 20
+    phone.now_s += WAIT_S
+    phone.intake.release_overdue()
+    assert len(phone.samples) >= 39
+    assert phone.post(second) >= 19
+    times = [sample.t_ns for sample in phone.samples]
+    assert len(times) == len(set(times)) >= 58
+
+
+def test_no_more_messages_wait_than_are_allowed() -> None:
+    phone = Phone()
+    bodies = list(recording(0.2 * (MAX_WAITING + 2), SENSORS, START_S))
+    waiting = [phone.intake.post("anna", body).waiting for body in bodies[1:]]
+    assert max(waiting) == MAX_WAITING
+    assert waiting[-1] == 0
+
+
+def test_a_service_that_hears_an_experiment_from_its_middle_on_does_not_wait_for_its_beginning() -> None:
+    phone = Phone()
+    assert phone.post(list(recording(4, SENSORS, START_S))[10]) >= 19
+
+
+def test_a_pause_moves_the_times_after_it_and_a_cleared_experiment_is_a_new_one() -> None:
+    phone = Phone()
+    phone.post(message(START, START_S + 1, at_rest(0.98, 0.99)))
+    resumed = [*START, event("PAUSE", 1.0, START_S + 1.0), event("START", 1.0, START_S + 61.0)]
+    assert phone.intake.post("anna", message(resumed, START_S + 62, {})).waiting == 0
+    phone.post(message(resumed, START_S + 62, at_rest(1.01, 1.02)))
+    phone.now_s += WAIT_S
+    phone.intake.release_overdue()
+    cleared = [event("START", 0.0, START_S + 100.0)]
+    phone.post(message(cleared, START_S + 101, at_rest(0.01)))
+    times = [round((sample.t_ns - START_NS) * 1e-9, 3) for sample in phone.samples]
+    assert times == [0.98, 0.99, 61.01, 61.02, 100.01]
+    assert len({frame.boot_id for frame in phone.frames}) == 2
+
+
+def test_a_phone_without_a_magnetometer_sends_samples_without_a_field() -> None:
+    phone = Phone()
+    assert phone.post(message(START, START_S, at_rest(0.05, 0.06))) == 2
+    assert {sample.mag for sample in phone.samples} == {None}
+
+
+def test_readings_that_make_no_sense_are_counted_and_harm_no_others() -> None:
+    phone = Phone()
+    readings = at_rest(0.05, 0.06, 0.07)
+    damaged = json.loads(message(START, START_S, readings))
+    damaged["gyroscope_x"][1] = None  # what the app sends for a value that is not finite
+    damaged["accelerometer_z"][0] = "9.81"
+    damaged["accelerometer_t"].append(-1)
+    outcome = phone.intake.post("anna", json.dumps(damaged).encode())
+    assert outcome.damaged == 3
+    assert [round((sample.t_ns - START_NS) * 1e-9, 3) for sample in phone.samples] == [0.07]
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        (b"\xff", "is not JSON"),
+        (b"[" * 100_000, "is not JSON"),
+        (b"[]", "load it again"),
+        (b"{}", "load it again"),
+        (b'{"time": 5}', "load it again"),
+        (json.dumps({"time": {}, "gyroscope_t": 1}).encode(), "gyroscope_t is not a list"),
+        (json.dumps({"time": {}, "gyroscope_t": [1]}).encode(), "names no start"),
+        (json.dumps({"time": {"events": [3]}, "gyroscope_t": [1]}).encode(), "names no start"),
+        (json.dumps({"time": {"events": [event("START", 0, -1)]}, "gyroscope_t": [1]}).encode(), "has no time"),
+        (json.dumps({"time": {"events": [event("START", 0, 1e300)]}, "gyroscope_t": [1]}).encode(), "has no time"),
+        (b'{"time": {"events": [{"event": "START"}]}, "gyroscope_t": [1]}', "has no time"),
+    ],
+)
+def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, sentence: str) -> None:
+    phone = Phone()
+    with pytest.raises(PhoneError, match=sentence):
+        phone.post(body)
+    assert phone.counted == [body]
+
+
+def test_an_experiment_that_has_not_begun_or_pauses_sends_nothing_and_is_welcome() -> None:
+    phone = Phone()
+    for body in (message([], START_S, {}), message(START, START_S, at_rest())):
+        assert phone.post(body) == 0
+    assert not phone.counted
