@@ -94,7 +94,10 @@ class Pose(_Answer):
     hypotheses: list[Hypothesis] = []
     lat: float | None = Field(default=None, description="Degrees; null unless the site is georeferenced.")
     lon: float | None = None
-    online: bool = Field(description="Whether the tag's liveliness token is present.")
+    online: bool = Field(
+        description="Whether the tag's liveliness token is present, its WebSocket is open, or it has sent something "
+        "over HTTP in the last 30 s."
+    )
 
 
 class PoseList(_Answer):

@@ -76,15 +76,28 @@ def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(tmp_pa
         wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"].get("json_syntax") == 1)
 
 
-def test_the_empty_battery_of_a_phone_over_http_is_told(tmp_path: Path) -> None:
+def test_a_phone_over_http_is_online_and_its_empty_battery_is_told(tmp_path: Path) -> None:
     config = settings_file(tmp_path, ["anna"])
     with running_service("--config", str(config)) as service:
+        assert not service.get("/api/v1/tags/anna")["online"]
         battery = {"name": "battery", "time": time.time_ns(), "values": {"batteryLevel": 0.12}}
         assert service.ask("POST", f"{PHONE}?tag=anna", content=message(0, [battery])).status_code == 200
+        assert service.get("/api/v1/tags/anna")["online"]
+        assert service.metric("dropanchor_tags_online") == 1
         wait_until(lambda: service.get("/api/v1/tags/anna")["health"] is not None)
         status = service.get("/api/v1/tags/anna")
         assert status["health"]["battery_fraction"] == 0.12
         assert [care["reason"] for care in status["needs_care"]] == ["battery_low"]
+
+
+def test_an_open_web_socket_makes_its_tag_online(tmp_path: Path) -> None:
+    config = settings_file(tmp_path, ["anna"])
+    with running_service("--config", str(config)) as service:
+        url = f"{service.url.replace('http', 'ws')}/api/v1/ingest/stream?tag=anna"
+        with connect(url, proxy=None) as socket:
+            socket.recv(5)
+            assert service.get("/api/v1/tags/anna")["online"]
+        wait_until(lambda: not service.get("/api/v1/tags/anna")["online"])
 
 
 def test_a_message_that_is_sent_again_over_a_web_socket_counts_as_a_duplicate_and_is_used_once(tmp_path: Path) -> None:

@@ -95,7 +95,9 @@ def columns_of(
     return PoseColumns(
         poses=aged,
         tags=of_tags,
-        online=tags.are_online(aged["row"]) if names is None else np.array([tags.is_online(name) for name in names]),
+        online=tags.presence.are_online(aged["row"])
+        if names is None
+        else np.array([tags.presence.is_online(name) for name in names]),
         hint_texts=hint_texts,
         hint=hint,
         anchor_ids=[anchor.id for anchor in site.anchors_by_index()],

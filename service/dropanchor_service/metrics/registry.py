@@ -121,6 +121,8 @@ class FleetGauges(Collector):
             len(self._pending_tags),
         )
         yield GaugeMetricFamily(
-            "dropanchor_tags_online", "Tags whose liveliness token is present.", self._tags.online_names
+            "dropanchor_tags_online",
+            "Tags that are online: by a liveliness token, an open WebSocket, or HTTP.",
+            self._tags.presence.count(),
         )
         yield GaugeMetricFamily("dropanchor_queue_messages", "Messages queued for the estimators.", self._queue_depth())

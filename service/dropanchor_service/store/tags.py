@@ -10,6 +10,7 @@ import numpy as np
 from dropanchor_schemas import kinds
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.presence import Presence
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.store.unknown_anchors import UnknownAnchors
 
@@ -37,7 +38,7 @@ class Tag:
 
     @property
     def online(self) -> bool:
-        return self.table.is_online(self.name)
+        return self.table.presence.is_online(self.name)
 
     @property
     def first_heard_ns(self) -> int | None:
@@ -73,8 +74,7 @@ class TagTable:
         self._by_name: dict[str, Tag] = {}
         self._by_row: list[Tag] = []
         self._counts = np.zeros(16, _COUNTS)
-        self._online: set[str] = set()
-        self._is_online = np.zeros(16, bool)  # the same as `_online`, by row
+        self.presence = Presence()
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past, by row
         self.unknown_anchors = UnknownAnchors()
 
@@ -103,25 +103,10 @@ class TagTable:
             if tag is None:
                 tag = Tag(name, len(self._by_row), self)
                 self._grow(tag.row + 1)
-                self._is_online[tag.row] = name in self._online
+                self.presence.add_row(name, tag.row)
                 self._by_row.append(tag)
                 self._by_name[name] = tag
             return tag
-
-    def set_online(self, name: str, online: bool) -> None:
-        """Set whether a tag has a liveliness token. The tag may be registered later."""
-        with self._lock:
-            (self._online.add if online else self._online.discard)(name)
-            tag = self._by_name.get(name)
-            if tag is not None:
-                self._is_online[tag.row] = online
-
-    def is_online(self, name: str) -> bool:
-        return name in self._online
-
-    def are_online(self, rows: Array) -> Array:
-        online: Array = self._is_online[rows]
-        return online
 
     def set_replay_lag(self, rows: Array, lag_ns: Array) -> None:
         """Set how far the samples of replayed tags lie in the past, ns; 0 for live tags."""
@@ -131,11 +116,6 @@ class TagTable:
         """Return the age of each POSE, s. The age of a replayed tag counts from the current time of its recording."""
         age_s: Array = (now_ns - self._replay_lag_ns[poses["row"]] - poses["t_ns"]) * 1e-9
         return age_s
-
-    @property
-    def online_names(self) -> int:
-        """The number of names with a liveliness token, registered or not."""
-        return len(self._online)
 
     def copy_counts(self) -> Array:
         """Return a copy of all counters, one record per row."""
@@ -169,7 +149,6 @@ class TagTable:
     def _grow(self, rows: int) -> None:
         if rows > len(self._counts):
             self._counts = enlarged(self._counts, 2 * len(self._counts))
-            self._is_online = enlarged(self._is_online, len(self._counts))
             self._replay_lag_ns = enlarged(self._replay_lag_ns, len(self._counts))
 
 

@@ -117,8 +117,8 @@ class ZenohIntake:
         except keys.InvalidKeyError:
             return
         if message.kind == zenoh.SampleKind.DELETE:
-            self._tags.set_online(name, False)
-        elif self._tags.online_names < self._max_tokens:
-            self._tags.set_online(name, True)
+            self._tags.presence.set_token(name, False)
+        elif self._tags.presence.tokens < self._max_tokens:
+            self._tags.presence.set_token(name, True)
             self._ingest.announce(name)
             self._catch_up.on_alive(keys.samples_key(self._site, name))

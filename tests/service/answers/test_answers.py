@@ -46,7 +46,7 @@ def test_a_tag_without_a_pose_has_no_answer() -> None:
 def test_an_answer_is_a_pose_of_the_contract() -> None:
     answers = make_answers()
     answers.tags.register("a")
-    answers.tags.set_online("a", True)
+    answers.tags.presence.set_token("a", True)
     answers.latest.write(make_pose(x=1.5, y=-2.5, heading=0.1, speed=1.2, range=2.9, sigma_pos=0.2), NO_MODES)
     pose = Pose.model_validate(pose_of(answers))
     assert (pose.tag, pose.t_ns, pose.age_s, pose.online, pose.anchor) == ("a", T_NS, 0.25, True, "17")

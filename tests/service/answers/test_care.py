@@ -71,7 +71,7 @@ def test_a_tag_without_contact_needs_care_and_the_hint_says_whether_it_is_connec
     fleet.tags.count_messages(np.array([fleet.tag("a").row]), NOW_NS)
     assert fleet.care("a", NO_CONTACT_S - 1.0) == {}
     assert "check its power" in fleet.care("a", NO_CONTACT_S + 1.0)["no_contact"]
-    fleet.tags.set_online("a", True)
+    fleet.tags.presence.set_token("a", True)
     assert "check its sensors" in fleet.care("a", NO_CONTACT_S + 1.0)["no_contact"]
 
 

@@ -24,7 +24,7 @@ def answers_with(count: int, site: Site) -> Answers:
     answers = Answers(SiteStore(site, {}), TagTable(), LatestPoses(), now_ns=lambda: T_NS)
     for row in range(count):
         answers.tags.register(NAMES[row] if row < len(NAMES) else f"tag-{row}")
-    answers.tags.set_online("plain", True)
+    answers.tags.presence.set_token("plain", True)
     rng = np.random.default_rng(1)
     poses = np.zeros(count, POSE)
     for name in POSE.names or ():

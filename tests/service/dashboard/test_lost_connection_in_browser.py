@@ -63,7 +63,7 @@ def outage(chromium: Browser) -> Iterator[Outage]:
     """Show six tracked tags with one of them selected, then stop the service."""
     bench = live_api_bench()
     bench.answers.tags.register("cart-0")
-    bench.answers.tags.set_online("cart-0", True)
+    bench.answers.tags.presence.set_token("cart-0", True)
     with ExitStack() as pages:
         with running_server(bench.app(DASHBOARD), bench.stopping) as port:
             place = Place(bench, f"http://127.0.0.1:{port}/")

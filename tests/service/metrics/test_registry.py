@@ -40,7 +40,7 @@ def test_tags_are_counted_by_their_aged_state_rather_than_the_stored_one() -> No
     latest.write(poses, np.empty(0, HYPOTHESIS))
     for name in "abcd":
         tags.register(name)
-    tags.set_online("a", True)
+    tags.presence.set_token("a", True)
     pending_tags = PendingTags(10)
     pending_tags.on_message("e", 100 * S)
     metrics.register(FleetGauges(tags, pending_tags, latest, lambda: 100 * S, lambda: 5))

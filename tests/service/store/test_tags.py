@@ -47,7 +47,7 @@ def test_counters_survive_the_growth_of_the_table() -> None:
 
 def test_a_token_seen_before_its_tag_is_remembered() -> None:
     tags = TagTable()
-    tags.set_online("a", True)
+    tags.presence.set_token("a", True)
     assert tags.register("a").online
-    tags.set_online("a", False)
+    tags.presence.set_token("a", False)
     assert not tags.at(0).online

@@ -135,7 +135,7 @@ class _Stream:
         tag = _tag(socket, identity)
         client = client_of(socket, identity)
         acknowledgements = _Acknowledgements(self._answers, tag, self._started_ns)
-        with self._connections.one_more(client):
+        with self._connections.one_more(client), self._answers.tags.presence.connected(tag):
             await socket.send_text(acknowledgements.greeting())
             async for payload, encoding in _messages(socket):
                 await self._wait_for_turn(client)

@@ -158,10 +158,10 @@ def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
 def test_a_tag_that_falls_silent_or_goes_offline_is_reported_without_a_new_pose() -> None:
     bench = make_api_bench()
     bench.move("a", "b")
-    bench.answers.tags.set_online("b", True)
+    bench.answers.tags.presence.set_token("b", True)
     with serving(bench) as port, streaming(port) as events:
         assert next(events)[1]["online"] == [False, True]
-        bench.answers.tags.set_online("b", False)
+        bench.answers.tags.presence.set_token("b", False)
         frame = next(events)[1]
         assert (frame["tags"], frame["online"]) == (["b"], [False])
         bench.now_ns += 2_000_000_000

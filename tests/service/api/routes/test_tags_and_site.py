@@ -19,7 +19,7 @@ def test_a_tag_shows_its_counts_of_messages_samples_and_rejections() -> None:
     tags.count_messages(rows, 5_000)
     tags.count_samples("range", np.repeat(rows, 3))
     tags.count_rejected(Reason.LATE, rows)
-    tags.set_online("a", True)
+    tags.presence.set_token("a", True)
     tag = TagStatus.model_validate(ask(bench.app(), "GET", "/api/v1/tags/a").json())
     assert (tag.online, tag.first_heard_ns, tag.last_heard_ns, tag.messages) == (True, 5_000, 5_000, 1)
     assert (tag.samples, tag.rejected, tag.settings) == ({"range": 3}, {"late": 1}, TagSettings())
