@@ -17,11 +17,24 @@ class RemoteSettingsStatus(_Answer):
     acknowledged: RemoteSettings | None = Field(description="null: the program has acknowledged no settings.")
 
 
+class ClockOffset(_Answer):
+    """How far the clock of a tag's motion is ahead of that of its ranges."""
+
+    offset_s: float = Field(
+        description="Negative: behind. Found from the messages with the least delay in the last 30 to 60 s, so that a "
+        "network that delays all messages of one side by this much looks the same."
+    )
+    uncertainty_s: float = Field(description="The offset lies within this much of it.")
+
+
 class TagStatus(_Answer):
     """The status of one tag: when it last sent data, what was received from it, and its settings."""
 
     tag: str
-    online: bool = Field(description="Whether the tag's liveliness token is present.")
+    online: bool = Field(
+        description="Whether the tag's liveliness token is present, its WebSocket is open, or it has sent something "
+        "over HTTP in the last 30 s."
+    )
     first_heard_ns: int | None = Field(description="UTC, ns; null if the tag has sent nothing yet.")
     last_heard_ns: int | None
     messages: int
@@ -32,6 +45,9 @@ class TagStatus(_Answer):
         "if nothing needs to be done."
     )
     health: TagHealth | None = Field(description="What the tag has reported about itself; null if nothing.")
+    clock_offset: ClockOffset | None = Field(
+        description="null: one program sends motion and ranges, or one of them has not come for a minute."
+    )
     needs_care: list[Care] = Field(description="What a person should do for the tag; empty if nothing.")
     remote_settings: RemoteSettingsStatus
     settings: TagSettings

@@ -74,7 +74,7 @@ class Care(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    reason: Literal["battery_low", "firmware_differs", "spool_growing", "no_contact"]
+    reason: Literal["battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact"]
     hint: str
 
 

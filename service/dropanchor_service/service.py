@@ -81,12 +81,19 @@ class Service:
         pending_tags = PendingTags(settings.max_tags)
         self.site = _site_store(settings)
         self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
+        self._publishers = Publishers()
         self.answers = Answers(
-            self.site, self.tags, self.latest, self.clock.now_ns, self._persistence.tracks, pending_tags, health
+            self.site,
+            self.tags,
+            self.latest,
+            self.clock.now_ns,
+            self._persistence.tracks,
+            pending_tags,
+            health,
+            self._publishers,
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         engine = GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics)
-        self._publishers = Publishers()
         self._ingest = Ingest(
             self._buffer,
             Admission(settings, self.site, self.tags, pending_tags),
@@ -111,7 +118,7 @@ class Service:
         )
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
-        self.metrics.register(HealthGauges(self.tags, health, self.clock.now_ns))
+        self.metrics.register(HealthGauges(self.tags, health, self.clock.now_ns, self._publishers))
         self.metrics.register(
             FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )

@@ -90,6 +90,22 @@ def test_a_phone_over_http_is_online_and_its_empty_battery_is_told(tmp_path: Pat
         assert [care["reason"] for care in status["needs_care"]] == ["battery_low"]
 
 
+def test_a_phone_whose_clock_is_ahead_of_the_ranges_is_told(tmp_path: Path) -> None:
+    config, ahead_ns = settings_file(tmp_path, ["anna"]), 800_000_000
+    with running_service("--config", str(config)) as service:
+        start_ns = time.time_ns() - 1_000_000_000
+        for batch in recording(1, SENSORS, start_ns=start_ns + ahead_ns, batch_ns=200_000_000):
+            service.ask("POST", f"{PHONE}?tag=anna", content=batch)
+        [distances] = ranges(1, start_ns)
+        service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers={"content-type": ENCODING_JSON})
+        wait_until(lambda: service.get("/api/v1/tags/anna")["clock_offset"] is not None)
+        status = service.get("/api/v1/tags/anna")
+        assert abs(status["clock_offset"]["offset_s"] - 0.8) < 0.3
+        assert [care["reason"] for care in status["needs_care"]] == ["clock_offset"]
+        assert service.metric('dropanchor_tags_needing_care{reason="clock_offset"}') == 1
+        assert abs(service.metric("dropanchor_clock_offset_seconds_max") - 0.8) < 0.3
+
+
 def test_an_open_web_socket_makes_its_tag_online(tmp_path: Path) -> None:
     config = settings_file(tmp_path, ["anna"])
     with running_service("--config", str(config)) as service:

@@ -19,6 +19,7 @@ from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_js
 from dropanchor_service.answers.track_pages import pose_in_tracks
 from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.store.clock_offsets import ClockOffsets, NoClockOffsets
 from dropanchor_service.store.health import HealthTable
 from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.pending_tags import PendingTags
@@ -48,9 +49,10 @@ class Answers:
         tracks: Tracks | None = None,
         pending_tags: PendingTags | None = None,
         health: HealthTable | None = None,
+        clock_offsets: ClockOffsets | None = None,
     ) -> None:
         """tracks: the history on disk, None if there is none. pending_tags: tags that have no row yet.
-        health: what the tags report about themselves."""
+        health: what the tags report about themselves. clock_offsets: between the clocks of a tag."""
         self.site = site
         self.tags = tags
         self.latest = latest
@@ -58,6 +60,7 @@ class Answers:
         self.tracks = tracks
         self.pending_tags = PendingTags(0) if pending_tags is None else pending_tags
         self.health = HealthTable() if health is None else health
+        self.clock_offsets = NoClockOffsets() if clock_offsets is None else clock_offsets
 
     def hint_of(self, tag: Tag) -> str:
         """Return what a person can do so that more of the tag's samples are used; empty if there is nothing to do."""

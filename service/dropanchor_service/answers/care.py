@@ -3,12 +3,13 @@
 from typing import Any
 
 from dropanchor_service.store import HealthTable, Tag
+from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.health import HealthRecord
 
 BATTERY_LOW = 0.2
 SPOOL_RISES = 3  # reports in a row
 NO_CONTACT_S = 300.0
-REASONS = ("battery_low", "firmware_differs", "spool_growing", "no_contact")
+REASONS = ("battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact")
 
 
 def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | None:
@@ -19,10 +20,14 @@ def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | 
     return {"age_s": _age_s(record.received_ns, now_ns)} | values
 
 
-def care_of(tag: Tag, health: HealthTable, now_ns: int) -> list[dict[str, str]]:
+def care_of(
+    tag: Tag, health: HealthTable, now_ns: int, clock_offset: ClockOffset | None = None
+) -> list[dict[str, str]]:
     """Return a `Care` for everything that a person should do for the tag."""
     record = health.of(tag.row)
     hints = {} if record is None else _of_values(record, health.majority_firmware)
+    if clock_offset is not None and clock_offset.is_too_large:
+        hints["clock_offset"] = _clock_hint(clock_offset.offset_s)
     last_ns = max(tag.last_heard_ns or 0, 0 if record is None or tag.last_heard_ns else record.received_ns)
     if last_ns and _age_s(last_ns, now_ns) > NO_CONTACT_S:
         hints["no_contact"] = _no_contact(tag.online, _age_s(last_ns, now_ns))
@@ -41,6 +46,14 @@ def _of_values(record: HealthRecord, majority: str | None) -> dict[str, str]:
         megabytes = values["spool_bytes"] / 1e6
         hints["spool_growing"] = f"Its spool grows ({megabytes:.1f} MB wait): its network is too slow for its data."
     return hints
+
+
+def _clock_hint(offset_s: float) -> str:
+    where, late = ("ahead of", "the ranges always come") if offset_s > 0 else ("behind", "the motion always comes")
+    return (
+        f"The clock of its motion is {abs(offset_s):.1f} s {where} that of its ranges, or {late} so late: let both "
+        "devices set their time automatically, and check the network."
+    )
 
 
 def _no_contact(online: bool, age_s: float) -> str:

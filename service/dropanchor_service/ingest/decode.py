@@ -138,6 +138,7 @@ def _json_forms(
         form["accepted"], form["boot_clock"], form["replay"] = True, frame.boot_clock, frame.replay
         form["numbered"] = frame.sequence is not None and bool(frame.boot_id)
         form["sequence"], form["boot_id"] = frame.sequence or 0, frame.boot_id or 0
+        form["kinds"] = sum(1 << kind for kind, count in enumerate(frame.counts()) if count)
     return frames, rejected
 
 

@@ -6,10 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.ingest.clock_offsets import offsets_of
 from dropanchor_service.ingest.kernels import sequences
 from dropanchor_service.ingest.kernels.clocks import TAG_TIME, time_offsets
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW
 from dropanchor_service.ingest.kernels.values import newest_times
+from dropanchor_service.store.clock_offsets import LEAST_DELAYS_S, ClockOffset
 from dropanchor_service.store.records import enlarged
 
 
@@ -124,6 +126,20 @@ class Publishers:
             forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, self._times, offsets
         )
         return offsets if offsets.any() else np.zeros(0, np.int64), jumps
+
+    def clock_offset(self, row: int, now_ns: int) -> ClockOffset | None:
+        """Return how far the clock of a tag's motion is ahead of that of its ranges, None if that is not known."""
+        return self._clock_offsets(row, row + 1, now_ns).get(row)
+
+    def clock_offsets(self, now_ns: int) -> dict[int, ClockOffset]:
+        """Return the offset of each row for which it is known."""
+        return self._clock_offsets(0, len(self._times), now_ns)
+
+    def _clock_offsets(self, first: int, end: int, now_ns: int) -> dict[int, ClockOffset]:
+        of_rows = self._columns[first * PER_TAG : end * PER_TAG].reshape(-1, PER_TAG)
+        rows, offset_ns, spread_ns = offsets_of(of_rows, now_ns)
+        found = zip((first + rows).tolist(), (offset_ns * 1e-9).tolist(), (spread_ns * 1e-9).tolist(), strict=True)
+        return {row: ClockOffset(offset_s, LEAST_DELAYS_S + spread_s) for row, offset_s, spread_s in found}
 
     def to_utc(self, outcomes: Array) -> None:
         """Convert the times of POSE or INNOVATION from the estimators' time to UTC, in place."""

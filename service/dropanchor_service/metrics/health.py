@@ -10,6 +10,7 @@ from prometheus_client.registry import Collector
 
 from dropanchor_service.answers.care import REASONS, care_of
 from dropanchor_service.store import HealthTable, TagTable
+from dropanchor_service.store.clock_offsets import ClockOffsets
 
 _EXTREMES: tuple[tuple[str, str, Callable[[Sequence[float]], float], str], ...] = (
     (
@@ -27,20 +28,30 @@ _EXTREMES: tuple[tuple[str, str, Callable[[Sequence[float]], float], str], ...] 
 class HealthGauges(Collector):
     """Gauges that are read from the store at every scrape."""
 
-    def __init__(self, tags: TagTable, health: HealthTable, now_ns: Callable[[], int]) -> None:
+    def __init__(
+        self, tags: TagTable, health: HealthTable, now_ns: Callable[[], int], clock_offsets: ClockOffsets
+    ) -> None:
         self._tags = tags
         self._health = health
         self._now_ns = now_ns
+        self._clock_offsets = clock_offsets
 
     def collect(self) -> Iterable[Metric]:
         now_ns, tags = self._now_ns(), self._tags.all()
-        reasons = Counter(care["reason"] for tag in tags for care in care_of(tag, self._health, now_ns))
+        offsets = self._clock_offsets.clock_offsets(now_ns)
+        cares = (care_of(tag, self._health, now_ns, offsets.get(tag.row)) for tag in tags)
+        reasons = Counter(care["reason"] for of_tag in cares for care in of_tag)
         needing = GaugeMetricFamily(
             "dropanchor_tags_needing_care", "Tags that need a person, by reason.", labels=["reason"]
         )
         for reason in REASONS:
             needing.add_metric([reason], reasons[reason])
         yield needing
+        yield GaugeMetricFamily(
+            "dropanchor_clock_offset_seconds_max",
+            "Largest offset between the clocks of a tag's motion and its ranges, either way; NaN if none is known.",
+            max((abs(offset.offset_s) for offset in offsets.values()), default=math.nan),
+        )
         yield from self._extremes([record.values for tag in tags if (record := self._health.of(tag.row))])
 
     def _extremes(self, values: Sequence[Mapping[str, Any]]) -> Iterable[Metric]:

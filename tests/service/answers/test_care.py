@@ -3,9 +3,11 @@
 from typing import Any
 
 import numpy as np
+import pytest
 
 from dropanchor_service.answers.care import NO_CONTACT_S, SPOOL_RISES, care_of
 from dropanchor_service.store import HealthTable, Tag, TagTable
+from dropanchor_service.store.clock_offsets import ClockOffset
 
 S = 1_000_000_000
 NOW_NS = 1_800_000_000 * S
@@ -53,6 +55,16 @@ def test_firmware_needs_care_while_it_differs_from_that_of_more_than_half_of_the
     assert fleet.care("b") == {}
     fleet.report("a", firmware="1.1")
     assert fleet.care("a") == {}
+
+
+@pytest.mark.parametrize(("offset_s", "said"), [(0.8, "0.8 s ahead"), (-1.2, "1.2 s behind")])
+def test_clocks_that_are_far_apart_need_care(offset_s: float, said: str) -> None:
+    fleet = Fleet()
+    tag = fleet.tag("a")
+    assert care_of(tag, fleet.health, NOW_NS, ClockOffset(0.25, 0.1)) == []
+    [care] = care_of(tag, fleet.health, NOW_NS, ClockOffset(offset_s, 0.1))
+    assert care["reason"] == "clock_offset"
+    assert said in care["hint"]
 
 
 def test_a_spool_needs_care_when_it_grows_from_report_to_report() -> None:

@@ -5,6 +5,7 @@ import time
 import pytest
 from playwright.sync_api import Browser, expect
 
+from dropanchor_service.store.clock_offsets import ClockOffset, NoClockOffsets
 from service.dashboard.place import Place
 from support.browser import watched_page
 
@@ -35,3 +36,20 @@ def test_tags_that_need_care_are_counted_and_filtered_and_the_panel_says_what_th
         page.locator("tr[data-tag='full']").click()
         expect(page.locator("[data-part='care']")).to_be_hidden()
         expect(page.locator("[data-part='health']")).to_contain_text("2.0")
+
+
+class Offsets(NoClockOffsets):
+    """One offset, of the first tag."""
+
+    def clock_offsets(self, _now_ns: int) -> dict[int, ClockOffset]:
+        return {0: ClockOffset(0.8, 0.12)}
+
+
+def test_the_panel_shows_how_far_the_clocks_of_a_tag_are_apart_and_what_to_do(chromium: Browser, place: Place) -> None:
+    place.bench.answers.clock_offsets = Offsets()
+    place.move("phone", x=1.0, y=2.0)
+    with watched_page(chromium, place.url) as watched:
+        watched.page.locator("tr[data-tag='phone']").click()
+        health = watched.page.locator("[data-part='health']")
+        expect(health).to_contain_text("0.80 s ahead of the ranges ± 0.12 s", timeout=10_000)
+        expect(watched.page.locator("[data-part='care']")).to_contain_text("0.8 s ahead of that of its ranges")

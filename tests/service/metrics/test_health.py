@@ -6,11 +6,12 @@ from prometheus_client import CollectorRegistry
 
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.store import HealthTable, TagTable
+from dropanchor_service.store.clock_offsets import NoClockOffsets
 
 
 def test_the_gauges_are_of_the_whole_fleet() -> None:
     tags, health, registry = TagTable(), HealthTable(), CollectorRegistry()
-    registry.register(HealthGauges(tags, health, lambda: 0))
+    registry.register(HealthGauges(tags, health, lambda: 0, NoClockOffsets()))
     value = registry.get_sample_value
     assert math.isnan(value("dropanchor_battery_fraction_min") or 0.0)
     for name, values in (

@@ -111,6 +111,7 @@ TAG: dict[str, Any] = {
     "rejected": {"range_negative": 2},
     "hint": "",
     "health": HEALTH | {"age_s": 12.5},
+    "clock_offset": {"offset_s": 0.02, "uncertainty_s": 0.1},
     "needs_care": [{"reason": "battery_low", "hint": "The battery is at 15%: charge it."}],
     "remote_settings": REMOTE_SETTINGS,
     "settings": TAG_SETTINGS,

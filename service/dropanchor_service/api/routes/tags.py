@@ -1,6 +1,6 @@
 """The routes for tags: what they have sent, and their settings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated
 
 from fastapi import APIRouter, Body
@@ -15,6 +15,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
+from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
 
 _REASON_NAMES = [reason.value for reason in REASONS]
@@ -31,7 +32,9 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_tags() -> Response:
-        return json_response({"t_ns": answers.now_ns(), "tags": list(_statuses(answers, answers.tags.all()))})
+        now_ns = answers.now_ns()
+        offsets = answers.clock_offsets.clock_offsets(now_ns)
+        return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, answers.tags.all(), offsets, now_ns))})
 
     @router.get(
         "/newcomers",
@@ -63,7 +66,9 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         responses=example_response(examples.TAG) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag(tag: TagId) -> Response:
-        return json_response(next(_statuses(answers, [known_tag(answers, tag)])))
+        known, now_ns = known_tag(answers, tag), answers.now_ns()
+        offset = answers.clock_offsets.clock_offset(known.row, now_ns)
+        return json_response(next(_statuses(answers, [known], {known.row: offset}, now_ns)))
 
     @router.get(
         "/tags/{tag}/settings",
@@ -113,11 +118,14 @@ def remote_answer(answers: Answers, tag: Tag) -> Answer:
     }
 
 
-def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
-    """Yield the `TagStatus` of each tag."""
+def _statuses(
+    answers: Answers, tags: list[Tag], offsets: Mapping[int, ClockOffset | None], now_ns: int
+) -> Iterator[Answer]:
+    """Yield the `TagStatus` of each tag. offsets: between its clocks, by row."""
     default = TagSettings().model_dump()
-    configured, now_ns = answers.site.tags, answers.now_ns()
+    configured = answers.site.tags
     for tag in tags:
+        offset = offsets.get(tag.row)
         first, last, messages, samples, rejected = answers.tags.counts(tag.row).item()
         yield {
             "tag": tag.name,
@@ -129,7 +137,8 @@ def _statuses(answers: Answers, tags: list[Tag]) -> Iterator[Answer]:
             "rejected": {name: count for name, count in zip(_REASON_NAMES, rejected.tolist(), strict=True) if count},
             "hint": answers.hint_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),
-            "needs_care": care_of(tag, answers.health, now_ns),
+            "clock_offset": None if offset is None else offset._asdict(),
+            "needs_care": care_of(tag, answers.health, now_ns, offset),
             "remote_settings": remote_answer(answers, tag),
             "settings": configured[tag.name].model_dump() if tag.name in configured else default,
         }

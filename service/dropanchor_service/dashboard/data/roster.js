@@ -14,6 +14,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {Record<string, number>} rejected by reason
  * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
  * @property {Health | null} health what the tag reports about itself
+ * @property {{offset_s: number, uncertainty_s: number} | null} clock_offset of motion, ahead of the ranges
  * @property {{reason: string, hint: string}[]} needs_care what a person should do for the tag
  * @property {{height_m: number}} settings
  */

@@ -43,6 +43,11 @@ export function healthTexts(health) {
     .filter(([, text]) => text !== "");
 }
 
+/** Return how far the clock of a tag's motion is ahead of that of its ranges.
+ * @param {{offset_s: number, uncertainty_s: number}} clock */
+export const clockText = ({ offset_s, uncertainty_s }) =>
+  `${fixed(Math.abs(offset_s), 2)} s ${offset_s < 0 ? "behind" : "ahead of"} the ranges ± ${fixed(uncertainty_s, 2)} s`;
+
 /** @param {number} bytes */
 const megabytes = (bytes) => (bytes === 0 ? "empty" : `${fixed(bytes / 1e6, 1)} MB`);
 

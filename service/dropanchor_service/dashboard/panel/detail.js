@@ -4,7 +4,7 @@ import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
 import { UNKNOWN, age, compass, fixed, metres, percent, sigma, turnRate, words } from "../data/format.js";
 import { AMBIGUOUS } from "../data/states.js";
-import { healthTexts } from "./care.js";
+import { clockText, healthTexts } from "./care.js";
 import { Plots } from "./plots.js";
 import { symbol } from "../map/symbols.js";
 
@@ -117,6 +117,7 @@ export class Detail {
     fillList(this.#part("care"), (status?.needs_care ?? []).map(({ hint }) => hint));
     const box = this.#part("health");
     const texts = status?.health ? healthTexts(status.health) : [];
+    if (status?.clock_offset) texts.push(["Motion clock", clockText(status.clock_offset)]);
     box.hidden = texts.length === 0;
     if (box.dataset.shown === JSON.stringify(texts)) return;
     box.dataset.shown = JSON.stringify(texts);

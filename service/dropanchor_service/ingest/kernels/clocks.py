@@ -47,16 +47,21 @@ def _since_start(publisher: Any, t_ns: int, arrival_ns: int) -> int:
         publisher.least_ns, publisher.previous_least_ns = difference, NONE_NS
         publisher.epoch_end_ns = arrival_ns + EPOCH_NS
         return difference
-    has_stopped = False
-    if arrival_ns >= publisher.epoch_end_ns:
-        has_stopped = _has_stopped(publisher)
-        publisher.previous_least_ns, publisher.least_ns = publisher.least_ns, NONE_NS
-        publisher.epoch_end_ns = arrival_ns + EPOCH_NS
-    publisher.least_ns = min(publisher.least_ns, difference)
+    has_stopped = arrival_ns >= publisher.epoch_end_ns and _has_stopped(publisher)
+    _note_difference(publisher, difference, arrival_ns)
     error = min(publisher.least_ns, publisher.previous_least_ns) - publisher.shift_ns
     if error < -STEP_NS or has_stopped:
         return int(publisher.shift_ns + error)
     return int(publisher.shift_ns + _slew(error, t_ns - publisher.newest_ns))
+
+
+@njit(nogil=True)
+def _note_difference(publisher: Any, difference_ns: int, arrival_ns: int) -> None:
+    """Note the difference between the arrival of a message and its newest sample; only the least of an epoch stays."""
+    if arrival_ns >= publisher.epoch_end_ns:
+        publisher.previous_least_ns, publisher.least_ns = publisher.least_ns, NONE_NS
+        publisher.epoch_end_ns = arrival_ns + EPOCH_NS
+    publisher.least_ns = min(publisher.least_ns, difference_ns)
 
 
 @njit(nogil=True)
@@ -117,6 +122,7 @@ def time_offsets(
         if slots[i] < 0 or newest[i] < 0:
             continue
         publisher, time = publishers[slots[i]], times[slots[i] // PER_TAG]
+        publisher.kinds |= forms[i].kinds
         if forms[i].boot_clock:
             utc = _since_start(publisher, newest[i], arrivals[i])
             known, change = publisher.arrival_ns != 0, utc - publisher.shift_ns
@@ -125,7 +131,11 @@ def time_offsets(
                 time.correction_ns += change
         else:
             utc = _shift(publisher, newest[i], arrivals[i])
-            jumps += utc != publisher.shift_ns
+            if utc != publisher.shift_ns:
+                jumps += 1
+                publisher.least_ns, publisher.epoch_end_ns = NONE_NS, 0  # differences of another clock, in effect
+            if not forms[i].replay:
+                _note_difference(publisher, arrivals[i] - newest[i], arrivals[i])
         offsets[i] = utc - time.correction_ns
         publisher.shift_ns, publisher.newest_ns, publisher.arrival_ns = utc, newest[i], arrivals[i]
     return jumps

@@ -20,7 +20,8 @@ FORM = np.dtype(
         ("sequence", "u4"),
         ("boot_id", "u4"),
         ("t0_ns", "i8"),
-        ("counts", "i8", len(KINDS)),
+        ("kinds", "u1"),  # bit k: it has samples of KINDS[k]
+        ("counts", "i8", len(KINDS)),  # of a packed payload
         ("start", "i8"),  # word of the buffer at which its samples begin, -1: not packed
     ]
 )
@@ -76,6 +77,7 @@ def read_forms(words: Any, starts: Any, sizes: Any, where: Any, forms: Any) -> i
         form.t0_ns = t0_ns
         for k in range(_KINDS):
             form.counts[k] = _count(words, at, k)
+            form.kinds |= np.uint8((form.counts[k] > 0) << k)
         form.start = at + _HEADER_WORDS
     return accepted
 

@@ -27,6 +27,7 @@ PUBLISHER: Final = np.dtype(
         ("boot_id", "u4"),
         ("next", "u4"),  # the expected number; while STARTING: the first that arrived
         ("status", "u1"),
+        ("kinds", "u1"),  # bit k: it has sent samples of KINDS[k]
         ("gap_allowed", "?"),  # the buffer has shed messages: do not wait for the missing ones
         ("used_ns", "i8"),  # last arrival
         ("least_ns", "i8"),  # least arrival minus time of this epoch, and of the one before; NONE_NS: not yet
@@ -122,7 +123,7 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
             found = slot
     publisher = publishers[found]
     publisher.boot_id, publisher.next, publisher.status = boot_id, sequence, STARTING
-    publisher.gap_allowed, publisher.used_ns, publisher.epoch_end_ns = False, arrival_ns, 0
+    publisher.gap_allowed, publisher.used_ns, publisher.epoch_end_ns, publisher.kinds = False, arrival_ns, 0, 0
     publisher.least_ns = publisher.previous_least_ns = NONE_NS
     publisher.newest_ns = publisher.arrival_ns = publisher.shift_ns = 0
     return found
