@@ -100,7 +100,10 @@ class GuardedProtocol(H11Protocol):
         self._stall = _cancelled(self._stall)
 
     def shutdown(self) -> None:
-        super().shutdown()
+        # uvicorn closes the transport here. Closed a second time, asyncio's TLS transport lets go of its connection,
+        # and nothing could cut a client that does not read its last response.
+        if not self.transport.is_closing():
+            super().shutdown()
         if self.flow.write_paused:
             self.stalled_s = self.stalled_at_shutdown_s
             _cancelled(self._stall)
@@ -112,14 +115,25 @@ class GuardedProtocol(H11Protocol):
         super().connection_lost(exc)
 
     def _watch_stall(self) -> None:
-        waiting = self.transport.get_write_buffer_size()
-        self._stall = self.loop.call_later(self.stalled_s, self._cut_if_stalled, waiting)
+        waiting = self._waiting()
+        if waiting is not None:
+            self._stall = self.loop.call_later(self.stalled_s, self._cut_if_stalled, waiting)
 
     def _cut_if_stalled(self, waiting_then: int) -> None:
-        if self.transport.get_write_buffer_size() >= waiting_then:
+        waiting = self._waiting()
+        if waiting is not None and waiting >= waiting_then:
             self._cut()
         else:
             self._watch_stall()
+
+    def _waiting(self) -> int | None:
+        """Return how many bytes wait to be sent; None after asyncio's TLS transport has let go of its connection."""
+        try:
+            return self.transport.get_write_buffer_size()
+        except AttributeError:
+            if self.transport.is_closing():
+                return None
+            raise
 
     def _cut(self) -> None:
         self.transport.abort()

@@ -13,9 +13,10 @@ from paho.mqtt.client import Client
 
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.cli import main
+from support.certificate import self_signed
 from support.commands import start_python
 from support.listening import ReceivedFrames, listening
-from support.mosquitto import mosquitto, needs_mosquitto, self_signed
+from support.mosquitto import mosquitto, needs_mosquitto
 from support.sensor_logger import G, recording
 from support.zenoh_router import free_port, wait_until
 
