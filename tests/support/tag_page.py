@@ -1,4 +1,4 @@
-"""The page of a tag in a real browser, with sensors and a serial port that the test plays."""
+"""The page of a tag in a real browser, with sensors, a serial port and a Bluetooth module that the test plays."""
 
 import time
 from collections.abc import Iterator
@@ -54,6 +54,49 @@ SERIAL = """
     };
     Object.defineProperty(navigator, "serial", { value: { requestPort: async () => port } });
 """
+BLUETOOTH = """
+    const SERVICE = "680c21d9-c946-4c1f-9c11-baa1c21329e7";
+    const [DATA, MODE] = ["003bbdf2-c634-4b3d-ab56-7ec889b89a37", "a02b947e-df97-4516-996a-1882521e0ead"];
+    const viewOf = (hex) => new DataView(Uint8Array.from(hex.match(/../g) ?? [], (byte) => parseInt(byte, 16)).buffer);
+    const state = { mode: 0, near: true, connections: 0 };
+    let data = null;
+
+    class Characteristic extends EventTarget {
+        async readValue() { return new DataView(Uint8Array.of(state.mode).buffer); }
+        async writeValueWithResponse(bytes) { [state.mode] = bytes; }
+        async startNotifications() { data = this; }
+    }
+    const characteristics = { [DATA]: () => new Characteristic(), [MODE]: () => new Characteristic() };
+    const found = (things, uuid) => {
+        if (!(uuid in things)) throw new DOMException(`No match for ${uuid}.`, "NotFoundError");
+        return things[uuid]();
+    };
+    const service = { getCharacteristic: async (uuid) => found(characteristics, uuid) };
+    const server = { getPrimaryService: async (uuid) => found({ [SERVICE]: () => service }, uuid) };
+    const device = Object.assign(new EventTarget(), { gatt: { async connect() {
+        if (!state.near) throw new DOMException("Connection attempt failed.", "NetworkError");
+        state.connections++;
+        return server;
+    } } });
+    window.module = {
+        state,
+        notify(hex) {
+            data.value = viewOf(hex);
+            data.dispatchEvent(new Event("characteristicvaluechanged"));
+        },
+        leave() {
+            state.near = false;
+            data = null;
+            device.dispatchEvent(new Event("gattserverdisconnected"));
+        },
+    };
+    Object.defineProperty(navigator, "bluetooth", { value: { async requestDevice(options) {
+        state.asked = options;
+        if (state.refused) throw new DOMException("User cancelled the requestDevice() chooser.", "NotFoundError");
+        return device;
+    } } });
+"""
+NO_MODULES = "delete Navigator.prototype.serial; delete Navigator.prototype.bluetooth;"
 
 
 @dataclass

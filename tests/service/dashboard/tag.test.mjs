@@ -4,6 +4,7 @@ import { test } from "node:test";
 
 import { Clock } from "../../../service/dropanchor_service/dashboard/tag/clock.js";
 import { Dwm1001 } from "../../../service/dropanchor_service/dashboard/tag/dwm1001.js";
+import { rangesOf } from "../../../service/dropanchor_service/dashboard/tag/location_data.js";
 import { sampleOf, signOf } from "../../../service/dropanchor_service/dashboard/tag/motion.js";
 import { anchorNumber, packed, stamp } from "../../../service/dropanchor_service/dashboard/tag/packed.js";
 import { Queue } from "../../../service/dropanchor_service/dashboard/tag/queue.js";
@@ -76,6 +77,18 @@ test("a line of a module is used only when it is whole, in pieces of any size", 
   assert.deepEqual(module.feed("dwm> lec\r\nPOS,7.10,5.24,-2.03,53\r\n"), []);
   assert.equal(module.damaged, damaged.length);
   assert.deepEqual(module.feed("022E[0.00,0.00,0.00]=3.38\r\n"), [{ anchor: "022E", range_m: 3.38 }]);
+});
+
+test("location data is used only when it is whole, and only its distances that a radio measures", () => {
+  const viewOf = (hex) => new DataView(Uint8Array.from(Buffer.from(hex, "hex")).buffer);
+  const [id, position] = ["2e02700d000064", "261b0000fa1400004ef8ffff34"];
+  const range = { anchor: "022E", range_m: 3.44 };
+  assert.deepEqual(rangesOf(viewOf(`0101${id}`)), [range]);
+  assert.deepEqual(rangesOf(viewOf(`02${position}02${id}80929c16000064`)), [range, { anchor: "9280", range_m: 5.788 }]);
+  assert.deepEqual(rangesOf(viewOf(`0102${id}8092ffffffff64`)), [range]);
+  for (const nothing of ["", "0100", `00${position}`]) assert.deepEqual(rangesOf(viewOf(nothing)), []);
+  const damaged = ["01", "02", `0102${id}`, `0101${id}00`, `0101${id.slice(2)}`, `0102${id}${id}`, `03${id}`, "0000", `02${position}`];
+  for (const hex of damaged) assert.equal(rangesOf(viewOf(hex)), null, hex);
 });
 
 test("a full queue drops its oldest messages, but none that is being sent, and counts them", () => {

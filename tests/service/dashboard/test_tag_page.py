@@ -2,64 +2,23 @@
 
 import math
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 import pytest
 import zxingcpp
 from playwright.sync_api import Browser
 
-from dropanchor_schemas.wire import ENCODING_PACKED, Frame, anchor_number, decode_packed
-from dropanchor_service.api.app import DASHBOARD
-from dropanchor_service.security.api_keys import SOURCE, ApiKeys
-from dropanchor_service.security.identity import Authenticator
-from support.api import ApiBench, make_api_bench
 from support.axe import axe_source, violations
 from support.browser import Scheme
-from support.http_server import running_server
-from support.module_strings import LEC, LEC_DAMAGED, LEC_RANGES, LES, LES_RANGES
 from support.relay import running_relay
 from support.tag_page import APPLE, SERIAL, TagPage, tag_page
-from support.zenoh_router import free_port, wait_until
+from support.tag_page_service import Service
 
 pytestmark = pytest.mark.browser
 
 OUTAGE_S = 30
-
-
-class Service:
-    """The interface with the key of the tag anna, at an address that stays. It can be cut and started again."""
-
-    def __init__(self, folder: Path) -> None:
-        self.bench: ApiBench = make_api_bench()
-        self.bench.answers.now_ns = time.time_ns
-        self.keys = ApiKeys(folder)
-        self.anna = self.keys.add_for_tag("anna's phone", "anna")
-        self.port = free_port()
-        self.link = f"http://127.0.0.1:{self.port}/tag#key={self.anna}&tag=anna"
-
-    @contextmanager
-    def running(self) -> Iterator[None]:
-        self.bench.stopping = Event()
-        app = self.bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: self.keys}))
-        with running_server(app, self.bench.stopping, self.port):
-            yield
-
-    def frames(self) -> list[Frame]:
-        """Return what arrived, each message once, in the order of its first arrival."""
-        found: dict[tuple[int | None, int | None], Frame] = {}
-        for tag, payload, encoding in self.bench.received:
-            frame = decode_packed(payload)
-            assert (tag, encoding) == ("anna", ENCODING_PACKED)
-            assert isinstance(frame, Frame)
-            found.setdefault((frame.boot_id, frame.sequence), frame)
-        return list(found.values())
-
-    def imu_samples(self) -> int:
-        return sum(len(frame.imu) for frame in self.frames())
 
 
 @pytest.fixture
@@ -237,25 +196,6 @@ def test_the_key_stays_out_of_the_address_the_page_and_every_request_line(chromi
         assert service.anna not in page.page.content()
         assert not any(service.anna in url for url in urls)
         assert page.page.evaluate("document.cookie + JSON.stringify({ ...localStorage })") == "{}"
-
-
-def test_a_module_at_a_serial_port_gives_the_ranges(chromium: Browser, service: Service) -> None:
-    with service.running(), tag_page(chromium, service.link, SERIAL) as page:
-        page.start()
-        page.page.locator("#module").click()
-        page.wait_for("written.length === 2")
-        assert page.page.evaluate("[baudRate, ...written]") == [115200, "\r\r", "lec\r"]
-        text = f"dwm> lec\r\n{LEC}\r\n{LEC_DAMAGED}\r\n{LES}\r\n"
-        for part in (text[:30], text[30:200], text[200:]):
-            page.page.evaluate("text => module.print(text)", part)
-        wait_until(lambda: sum(len(frame.ranges) for frame in service.frames()) == 8)
-        page.wait_for("document.getElementById('ranges').textContent === '8 ranges'")
-        page.page.evaluate("module.unplug()")
-        page.wait_for("document.getElementById('module-problem').textContent")
-        assert page.text("module-problem") == "The module cannot be read: The device has been lost."
-        assert page.page.locator("#module").is_visible()
-    ranges = [(sample.anchor, round(sample.range_m, 3)) for frame in service.frames() for sample in frame.ranges]
-    assert ranges == [(anchor_number(name), range_m) for name, range_m in [*LEC_RANGES, *LES_RANGES]]
 
 
 def test_the_page_shows_the_state_of_the_tag_and_the_offset_of_its_clock(chromium: Browser, service: Service) -> None:

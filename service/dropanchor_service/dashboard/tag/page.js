@@ -3,6 +3,7 @@
 import { OUT_OF_DATE, STATES } from "../data/states.js";
 import { fixed, UNKNOWN } from "../data/format.js";
 import { installTheme } from "../page/theme.js";
+import { hasBluetooth } from "./bluetooth.js";
 import { remember, remembered, takeFromAddress } from "./link.js";
 import { phyphoxCode, phyphoxLink } from "./phyphox.js";
 import { hasSerial } from "./serial.js";
@@ -58,7 +59,7 @@ function* problems(tag) {
 
 /** @param {ThisTag} tag */
 function show(tag) {
-  const { uplink, motion, queue, serial } = tag;
+  const { uplink, motion, queue } = tag;
   const state = stateOf(tag);
   byId("status").dataset.status = { open: "live", broken: "lost", refused: "lost" }[String(uplink.status)] ?? "connecting";
   write("status-text", STATUS[uplink.status]);
@@ -77,9 +78,24 @@ function show(tag) {
   byId("problem").hidden = first === undefined;
   write("problem", [first, ...others].join(" "));
   byId("change").hidden = tag.running && uplink.status !== "refused";
-  byId("module").hidden = serial.connected;
-  write("ranges", serial.connected || serial.ranges ? `${counted(serial.ranges)} ranges` : "");
-  write("module-problem", serial.problem);
+  showModule(tag);
+}
+
+/** @param {ThisTag} tag */
+function showModule({ serial, bluetooth }) {
+  const connected = serial.connected || bluetooth.connected;
+  const [ranges, damaged] = [serial.ranges + bluetooth.ranges, serial.damaged + bluetooth.damaged];
+  byId("usb").hidden = connected || !hasSerial();
+  byId("bluetooth").hidden = connected || !hasBluetooth();
+  write("ranges", connected || ranges || damaged ? `${counted(ranges)} ranges${damaged ? `, ${counted(damaged)} damaged` : ""}` : "");
+  write("module-problem", [serial.problem, bluetooth.problem].filter(Boolean).join(" "));
+}
+
+/** Why no module can be connected here; null where one can. */
+function moduleRefusal() {
+  if (!isSecureContext) return "Browsers reach modules from pages over HTTPS only: open this page with https://.";
+  if (hasSerial() || hasBluetooth()) return null;
+  return "This browser reaches no UWB module: Firefox and Safari have neither Web Bluetooth nor Web Serial. Use Chrome or Edge.";
 }
 
 /** @param {string} name @param {string} key */
@@ -88,7 +104,9 @@ async function open(name, key) {
   write("name", name);
   byId("form").hidden = true;
   byId("live").hidden = false;
-  byId("uwb").hidden = !hasSerial();
+  const refusal = moduleRefusal();
+  byId("modules").hidden = refusal !== null;
+  if (refusal !== null) write("module-hint", refusal);
   byId("phyphox").addEventListener("toggle", () => showPhyphox(name, key));
   show(tag);
 }
@@ -119,7 +137,8 @@ byId("form").addEventListener("submit", (event) => {
   location.reload(); // the old key's connection and sensors end with the old page
 });
 byId("toggle").addEventListener("click", () => (tag?.running ? tag.stop() : tag?.start()));
-byId("module").addEventListener("click", () => tag?.serial.connect());
+byId("usb").addEventListener("click", () => tag?.serial.connect());
+byId("bluetooth").addEventListener("click", () => tag?.bluetooth.connect());
 byId("change").addEventListener("click", async () => {
   await tag?.stop();
   ask();

@@ -32,6 +32,11 @@ export class Serial {
     this.take = take;
   }
 
+  /** Lines that look like ranges but are damaged. */
+  get damaged() {
+    return this.#parser.damaged;
+  }
+
   /** Let the person choose a port, and read it until it is unplugged. Call it in a tap. */
   async connect() {
     const serial = /** @type {{ serial: { requestPort: () => Promise<Port> } }} */ (/** @type {unknown} */ (navigator)).serial;

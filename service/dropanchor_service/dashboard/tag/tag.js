@@ -1,5 +1,6 @@
 /** The tag that this device is: its samples become numbered messages in the queue. */
 
+import { Bluetooth } from "./bluetooth.js";
 import { Clock } from "./clock.js";
 import { Motion } from "./motion.js";
 import { packed } from "./packed.js";
@@ -31,7 +32,9 @@ export class ThisTag {
     this.queue = new Queue(store);
     this.uplink = new Uplink(url, key, this.queue, this.clock);
     this.motion = new Motion(this.clock, (sample) => this.#take(this.#imu, sample));
-    this.serial = new Serial(this.clock, (sample) => this.#take(this.#ranges, sample));
+    const takeRange = (/** @type {import("./packed.js").RangeSample} */ sample) => this.#take(this.#ranges, sample);
+    this.serial = new Serial(this.clock, takeRange);
+    this.bluetooth = new Bluetooth(this.clock, takeRange);
     setInterval(() => this.#turn(), MESSAGE_MS);
     setInterval(() => this.#save(), SAVE_MS);
     addEventListener("pagehide", () => this.#save());
