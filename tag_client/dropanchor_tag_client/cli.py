@@ -2,6 +2,7 @@
 
 import argparse
 import logging
+import os
 import shlex
 import signal
 import sys
@@ -9,10 +10,8 @@ from importlib import import_module
 from types import FrameType, ModuleType
 
 from dropanchor_tag_client.options import apply_defaults
-from dropanchor_tag_client.recording import RecordingError
 from dropanchor_tag_client.session import ConnectError
 
-_FORMATTER = argparse.RawDescriptionHelpFormatter
 _EXTRAS = {
     "numpy": ("this command needs numpy", "numpy"),
     "serial": ("modules on a serial port need pyserial", "pyserial"),
@@ -138,7 +137,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         needs, package = _EXTRAS[error.name]
         return _failed(f"{needs}: {shlex.quote(sys.executable)} -m pip install {package}")
-    except (ConnectError, RecordingError, ValueError) as error:
+    except (ConnectError, ValueError) as error:
         return _failed(str(error))
 
 
@@ -148,7 +147,7 @@ def parser(command: str) -> argparse.ArgumentParser:
         prog="dropanchor-tag",
         description="Publishes the raw samples of a tag: UWB ranges and IMU.",
         epilog=_EXAMPLES,
-        formatter_class=_FORMATTER,
+        formatter_class=_Formatter,
     )
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary, examples in (
@@ -161,10 +160,24 @@ def parser(command: str) -> argparse.ArgumentParser:
         ("calibrate", _CALIBRATE, _CALIBRATE_EXAMPLES),
         ("install", _INSTALL, _INSTALL_EXAMPLES),
     ):
-        one = commands.add_parser(name, help=summary, description=summary, epilog=examples, formatter_class=_FORMATTER)
+        one = commands.add_parser(name, help=summary, description=summary, epilog=examples, formatter_class=_Formatter)
         if name == command:
             _source(name).add_arguments(one)
     return top
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Help as wide as the terminal. Without a width, argparse loads shutil, which loads 1 MB of compression."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=_width() - 2)
+
+
+def _width() -> int:
+    try:
+        return int(os.environ.get("COLUMNS", "")) or os.get_terminal_size().columns
+    except (ValueError, OSError):
+        return 80
 
 
 def _source(command: str) -> ModuleType:

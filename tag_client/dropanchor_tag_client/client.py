@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, NamedTuple, Self, Unpack
+from typing import TYPE_CHECKING, Literal, NamedTuple, Self, Unpack
 
 import zenoh
 
@@ -32,8 +32,9 @@ from dropanchor_tag_client.publisher import Publisher, declare_publisher
 from dropanchor_tag_client.remote import Decimator, RemoteSettings
 from dropanchor_tag_client.sample_methods import SampleMethods
 from dropanchor_tag_client.session import DEFAULT_CONNECT, SessionSettings, open_session
-from dropanchor_tag_client.spool import Spool
-from dropanchor_tag_client.spooling import SpoolCounts, SpoolingPublisher
+
+if TYPE_CHECKING:
+    from dropanchor_tag_client.spooling import SpoolCounts, SpoolingPublisher
 
 _MAX_BATCH = 50  # about 8 kB in JSON, the limit that routers in the field are configured for
 
@@ -69,7 +70,7 @@ class TagClient(SampleMethods):
 
     _session: zenoh.Session | None = None
     _publisher: Publisher | None = None
-    _spooling: SpoolingPublisher | None = None
+    _spooling: "SpoolingPublisher | None" = None
     _token: zenoh.LivelinessToken | None = None
     _timer: threading.Thread | None = None
     _decimator: Decimator | None = None
@@ -135,14 +136,7 @@ class TagClient(SampleMethods):
         if self._publisher is not None:
             raise RuntimeError(f"the client of tag {self.tag!r} is already open")
         if self._spool is not None:
-            self._publisher = self._spooling = SpoolingPublisher(
-                Spool(self._spool, self._spool_limit_bytes),
-                self._connect,
-                self._keys,
-                self._declare_publisher,
-                self._cache_messages,
-                "" if self._calibration is None else f";{self._calibration.label}",
-            )
+            self._publisher = self._spooling = self._opened_spool(self._spool)
         else:
             if isinstance(self._connect, SessionSettings):
                 self._session = open_session(self._connect, self._connect_timeout_s)
@@ -219,9 +213,23 @@ class TagClient(SampleMethods):
         return self._session if self._spooling is None else self._spooling.session
 
     @property
-    def spool_counts(self) -> SpoolCounts | None:
+    def spool_counts(self) -> "SpoolCounts | None":
         """Return what the spool holds and has lost, None without a spool."""
         return None if self._spooling is None else self._spooling.counts
+
+    def _opened_spool(self, folder: Path) -> "SpoolingPublisher":
+        # imported here because a client without a spool saves the memory of these modules
+        from dropanchor_tag_client.spool import Spool
+        from dropanchor_tag_client.spooling import SpoolingPublisher
+
+        return SpoolingPublisher(
+            Spool(folder, self._spool_limit_bytes),
+            self._connect,
+            self._keys,
+            self._declare_publisher,
+            self._cache_messages,
+            "" if self._calibration is None else f";{self._calibration.label}",
+        )
 
     def _declare_publisher(self, session: zenoh.Session) -> Publisher:
         encoding = ENCODING_PACKED if self._packed else ENCODING_JSON

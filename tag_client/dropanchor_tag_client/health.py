@@ -2,12 +2,14 @@
 
 import time
 from collections import Counter
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from dropanchor_schemas.health import MAX_FIRMWARE_LENGTH, is_absurd
 from dropanchor_schemas.wire import Reason
 from dropanchor_tag_client.remote import RemoteSettings
-from dropanchor_tag_client.spooling import SpoolCounts
+
+if TYPE_CHECKING:
+    from dropanchor_tag_client.spooling import SpoolCounts
 
 
 class HealthValues(TypedDict, total=False):
@@ -21,7 +23,7 @@ class HealthValues(TypedDict, total=False):
 
 
 def reportable(
-    given: HealthValues, spool: SpoolCounts | None, settings: RemoteSettings | None, refused: Counter[Reason]
+    given: HealthValues, spool: "SpoolCounts | None", settings: RemoteSettings | None, refused: Counter[Reason]
 ) -> dict[str, Any]:
     """Return what a report contains: the given values that a tag can have measured, what its spool holds, and the
     settings of the service that are applied."""
@@ -35,7 +37,7 @@ def reportable(
     return {name: value for name, value in values.items() if name not in absurd}
 
 
-def _of_spool(counts: SpoolCounts | None) -> dict[str, Any]:
+def _of_spool(counts: "SpoolCounts | None") -> dict[str, Any]:
     if counts is None:
         return {}
     oldest_s = 0.0 if counts.oldest_ns is None else max(0.0, (time.time_ns() - counts.oldest_ns) * 1e-9)

@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 
-class RecordingError(Exception):
+class RecordingError(ValueError):
     """The folder is not a recording, or one of its files cannot be read. The message says where and what is wrong."""
 
 

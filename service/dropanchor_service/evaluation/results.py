@@ -27,7 +27,7 @@ _BLOCK = re.compile(
 _PLACE = re.compile(r"<!-- place for (?P<name>[\w-]+) -->\n")
 _FACT = re.compile(r'(\w+)="([^"]*)"')
 _DIGITS = 16
-_CODE = (".py", ".js", ".css", ".html")
+_CODE = (".py", ".js", ".css", ".html", ".c", ".h")
 
 ROOT = Path(__file__).parents[3]
 PAGES = ROOT / "service" / "docs" / "results"

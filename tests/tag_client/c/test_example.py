@@ -1,6 +1,5 @@
 """The example for microcontrollers against the real zenoh-pico, where there is one."""
 
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -8,20 +7,19 @@ from pathlib import Path
 import pytest
 
 from support.listening import listening
+from support.zenoh_pico import zenoh_pico
 from support.zenoh_router import wait_until
 
 EXAMPLES = Path(__file__).parents[3] / "tag_client/c/examples"
 SOURCES = ("zenoh_pico_tag.c", "posix_main.c")
 WARNINGS = ("-std=gnu11", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-DZENOH_LINUX")
-PREFIXES = [os.environ.get("ZENOH_PICO_PREFIX", ""), "/usr/local", "/usr"]
 
 
 def prefix() -> Path:
-    """Where zenoh-pico is installed."""
-    for folder in PREFIXES:
-        if folder and (Path(folder) / "include/zenoh-pico.h").is_file():
-            return Path(folder)
-    pytest.skip("zenoh-pico is not installed: set ZENOH_PICO_PREFIX to where its include/zenoh-pico.h is")
+    found = zenoh_pico()
+    if found is None:
+        pytest.skip("zenoh-pico is not installed: set ZENOH_PICO_PREFIX to where its include/zenoh-pico.h is")
+    return found
 
 
 def compiler() -> str:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from queue import Empty, Full, Queue
+from queue import Empty, SimpleQueue
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -67,7 +67,7 @@ class Broker:
         self._url = settings.url
         self._topics = topics
         self._say = say
-        self._queue: Queue[Received] = Queue(_QUEUE_MESSAGES)
+        self._queue: SimpleQueue[Received] = SimpleQueue()
         self._scheme, self._host, self._port, path = settings.address()
         self._client = _client(settings, self._scheme, path)
         self._client.on_connect = self._on_connect
@@ -122,9 +122,9 @@ class Broker:
             self._say(f"{self._url}: the connection broke ({reason}). Trying again until it is back.")
 
     def _on_message(self, _client: Client, _data: Any, message: MQTTMessage) -> None:
-        try:
-            self._queue.put_nowait(Received(message.topic, bytes(message.payload), time.time_ns()))
-        except Full:
+        if self._queue.qsize() < _QUEUE_MESSAGES:  # only this thread puts
+            self._queue.put(Received(message.topic, bytes(message.payload), time.time_ns()))
+        else:
             self.lost += 1
 
 
