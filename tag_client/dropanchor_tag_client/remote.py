@@ -16,6 +16,13 @@ class RemoteSettings(NamedTuple):
     batch_s: float | None = None
     imu_hz: float | None = None
 
+    @property
+    def sentence(self) -> str:
+        """Return what the service sets, for the log."""
+        batch = "none" if self.batch_s is None else f"{self.batch_s:g} s"
+        imu = "none" if self.imu_hz is None else f"{self.imu_hz:g} Hz"
+        return f"the service sets the batch period to {batch} and the IMU rate to {imu} (none: as the program says)"
+
 
 def parse(payload: bytes) -> RemoteSettings | None:
     """Return the settings in a message of the service; None, with a line in the log, if there are none."""

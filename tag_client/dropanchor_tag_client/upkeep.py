@@ -13,7 +13,7 @@ import zenoh
 
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.health import HealthValues
-from dropanchor_tag_client.remote import parse
+from dropanchor_tag_client.remote import RemoteSettings, parse
 
 PERIOD_S = 60.0
 _POLL_S = 1.0
@@ -93,8 +93,9 @@ class Upkeep:
         settings = parse(payload)
         if settings is None or settings == client.wanted:
             return
+        if client.wanted is not None or settings != RemoteSettings():
+            _log.info("tag %s: %s", client.tag, settings.sentence)
         client.apply(settings)
-        _log.info("tag %s: the service sets %s", client.tag, settings)
         self._report(client, HealthValues())
 
     def _report(self, client: TagClient, values: HealthValues) -> None:

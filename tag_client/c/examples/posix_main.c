@@ -5,9 +5,13 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <time.h>
 
 #include "zenoh_pico_tag.h"
+
+/* Wheels shake every IMU. One that repeats itself would count as stuck, and a quiet one as a tag that stands. */
+static float shaken(double value, double by) { return (float)(value + by * (2.0 * rand() / RAND_MAX - 1.0)); }
 
 /* Where a DW3000 driver would call back, and the queue of an IMU would be read. */
 static void *sensors(void *unused) {
@@ -17,7 +21,8 @@ static void *sensors(void *unused) {
     for (unsigned tick = 0;; tick++) {
         const int64_t now_ns = tag_now_ns();
         const double angle = 0.2 * 1e-9 * (double)(now_ns - began_ns); /* 1 m/s on a radius of 5 m */
-        const float acc[3] = {0.0f, 0.2f, 9.81f}, gyro[3] = {0.0f, 0.0f, 0.2f};
+        const float acc[3] = {shaken(0.0, 0.8), shaken(0.2, 0.8), shaken(9.81, 0.8)};
+        const float gyro[3] = {shaken(0.0, 0.02), shaken(0.0, 0.02), shaken(0.2, 0.02)};
         const double heading = angle + 1.5707963;
         const float mag[3] = {(float)(20.0 * sin(heading)), (float)(20.0 * cos(heading)), -44.0f};
         tag_on_imu(now_ns, acc, gyro, mag);

@@ -4,7 +4,8 @@
 topic = "plant/+/uwb"            # a filter; {1} below is what the first + stands for
 tag = "cart-{1}"                 # or "{device.id}": from the payload
 kind = "range"                   # range, imu, heading or bearing
-each = "anchors"                 # optional: a list in the payload; paths begin at each of its elements
+each = "anchors"                 # optional: a list in the payload; paths begin at each of its elements. The time
+                                 # and the tag may stand beside the list
 time_unit = "ms"                 # of t_ns: ns, us, ms or s; without t_ns the time of arrival is used
 [rule.fields]
 anchor = "id"                    # a path: names and list indices with dots; "=yard" is the text yard itself
@@ -64,7 +65,7 @@ class Rule:
             return
         for part in parts:
             try:
-                yield Measurement(self._tag(wildcards, value, part), self.kind, self._fields(part, t_ns))
+                yield Measurement(self._tag(wildcards, value, part), self.kind, self._fields(part, value, t_ns))
             except _MissingError as missing:
                 yield Dropped(Drop.NOT_UNDERSTOOD, f"{topic}: the payload has no usable {missing}")
 
@@ -73,25 +74,22 @@ class Rule:
             name = place[1]
             if name.isdecimal():
                 return wildcards[int(name) - 1]
-            try:
-                return str(_at(part, name))
-            except _MissingError:
-                return str(_at(value, name))
+            return str(_of_part_or_payload(part, value, name))
 
         return _PLACE.sub(replaced, self.tag)
 
-    def _fields(self, part: Any, t_ns: int) -> dict[str, Any]:
-        found = {name: self._field(part, name, path) for name, path in self.fields.items()}
+    def _fields(self, part: Any, value: Any, t_ns: int) -> dict[str, Any]:
+        found = {name: self._field(part, value, name, path) for name, path in self.fields.items()}
         return {"t_ns": t_ns} | found
 
-    def _field(self, part: Any, name: str, path: _Path) -> Any:
+    def _field(self, part: Any, payload: Any, name: str, path: _Path) -> Any:
         if isinstance(path, list):
             return [self._scaled(_at(part, one), name, one) for one in path]
         if path.startswith("="):
             return path[1:]
-        value = _at(part, path)
         if name == "t_ns":
-            return self._time(value, path)
+            return self._time(_of_part_or_payload(part, payload, path), path)
+        value = _at(part, path)
         if isinstance(value, list):
             return [self._scaled(one, name, path) for one in value]
         return self._scaled(value, name, path)
@@ -152,6 +150,14 @@ def _at(value: Any, path: str) -> Any:
         except (KeyError, IndexError, TypeError, ValueError):
             raise _MissingError(path) from None
     return value
+
+
+def _of_part_or_payload(part: Any, payload: Any, path: str) -> Any:
+    """Return what an element of a list has at a path, or the payload around it. Raises _MissingError."""
+    try:
+        return _at(part, path)
+    except _MissingError:
+        return _at(payload, path)
 
 
 def _rules(path: Path) -> list[Rule]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
+from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.sources.axes import Mounting, UpAxis, direction
 from dropanchor_tag_client.sources.modules.report import Imu, Range, Report
@@ -33,7 +34,7 @@ class Samples:
         self._log.ranges += 1
         if str(name) not in self._anchors and len(self._anchors) < MAX_TAGS:
             self._anchors.add(str(name))
-            self._log.add(f'tag "{client.tag}": anchor "{name}" at {range_m:.2f} m')
+            self._log.add(f'tag "{client.tag}": anchor "{name}"{_number(str(name))} at {range_m:.2f} m')
 
     def imu(self, client: TagClient, imu: Imu, t_ns: int) -> None:
         client.publish_imu(self._mounted.to_body(imu.acc), self._mounted.to_body(imu.gyro), t_ns=t_ns)
@@ -42,6 +43,12 @@ class Samples:
             self._up_axis = None
             if self._mounted.up != direction(up):
                 self._log.add(f"gravity says that axis {up} of the module points up: start again with --up={up}")
+
+
+def _number(name: str) -> str:
+    """Return how a service whose site does not have the anchor calls it, if that differs from its name."""
+    number = str(anchor_number(name))
+    return "" if number == name else f" (number {number})"
 
 
 class OneTag:

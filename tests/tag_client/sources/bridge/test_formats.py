@@ -176,6 +176,18 @@ def test_a_template_finds_tag_anchor_range_and_time(template: Template) -> None:
     assert reasons(found) == [Drop.NOT_UNDERSTOOD]
 
 
+def test_the_time_may_stand_beside_a_list_but_an_anchor_may_not(template: Template) -> None:
+    value = {
+        "device": {"id": 7},
+        "id": "not the anchor",
+        "at": 1_700_000_000_000,
+        "anchors": [{"id": 2, "cm": 5}, {"cm": 6}],
+    }
+    found = parsed(template, "plant/hall/uwb", value)
+    assert fields(found) == [{"anchor": 2, "range_m": pytest.approx(0.05), "t_ns": 1_700_000_000_000 * MS}]
+    assert reasons(found) == [Drop.NOT_UNDERSTOOD]
+
+
 def test_a_template_reads_vectors_constants_and_indices(template: Template) -> None:
     (imu,) = fields(parsed(template, "imu/left/front", {"ax": 0, "ay": 0, "az": 1, "g": [1, 2, 3]}))
     assert imu == {"t_ns": NOW_NS, "acc": [0, 0, 9.80665], "gyro": [0.5, 1.0, 1.5]}
