@@ -24,7 +24,7 @@ from dropanchor_tag_client.sources.throttled_log import throttled_log
 from dropanchor_tag_client.upkeep import Upkeep
 
 PASSWORD_VARIABLE = "DROPANCHOR_MQTT_PASSWORD"
-_FLUSH_S = 0.1
+_FLUSH_S, _POLL_S = 0.1, 0.02
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,9 +69,11 @@ def forward(broker: Broker, bridge: Bridge) -> None:
     """Publish the measurements of every message until the program is interrupted."""
     flush_s = 0.0
     while True:
-        message = broker.receive(_FLUSH_S)
+        message = broker.receive()
         if message is not None:
             bridge.take(message)
+        else:
+            time.sleep(_POLL_S)  # then all that came is taken at once: a wake-up for each message costs more
         if time.monotonic() >= flush_s:
             flush_s = time.monotonic() + _FLUSH_S
             bridge.flush()

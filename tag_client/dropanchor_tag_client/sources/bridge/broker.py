@@ -86,10 +86,10 @@ class Broker:
             self._client.disconnect()
             self._client.loop_stop()
 
-    def receive(self, timeout_s: float) -> Received | None:
-        """Return the next message, None if none comes in time."""
+    def receive(self) -> Received | None:
+        """Return the next message, None if none waits."""
         try:
-            return self._queue.get(timeout=timeout_s)
+            return self._queue.get_nowait()
         except Empty:
             return None
 
