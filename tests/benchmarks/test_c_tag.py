@@ -66,7 +66,7 @@ def example_lines(folder: Path, prefix: Path) -> list[str]:
     for name in ("zenoh_pico_tag", "posix_main"):
         subprocess.run(["gcc", *options, "-c", EXAMPLES / f"{name}.c", "-o", folder / f"{name}.o"], check=True)
     objects = [folder / "zenoh_pico_tag.o", folder / "posix_main.o"]
-    libraries = [prefix / "lib/libzenohpico.a", "-lm", "-lpthread"]
+    libraries: tuple[Path | str, ...] = (prefix / "lib/libzenohpico.a", "-lm", "-lpthread")
     subprocess.run(["gcc", *objects, *libraries, "-o", folder / "tag"], check=True)
     sent, resident = running_example(folder / "tag")
     return [
