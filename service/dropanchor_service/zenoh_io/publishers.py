@@ -1,7 +1,5 @@
 """Publishes poses over Zenoh while somebody subscribes: each tag's pose on change, and one frame of all poses."""
 
-import logging
-import threading
 import time
 from types import TracebackType
 from typing import Self
@@ -11,27 +9,24 @@ import zenoh
 from dropanchor_schemas import keys
 from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
 PERIOD_S = 0.05  # the shortest time between two poses of a tag
 FRAME_PERIOD_S = 0.1
 
 
-class ZenohPoses:
-    """Publishes from its own thread while it is open, because a put may take longer than the ingest thread can wait.
+class ZenohPoses(PeriodicPublisher):
+    """Publishes while it is open.
 
     One publisher on `…/tag/*/pose` shows whether anybody subscribes to any tag. Each put then uses the key of its tag,
     and Zenoh drops those without a subscriber. One declared publisher per tag would stall the routing of a fleet.
     """
 
     def __init__(self, session: zenoh.Session, answers: Answers, metrics: Metrics) -> None:
-        self._log = RareLog(logging.getLogger(__name__))
+        super().__init__("poses", PERIOD_S, metrics)
         self._session = session
         self._answers = answers
-        self._metrics = metrics
         self._site = answers.site.site.id
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="poses", daemon=True)
         self._tag_version = 0
         self._frame_version = 0
         self._frame_due_s = 0.0
@@ -45,25 +40,19 @@ class ZenohPoses:
             encoding=zenoh.Encoding.APPLICATION_JSON,
             congestion_control=zenoh.CongestionControl.DROP,
         )
-        self._thread.start()
-        return self
+        return super().__enter__()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._stop.set()
-        self._thread.join(1.0)
+        super().__exit__(kind, error, traceback)
         self._tag_publisher.undeclare()
         self._frame_publisher.undeclare()
 
-    def _run(self) -> None:
-        while not self._stop.wait(PERIOD_S):
-            try:
-                self._put_tags()
-                self._put_frame()
-            except Exception as error:
-                self._metrics.faults.labels("publication").inc()
-                self._log.exception("publication", error)
+    def publish(self) -> None:
+        """Put the poses of the tags that have changed, and the frame of all poses when it is due."""
+        self._put_tags()
+        self._put_frame()
 
     def _put_tags(self) -> None:
         if not _has_subscribers(self._tag_publisher):

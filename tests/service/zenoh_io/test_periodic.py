@@ -1,0 +1,39 @@
+"""A thread that publishes survives errors and stops with its context."""
+
+import logging
+import threading
+
+import pytest
+
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
+from support.zenoh_router import wait_until
+
+
+class FailsFirst(PeriodicPublisher):
+    """Fails at the first call."""
+
+    def __init__(self, metrics: Metrics) -> None:
+        super().__init__("numbers", 0.001, metrics)
+        self.calls: list[int] = []
+
+    def publish(self) -> None:
+        self.calls.append(len(self.calls))
+        if len(self.calls) == 1:
+            raise OSError("the network is down")
+
+
+def test_an_error_is_counted_and_logged_and_does_not_end_the_calls(caplog: pytest.LogCaptureFixture) -> None:
+    metrics = Metrics()
+    with caplog.at_level(logging.ERROR), FailsFirst(metrics) as publisher:
+        wait_until(lambda: len(publisher.calls) > 3)
+    assert metrics.registry.get_sample_value("dropanchor_faults_total", {"where": "publication"}) == 1
+    assert [record.getMessage() for record in caplog.records] == [
+        "publication of numbers: OSError: the network is down"
+    ]
+
+
+def test_its_thread_ends_with_the_context() -> None:
+    with FailsFirst(Metrics()):
+        assert "numbers" in {thread.name for thread in threading.enumerate()}
+    assert "numbers" not in {thread.name for thread in threading.enumerate()}
