@@ -94,20 +94,7 @@ class Service:
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         engine = GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics)
-        self._ingest = Ingest(
-            self._buffer,
-            Admission(settings, self.site, self.tags, pending_tags),
-            engine,
-            self._publishers,
-            self.site,
-            self.tags,
-            self.latest,
-            self.metrics,
-            self.clock,
-            observers=self._persistence.observers,
-            reorder_ns=round(settings.ingest.reorder_ms * 1e6),
-            health=health,
-        )
+        self._ingest = self._create_ingest(engine, pending_tags, health)
         self._checkpoints = self._checkpointer(engine)
         self._thread = IngestThread(
             self._ingest,
@@ -121,6 +108,22 @@ class Service:
         self.metrics.register(HealthGauges(self.tags, health, self.clock.now_ns, self._publishers))
         self.metrics.register(
             FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
+        )
+
+    def _create_ingest(self, engine: GuardedEngine, pending_tags: PendingTags, health: HealthTable) -> Ingest:
+        return Ingest(
+            self._buffer,
+            Admission(self._settings, self.site, self.tags, pending_tags),
+            engine,
+            self._publishers,
+            self.site,
+            self.tags,
+            self.latest,
+            self.metrics,
+            self.clock,
+            observers=self._persistence.observers,
+            reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
+            health=health,
         )
 
     def __enter__(self) -> Self:

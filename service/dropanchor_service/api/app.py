@@ -68,19 +68,7 @@ def create_app(
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
     no limit.
     """
-    app = FastAPI(
-        title="Dropanchor",
-        version="1",
-        openapi_url=f"{PREFIX}/openapi.json",
-        docs_url=None,  # its scripts come from a CDN, but the service must work without internet access
-        redoc_url=None,
-        redirect_slashes=False,
-    )
-    app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
-    app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter)
-    app.add_middleware(EscapedPath)
-    app.add_middleware(SecurityHeaders)
-    add_error_handlers(app)
+    app = _app_without_routes(authenticator, rate_limiter)
     for router in (
         poses_router(answers),
         tags_router(answers, max_tags),
@@ -100,6 +88,23 @@ def create_app(
     app.include_router(metrics_router(registry))
     if dashboard is not None:
         app.router.routes.append(DashboardMount(dashboard))
+    return app
+
+
+def _app_without_routes(authenticator: Authenticator | None, rate_limiter: RateLimiter | None) -> FastAPI:
+    app = FastAPI(
+        title="Dropanchor",
+        version="1",
+        openapi_url=f"{PREFIX}/openapi.json",
+        docs_url=None,  # its scripts come from a CDN, but the service must work without internet access
+        redoc_url=None,
+        redirect_slashes=False,
+    )
+    app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
+    app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter)
+    app.add_middleware(EscapedPath)
+    app.add_middleware(SecurityHeaders)
+    add_error_handlers(app)
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 

@@ -71,6 +71,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="source of the heading: the IMU, or heading.csv (default: auto, the IMU if the recording has one)",
     )
+    _add_tag_settings(parser)
+    _add_smoothing(parser)
+    add("--out", type=Path, metavar="CSV", help=f"write the poses to this file: {','.join(COLUMNS)}")
+    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth if there is one")
+    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
+
+
+def _add_tag_settings(parser: argparse.ArgumentParser) -> None:
     known = parser.add_argument_group("settings of the tag (measured range = scale · distance + bias)")
     known.add_argument("--tag-height", type=float, default=0.0, metavar="M", help="on the z axis of anchors.csv (0)")
     known.add_argument("--range-std", type=float, metavar="M", help="standard deviation of one range")
@@ -93,6 +101,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     known.add_argument("--speed-max", type=float, metavar="M/S", help="top speed of the tag")
     known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
+
+
+def _add_smoothing(parser: argparse.ArgumentParser) -> None:
     smoothing = parser.add_argument_group("smoothing (engine fleet): estimate each pose from later samples too")
     smoothing.add_argument("--smooth", action="store_true", help="use all samples of the recording")
     smoothing.add_argument(
@@ -103,9 +114,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help=f"with --smooth: use only samples up to S seconds after the pose ({LAG_S:g})",
     )
-    add("--out", type=Path, metavar="CSV", help=f"write the poses to this file: {','.join(COLUMNS)}")
-    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth if there is one")
-    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
 
 
 def run(arguments: argparse.Namespace) -> int:

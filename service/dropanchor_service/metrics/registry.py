@@ -1,6 +1,7 @@
 """The counters and gauges of the service for Prometheus."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector
@@ -22,50 +23,39 @@ class Metrics:
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
-        self.messages = Counter("dropanchor_messages", "Messages received from tags.", registry=self.registry)
-        self.samples = Counter(
-            "dropanchor_samples", "Samples passed to the estimators.", ["kind"], registry=self.registry
+        counter = partial(Counter, registry=self.registry)
+        duration = partial(Histogram, buckets=_SECONDS, registry=self.registry)
+        self.messages = counter("dropanchor_messages", "Messages received from tags.")
+        self.samples = counter("dropanchor_samples", "Samples passed to the estimators.", ["kind"])
+        self.rejected = counter("dropanchor_rejected", "Messages and samples that were rejected.", ["reason"])
+        self.shed_samples = counter(
+            "dropanchor_shed_samples", "Samples of packed messages that were shed under overload."
         )
-        self.rejected = Counter(
-            "dropanchor_rejected", "Messages and samples that were rejected.", ["reason"], registry=self.registry
+        self.poses = counter("dropanchor_poses", "Poses that the estimators produced.")
+        self.misses = counter(
+            "dropanchor_missed_messages", "Messages that a publisher numbered but that can no longer be retrieved."
         )
-        self.shed_samples = Counter(
-            "dropanchor_shed_samples",
-            "Samples of packed messages that were shed under overload.",
-            registry=self.registry,
+        self.given_up = counter(
+            "dropanchor_given_up_messages", "Messages missing from a publisher's sequence that did not arrive in time."
         )
-        self.poses = Counter("dropanchor_poses", "Poses that the estimators produced.", registry=self.registry)
-        self.misses = Counter(
-            "dropanchor_missed_messages",
-            "Messages that a publisher numbered but that can no longer be retrieved.",
-            registry=self.registry,
-        )
-        self.given_up = Counter(
-            "dropanchor_given_up_messages",
-            "Messages missing from a publisher's sequence that did not arrive in time.",
-            registry=self.registry,
-        )
-        self.faults = Counter("dropanchor_faults", "Internal errors, by place.", ["where"], registry=self.registry)
-        self.estimator_seconds = Histogram(
-            "dropanchor_estimator_seconds",
-            "Time to fuse one batch of samples.",
-            buckets=_SECONDS,
-            registry=self.registry,
-        )
-        self.delay_seconds = Histogram(
+        self.faults = counter("dropanchor_faults", "Internal errors, by place.", ["where"])
+        self.estimator_seconds = duration("dropanchor_estimator_seconds", "Time to fuse one batch of samples.")
+        self.delay_seconds = duration(
             "dropanchor_pose_delay_seconds",
             "Time from the arrival of the oldest message of a batch until its poses are in the store.",
-            buckets=_SECONDS,
-            registry=self.registry,
         )
-        self.clock_jumps = Counter(
-            "dropanchor_clock_jumps", "Tag clocks that were set while they ran.", registry=self.registry
-        )
-        self.caught_up = Counter(
+        self.clock_jumps = counter("dropanchor_clock_jumps", "Tag clocks that were set while they ran.")
+        self.caught_up = counter(
             "dropanchor_caught_up_messages",
             "Messages that were suspended while the caches of their tag were queried, and then processed.",
-            registry=self.registry,
         )
+        self._add_checkpoints()
+        for kind in KINDS:
+            self.samples.labels(kind)
+        for reason in Reason:
+            self.rejected.labels(reason)
+
+    def _add_checkpoints(self) -> None:
         self.checkpoints = Counter(
             "dropanchor_checkpoints", "Attempts to write a checkpoint, by outcome.", ["outcome"], registry=self.registry
         )
@@ -79,10 +69,6 @@ class Metrics:
         )
         for outcome in ("written", "failed"):
             self.checkpoints.labels(outcome)
-        for kind in KINDS:
-            self.samples.labels(kind)
-        for reason in Reason:
-            self.rejected.labels(reason)
 
     def register(self, collector: Collector) -> None:
         """Include the metrics of this collector in every scrape."""

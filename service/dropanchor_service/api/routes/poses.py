@@ -35,7 +35,13 @@ _NEGOTIATION = (Kind.NOT_ACCEPTABLE, Kind.NOT_GEOREFERENCED, Kind.INVALID_REQUES
 
 def poses_router(answers: Answers) -> APIRouter:
     router = APIRouter(tags=["poses"])
+    _add_pose_route(router, answers)
+    _add_explanation_route(router, answers)
+    _add_list_route(router, answers)
+    return router
 
+
+def _add_pose_route(router: APIRouter, answers: Answers) -> None:
     async def get_pose(tag: TagId, query: Annotated[AtTime, Query()], request: Request) -> Response:
         as_geojson = geojson.is_preferred(request, answers)
         if query.at is None:
@@ -58,6 +64,8 @@ def poses_router(answers: Answers) -> APIRouter:
         | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
     )
 
+
+def _add_explanation_route(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/tags/{tag}/explain",
         operation_id="explain_pose",
@@ -72,6 +80,8 @@ def poses_router(answers: Answers) -> APIRouter:
             raise _no_pose_yet(answers, tag)
         return json_response(explanation)
 
+
+def _add_list_route(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/poses",
         operation_id="list_poses",
@@ -87,8 +97,6 @@ def poses_router(answers: Answers) -> APIRouter:
             return _response(geojson.collection_of(answers.pose_list(tags)), geojson.MEDIA_TYPE)
         headers = {"cache-control": "no-store", "vary": "accept"}
         return StreamingResponse(_in_pieces(answers.pose_list_json(tags)), media_type=geojson.JSON, headers=headers)
-
-    return router
 
 
 class PlainPose(APIRoute):

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Annotated, Any, BinaryIO
 
 from fastapi import APIRouter, Body, Path
@@ -26,7 +27,14 @@ FileName = Annotated[
 
 def recordings_router(recorder: Recorder | None) -> APIRouter:
     router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
+    _add_list_route(router, recorder)
+    _add_start_route(router, recorder)
+    _add_stop_route(router, recorder)
+    _add_download_route(router, recorder)
+    return router
 
+
+def _add_list_route(router: APIRouter, recorder: Recorder | None) -> None:
     @router.get(
         "/recordings",
         operation_id="list_recordings",
@@ -42,6 +50,8 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
         ]
         return json_response(_state(found) | {"files": files})
 
+
+def _add_start_route(router: APIRouter, recorder: Recorder | None) -> None:
     @router.post(
         "/recordings",
         operation_id="start_recording",
@@ -63,6 +73,8 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
             )
         return json_response(_state(found), status=201)
 
+
+def _add_stop_route(router: APIRouter, recorder: Recorder | None) -> None:
     @router.post(
         "/recordings/stop",
         operation_id="stop_recording",
@@ -77,6 +89,8 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
             raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
         return json_response(_state(found))
 
+
+def _add_download_route(router: APIRouter, recorder: Recorder | None) -> None:
     @router.get(
         "/recordings/{name}",
         operation_id="get_recording",
@@ -85,18 +99,18 @@ def recordings_router(recorder: Recorder | None) -> APIRouter:
         responses=_file() | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.INVALID_REQUEST),
     )
     def get_recording(name: FileName) -> Response:
-        path = _required(recorder).path_of(name)
-        try:
-            file = None if path is None else path.open("rb")
-        except FileNotFoundError:  # deleted by the retention limit meanwhile
-            file = None
-        if file is None:
-            raise ProblemError(
-                Kind.UNKNOWN_RECORDING, f"There is no recording {name!r}. GET /api/v1/recordings lists the files."
-            )
-        return _download(file, name)
+        return _download(_opened(_required(recorder), name), name)
 
-    return router
+
+def _opened(recorder: Recorder, name: str) -> BinaryIO:
+    """Open the recording with this name. Raises ProblemError."""
+    path = recorder.path_of(name)
+    if path is not None:
+        with suppress(FileNotFoundError):  # deleted by the retention limit meanwhile
+            return path.open("rb")
+    raise ProblemError(
+        Kind.UNKNOWN_RECORDING, f"There is no recording {name!r}. GET /api/v1/recordings lists the files."
+    )
 
 
 def _download(file: BinaryIO, name: str) -> Response:

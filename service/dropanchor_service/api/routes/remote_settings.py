@@ -32,7 +32,12 @@ _PATCH = {
 
 def remote_settings_router(answers: Answers) -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
+    _add_get_route(router, answers)
+    _add_patch_route(router, answers)
+    return router
 
+
+def _add_get_route(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/tags/{tag}/remote-settings",
         operation_id="get_remote_settings",
@@ -43,6 +48,8 @@ def remote_settings_router(answers: Answers) -> APIRouter:
     async def get_remote_settings(tag: TagId) -> Response:
         return _response(answers, known_tag(answers, tag))
 
+
+def _add_patch_route(router: APIRouter, answers: Answers) -> None:
     @router.patch(
         "/tags/{tag}/remote-settings",
         operation_id="patch_remote_settings",
@@ -59,20 +66,28 @@ def remote_settings_router(answers: Answers) -> APIRouter:
         tag: TagId, patch: Annotated[dict[str, Any], Body()], if_match: Annotated[str | None, Header()] = None
     ) -> Response:
         known = known_tag(answers, tag)
-        current = answers.site.remote_settings(known.name)
-        try:
-            wanted = RemoteSettings.model_validate(current.model_dump() | patch)
-        except ValidationError as error:
-            first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-            where = ".".join(("body", *map(str, first["loc"])))
-            raise ProblemError(Kind.INVALID_REQUEST, f"{where}: {first['msg']}") from error
-        matches = if_match in (None, "*", _etag(current))
-        with saving():
-            if not matches or not answers.site.set_remote(known.name, wanted, expected=current):
-                raise ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed the settings: get them and try again.")
+        _change(answers, known, patch, if_match)
         return _response(answers, known)
 
-    return router
+
+def _change(answers: Answers, tag: Tag, patch: dict[str, Any], if_match: str | None) -> None:
+    """Replace the values in the patch, unless the current ones differ from `if_match`. Raises ProblemError."""
+    current = answers.site.remote_settings(tag.name)
+    wanted = _patched(current, patch)
+    matches = if_match in (None, "*", _etag(current))
+    with saving():
+        if not matches or not answers.site.set_remote(tag.name, wanted, expected=current):
+            raise ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed the settings: get them and try again.")
+
+
+def _patched(current: RemoteSettings, patch: dict[str, Any]) -> RemoteSettings:
+    """Return the settings with the values of the patch. Raises ProblemError."""
+    try:
+        return RemoteSettings.model_validate(current.model_dump() | patch)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+        where = ".".join(("body", *map(str, first["loc"])))
+        raise ProblemError(Kind.INVALID_REQUEST, f"{where}: {first['msg']}") from error
 
 
 def _response(answers: Answers, tag: Tag) -> Response:

@@ -20,6 +20,7 @@ def site_router(store: SiteStore) -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
     _add_site_routes(router, store)
     _add_anchor_routes(router, store)
+    _add_anchor_change_routes(router, store)
     return router
 
 
@@ -74,6 +75,8 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
                 return json_response(candidate.model_dump())
         raise _unknown(anchor)
 
+
+def _add_anchor_change_routes(router: APIRouter, store: SiteStore) -> None:
     @router.put(
         "/anchors/{anchor}",
         operation_id="put_anchor",

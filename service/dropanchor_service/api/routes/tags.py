@@ -23,7 +23,13 @@ _REASON_NAMES = [reason.value for reason in REASONS]
 
 def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
+    _add_list_routes(router, answers)
+    _add_status_route(router, answers)
+    _add_settings_routes(router, answers, max_tags)
+    return router
 
+
+def _add_list_routes(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/tags",
         operation_id="list_tags",
@@ -47,17 +53,10 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
     )
     def list_newcomers() -> Response:
-        pending = [
-            {
-                "tag": tag.name,
-                "first_heard_ns": tag.first_heard_ns,
-                "last_heard_ns": tag.last_heard_ns,
-                "messages": tag.messages,
-            }
-            for tag in answers.pending_tags.all()
-        ]
-        return json_response({"t_ns": answers.now_ns(), "newcomers": pending})
+        return json_response({"t_ns": answers.now_ns(), "newcomers": _newcomers(answers)})
 
+
+def _add_status_route(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/tags/{tag}",
         operation_id="get_tag",
@@ -70,6 +69,8 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
         offset = answers.clock_offsets.clock_offset(known.row, now_ns)
         return json_response(next(_statuses(answers, [known], {known.row: offset}, now_ns)))
 
+
+def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> None:
     @router.get(
         "/tags/{tag}/settings",
         operation_id="get_tag_settings",
@@ -93,20 +94,21 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     def put_tag_settings(
         tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])]
     ) -> Response:
-        try:
-            refuse_pattern(tag)
-        except InvalidKeyError as error:
-            raise ProblemError(Kind.INVALID_REQUEST, f"path.tag: {error}") from error
-        if answers.tags.find(tag) is None and len(answers.tags) >= max_tags:
-            raise ProblemError(
-                Kind.TAGS_FULL, f"{max_tags} tags are registered already. Raise `max_tags` to allow more."
-            )
-        with saving():
-            answers.site.set_tag(tag, settings)
-        answers.tags.register(tag)
+        _register(answers, tag, settings, max_tags)
         return json_response(settings.model_dump())
 
-    return router
+
+def _register(answers: Answers, tag: str, settings: TagSettings, max_tags: int) -> None:
+    """Store the settings of a tag, and register it if it is unknown. Raises ProblemError."""
+    try:
+        refuse_pattern(tag)
+    except InvalidKeyError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"path.tag: {error}") from error
+    if answers.tags.find(tag) is None and len(answers.tags) >= max_tags:
+        raise ProblemError(Kind.TAGS_FULL, f"{max_tags} tags are registered already. Raise `max_tags` to allow more.")
+    with saving():
+        answers.site.set_tag(tag, settings)
+    answers.tags.register(tag)
 
 
 def remote_answer(answers: Answers, tag: Tag) -> Answer:
@@ -116,6 +118,19 @@ def remote_answer(answers: Answers, tag: Tag) -> Answer:
         "wanted": answers.site.remote_settings(tag.name).model_dump(),
         "acknowledged": None if health is None else health.values.get("settings"),
     }
+
+
+def _newcomers(answers: Answers) -> list[Answer]:
+    """Return the `Newcomer` of each pending tag."""
+    return [
+        {
+            "tag": tag.name,
+            "first_heard_ns": tag.first_heard_ns,
+            "last_heard_ns": tag.last_heard_ns,
+            "messages": tag.messages,
+        }
+        for tag in answers.pending_tags.all()
+    ]
 
 
 def _statuses(

@@ -105,45 +105,38 @@ def run(draws: int = 400_000, seed: int = 20) -> Section:
             "Algorithm 1 always has unequal intervals; with equal ones the two agree.",
             "Where δv is not small against v, the square root is biased upwards and S may be negative (last column).",
         ],
-        tables=[
-            Table(
-                f"Standard deviation of the speed, m/s ({draws} draws, seed {seed})",
-                ["r0, m", "v, m/s", "Δt, s", "σ, m", "Monte Carlo", "corrected", "paper", "bias, m/s", "S < 0"],
-                [
-                    [
-                        c.start_m,
-                        c.speed_mps,
-                        c.dt_s,
-                        c.sigma_m,
-                        m.std,
-                        corrected_std(c),
-                        paper_std(c),
-                        m.bias,
-                        m.negative,
-                    ]
-                    for c, m in rows
-                ],
-            )
-        ],
+        tables=[_table(rows, f"{draws} draws, seed {seed}")],
         figures={"error_propagation": _figure(draws // 10, seed)},
         results={
             "unequal_intervals_mps": {"true": 2.0, "paper": printed, "corrected": corrected},
-            "cases": [
-                {
-                    "start_m": c.start_m,
-                    "speed_mps": c.speed_mps,
-                    "dt_s": c.dt_s,
-                    "sigma_m": c.sigma_m,
-                    "monte_carlo_mps": m.std,
-                    "corrected_mps": corrected_std(c),
-                    "paper_mps": paper_std(c),
-                    "bias_mps": m.bias,
-                    "share_negative": m.negative,
-                }
-                for c, m in rows
-            ],
+            "cases": [_result(case, errors) for case, errors in rows],
         },
     )
+
+
+def _table(rows: list[tuple[Case, Sampled]], sampling: str) -> Table:
+    return Table(
+        f"Standard deviation of the speed, m/s ({sampling})",
+        ["r0, m", "v, m/s", "Δt, s", "σ, m", "Monte Carlo", "corrected", "paper", "bias, m/s", "S < 0"],
+        [
+            [c.start_m, c.speed_mps, c.dt_s, c.sigma_m, m.std, corrected_std(c), paper_std(c), m.bias, m.negative]
+            for c, m in rows
+        ],
+    )
+
+
+def _result(case: Case, errors: Sampled) -> dict[str, float]:
+    return {
+        "start_m": case.start_m,
+        "speed_mps": case.speed_mps,
+        "dt_s": case.dt_s,
+        "sigma_m": case.sigma_m,
+        "monte_carlo_mps": errors.std,
+        "corrected_mps": corrected_std(case),
+        "paper_mps": paper_std(case),
+        "bias_mps": errors.bias,
+        "share_negative": errors.negative,
+    }
 
 
 def _figure(draws: int, seed: int) -> Figure:

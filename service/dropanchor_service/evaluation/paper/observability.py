@@ -137,18 +137,7 @@ def run() -> Section:
             + (" (checked symbolically)." if found.third_order_adds_nothing else " was NOT confirmed."),
             "Local observability leaves discrete twins. The figure shows four pairs of motions with identical ranges.",
         ],
-        tables=[
-            Table(
-                "Rank of the five states",
-                ["state", "speed measured, order 1", "not measured, order 1", "not measured, order 2"],
-                [[name, *values] for name, values in ranks.items()],
-            ),
-            Table(
-                "Twins: motions that no range tells apart",
-                ["pair", "largest difference of range, m", "apart by up to, m"],
-                [[f"{pair.name}: {pair.why}", pair.difference, pair.apart] for pair in pairs],
-            ),
-        ],
+        tables=[_rank_table(ranks), _twin_table(pairs)],
         figures={"observability_twins": _figure(pairs)},
         results={
             "determinant_speed_measured": str(found.paper),
@@ -159,6 +148,22 @@ def run() -> Section:
             "ranks": ranks,
             "twins": {pair.name: {"range_difference_m": pair.difference, "apart_m": pair.apart} for pair in pairs},
         },
+    )
+
+
+def _rank_table(ranks: dict[str, list[int]]) -> Table:
+    return Table(
+        "Rank of the five states",
+        ["state", "speed measured, order 1", "not measured, order 1", "not measured, order 2"],
+        [[name, *values] for name, values in ranks.items()],
+    )
+
+
+def _twin_table(pairs: list[Twin]) -> Table:
+    return Table(
+        "Twins: motions that no range tells apart",
+        ["pair", "largest difference of range, m", "apart by up to, m"],
+        [[f"{pair.name}: {pair.why}", pair.difference, pair.apart] for pair in pairs],
     )
 
 

@@ -76,15 +76,7 @@ def runners(noise: Noise) -> dict[str, Runner]:
 
 def run(progress: Callable[[], None] = lambda: None, seeds: range = SEEDS) -> Section:
     """Run all estimators at both noises. progress: called after each of the `RUNS_PER_SEED · len(seeds)` runs."""
-    found: dict[str, dict[str, list[Run]]] = {}
-    for label, noise in (("stated", STATED), ("released", RELEASED)):
-        simulations = [simulate("P", seed, preset(noise.preset)) for seed in seeds]
-        found[label] = {}
-        for name, runner in runners(noise).items():
-            found[label][name] = []
-            for simulation in simulations:
-                found[label][name].append(runner(simulation))
-                progress()
+    found = _run_all(progress, seeds)
     numbers = {label: {name: _numbers(runs) for name, runs in by_name.items()} for label, by_name in found.items()}
     return Section(
         key="table1",
@@ -116,6 +108,20 @@ def run(progress: Callable[[], None] = lambda: None, seeds: range = SEEDS) -> Se
         figures={f"fig7_{label}": _figure(label, by_name) for label, by_name in found.items()},
         results=numbers,
     )
+
+
+def _run_all(progress: Callable[[], None], seeds: range) -> dict[str, dict[str, list[Run]]]:
+    """Return the runs by noise and estimator."""
+    found: dict[str, dict[str, list[Run]]] = {}
+    for label, noise in (("stated", STATED), ("released", RELEASED)):
+        simulations = [simulate("P", seed, preset(noise.preset)) for seed in seeds]
+        found[label] = {}
+        for name, runner in runners(noise).items():
+            found[label][name] = []
+            for simulation in simulations:
+                found[label][name].append(runner(simulation))
+                progress()
+    return found
 
 
 def _numbers(runs: list[Run]) -> dict[str, float]:
