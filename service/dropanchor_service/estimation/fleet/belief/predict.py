@@ -47,23 +47,11 @@ def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
     dt = node.dt_s
     w = node.dyaw - s[GYRO_BIAS] * dt
     m = s[MOUNT] + s[SLIP]
-    cm, sm = math.cos(m + w / 2), math.sin(m + w / 2)
-    sensed = math.isfinite(node.dv_var)
-    forward = node.dv_forward if sensed else 0.0
-    left = node.dv_left if sensed else 0.0
-    bias = s[ACC_BIAS] * dt if sensed else 0.0
-    f = forward * cm + left * sm - bias
-    f_m = -forward * sm + left * cm
-    f_b = -dt if sensed else 0.0
-    f_g = -f_m * dt / 2
+    f, f_m, f_b = _speed_change(m + w / 2, s[ACC_BIAS], node)
     d = s[V] * dt + f * dt / 2
     alpha = s[YAW] + w / 2 + m - s[PHI]
     ca, sa = math.cos(alpha), math.sin(alpha)
-    sx, sy = 0.0, 0.0
-    if node.swing_forward != 0.0 or node.swing_left != 0.0:
-        cb, sb = math.cos(s[YAW] - s[PHI]), math.sin(s[YAW] - s[PHI])
-        sx = node.swing_forward * cb - node.swing_left * sb
-        sy = node.swing_forward * sb + node.swing_left * cb
+    sx, sy = _swing(s[YAW] - s[PHI], node)
     zx, zy = s[R] + d * ca + sx, d * sa + sy
     r = max(math.sqrt(zx * zx + zy * zy), 1e-6)
     r_alpha, r_d = (-zx * d * sa + zy * d * ca) / r, (zx * ca + zy * sa) / r
@@ -71,15 +59,10 @@ def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
     r_beta, p_beta = (zy * sx - zx * sy) / r, (zx * sx + zy * sy) / r**2
     F[0, R], F[1, R] = zx / r, -zy / r**2
     F[0, PHI], F[1, PHI] = -r_alpha - r_beta, 1.0 - p_alpha - p_beta
-    F[0, YAW], F[1, YAW] = r_alpha + r_beta, p_alpha + p_beta
-    F[0, V], F[1, V] = r_d * dt, p_d * dt
-    F[0, MOUNT], F[1, MOUNT] = r_alpha + r_d * f_m * dt / 2, p_alpha + p_d * f_m * dt / 2
-    F[0, SLIP], F[1, SLIP] = F[0, MOUNT], F[1, MOUNT]
-    F[0, GYRO_BIAS] = (r_d * f_g - r_alpha) * dt / 2
-    F[1, GYRO_BIAS] = (p_d * f_g - p_alpha) * dt / 2
-    F[0, ACC_BIAS], F[1, ACC_BIAS] = r_d * f_b * dt / 2, p_d * f_b * dt / 2
+    _fill_motion(F, 0, r_alpha, r_d, r_beta, dt, f_m, f_b)
+    _fill_motion(F, 1, p_alpha, p_d, p_beta, dt, f_m, f_b)
     F[2, YAW], F[2, GYRO_BIAS] = 1.0, -dt
-    F[3, V], F[3, MOUNT], F[3, SLIP], F[3, GYRO_BIAS], F[3, ACC_BIAS] = 1.0, f_m, f_m, f_g, f_b
+    F[3, V], F[3, MOUNT], F[3, SLIP], F[3, GYRO_BIAS], F[3, ACC_BIAS] = 1.0, f_m, f_m, -f_m * dt / 2, f_b
     s[PHI] += fast_atan2(zx, zy)
     s[R] = r
     s[YAW] += w
@@ -87,6 +70,38 @@ def predict_state(s: Floats, node: Node, decay: Floats, F: Floats) -> None:
     for i in range(4, N):
         s[i] *= decay[i]
     s[GYRO_BIAS] -= node.gyro_bias_step
+
+
+@njit(nogil=True)
+def _speed_change(c: float, acc_bias: float, node: Node) -> tuple[float, float, float]:
+    """Return f and its derivatives by c and by b_a. They are 0 without an accelerometer."""
+    if not math.isfinite(node.dv_var):
+        return 0.0, 0.0, 0.0
+    cc, sc = math.cos(c), math.sin(c)
+    f = node.dv_forward * cc + node.dv_left * sc - acc_bias * node.dt_s
+    return f, -node.dv_forward * sc + node.dv_left * cc, -node.dt_s
+
+
+@njit(nogil=True)
+def _swing(beta: float, node: Node) -> tuple[float, float]:
+    """Return R(beta) g."""
+    if node.swing_forward == 0.0 and node.swing_left == 0.0:
+        return 0.0, 0.0
+    cb, sb = math.cos(beta), math.sin(beta)
+    return node.swing_forward * cb - node.swing_left * sb, node.swing_forward * sb + node.swing_left * cb
+
+
+@njit(nogil=True)
+def _fill_motion(
+    F: Floats, i: int, by_alpha: float, by_d: float, by_beta: float, dt: float, f_m: float, f_b: float
+) -> None:
+    """Fill row i of F beyond r and phi, from its derivatives by alpha, d and the direction beta of g."""
+    F[i, YAW] = by_alpha + by_beta
+    F[i, V] = by_d * dt
+    F[i, MOUNT] = by_alpha + by_d * f_m * dt / 2
+    F[i, SLIP] = F[i, MOUNT]
+    F[i, GYRO_BIAS] = (by_d * (-f_m * dt / 2) - by_alpha) * dt / 2
+    F[i, ACC_BIAS] = by_d * f_b * dt / 2
 
 
 @njit(nogil=True)
