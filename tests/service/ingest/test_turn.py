@@ -1,40 +1,30 @@
-"""The way from messages to poses: admission, anchors, duplicates, clocks. Losses are counted, and no fault spreads."""
+"""The way from messages to poses: order, duplicates, clocks, settings. Losses are counted, and no fault spreads."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dropanchor_schemas import Anchor, StartPose, TagSettings
+from dropanchor_schemas import StartPose, TagSettings
 from dropanchor_schemas.wire import (
     ENCODING_JSON,
     Frame,
     HeadingSample,
     ImuSample,
     RangeSample,
-    anchor_number,
     encode_json,
     encode_packed,
 )
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import SampleBatch, State, StateReason
 from dropanchor_service.ingest import samples as sample_reader
-from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from dropanchor_service.ingest.decode import Forms, read_forms
 from dropanchor_service.ingest.guarded_engine import FAULTS_BEFORE_QUARANTINE
-from dropanchor_service.store.unknown_anchors import FRESH_NS, MAX_LOGGED
+from service.ingest.messages import S, T, ranges
 from support.ingest import IngestBench
 
-T = 1_760_000_000_000_000_000
-S = 1_000_000_000
 IMU = ImuSample(T, (0.0, 0.0, 9.81), (0.0, 0.0, 0.0))
-
-
-def ranges(*values: float, anchor: int = 7, sequence: int | None = None, boot_id: int | None = None) -> Frame:
-    samples = [RangeSample(T + i * 1_000_000, anchor, value) for i, value in enumerate(values)]
-    return Frame(ranges=samples, sequence=sequence, boot_id=boot_id)
 
 
 def test_samples_of_several_tags_reach_the_engine_in_one_batch_and_become_poses() -> None:
@@ -57,31 +47,6 @@ def test_json_and_packed_messages_give_the_same_poses() -> None:
     bench.put("b", ranges(3.0))
     bench.ingest.turn()
     assert bench.x_of("ab") == [3.0, 3.0]
-
-
-def test_the_first_anchor_becomes_the_origin_and_others_are_unknown() -> None:
-    bench = IngestBench()
-    bench.send("a", ranges(1.0, anchor=7), ranges(2.0, anchor=8), ranges(3.0, anchor=7))
-    assert bench.site.site.anchors == [Anchor(id="7")]
-    assert bench.engine.anchors is not None
-    assert bench.engine.anchors.tolist() == [(0.0, 0.0, 0.0)]
-    assert bench.rejected() == {"anchor_unknown": 1}
-    assert bench.x_of("a") == [3.0]
-
-
-def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
-    bench = IngestBench()
-    frame = ranges(1.0, anchor=anchor_number("gate"))
-    frame.anchor_names = {anchor_number("gate"): "gate"}
-    bench.put("a", encode_json(frame), ENCODING_JSON)
-    bench.ingest.turn()
-    assert [anchor.id for anchor in bench.site.site.anchors] == ["gate"]
-
-
-def test_a_bad_range_does_not_bind_an_anchor() -> None:
-    bench = IngestBench()
-    bench.send("a", ranges(-1.0, anchor=9), ranges(1.0, anchor=7))
-    assert [anchor.id for anchor in bench.site.site.anchors] == ["7"]
 
 
 def test_bad_samples_of_a_frame_are_counted_for_their_tag_and_good_ones_are_kept() -> None:
@@ -134,25 +99,6 @@ def test_a_key_that_does_not_follow_the_contract_is_counted(key: str) -> None:
     bench.ingest.turn()
     assert bench.rejected() == {"key_invalid": 1}
     assert len(bench.tags) == 0
-
-
-def test_unknown_tags_are_rejected_if_the_settings_say_so_and_listed_ones_are_not() -> None:
-    bench = IngestBench(unknown_tags="refuse", tags={"listed": {}})
-    bench.send("listed", ranges(1.0))
-    bench.send("unlisted", ranges(2.0))
-    assert bench.rejected() == {"tag_unknown": 1}
-    assert bench.x_of(["listed", "unlisted"]) == [1.0, None]
-    bench.site.set_tag("unlisted", TagSettings())
-    bench.send("unlisted", ranges(3.0))
-    assert bench.x_of(["unlisted"]) == [3.0]
-
-
-def test_no_more_tags_than_max_tags_are_registered() -> None:
-    bench = IngestBench(max_tags=2)
-    for name in "abcd":
-        bench.send(name, ranges(1.0))
-    assert [tag.name for tag in bench.tags.all()] == ["a", "b"]
-    assert bench.rejected() == {"tags_full": 2}
 
 
 def test_a_message_that_arrives_twice_is_fused_once() -> None:
@@ -209,19 +155,6 @@ def test_settings_of_a_tag_reach_the_engine_before_its_first_message_and_when_th
     assert len(bench.engine.configured[1]) == 1
 
 
-def test_tracks_start_afresh_when_an_anchor_moves_but_not_when_one_is_added() -> None:
-    bench = IngestBench()
-    bench.send("a", ranges(1.0))
-    bench.site.set_anchor(Anchor(id="8", x=5.0))
-    bench.ingest.turn()
-    assert len(bench.engine.configured[0]) == 1
-    bench.site.set_anchor(Anchor(id="7", x=1.0))
-    bench.ingest.turn()
-    assert len(bench.engine.configured[0]) == 2
-    assert bench.engine.anchors is not None
-    assert bench.engine.anchors["x"].tolist() == [1.0, 5.0]
-
-
 def poison_row(row: int) -> Callable[[SampleBatch], bool]:
     def poisoned(samples: SampleBatch) -> bool:
         return row in samples.ranges["row"]
@@ -274,116 +207,6 @@ def test_a_payload_that_makes_the_decoder_fail_harms_no_other_payload(monkeypatc
     assert bench.rejected() == {"payload_empty": 1}
 
 
-def test_a_flood_of_unknown_tags_is_bounded_and_does_not_harm_registered_tags() -> None:
-    bench = IngestBench(max_tags=10)
-    bench.send("known", ranges(1.0))
-    for number in range(50_000):
-        bench.put(f"unlisted{number}", ranges(1.0))
-    bench.send("known", ranges(2.0))
-    assert bench.x_of(["known"]) == [2.0]
-    take_turns(bench)
-    assert len(bench.tags) == 10
-    rejected = bench.rejected()
-    assert rejected["shed"] > 0
-    assert rejected["shed"] + rejected["tags_full"] == 50_000 - 9
-
-
-def take_turns(bench: IngestBench) -> None:
-    while bench.buffer.depth:
-        bench.ingest.turn()
-
-
-def fused(bench: IngestBench) -> list[float]:
-    return [value for batch in bench.engine.batches for value in batch.ranges["range"].tolist()]
-
-
-def test_a_tag_gets_its_row_with_its_second_message_if_many_are_new_and_loses_none() -> None:
-    bench = IngestBench(unproven_tags=1)
-    bench.send("quick", ranges(1.0))
-    bench.put("slow", ranges(2.0, sequence=0, boot_id=5), at_ns=T)
-    bench.ingest.turn()
-    assert [tag.name for tag in bench.tags.all()] == ["quick"]
-    assert len(bench.pending_tags) == 1
-    bench.put("slow", ranges(3.0, sequence=1, boot_id=5), at_ns=T + S)
-    bench.ingest.turn()
-    assert [tag.name for tag in bench.tags.all()] == ["quick", "slow"]
-    assert fused(bench) == [1.0, 2.0, 3.0]
-    assert len(bench.pending_tags) == 0
-    assert bench.rejected() == {}
-
-
-def test_a_duplicated_or_unreadable_message_does_not_confirm_a_tag() -> None:
-    bench = IngestBench(unproven_tags=0)
-    for _ in range(3):
-        bench.put("doubled", ranges(1.0), at_ns=T)
-    for second in range(3):
-        bench.put("junk", b"junk", at_ns=T + second * S)
-    bench.ingest.turn()
-    assert len(bench.tags) == 0
-    assert bench.rejected() == {"version_unknown": 3}
-    assert [pending.name for pending in bench.pending_tags.all()] == ["doubled"]
-
-
-def test_confirmed_tags_make_room_for_other_unlisted_ones() -> None:
-    bench = IngestBench(unproven_tags=1)
-    bench.put("first", ranges(1.0), at_ns=T)
-    bench.put("waits", ranges(2.0), at_ns=T)
-    bench.ingest.turn()
-    bench.put("first", ranges(3.0), at_ns=T + S)
-    bench.ingest.turn()
-    bench.put("at-once", ranges(4.0), at_ns=T + S)
-    bench.ingest.turn()
-    assert [tag.name for tag in bench.tags.all()] == ["first", "at-once"]
-
-
-def test_tags_that_send_once_are_dropped_and_all_of_their_messages_are_counted() -> None:
-    bench = IngestBench(max_tags=100, unproven_tags=10)
-    for number in range(5_000):
-        bench.put(f"unlisted{number}", ranges(1.0))
-        if number % 200 == 0:
-            bench.ingest.turn()
-    take_turns(bench)
-    bench.ingest.turn()
-    assert len(bench.tags) == 10
-    assert len(bench.pending_tags) == 100
-    assert bench.rejected() == {"tag_unproven": 5_000 - 10 - 100}
-
-
-def test_a_quarantined_tag_is_pending_until_its_settings_are_put() -> None:
-    bench = IngestBench(unknown_tags="quarantine", tags={"listed": {}})
-    bench.send("listed", ranges(1.0))
-    for value in (2.0, 3.0):
-        bench.send("unlisted", ranges(value))
-    assert fused(bench) == [1.0]
-    assert [(pending.name, pending.messages) for pending in bench.pending_tags.all()] == [("unlisted", 2)]
-    assert bench.rejected() == {"tag_quarantined": 2}
-    bench.site.set_tag("unlisted", TagSettings())
-    bench.send("unlisted", ranges(4.0))
-    assert fused(bench) == [1.0, 4.0]
-    assert len(bench.pending_tags) == 0
-
-
-def test_messages_kept_for_a_tag_are_used_when_rest_registers_it() -> None:
-    bench = IngestBench(unproven_tags=0)
-    bench.put("a", ranges(1.0), at_ns=T)
-    bench.ingest.turn()
-    bench.tags.register("a")  # as REST does
-    bench.ingest.turn()
-    assert fused(bench) == [1.0]
-
-
-def test_messages_of_listed_tags_do_not_wait_among_those_of_unregistered_ones() -> None:
-    names = [f"listed-{number}" for number in range(UNREGISTERED_PER_TURN + 500)]
-    bench = IngestBench(tags={name: {} for name in names})
-    bench.ingest.turn()
-    for name in names:
-        bench.put(name, ranges(1.0))
-    while bench.buffer.depth:
-        bench.ingest.turn()
-    assert bench.rejected() == {}
-    assert bench.x_of(names) == [1.0] * len(names)
-
-
 def test_shed_messages_are_counted_for_their_tag() -> None:
     bench = IngestBench(capacity=100_000)
     bench.send("busy", ranges(1.0))
@@ -399,28 +222,6 @@ def test_shed_messages_are_counted_for_their_tag() -> None:
     assert busy.rejected["shed"] + busy.messages == 1001
     assert busy.rejected["shed"] > 0
     assert quiet.messages == 2
-
-
-def test_listed_and_announced_tags_have_a_row_before_their_first_message(tmp_path: Path) -> None:
-    bench = IngestBench(tmp_path, tags={"listed": {}})
-    bench.ingest.announce("alive")
-    bench.ingest.turn()
-    assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]
-
-
-def test_unknown_anchors_are_logged_once_each_up_to_a_limit(
-    caplog: pytest.LogCaptureFixture,
-) -> None:
-    bench = IngestBench(site={"anchors": [{"id": "1"}]})
-    for anchor in range(2, 1000):
-        bench.send("a", ranges(1.0, anchor=anchor), ranges(1.0, anchor=anchor))
-    lines = [record.message for record in caplog.records if "unknown_anchors" in record.name]
-    assert len(lines) == MAX_LOGGED + 1
-    assert lines[0].startswith("tag a hears anchor 2, which this site does not have")
-    assert "PUT /api/v1/anchors/2" in lines[0]
-    assert "further ones are not logged" in lines[-1]
-    assert len(list(bench.tags.unknown_anchors.fresh(bench.clock.now_ns()))) == 1
-    assert bench.tags.unknown_anchors.of(0, bench.clock.now_ns() + FRESH_NS) is None
 
 
 def test_the_age_of_a_replay_counts_from_its_arrival_and_that_of_a_live_tag_from_its_samples() -> None:

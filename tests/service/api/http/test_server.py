@@ -1,26 +1,17 @@
-"""A real uvicorn on loopback: the stream, and clients that misbehave."""
+"""A real uvicorn on loopback, and clients that misbehave."""
 
-import asyncio
-import json
 import socket
 import statistics
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
-from typing import Any
+from contextlib import closing
 
-import httpx
 import pytest
 
-from dropanchor_schemas.pose import PoseFrame
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.limits import GuardedProtocol
-from dropanchor_service.api.http.server import ListenError, build_server, listen
-from dropanchor_service.api.routes import stream
-from support.api import ApiBench, kind_of, make_api_bench
-
-TIMEOUT_S = 10.0
+from dropanchor_service.api.http.server import ListenError, listen
+from support.api import make_api_bench
+from support.event_stream import TIMEOUT_S, get, serving, streaming
 
 
 class ShortDeadlines(GuardedProtocol):
@@ -31,54 +22,6 @@ class ShortDeadlines(GuardedProtocol):
 class LongDeadlines(GuardedProtocol):
     request_s = 2.0
     stalled_s = 2.0
-
-
-@contextmanager
-def serving(bench: ApiBench, protocol: type[GuardedProtocol] = GuardedProtocol) -> Iterator[int]:
-    """Run a server and yield its port. The server and its streams have ended after the block."""
-    server = build_server(bench.app(), bench.stopping, protocol)
-    bound = listen("127.0.0.1", 0)
-    port = int(bound.getsockname()[1])
-    thread = threading.Thread(target=lambda: asyncio.run(server.serve(sockets=[bound])))
-    thread.start()
-    try:
-        _wait_for(lambda: server.started)
-        yield port
-    finally:
-        server.should_exit = True
-        thread.join(TIMEOUT_S)
-    assert not thread.is_alive()
-
-
-@contextmanager
-def streaming(port: int, query: str = "max_hz=30") -> Iterator[Iterator[tuple[str, Any]]]:
-    """Open a stream and yield its events: name and frame. A comment has an empty name."""
-    url = f"http://127.0.0.1:{port}/api/v1/stream?{query}"
-    with httpx.Client(timeout=TIMEOUT_S, trust_env=False) as client, client.stream("GET", url) as response:
-        assert response.headers["content-type"].startswith("text/event-stream")
-        yield _events(response)
-
-
-def _events(response: httpx.Response) -> Iterator[tuple[str, Any]]:
-    name = ""
-    for line in response.iter_lines():
-        if line.startswith("event: "):
-            name = line[7:]
-        elif line.startswith("data: "):
-            yield name, json.loads(line[6:])
-        elif line.startswith(":"):
-            yield "", line
-
-
-def _wait_for(condition: Any) -> None:
-    end_s = time.monotonic() + TIMEOUT_S
-    while not condition():
-        assert time.monotonic() < end_s, "the condition did not become true in time"
-        time.sleep(0.01)
-
-
-def _get(port: int, path: str = "/api/v1/health/live") -> httpx.Response:
-    return httpx.get(f"http://127.0.0.1:{port}{path}", timeout=TIMEOUT_S, trust_env=False)
 
 
 def _connected(port: int, *sent: bytes) -> socket.socket:
@@ -107,88 +50,6 @@ def _ended(client: socket.socket) -> bool:
     except ConnectionResetError:
         pass
     return True
-
-
-def test_a_stream_starts_with_all_tags_and_continues_with_changes() -> None:
-    bench = make_api_bench()
-    bench.move("a", "b", x=1.0)
-    with serving(bench) as port, streaming(port) as events:
-        name, frame = next(events)
-        assert (name, frame["tags"], frame["x"]) == ("snapshot", ["a", "b"], [1.0, 1.0])
-        PoseFrame.model_validate(frame)
-        bench.move("b", x=2.0)
-        name, frame = next(events)
-        assert (name, frame["tags"], frame["x"]) == ("poses", ["b"], [2.0])
-        bench.move("c", x=3.0)
-        assert next(events)[1]["tags"] == ["c"]
-
-
-def test_a_stream_without_poses_starts_with_an_empty_snapshot() -> None:
-    with serving(make_api_bench()) as port, streaming(port) as events:
-        name, frame = next(events)
-        assert (name, frame["tags"]) == ("snapshot", [])
-
-
-def test_a_stream_of_selected_tags_includes_those_that_appear_later() -> None:
-    bench = make_api_bench()
-    bench.move("a", "b")
-    with serving(bench) as port, streaming(port, "max_hz=30&tags=b,late") as events:
-        assert next(events)[1]["tags"] == ["b"]
-        bench.move("a")
-        bench.move("late")
-        assert next(events)[1]["tags"] == ["late"]
-
-
-def test_a_client_gets_the_newest_poses_at_no_more_than_its_rate() -> None:
-    bench = make_api_bench()
-    bench.move("a", x=0.0)
-    with serving(bench) as port, streaming(port, "max_hz=5") as events:
-        next(events)
-        start_s = time.monotonic()
-        seen: list[float] = []
-        for count in range(1, 101):
-            bench.move("a", x=float(count))
-            time.sleep(0.01)
-        while not seen or seen[-1] != 100.0:
-            seen.append(next(events)[1]["x"][0])
-        assert len(seen) <= (time.monotonic() - start_s) * 5 + 1
-        assert seen == sorted(set(seen))
-
-
-def test_a_tag_that_falls_silent_or_goes_offline_is_reported_without_a_new_pose() -> None:
-    bench = make_api_bench()
-    bench.move("a", "b")
-    bench.answers.tags.presence.set_token("b", True)
-    with serving(bench) as port, streaming(port) as events:
-        assert next(events)[1]["online"] == [False, True]
-        bench.answers.tags.presence.set_token("b", False)
-        frame = next(events)[1]
-        assert (frame["tags"], frame["online"]) == (["b"], [False])
-        bench.now_ns += 2_000_000_000
-        assert next(events)[1]["state"] == ["coasting", "coasting"]
-
-
-def test_a_quiet_stream_sends_heartbeats(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stream, "HEARTBEAT_S", 0.1)
-    with serving(make_api_bench()) as port, streaming(port) as events:
-        next(events)
-        assert next(events) == ("", ": alive")
-
-
-@pytest.mark.parametrize("query", ["max_hz=nan", "max_hz=inf", "max_hz=0.09", "max_hz=30.1", "max_hz=fast", "hz=1"])
-def test_invalid_stream_parameters_are_a_problem(query: str) -> None:
-    with serving(make_api_bench()) as port:
-        assert kind_of(_get(port, f"/api/v1/stream?{query}")) == "invalid-request"
-
-
-def test_streams_end_when_the_server_stops() -> None:
-    bench = make_api_bench()
-    with serving(bench) as port, streaming(port, "max_hz=0.1") as events:
-        next(events)
-        bench.stopping.set()
-        start_s = time.monotonic()
-        assert list(events) == []
-        assert time.monotonic() - start_s < 8.0
 
 
 def test_the_server_stops_in_time_with_a_stuck_stream() -> None:
@@ -236,7 +97,7 @@ def test_a_client_that_stops_reading_is_disconnected_and_does_not_delay_others()
 def test_an_incomplete_request_is_disconnected(sent: bytes) -> None:
     with serving(make_api_bench(), ShortDeadlines) as port:
         clients = [_connected(port, sent) for _ in range(50)]
-        assert _get(port).status_code == 200
+        assert get(port).status_code == 200
         start_s = time.monotonic()
         assert all(_ended(client) for client in clients)
         assert time.monotonic() - start_s < 30.0
@@ -286,7 +147,7 @@ def test_the_server_survives_junk_and_endless_headers() -> None:
         for sent in (b"\x16\x03\x01" * 100, b"GET / HTTP/1.1\r\n" + b"x: y\r\n" * 20_000):
             with closing(_connected(port, sent)) as client:
                 assert _ended(client)
-        assert _get(port).status_code == 200
+        assert get(port).status_code == 200
 
 
 def test_a_port_in_use_is_explained() -> None:
