@@ -5,15 +5,13 @@ in one order. This module does no I/O: the caller passes live and cached message
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from threading import Lock
-from typing import NamedTuple
 
 from dropanchor_schemas.keys import tag_from_key
-from dropanchor_schemas.samples import decode_json
-from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, Rejection, read_header
-from dropanchor_service.ingest.buffer import MESSAGE_OVERHEAD, MessageBuffer
+from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.publishers import Publishers, SequenceState
+from dropanchor_service.ingest.suspended import Number, Suspended, in_order, number_of, size_of
 from dropanchor_service.store import TagTable
 
 MAX_BYTES = 64 * 2**20  # of suspended messages; beyond it all of them are released
@@ -21,22 +19,6 @@ MAX_RETRIES = 10
 
 StatesOf = Callable[[str], Mapping[int, SequenceState]]
 """Return what was fused before the restart, by boot id, for the tag with this key."""
-
-
-class _Number(NamedTuple):
-    """t_ns: time of a sample, on the publisher's own clock."""
-
-    boot_id: int
-    sequence: int
-    t_ns: int
-
-
-class _Suspended(NamedTuple):
-    key: str
-    payload: bytes
-    encoding: str
-    arrival_ns: int
-    number: _Number | None
 
 
 class CatchUp:
@@ -64,15 +46,16 @@ class CatchUp:
         self._ask = ask
         self._new_publisher_limit = new_publisher_limit
         self._first_round = True  # all caches are being asked, and all messages are suspended
-        self._suspended: dict[str, list[_Suspended]] = {}
+        self._suspended: dict[str, list[Suspended]] = {}
         self._cached: Counter[str] = Counter()  # cached messages since the caches of a key were last asked
         self._retries: Counter[str] = Counter()
+        self._silent: set[str] = set()  # keys whose caches exist, so that an empty answer is none
         self._bytes = 0
 
     def on_live(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """Suspend a live message while its tag is catching up, or pass it to the buffer."""
         if self._suspends(key):
-            suspended = _Suspended(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
+            suspended = Suspended(key, payload, encoding, arrival_ns, number_of(payload, encoding))
             with self._lock:
                 suspends = self._suspends(key) and not self._is_first(suspended)
                 if suspends:
@@ -88,9 +71,15 @@ class CatchUp:
             if key in self._expected:
                 self._open(key)
 
+    def on_silent(self, key: str) -> None:
+        """Ask the caches of a tag that is online again but sends nothing new."""
+        with self._lock:
+            self._silent.add(key)
+            self._open(key)
+
     def on_cached(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """Suspend a message from a cache, if its tag is catching up."""
-        suspended = _Suspended(key, payload, encoding, arrival_ns, _number_of(payload, encoding))
+        suspended = Suspended(key, payload, encoding, arrival_ns, number_of(payload, encoding))
         with self._lock:
             if self._first_round or key in self._suspended:
                 self._cached[key] += 1
@@ -127,7 +116,7 @@ class CatchUp:
     def _suspends(self, key: str) -> bool:
         return self._first_round or key in self._expected or key in self._suspended
 
-    def _is_first(self, message: _Suspended) -> bool:
+    def _is_first(self, message: Suspended) -> bool:
         """Return whether this is the first message of a new tag, so that its caches hold nothing else."""
         number, key = message.number, message.key
         if self._first_round or key in self._suspended or number is None or number.sequence or self._states_of(key):
@@ -146,9 +135,13 @@ class CatchUp:
         distances = self._distances(key)
         missing = self._missing(key)
         cut_short, empty = self._cached[key] >= limit, not self._cached[key]
-        return (missing > limit and cut_short) or any(
-            max(numbers) - min(numbers) >= len(numbers) or (empty and known and min(numbers) > 0)
-            for known, numbers in distances
+        return (
+            (missing > limit and cut_short)
+            or (empty and key in self._silent)
+            or any(
+                max(numbers) - min(numbers) >= len(numbers) or (empty and known and min(numbers) > 0)
+                for known, numbers in distances
+            )
         )
 
     def _distances(self, key: str) -> list[tuple[bool, set[int]]]:
@@ -173,7 +166,7 @@ class CatchUp:
         numbers = [suspended.number for suspended in self._suspended.get(key, ()) if suspended.number]
         return max((self._missing_to(number, states) for number in numbers), default=0)
 
-    def _missing_to(self, number: _Number, states: Mapping[int, SequenceState]) -> int:
+    def _missing_to(self, number: Number, states: Mapping[int, SequenceState]) -> int:
         known = states.get(number.boot_id)
         return (
             max(0, known.ahead(number.sequence)) + 1 if known else min(number.sequence + 1, self._new_publisher_limit)
@@ -184,10 +177,10 @@ class CatchUp:
         self._cached[key] = 0
         self._retries[key] += 1
 
-    def _suspend(self, message: _Suspended) -> None:
+    def _suspend(self, message: Suspended) -> None:
         self._open(message.key)
         self._suspended[message.key].append(message)
-        self._bytes += _size(message)
+        self._bytes += size_of(message)
 
     def _bound(self) -> None:
         if self._bytes > MAX_BYTES:
@@ -210,7 +203,7 @@ class CatchUp:
             cached = any(self._cached[key] or self._retries[key] for key in taken)
             self._suspended |= {key: [] for key in taken}
         released = [
-            message for key, suspended in taken.items() for message in _in_order(suspended, self._states_of(key))
+            message for key, suspended in taken.items() for message in in_order(suspended, self._states_of(key))
         ]
         released.sort(key=lambda message: message.arrival_ns)
         for message in released:
@@ -221,8 +214,9 @@ class CatchUp:
                 self._expected.discard(key)
                 self._cached.pop(key, None)
                 self._retries.pop(key, None)
+                self._silent.discard(key)
                 meanwhile = self._suspended[key]
-                self._bytes -= sum(map(_size, suspended)) + sum(map(_size, meanwhile))
+                self._bytes -= sum(map(size_of, suspended)) + sum(map(size_of, meanwhile))
                 for message in meanwhile:
                     if (key, message.number) not in released_numbers:
                         self._buffer.append(key, message.payload, message.encoding, message.arrival_ns)
@@ -238,62 +232,3 @@ def sequence_states(tags: TagTable, publishers: Publishers) -> StatesOf:
         return {} if tag is None else publishers.sequence_states(tag.row)
 
     return states_of
-
-
-def _size(message: _Suspended) -> int:
-    return len(message.payload) + MESSAGE_OVERHEAD
-
-
-_Numbered = tuple[_Number, _Suspended]
-
-
-def _in_order(suspended: list[_Suspended], states: Mapping[int, SequenceState]) -> list[_Suspended]:
-    """Return every message once, with the arrival that it would have had live.
-
-    Those of each publisher are in the order of their numbers, and have the delay of its newest message.
-    """
-    by_publisher: dict[int, dict[int, _Numbered]] = {}
-    others: list[_Suspended] = []
-    for message in suspended:
-        number = message.number
-        if number is None:
-            others.append(message)
-            continue
-        known = states.get(number.boot_id)
-        if known is None or not known.has(number.sequence):
-            by_publisher.setdefault(number.boot_id, {}).setdefault(number.sequence, (number, message))
-    for messages in by_publisher.values():
-        others += _as_if_live(list(messages.values()))
-    return others
-
-
-def _as_if_live(messages: list[_Numbered]) -> Iterator[_Suspended]:
-    """Yield the messages of one publisher with the arrivals that they would have had live.
-
-    The arrivals are in the order of the numbers, even if a clock jumped.
-    """
-    first = messages[0][0].sequence
-    ordered = sorted(messages, key=lambda entry: (entry[0].sequence - first + 2**31) % 2**32)
-    newest, last = ordered[-1]
-    delay_ns, arrival_ns = last.arrival_ns - newest.t_ns, last.arrival_ns
-    arrivals: list[int] = []
-    for number, _ in reversed(ordered):
-        arrival_ns = min(arrival_ns, number.t_ns + delay_ns)
-        arrivals.append(arrival_ns)
-    for (number, suspended), arrived_ns in zip(ordered, reversed(arrivals), strict=True):
-        yield _Suspended(suspended.key, suspended.payload, suspended.encoding, arrived_ns, number)
-
-
-def _number_of(payload: bytes, encoding: str) -> _Number | None:
-    """Return boot id, sequence and time of a message, None if it is not numbered."""
-    kind = encoding.partition(";")[0]
-    if kind == ENCODING_PACKED:
-        header = read_header(payload)
-        if isinstance(header, Rejection):
-            return None
-        _, _, sequence, boot_id, t_ns = header
-        return _Number(boot_id, sequence, t_ns) if boot_id else None
-    frame = decode_json(payload) if kind == ENCODING_JSON else None
-    if not isinstance(frame, Frame) or frame.sequence is None or not frame.boot_id:
-        return None
-    return _Number(frame.boot_id, frame.sequence, min(frame.times()))

@@ -31,6 +31,7 @@ MESSAGES_PER_S = 200  # asked for in addition, per second of silence; no publish
 RATE_QUANTILE = 0.9  # of the tags' rates; the first round covers these tags, the others are asked again
 MARGIN = 1.2  # on the number of messages that a rate predicts
 RETRY_S = 0.1  # pause before the same tag is asked again
+SILENT_S = 1.0  # after it came back online, until a tag counts as silent
 REPLIES = 2**16  # queue length; a full queue would block the receive thread and delay live messages
 
 _log = logging.getLogger(__name__)
@@ -57,6 +58,7 @@ class ZenohCaches:
         self._metrics = metrics
         self._clock = clock
         self._later: deque[tuple[float, str, int]] = deque()  # queries to repeat: when, key, missing
+        self._returned: deque[tuple[float, str, int]] = deque()  # tags online again: when to look, name, last heard ns
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # before this process started
         self._thread = threading.Thread(target=self._run, name="caches", daemon=True)
@@ -82,10 +84,20 @@ class ZenohCaches:
             self._later.append((time.monotonic() + RETRY_S, key, missing))
         self._tasks.put(self._ask_later if retries else partial(self._ask, key, missing))
 
+    def ask_if_silent(self, name: str) -> None:
+        """Ask the caches of a tag that came online and sends nothing, for what it sent while it was away.
+
+        Zenoh itself fetches what is missing before a live message. It should also do so after a heartbeat of the
+        publisher, but it ignores heartbeats on keys with a verbatim chunk such as `@v1`.
+        """
+        heard_ns = self._last_heard_ns(name)
+        if heard_ns:
+            self._tasks.put(partial(self._returned.append, (time.monotonic() + SILENT_S, name, heard_ns)))
+
     def _run(self) -> None:
         while True:
             try:
-                task = self._tasks.get(timeout=RETRY_S if self._later else None)
+                task = self._tasks.get(timeout=RETRY_S if self._later or self._returned else None)
             except Empty:
                 task = self._ask_later
             if task is None:
@@ -97,10 +109,14 @@ class ZenohCaches:
                 self._rare.exception("caches", error)
 
     def _ask_later(self) -> None:
-        """Repeat the queries that are due."""
+        """Repeat the queries that are due, and ask the caches of tags that came back and are silent."""
         while self._later and self._later[0][0] <= time.monotonic():
             _, key, missing = self._later.popleft()
             self._ask(key, missing)
+        while self._returned and self._returned[0][0] <= time.monotonic():
+            _, name, heard_ns = self._returned.popleft()
+            if self._last_heard_ns(name) == heard_ns:
+                self._catch_up.on_silent(keys.samples_key(self._site, name))
 
     def _ask_all(self) -> None:
         limit, asked_s = min(self._typical_limit(), self._limit(self._newest_ns)), time.monotonic()
@@ -112,9 +128,7 @@ class ZenohCaches:
             self._finish(partial(self._catch_up.on_first_round_answer, limit), asked_s)
 
     def _ask(self, key: str, missing: int) -> None:
-        tag = self._tags.find(keys.tag_from_key(key))
-        last_heard_ns = None if tag is None else tag.last_heard_ns
-        limit = MIN_MESSAGES + missing if missing else self._limit(last_heard_ns or 0)
+        limit = MIN_MESSAGES + missing if missing else self._limit(self._last_heard_ns(keys.tag_from_key(key)))
         answered = partial(self._catch_up.on_answer, key, limit)
         done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
         try:
@@ -143,6 +157,10 @@ class ZenohCaches:
         heard_s = np.maximum((heard["last_heard_ns"] - heard["first_heard_ns"]) * 1e-9, 1.0)
         rate = float(np.quantile(heard["messages"] / heard_s, RATE_QUANTILE))
         return MIN_MESSAGES // 5 + round(MARGIN * rate * self._silent_s(self._newest_ns))
+
+    def _last_heard_ns(self, name: str) -> int:
+        tag = self._tags.find(name)
+        return 0 if tag is None else tag.last_heard_ns or 0
 
     def _limit(self, last_heard_ns: int) -> int:
         """Return how many messages a tag can have sent since it was last heard, at most."""

@@ -122,3 +122,4 @@ class ZenohIntake:
             self._tags.presence.set_token(name, True)
             self._ingest.announce(name)
             self._catch_up.on_alive(keys.samples_key(self._site, name))
+            self._caches.ask_if_silent(name)
