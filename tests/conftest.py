@@ -1,5 +1,6 @@
 """Set-up and fixtures for the whole suite."""
 
+import signal
 from collections.abc import Iterator
 
 import pytest
@@ -9,6 +10,8 @@ from support.kernel_cache import use_cache_of_these_sources
 from support.zenoh_router import free_endpoint, running_router
 
 use_cache_of_these_sources()
+# A shell without job control makes what it starts in the background ignore Ctrl-C, and so would the programs of tests.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("dropanchor", deadline=None)  # test machines are slow at times
 settings.load_profile("dropanchor")
 

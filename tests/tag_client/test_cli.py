@@ -79,11 +79,15 @@ def test_a_signal_ends_a_replay_quickly_and_buffered_samples_are_sent(
 ) -> None:
     with listening(router_endpoint) as heard:
         process = start_python(*COMMAND, "replay", str(recording), "--connect", router_endpoint, "--loop")
-        wait_until(lambda: len(heard.ranges()) >= 3)
-        began = time.monotonic()
-        process.send_signal(number)
-        _, errors = process.communicate(timeout=60)
-        assert time.monotonic() - began < 30.0
+        try:
+            wait_until(lambda: len(heard.ranges()) >= 3)
+            began = time.monotonic()
+            process.send_signal(number)
+            process.wait(60)
+            assert time.monotonic() - began < 30.0
+        finally:
+            process.kill()
+            _, errors = process.communicate()
     assert process.returncode == code
     assert "Traceback" not in errors
     assert heard.ranges() == [float(i) for i in range(len(heard.ranges()))]
@@ -92,11 +96,14 @@ def test_a_signal_ends_a_replay_quickly_and_buffered_samples_are_sent(
 def test_ctrl_c_ends_a_client_that_is_still_connecting(recording: Path) -> None:
     endpoint = free_endpoint()
     process = start_python(*COMMAND, "replay", str(recording), "--connect", endpoint)
-    assert process.stderr is not None
-    assert f"Cannot connect to {endpoint}" in process.stderr.readline()
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60.0)
-    assert process.returncode == -signal.SIGINT
+    try:
+        assert process.stderr is not None
+        assert f"Cannot connect to {endpoint}" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == -signal.SIGINT
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def test_a_replay_reports_how_much_it_sent(router_endpoint: str, recording: Path) -> None:
