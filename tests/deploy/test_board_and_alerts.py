@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-import httpx
 import promql_parser as promql
 import pytest
 import yaml
@@ -37,7 +36,7 @@ def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set
     """Return what a running service exposes: metric → label → values."""
     folder = tmp_path_factory.mktemp("data")
     with running_service("--engine", "paper", "--data-dir", str(folder)) as service:
-        text = httpx.get(f"{service.url}/metrics").text
+        text = service.ask("GET", "/metrics").text
     found: dict[str, dict[str, set[str]]] = {}
     for family in text_string_to_metric_families(text):
         for sample in family.samples:

@@ -85,10 +85,10 @@ def test_the_service_is_not_ready_without_its_router_and_ready_again_with_it() -
     endpoint = free_endpoint()
 
     def is_ready() -> bool:
-        return httpx.get(f"{service.url}/api/v1/health/ready").status_code == 200
+        return service.ask("GET", "/api/v1/health/ready").status_code == 200
 
     with running_service("--zenoh-connect", endpoint, ready=False) as service:
-        problem = httpx.get(f"{service.url}/api/v1/health/ready")
+        problem = service.ask("GET", "/api/v1/health/ready")
         assert problem.status_code == 503
         assert "no connection to the Zenoh router" in problem.text
         router = start_router_process(endpoint)

@@ -4,8 +4,6 @@ import resource
 import signal
 from pathlib import Path
 
-import httpx
-
 from support.live_tags import LiveTags, is_current, samples_of
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, router_process, wait_until
@@ -15,7 +13,7 @@ TAGS, SEED = 2, 5
 
 def impaired(service: Running) -> str:
     """Return what a service that is ready reports as impaired."""
-    answer = httpx.get(f"{service.url}/api/v1/health/ready")
+    answer = service.ask("GET", "/api/v1/health/ready")
     assert answer.status_code == 200
     return "; ".join(answer.json()["impaired"])
 

@@ -97,7 +97,8 @@ def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
 
 def wait_until(condition: Callable[[], object], timeout_s: float = 40.0) -> None:
     """Wait until the condition is true. Fail the test when it is still false after `timeout_s`."""
-    deadline = time.monotonic() + timeout_s
+    deadline, pause_s = time.monotonic() + timeout_s, 0.005
     while not condition():
         assert time.monotonic() < deadline, f"not within {timeout_s} s"
-        time.sleep(0.005)
+        time.sleep(pause_s)
+        pause_s = min(1.5 * pause_s, 0.05)  # a condition may cost much more than the pause, here and in the service
