@@ -15,7 +15,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("dropanchor", deadline=None)  # test machines are slow at times
 settings.load_profile("dropanchor")
 
-# With two workers, one runs these tests, which need no kernels, while the other one fills the kernel cache.
+# One worker runs these tests, which need no kernels, while another one fills the kernel cache.
 FIRST = ("benchmarks", "schemas", "tag_client")
 
 
