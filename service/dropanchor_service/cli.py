@@ -4,11 +4,13 @@ import argparse
 import gc
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
+from dropanchor_tag_client.command_line import COMPLETION, Parser, add_completion_arguments, completion_script
 
 _COMMANDS = {
     "demo": "run the service with simulated tags and watch them in a browser",
@@ -61,23 +63,52 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     words = _with_negative_values(sys.argv[1:] if arguments is None else arguments)
-    parser = argparse.ArgumentParser(
-        "dropanchor",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    chosen = _parser(words[:1]).parse_args(words)
+    if chosen.command == "completion":
+        print(completion_script(_parser([name for name in _COMMANDS if _is_installed(name)]), chosen.shell))
+        return 0
+    return int(chosen.run(chosen))
+
+
+def _parser(chosen: Container[str]) -> Parser:
+    """Return the parser of the whole command line. Only the chosen commands get their options and are imported."""
+    parser = Parser("dropanchor", description=_DESCRIPTION, epilog=_EPILOG)
+    parser.add_argument("--version", action=_Version, help="print the version and exit")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, brief in _COMMANDS.items():
-        one = commands.add_parser(name, help=brief, formatter_class=argparse.RawDescriptionHelpFormatter)
-        if words[:1] == [name]:
+        one = commands.add_parser(name, help=brief)
+        if name in chosen:
             use_kernel_cache()  # before a command imports compiled kernels
             command = _imported(f"dropanchor_service.commands.{name}")
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
             one.set_defaults(run=command.run)
-    chosen = parser.parse_args(words)
-    return int(chosen.run(chosen))
+    add_completion_arguments(commands.add_parser("completion", help=COMPLETION), "dropanchor")
+    return parser
+
+
+class _Version(argparse.Action):
+    """Prints the version of the distribution, which is looked up only then."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(nargs=0, **options)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import version
+
+        print(f"dropanchor {version('dropanchor-service')}")
+        parser.exit()
+
+
+def _is_installed(command: str) -> bool:
+    """Return whether the packages of a command are there: some commands need an extra."""
+    try:
+        _imported(f"dropanchor_service.commands.{command}")
+    except ModuleNotFoundError as error:
+        if error.name not in _EXTRAS:
+            raise
+        return False
+    return True
 
 
 def _imported(name: str) -> ModuleType:

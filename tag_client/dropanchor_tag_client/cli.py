@@ -9,9 +9,18 @@ import sys
 from importlib import import_module
 from types import FrameType, ModuleType
 
+from dropanchor_tag_client.command_line import (
+    COMPLETION,
+    LOG_LEVELS,
+    Parser,
+    add_completion_arguments,
+    completion_script,
+)
+from dropanchor_tag_client.host import program
 from dropanchor_tag_client.options import apply_defaults
 from dropanchor_tag_client.session import ConnectError
 
+_PROGRAM = "dropanchor-tag"
 _EXTRAS = {
     "numpy": ("this command needs numpy", "numpy"),
     "serial": ("modules on a serial port need pyserial", "pyserial"),
@@ -20,6 +29,7 @@ _EXTRAS = {
     "adafruit_bno08x": ("the BNO085 needs Adafruit's library", "adafruit-circuitpython-bno08x"),
     "adafruit_icm20x": ("the ICM-20948 needs Adafruit's library", "adafruit-circuitpython-icm20x"),
     "paho": ("MQTT needs paho-mqtt", "paho-mqtt"),
+    "shtab": ("completion needs shtab", "shtab"),
 }
 _INTERRUPTED, _TERMINATED = 130, 143
 
@@ -122,14 +132,24 @@ _SIMULATE_EXAMPLES = """examples:
 """
 
 
+_COMMANDS = {
+    "replay": (_REPLAY, _REPLAY_EXAMPLES),
+    "simulate": (_SIMULATE, _SIMULATE_EXAMPLES),
+    "publish": (_PUBLISH, _PUBLISH_EXAMPLES),
+    "serial": (_SERIAL, _SERIAL_EXAMPLES),
+    "mqtt": (_MQTT, _MQTT_EXAMPLES),
+    "imu": (_IMU, _IMU_EXAMPLES),
+    "calibrate": (_CALIBRATE, _CALIBRATE_EXAMPLES),
+    "install": (_INSTALL, _INSTALL_EXAMPLES),
+}
+
+
 def main(arguments: list[str] | None = None) -> int:
     logging.basicConfig(format="%(message)s", level=logging.INFO)
     signal.signal(signal.SIGTERM, _terminate)
     given = sys.argv[1:] if arguments is None else arguments
     try:
-        parsed = parser(given[0] if given else "").parse_args(given)
-        apply_defaults(parsed)
-        return int(_source(parsed.command).run(parsed))
+        return _run(parser(*given[:1]).parse_args(given))
     except KeyboardInterrupt:
         return _INTERRUPTED
     except ModuleNotFoundError as error:
@@ -141,28 +161,28 @@ def main(arguments: list[str] | None = None) -> int:
         return _failed(str(error))
 
 
-def parser(command: str) -> argparse.ArgumentParser:
-    """Return the parser of the whole command line. Only `command` gets its options, so only its source is imported."""
-    top = argparse.ArgumentParser(
-        prog="dropanchor-tag",
-        description="Publishes the raw samples of a tag: UWB ranges and IMU.",
-        epilog=_EXAMPLES,
-        formatter_class=_Formatter,
-    )
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, summary, examples in (
-        ("replay", _REPLAY, _REPLAY_EXAMPLES),
-        ("simulate", _SIMULATE, _SIMULATE_EXAMPLES),
-        ("publish", _PUBLISH, _PUBLISH_EXAMPLES),
-        ("serial", _SERIAL, _SERIAL_EXAMPLES),
-        ("mqtt", _MQTT, _MQTT_EXAMPLES),
-        ("imu", _IMU, _IMU_EXAMPLES),
-        ("calibrate", _CALIBRATE, _CALIBRATE_EXAMPLES),
-        ("install", _INSTALL, _INSTALL_EXAMPLES),
-    ):
-        one = commands.add_parser(name, help=summary, description=summary, epilog=examples, formatter_class=_Formatter)
-        if name == command:
+def _run(parsed: argparse.Namespace) -> int:
+    if parsed.command == "completion":
+        print(completion_script(parser(*_COMMANDS), parsed.shell))
+        return 0
+    logging.getLogger().setLevel(parsed.log_level)
+    apply_defaults(parsed)
+    return int(_source(parsed.command).run(parsed))
+
+
+def parser(*commands: str) -> argparse.ArgumentParser:
+    """Return the parser of the whole command line. Only these commands get their options and have to be imported."""
+    top = Parser(prog=_PROGRAM, description="Publishes the raw samples of a tag: UWB ranges and IMU.", epilog=_EXAMPLES)
+    top.add_argument("--version", action="version", version=program())
+    actions = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, (summary, examples) in _COMMANDS.items():
+        one = actions.add_parser(name, help=summary, description=summary, epilog=examples)
+        if name in commands:
+            one.add_argument(
+                "--log-level", default="INFO", choices=LOG_LEVELS, help="least severity to report (default: INFO)"
+            )
             _source(name).add_arguments(one)
+    add_completion_arguments(actions.add_parser("completion", help=COMPLETION), _PROGRAM)
     return top
 
 

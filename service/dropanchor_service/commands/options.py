@@ -6,6 +6,7 @@ from typing import Any
 
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import load_settings
+from dropanchor_tag_client.command_line import LOG_LEVELS
 
 
 def add_service_options(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +34,9 @@ def add_security_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_log_option(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--log-level", default="INFO", choices=("DEBUG", "INFO", "WARNING", "ERROR"))
+    parser.add_argument(
+        "--log-level", default="INFO", choices=LOG_LEVELS, help="least severity to log (default: %(default)s)"
+    )
 
 
 def positive(text: str) -> int:

@@ -6,9 +6,9 @@ import os
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from dropanchor_schemas.site import Typed
 from dropanchor_service.settings.model import Settings
@@ -112,9 +112,17 @@ def _depth(layer: Any, path: list[str]) -> int:
 
 def _suggestion(path: list[str]) -> str:
     """Return "; did you mean ...?" when a setting has a similar name, else nothing."""
-    model: Any = Settings
+    model: type[BaseModel] = Settings
     for part in path[:-1]:
-        field = getattr(model, "model_fields", {}).get(part)
-        model = None if field is None else field.annotation
-    close = difflib.get_close_matches(path[-1], getattr(model, "model_fields", {}), 1)
+        field = model.model_fields.get(part)  # None for the id of a tag and the index in a list
+        model = model if field is None else model_in(field.annotation) or model
+    close = difflib.get_close_matches(path[-1], model.model_fields, 1)
     return f"; did you mean {close[0]}?" if close else ""
+
+
+def model_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the model that an annotation is, or holds in a list, a dict or an optional."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (model_in(argument) for argument in get_args(annotation))
+    return next((model for model in found if model is not None), None)
