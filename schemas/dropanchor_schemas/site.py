@@ -147,6 +147,10 @@ class TagSettings(_Settings):
     )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
 
+    def over(self, defaults: "TagSettings") -> "TagSettings":
+        """Return these settings, with those of `defaults` where nothing was given."""
+        return defaults.model_copy(update={name: getattr(self, name) for name in self.model_fields_set})
+
 
 class RemoteSettings(_Settings):
     """What the service sets in the program of a tag, while it runs."""

@@ -4,12 +4,13 @@ import logging
 import os
 import socket
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from threading import Event
 from types import TracebackType
 from typing import Self
 
 import zenoh
+from fastapi import FastAPI
 from pydantic import ValidationError
 
 from dropanchor_schemas.keys import health_key, samples_key
@@ -18,11 +19,13 @@ from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
+from dropanchor_service.api.starting import CurrentApp, create_starting_app
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest
+from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest
+from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
@@ -62,23 +65,24 @@ class Service:
     Creating or entering it raises SettingsError, ListenError or ZenohError, each with a message for the user.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, compiling: AbstractContextManager[None] | None = None) -> None:
+        """compiling: entered while the kernels are compiled, so that a signal can interrupt that."""
         self._settings = settings
         self._credentials = credentials_of(settings)
         refuse_exposure(settings, self._credentials)
         self._certificate = certificate_of(settings.http, self._credentials)
         self._authenticator = authenticator_of(settings.security)
-        warm_up_ingest()
-        warm_up_answers()
+        self._compiling = compiling or nullcontext()
         self._stopping = Event()
         self._opened = ExitStack()
         self._supervision = Supervision()
+        self._progress = CompilationProgress()
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.tags = TagTable()
         self.latest = LatestPoses()
-        health = HealthTable()
-        pending_tags = PendingTags(settings.max_tags)
+        self._health = HealthTable()
+        self._pending_tags = PendingTags(settings.max_tags)
         self.site = _site_store(settings)
         self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
         self._publishers = Publishers()
@@ -88,42 +92,16 @@ class Service:
             self.latest,
             self.clock.now_ns,
             self._persistence.tracks,
-            pending_tags,
-            health,
+            self._pending_tags,
+            self._health,
             self._publishers,
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
-        engine = GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics)
-        self._ingest = self._create_ingest(engine, pending_tags, health)
-        self._checkpoints = self._checkpointer(engine)
-        self._thread = IngestThread(
-            self._ingest,
-            self._buffer,
-            self.metrics,
-            settings.ingest.period_ms * 1e-3,
-            self._checkpoints.between_turns if self._checkpoints else lambda: None,
-        )
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
-        self.metrics.register(HealthGauges(self.tags, health, self.clock.now_ns, self._publishers))
+        self.metrics.register(HealthGauges(self.tags, self._health, self.clock.now_ns, self._publishers))
         self.metrics.register(
-            FleetGauges(self.tags, pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
-        )
-
-    def _create_ingest(self, engine: GuardedEngine, pending_tags: PendingTags, health: HealthTable) -> Ingest:
-        return Ingest(
-            self._buffer,
-            Admission(self._settings, self.site, self.tags, pending_tags),
-            engine,
-            self._publishers,
-            self.site,
-            self.tags,
-            self.latest,
-            self.metrics,
-            self.clock,
-            observers=self._persistence.observers,
-            reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
-            health=health,
+            FleetGauges(self.tags, self._pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )
 
     def __enter__(self) -> Self:
@@ -133,6 +111,9 @@ class Service:
             self._opened.enter_context(self._supervision)
             self._http = self._http_thread(bound)
             self._opened.callback(self._http.join, HTTP_STOP_S)
+            self._http.start()
+            self._opened.callback(self._http.ask_to_stop)
+            self._build_ingest(self._compiled_engine())
             self._opened.enter_context(self._persistence)
             if self._checkpoints is not None:
                 self._checkpoints.load()
@@ -141,7 +122,7 @@ class Service:
             self._thread.start()
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._link)
-            self._http.start()
+            self._app.app = self._full_app()
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
@@ -154,6 +135,41 @@ class Service:
             )
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
+
+    def _compiled_engine(self) -> Engine:
+        """Return the engine. Compile whatever the service will run, so that no sample waits for it."""
+        progress = self._progress
+        progress.page = f"{self.url}/"
+        with self._compiling:
+            warm_up_ingest(progress)
+            warm_up_answers(progress)
+            return create_engine(self._settings, progress)
+
+    def _build_ingest(self, engine: Engine) -> None:
+        settings = self._settings
+        guarded = GuardedEngine(engine, self.site, self.tags, self.metrics)
+        self._ingest = Ingest(
+            self._buffer,
+            Admission(settings, self.site, self.tags, self._pending_tags),
+            guarded,
+            self._publishers,
+            self.site,
+            self.tags,
+            self.latest,
+            self.metrics,
+            self.clock,
+            observers=self._persistence.observers,
+            reorder_ns=round(settings.ingest.reorder_ms * 1e6),
+            health=self._health,
+        )
+        self._checkpoints = self._checkpointer(guarded)
+        self._thread = IngestThread(
+            self._ingest,
+            self._buffer,
+            self.metrics,
+            settings.ingest.period_ms * 1e-3,
+            self._checkpoints.between_turns if self._checkpoints else lambda: None,
+        )
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -255,7 +271,13 @@ class Service:
         self._ingest.health.put(health_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
-        app = create_app(
+        """Return the thread of the HTTP server. Until the service is ready, it serves the page with the progress."""
+        self._app = CurrentApp(create_starting_app(lambda: self._progress.sentence))
+        self._address = bound.getsockname()
+        return HttpThread(build_server(self._app, self._stopping, certificate=self._certificate), bound)
+
+    def _full_app(self) -> FastAPI:
+        return create_app(
             self.answers,
             ready=lambda: (not (found := self.problems()), found),
             impaired=self.impairments,
@@ -269,13 +291,12 @@ class Service:
             credentials=self._credentials,
             authenticator=self._authenticator,
             rate_limiter=RateLimiter(self._settings.http.requests_per_s, self._settings.http.burst),
+            cors_origins=self._settings.http.cors_origins,
         )
-        self._address = bound.getsockname()
-        return HttpThread(build_server(app, self._stopping, certificate=self._certificate), bound)
 
 
 def _site_store(settings: Settings) -> SiteStore:
     try:
-        return SiteStore(settings.site, dict(settings.tags), settings.data_dir)
+        return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
     except (OSError, ValidationError) as error:
         raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error

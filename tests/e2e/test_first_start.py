@@ -1,13 +1,17 @@
-"""The first start compiles the estimator. It reports its progress and can be interrupted."""
+"""The first start compiles the estimator. It reports its progress, serves the page meanwhile and can be interrupted."""
 
 import signal
 import subprocess
 from pathlib import Path
 
+import httpx
 import pytest
 
+from dropanchor_tag_client import TagClient
 from support.service import command, environment
-from support.zenoh_router import free_endpoint
+from support.zenoh_router import free_endpoint, free_port, wait_until
+
+COMPILING_S = 600.0  # at most, on a busy machine
 
 
 @pytest.mark.parametrize(("subcommand", "how"), [("serve", signal.SIGTERM), ("demo", signal.SIGINT)])
@@ -27,3 +31,33 @@ def test_a_signal_ends_a_first_start_while_it_compiles(tmp_path: Path, subcomman
             assert process.stderr.read() == ""
         finally:
             process.kill()
+
+
+def test_a_first_start_serves_the_page_at_once_and_loses_no_sample(tmp_path: Path) -> None:
+    url, zenoh = f"http://127.0.0.1:{free_port()}", free_endpoint()
+    arguments = command("serve", "--port", url.rpartition(":")[2], "--zenoh-listen", zenoh)
+
+    def status(path: str) -> int:
+        try:
+            return httpx.get(url + path, trust_env=False).status_code
+        except httpx.TransportError:
+            return 0
+
+    with subprocess.Popen(
+        arguments, stderr=subprocess.DEVNULL, env=environment(NUMBA_CACHE_DIR=str(tmp_path))
+    ) as process:
+        try:
+            wait_until(lambda: status("/") == 200, 60.0)
+            wait_until(lambda: "so far" in httpx.get(f"{url}/api/v1/health/ready", trust_env=False).text, 60.0)
+            assert status("/api/v1/poses") == 503
+            with TagClient("cart", connect=zenoh, spool=tmp_path / "spool") as tag:
+                for number in range(20):
+                    tag.publish_range(1, 5.0 + 0.01 * number)
+                assert status("/api/v1/health/ready") == 503
+                wait_until(lambda: status("/api/v1/health/ready") == 200, COMPILING_S)
+                wait_until(lambda: status("/api/v1/tags/cart") == 200, 60.0)
+            tag_status = f"{url}/api/v1/tags/cart"
+            wait_until(lambda: httpx.get(tag_status, trust_env=False).json()["samples"] == {"range": 20}, 60.0)
+        finally:
+            process.terminate()
+            assert process.wait(60.0) == 0

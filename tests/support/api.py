@@ -63,6 +63,7 @@ class ApiBench:
         authenticator: Authenticator | None = None,
         rate_limiter: RateLimiter | None = None,
         endpoints: tuple[str, ...] = (),
+        cors_origins: tuple[str, ...] = (),
     ) -> FastAPI:
         return create_app(
             self.answers,
@@ -77,6 +78,7 @@ class ApiBench:
             authenticator=authenticator,
             rate_limiter=rate_limiter,
             endpoints=endpoints,
+            cors_origins=cors_origins,
         )
 
 

@@ -73,6 +73,20 @@ def watched_page(
     reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
 ) -> Iterator[WatchedPage]:
     """Open the page, wait until its stream is live, and close it at the end. size: CSS pixels."""
+    with open_page(browser, url, scheme, size, reduced_motion) as watched:
+        watched.wait_for("window.dropanchor?.status() === 'live'")
+        yield watched
+
+
+@contextmanager
+def open_page(
+    browser: Browser,
+    url: str,
+    scheme: Scheme = "light",
+    size: tuple[int, int] = (1280, 800),
+    reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
+) -> Iterator[WatchedPage]:
+    """Open the page, and close it at the end. size: CSS pixels."""
     context = browser.new_context(
         viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion=reduced_motion
     )
@@ -82,6 +96,5 @@ def watched_page(
     page.on("pageerror", lambda error: watched.errors.append(str(error)))
     page.on("console", lambda line: watched.errors.append(line.text) if line.type in ("error", "warning") else None)
     page.goto(url)
-    watched.wait_for("window.dropanchor?.status() === 'live'")
     yield watched
     context.close()

@@ -1,5 +1,6 @@
 """Build the FastAPI application. Everything it uses is passed in."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -15,11 +16,11 @@ from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import OPEN_PATHS, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
-from dropanchor_service.api.http.headers import SecurityHeaders
+from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.connect import connect_router
-from dropanchor_service.api.routes.dashboard import DashboardMount
+from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
@@ -58,6 +59,7 @@ def create_app(
     credentials: SecurityFolder | None = None,
     authenticator: Authenticator | None = None,
     rate_limiter: RateLimiter | None = None,
+    cors_origins: Sequence[str] = (),
 ) -> FastAPI:
     """Return the application with all routes and middleware.
 
@@ -66,9 +68,9 @@ def create_app(
     recorder: None when there is no folder for recordings. dashboard: the folder of the page; None for no page.
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
-    no limit.
+    no limit. cors_origins: of other web pages that may use the interface.
     """
-    app = _app_without_routes(authenticator, rate_limiter)
+    app = _app_without_routes(authenticator, rate_limiter, cors_origins)
     for router in (
         poses_router(answers),
         tags_router(answers, max_tags),
@@ -87,16 +89,19 @@ def create_app(
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))
     if dashboard is not None:
-        app.router.routes.append(DashboardMount(dashboard))
+        app.router.routes.extend(page_mounts(dashboard))
+    app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 
 
-def _app_without_routes(authenticator: Authenticator | None, rate_limiter: RateLimiter | None) -> FastAPI:
+def _app_without_routes(
+    authenticator: Authenticator | None, rate_limiter: RateLimiter | None, cors_origins: Sequence[str]
+) -> FastAPI:
     app = FastAPI(
         title="Dropanchor",
         version="1",
         openapi_url=f"{PREFIX}/openapi.json",
-        docs_url=None,  # its scripts come from a CDN, but the service must work without internet access
+        docs_url=None,  # its scripts come from a CDN; `page_mounts` has them without internet access
         redoc_url=None,
         redirect_slashes=False,
     )
@@ -104,8 +109,8 @@ def _app_without_routes(authenticator: Authenticator | None, rate_limiter: RateL
     app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
+    allow_origins(app, cors_origins)
     add_error_handlers(app)
-    app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 
 

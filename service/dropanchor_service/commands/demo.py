@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_service.api.http.server import ListenError
+from dropanchor_service.commands.lan import show_addresses
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.commands.recorded import recorded_tag
 from dropanchor_service.runtime import logs
@@ -60,14 +61,17 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the demo. Return 0 if it was stopped, 1 if a part of it died, 2 if it could not start."""
     logs.configure(arguments.log_level)
     try:
-        with interrupts() as interrupt, _demo_setup(arguments) as setup:
-            with interrupt.raising():  # the service may have to compile the estimator
-                created = Service(setup.settings)
-            with created as service, _running_tags(setup) as tags:
-                sys.stdout.write(_addresses(service.url))
-                sys.stdout.flush()
-                # A recording that ended normally (exit code 0) is no failure: the page stays available.
-                stopped = interrupt.wait(lambda: tags.poll() in (None, 0) and not service.has_died)
+        with (
+            interrupts() as interrupt,
+            _demo_setup(arguments) as setup,
+            Service(setup.settings, compiling=interrupt.raising()) as service,
+            _running_tags(setup) as tags,
+        ):
+            sys.stdout.write(_addresses(service.url))
+            show_addresses(service.url, sys.stdout)
+            sys.stdout.flush()
+            # A recording that ended normally (exit code 0) is no failure: the page stays available.
+            stopped = interrupt.wait(lambda: tags.poll() in (None, 0) and not service.has_died)
     except KeyboardInterrupt:
         return 0
     except (SettingsError, ListenError, ZenohError, RecordingError) as error:

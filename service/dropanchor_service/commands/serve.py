@@ -6,6 +6,7 @@ import sys
 from typing import Protocol
 
 from dropanchor_service.api.http.server import ListenError
+from dropanchor_service.commands.lan import show_addresses
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.runtime import logs, open_files
 from dropanchor_service.runtime.memory import HeapTrimmer
@@ -54,14 +55,12 @@ def run(arguments: argparse.Namespace) -> int:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     systemd = Systemd()
     try:
-        with interrupts() as interrupt:
-            with interrupt.raising():  # the service may have to compile the estimator
-                created = Service(settings_of(arguments))
-            with created as service:
-                systemd.ready()
-                heap = HeapTrimmer()
-                stopped = interrupt.wait(lambda: supervise(service, systemd, heap))
-                systemd.stopping()
+        with interrupts() as interrupt, Service(settings_of(arguments), compiling=interrupt.raising()) as service:
+            systemd.ready()
+            show_addresses(service.url, sys.stdout)
+            heap = HeapTrimmer()
+            stopped = interrupt.wait(lambda: supervise(service, systemd, heap))
+            systemd.stopping()
     except KeyboardInterrupt:
         return 0
     except (SettingsError, ListenError, ZenohError) as error:

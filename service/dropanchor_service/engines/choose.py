@@ -1,12 +1,12 @@
 """Create the engine that the settings choose."""
 
-from dropanchor_service.engines.warm_up import warm_up
+from dropanchor_service.engines.warm_up import CompilationProgress, warm_up
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 from dropanchor_service.settings.model import Settings
 
 
-def create_engine(settings: Settings) -> Engine:
+def create_engine(settings: Settings, progress: CompilationProgress | None = None) -> Engine:
     """Return a compiled engine. Only the chosen one is imported: filterpy takes seconds, the first compile a minute."""
     match settings.engine:
         case "paper":
@@ -17,5 +17,5 @@ def create_engine(settings: Settings) -> Engine:
             use_kernel_cache()
             from dropanchor_service.estimation.fleet.engine import FleetEngine
 
-            warm_up(FleetEngine())
+            warm_up(FleetEngine(), progress)
             return FleetEngine()

@@ -47,9 +47,41 @@ IMPORT_BLOCKED: Final[Any] = None  # in sys.modules it makes an import fail
 _log = logging.getLogger(__name__)
 
 
+class CompilationProgress:
+    """How far compiling has come. The thread that compiles writes; any thread reads.
+
+    page: URL of the page that shows the progress; "" without one.
+    """
+
+    def __init__(self, page: str = "") -> None:
+        self.page = page
+        self._what = ""
+        self._began_s = 0.0
+
+    def begin(self, what: str) -> None:
+        self._what, self._began_s = what, time.monotonic()
+
+    def end(self) -> None:
+        self._what = ""
+
+    @property
+    def elapsed_s(self) -> float:
+        return time.monotonic() - self._began_s
+
+    @property
+    def sentence(self) -> str:
+        """What the service does before it is ready, for people."""
+        if not self._what:
+            return "The service is starting."
+        return (
+            f"The service compiles {self._what} on this machine: {self.elapsed_s:.0f} s so far. "
+            "This happens once after an update."
+        )
+
+
 @contextmanager
-def _log_compilation(what: str) -> Iterator[None]:
-    """Log the progress of compiling, because a minute of silence looks like a fault.
+def _compiling(what: str, progress: CompilationProgress) -> Iterator[None]:
+    """Log and note the progress of compiling, because a minute of silence looks like a fault.
 
     The level is WARNING, so that the lines appear at any usual log level.
     """
@@ -58,26 +90,27 @@ def _log_compilation(what: str) -> Iterator[None]:
     class Progress(Listener):
         """Receives an event for each of hundreds of functions."""
 
-        started: float | None = None
+        has_begun = False
         logged = 0.0
 
         def on_start(self, event: Event) -> None:  # noqa: ARG002
-            now = time.monotonic()
-            if self.started is None:
-                self.started = self.logged = now
-                _log.warning("compiling %s; please wait. This happens once after an update", what)
-            elif now - self.logged >= PROGRESS_S:
-                self.logged = now
-                _log.warning("compiling: %.0f s so far", now - self.started)
+            if not self.has_begun:
+                self.has_begun, self.logged = True, time.monotonic()
+                progress.begin(what)
+                shown = f"; {progress.page} shows the progress" if progress.page else ""
+                _log.warning("compiling %s; please wait. This happens once after an update%s", what, shown)
+            elif time.monotonic() - self.logged >= PROGRESS_S:
+                self.logged = time.monotonic()
+                _log.warning("compiling: %.0f s so far", progress.elapsed_s)
 
         def on_end(self, event: Event) -> None: ...
 
-    progress = Progress()
-    with install_listener("numba:compile", progress):
+    listener = Progress()
+    with _without_blas(), install_listener("numba:compile", listener):
         yield
-    if progress.started is not None:
-        elapsed = time.monotonic() - progress.started
-        _log.warning("compiled in %.0f s; the result is cached in %s", elapsed, os.environ.get(VARIABLE))
+    if listener.has_begun:
+        _log.warning("compiled in %.0f s; the result is cached in %s", progress.elapsed_s, os.environ.get(VARIABLE))
+        progress.end()
 
 
 @contextmanager
@@ -94,10 +127,13 @@ def _without_blas() -> Iterator[None]:
             del sys.modules["scipy.linalg"]
 
 
-@_without_blas()
-@_log_compilation("the estimator, which takes about a minute")
-def warm_up(engine: Engine) -> None:
+def warm_up(engine: Engine, progress: CompilationProgress | None = None) -> None:
     """Compile the kernels of `engine` with two seconds of a tag that moves off. Discard `engine` afterwards."""
+    with _compiling("the estimator, which takes about a minute", progress or CompilationProgress()):
+        _run(engine)
+
+
+def _run(engine: Engine) -> None:
     engine.set_anchors(np.zeros(1, ANCHOR))
     unknown_start, known_start = default_settings(), default_settings()
     known_start["start_known"] = True
@@ -120,9 +156,7 @@ def _moving_off(rows: int) -> SampleBatch:
     return SampleBatch(imu=imu, ranges=ranges, headings=headings)
 
 
-@_without_blas()
-@_log_compilation("the decoder of messages")
-def warm_up_ingest() -> None:
+def warm_up_ingest(progress: CompilationProgress | None = None) -> None:
     """Compile the kernels of the ingest with two messages around a gap, and with one message.
 
     The columns of a single message have no strides, which makes them another type to the compiler.
@@ -136,8 +170,9 @@ def warm_up_ingest() -> None:
         boot_clock=True,
     )
     payloads = [encode_packed(replace(frame, sequence=number)) for number in (0, 2)]
-    for batch in (payloads, payloads[:1]):
-        _ingest(batch)
+    with _compiling("the decoder of messages", progress or CompilationProgress()):
+        for batch in (payloads, payloads[:1]):
+            _ingest(batch)
 
 
 def _ingest(payloads: list[bytes]) -> None:
@@ -151,9 +186,7 @@ def _ingest(payloads: list[bytes]) -> None:
         shift_times(t_ns, messages, offsets)
 
 
-@_without_blas()
-@_log_compilation("the encoder of answers")
-def warm_up_answers() -> None:
+def warm_up_answers(progress: CompilationProgress | None = None) -> None:
     """Compile the kernels of the answers with an old pose and an ambiguous one."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
     poses, hypotheses = np.zeros(2, POSE), np.zeros(2, HYPOTHESIS)
@@ -163,4 +196,5 @@ def warm_up_answers() -> None:
     poses["t_ns"] = [0, answers.now_ns()]
     poses["state"], hypotheses["row"] = State.AMBIGUOUS, 1
     answers.latest.write(poses, hypotheses)
-    b"".join(answers.pose_list_json())
+    with _compiling("the encoder of answers", progress or CompilationProgress()):
+        b"".join(answers.pose_list_json())

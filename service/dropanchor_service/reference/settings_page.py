@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 
 from dropanchor_service.reference.markdown import table
 from dropanchor_service.settings.model import Settings
+from dropanchor_service.settings.sources import model_in
 
 HEADER = ("key", "type", "unit", "default", "meaning")
 _INTRODUCTION = """\
@@ -20,7 +21,8 @@ _INTRODUCTION = """\
 `[http]` is `DROPANCHOR_HTTP__PORT`. An option of the command overrides both. A key that does not exist is an error that
 names the file, the key and the nearest one that does exist.
 
-`[tags.<id>]` holds the settings of one tag. Quote an id in TOML where it holds more than letters, digits, `_` and `-`.
+`[tags.<id>]` holds the settings of one tag, and `[tag_defaults]` those of all tags that do not say otherwise. Quote
+an id in TOML where it holds more than letters, digits, `_` and `-`.
 """
 _UNITS = {
     "ms": "ms",
@@ -37,24 +39,37 @@ _UNITS = {
 
 def page() -> str:
     """Return the page as Markdown."""
-    sections = [f"## {title}\n\n{text}\n\n{table(HEADER, rows)}" for title, text, rows in _sections(Settings, "", "")]
+    sections = [
+        f"## {title}\n\n{text}\n" + (f"\n{table(HEADER, rows)}" if rows else "")
+        for title, text, rows in _sections(Settings, "", "", {})
+    ]
     return "\n".join([_INTRODUCTION, *sections])
 
 
-def _sections(model: type[BaseModel], path: str, text: str) -> Iterator[tuple[str, str, list[tuple[str, ...]]]]:
-    """Yield title, introduction and rows of this model's own keys, then of each section below it."""
+def _sections(
+    model: type[BaseModel], path: str, text: str, shown: dict[type[BaseModel], str]
+) -> Iterator[tuple[str, str, list[tuple[str, ...]]]]:
+    """Yield title, introduction and rows of this model's own keys, then of each section below it.
+
+    shown: titles of the models that have a section already, whose keys are not repeated.
+    """
+    title = f"`[{path}]`" if path else "Top level"
+    if model in shown:
+        yield title, f"{text} The keys are those of {shown[model]}.", []
+        return
+    shown[model] = title
     rows: list[tuple[str, ...]] = []
-    below: list[tuple[type[BaseModel], str]] = []
+    below: list[tuple[type[BaseModel], str, str]] = []
     for name, field in model.model_fields.items():
-        section = _model_in(field.annotation)
+        section = model_in(field.annotation)
         if section is None:
             rows.append(_row(name, field))
         else:
-            below.append((section, _path_of(path, name, field)))
+            below.append((section, _path_of(path, name, field), field.description or ""))
     if rows:
-        yield (f"`[{path}]`" if path else "Top level"), text or _first_paragraph(model), rows
-    for section, inner in below:
-        yield from _sections(section, inner, "")
+        yield title, _first_paragraph(model), rows
+    for section, inner, description in below:
+        yield from _sections(section, inner, description, shown)
 
 
 def _path_of(path: str, name: str, field: FieldInfo) -> str:
@@ -63,14 +78,6 @@ def _path_of(path: str, name: str, field: FieldInfo) -> str:
     if origin.startswith("dict"):
         return f"{inner}.<id>"
     return f"[{inner}]" if origin.startswith("list") else inner
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the model that an annotation is, or holds in a list, a dict or an optional."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    found = (_model_in(argument) for argument in get_args(annotation))
-    return next((model for model in found if model is not None), None)
 
 
 def _first_paragraph(model: type[BaseModel]) -> str:
@@ -141,8 +148,8 @@ def _type_name(annotation: Any) -> str:
         ("dict", "table of numbers"),
         ("tuple", "list of texts"),
         ("Path", "path"),
-        ("bool", "true or false"),
         ("float", "number"),
+        ("bool", "true or false"),
         ("int", "integer"),
         ("str", "text"),
     )

@@ -1,6 +1,7 @@
 """The settings of the service. `sources` reads them; they are built once and passed down."""
 
 import difflib
+import re
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -41,6 +42,15 @@ Parameters = TypeVar("Parameters", PaperParameters, AttitudeParameters)
 Port = Annotated[int, Field(ge=0, le=65535)]
 
 
+def _is_origin(text: str) -> str:
+    if text != "*" and not re.fullmatch(r"https?://[^/?#\s]+", text):
+        raise ValueError('an origin such as https://board.example was expected, or "*" for all')
+    return text
+
+
+Origins = Annotated[tuple[Annotated[str, AfterValidator(_is_origin)], ...], BeforeValidator(_as_list)]
+
+
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -64,6 +74,12 @@ class HttpSettings(_Section):
     )
     burst: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
         default=400, description="Requests that it may make at once."
+    )
+
+    cors_origins: Origins = Field(
+        default=(),
+        description='Origins of other web pages that may use the REST interface, such as `["https://board.example"]`; '
+        '`["*"]`: all. They need a key like any other client.',
     )
 
     @model_validator(mode="after")
@@ -249,7 +265,15 @@ class Settings(_Section):
     recording: RecordingSettings = RecordingSettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}
+    tag_defaults: TagSettings = Field(
+        default=TagSettings(), description="What every tag gets, unless its own table says otherwise."
+    )
     paper: PaperSettings = PaperSettings()
+
+    @property
+    def listed_tags(self) -> dict[str, TagSettings]:
+        """The settings of the tags that are listed, with the defaults where their tables say nothing."""
+        return {name: tag.over(self.tag_defaults) for name, tag in self.tags.items()}
 
     @model_validator(mode="after")
     def _listed_tags_fit(self) -> "Settings":

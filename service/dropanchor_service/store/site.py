@@ -33,14 +33,21 @@ class SiteStore:
     so that one comparison detects a change.
     """
 
-    def __init__(self, site: Site, tags: dict[str, TagSettings], folder: Path | None = None) -> None:
+    def __init__(
+        self,
+        site: Site,
+        tags: dict[str, TagSettings],
+        folder: Path | None = None,
+        tag_defaults: TagSettings | None = None,
+    ) -> None:
         """Load the file in `folder` if there is one, else use `site` and `tags`.
 
-        folder: where changes are saved; with None they are lost at a restart.
+        folder: where changes are saved; with None they are lost at a restart. tag_defaults: what a tag gets where its
+        own settings say nothing.
         Raises OSError or pydantic's ValidationError when the file cannot be read.
         """
         self._lock = Lock()
-        self._default_settings = TagSettings()
+        self.default_settings = tag_defaults or TagSettings()
         self._path = None if folder is None else folder / FILE_NAME
         self._document = SiteDocument(site=site, tags=tags)
         if self._path is not None and self._path.exists():
@@ -64,7 +71,7 @@ class SiteStore:
 
     def tag_settings(self, tag: str) -> TagSettings:
         """Return the settings of the tag, or the defaults when it has none."""
-        return self._document.tags.get(tag, self._default_settings)
+        return self._document.tags.get(tag, self.default_settings)
 
     def anchor_index(self, number: int) -> int | None:
         """Return the engine's index of the anchor with this number, or None when the site does not have it."""
@@ -127,9 +134,10 @@ class SiteStore:
             self._replace(self._document.model_copy(update={"site": site}))
 
     def set_tag(self, tag: str, settings: TagSettings) -> None:
-        """Replace the settings of the tag and save them. Raises OSError."""
+        """Replace the settings of the tag and save them. What is not given becomes the default. Raises OSError."""
         with self._lock:
-            self._replace(self._document.model_copy(update={"tags": self.tags | {tag: settings}}))
+            complete = settings.over(self.default_settings)
+            self._replace(self._document.model_copy(update={"tags": self.tags | {tag: complete}}))
 
     def remote_settings(self, tag: str) -> RemoteSettings:
         """Return what the program of the tag should apply."""

@@ -7,6 +7,7 @@ from pydantic import ValidationError
 
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.settings.sources import SettingsError, load_settings
+from dropanchor_service.store import SiteStore
 
 
 def write(folder: Path, text: str) -> Path:
@@ -86,6 +87,13 @@ def test_unrelated_variables_with_the_prefix_are_ignored() -> None:
     [
         ("[http]\nport = 99999", ["http.port", "less than or equal to 65535"]),
         ("[http]\nprot = 1", ["http.prot is not a setting", "did you mean port?"]),
+        ("[tags.a]\nheigth_m = 1", ["tags.a.heigth_m is not a setting", "did you mean height_m?"]),
+        ("[[site.anchors]]\nid = '1'\nxx = 1", ["site.anchors.0.xx is not a setting", "did you mean x?"]),
+        (
+            "[tag_defaults.start]\nx = 1\ny = 2\nheading = 1",
+            ["tag_defaults.start.heading", "did you mean heading_rad?"],
+        ),
+        ("[http]\ncors_origins = ['board.example']", ["http.cors_origins.0", "an origin such as https://"]),
         ("[htp]\nport = 1", ["htp is not a setting", "did you mean http?"]),
         ('engine = "magic"', ["engine", "'paper'"]),
         ('unknown_tags = "maybe"', ["unknown_tags", "'accept', 'quarantine' or 'refuse'"]),
@@ -136,3 +144,22 @@ def test_an_unreadable_file_is_named(tmp_path: Path) -> None:
 def test_settings_are_immutable() -> None:
     with pytest.raises(ValidationError):
         load_settings(environment={}).max_tags = 3
+
+
+def test_a_tag_gets_the_defaults_unless_its_own_table_says_otherwise(tmp_path: Path) -> None:
+    text = """
+[tag_defaults]
+height_m = 1.2
+speed_max_mps = 3.0
+start = { x = 1.0, y = 2.0 }
+[tags.cart]
+height_m = 0.0
+[tags.drone]
+start = { x = 5.0, y = 6.0 }
+"""
+    settings = load_settings(write(tmp_path, text), environment={})
+    store = SiteStore(settings.site, settings.listed_tags, tag_defaults=settings.tag_defaults)
+    cart, drone, other = (store.tag_settings(name) for name in ("cart", "drone", "other"))
+    assert (cart.height_m, drone.height_m, other.height_m) == (0.0, 1.2, 1.2)
+    assert {tag.speed_max_mps for tag in (cart, drone, other)} == {3.0}
+    assert [tag.start and tag.start.x for tag in (cart, drone, other)] == [1.0, 5.0, 1.0]

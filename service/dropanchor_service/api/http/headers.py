@@ -1,6 +1,10 @@
-"""Security headers of every response. There is no CORS, so pages of other origins cannot read the responses."""
+"""Headers for browsers: security headers of every response, and which pages of other origins may read them."""
 
+from collections.abc import Sequence
+
+from fastapi import FastAPI
 from starlette.datastructures import MutableHeaders
+from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _HEADERS = {
@@ -26,3 +30,18 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, sending)
+
+
+def allow_origins(app: FastAPI, origins: Sequence[str]) -> None:
+    """Let pages of these origins use the interface. Call this after all other middleware was added.
+
+    A browser asks for permission without credentials, so this comes before authentication.
+    """
+    if origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=list(origins),
+            allow_methods=["DELETE", "GET", "HEAD", "PATCH", "POST", "PUT"],
+            allow_headers=["authorization", "content-type", "if-match", "if-none-match", "last-event-id"],
+            expose_headers=["etag", "link", "retry-after"],
+        )

@@ -1,5 +1,6 @@
 """The dashboard: static files that browsers always revalidate and that may load nothing from other origins."""
 
+from importlib.resources import files
 from pathlib import Path
 
 from starlette.responses import Response
@@ -21,6 +22,12 @@ class _Files(StaticFiles):
         response = await super().get_response(path, scope)
         response.headers.update(_HEADERS)
         return response
+
+
+def page_mounts(dashboard: Path) -> list[Mount]:
+    """Return the routes of the pages: the dashboard, and the interactive documentation with its program."""
+    swagger_ui = _Files(directory=str(files("fastapi_swagger.resources")))
+    return [Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui"), DashboardMount(dashboard)]
 
 
 class DashboardMount(Mount):

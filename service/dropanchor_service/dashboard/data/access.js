@@ -4,13 +4,20 @@ const STORAGE_KEY = "dropanchor.key";
 
 export class KeyRequiredError extends Error {}
 
+/** The service answers, but is still starting. The message says what it does. */
+export class StartingError extends Error {}
+
+const UNAVAILABLE = 503;
+const NOT_READY = "urn:dropanchor:problem:not-ready";
+
 export const hasKey = () => sessionStorage.getItem(STORAGE_KEY) !== null;
 
 /** @param {string} key */
 export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
 
 /**
- * Return a successful response. Throws KeyRequiredError without a valid key, and Error for any other failure.
+ * Return a successful response. Throws KeyRequiredError without a valid key, StartingError while the service starts, and
+ * Error for any other failure.
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
 export async function request(url, options) {
@@ -18,6 +25,10 @@ export async function request(url, options) {
   const headers = key === null ? {} : { authorization: `Bearer ${key}` };
   const response = await fetch(url, { ...options, headers, cache: "no-store" });
   if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
+  if (response.status === UNAVAILABLE) {
+    const problem = await response.json();
+    if (problem.type === NOT_READY) throw new StartingError(problem.detail);
+  }
   if (!response.ok) throw new Error(`${url.pathname} returned status ${response.status}`);
   return response;
 }

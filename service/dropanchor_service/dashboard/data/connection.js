@@ -1,6 +1,6 @@
 /** The connection to the service: the stream of poses, and the site. It reconnects by itself. */
 
-import { request, KeyRequiredError } from "./access.js";
+import { request, KeyRequiredError, StartingError } from "./access.js";
 import { eventsOf } from "./events.js";
 
 /** Frames per second; fewer for a large fleet, whose frames are large. */
@@ -8,6 +8,7 @@ const HZ = 10;
 const HZ_OF_LARGE_FLEET = 4;
 const LARGE_FLEET = 2000;
 const RETRY_MS = [500, 1000, 2000, 3000];
+const STARTING_MS = 1000;
 const PROBE_MS = 3000;
 const PROBE_TIMEOUT_MS = 4000;
 
@@ -24,8 +25,11 @@ export async function getJson(url) {
  * The site is requested every few seconds, since its anchors may have moved and a silent stream may be dead.
  */
 export class Connection extends EventTarget {
-  /** "locked": the service requires a key, or another one. @type {"connecting" | "live" | "lost" | "locked"} */
+  /** "locked": the service requires a key, or another one. "starting": it answers, but is not ready yet.
+   * @type {"connecting" | "starting" | "live" | "lost" | "locked"} */
   status = "connecting";
+  /** What the service does while it is starting. */
+  progress = "";
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;
   /** For tests and the console: number of frames so far, and the time that the last one took. */
@@ -92,6 +96,12 @@ export class Connection extends EventTarget {
   #failed(why) {
     this.#stream.abort();
     clearTimeout(this.#timer);
+    if (why instanceof StartingError) {
+      this.progress = why.message;
+      this.#become("starting");
+      this.#timer = setTimeout(() => this.#open(), STARTING_MS);
+      return;
+    }
     const locked = why instanceof KeyRequiredError;
     this.#become(locked ? "locked" : "lost");
     if (locked) return;
@@ -107,7 +117,7 @@ export class Connection extends EventTarget {
     setTimeout(() => this.#probe(), PROBE_MS);
   }
 
-  /** @param {"connecting" | "live" | "lost" | "locked"} status */
+  /** @param {Connection["status"]} status */
   #become(status) {
     if (status === this.status) return;
     if (status === "lost") this.lostAt = performance.now();

@@ -1,4 +1,4 @@
-/** Messages about the page itself: connecting, connection lost, key required, no tags yet. */
+/** Messages about the page itself: connecting, starting, connection lost, key required, no tags yet. */
 
 import { hasKey, storeKey } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
@@ -20,13 +20,15 @@ export class Notices {
   }
 
   update() {
-    const { status, lostAt } = this.connection;
-    const label = { connecting: "Connecting", live: "Live", lost: "Disconnected", locked: "Locked" }[status];
+    const { status, lostAt, progress } = this.connection;
+    const label = { connecting: "Connecting", starting: "Starting", live: "Live", lost: "Disconnected", locked: "Locked" }[status];
     byId("status").dataset.status = status;
     write(byId("status-text"), label);
     byId("lost").hidden = status !== "lost";
     document.title = status === "lost" ? "Connection lost · Dropanchor" : "Dropanchor";
     write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
+    byId("starting").hidden = status !== "starting";
+    write(byId("progress"), progress);
     byId("locked").hidden = status !== "locked";
     byId("refused").hidden = !hasKey();
     const isEmpty = status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;

@@ -1,0 +1,38 @@
+"""Until the service is ready, it serves the page, and every other answer says what it still does."""
+
+import pytest
+
+from dropanchor_service.api.starting import create_starting_app
+from support.api import ask, kind_of
+
+REASON = "The service compiles the estimator on this machine: 7 s so far."
+APP = create_starting_app(lambda: REASON)
+
+
+def test_the_page_and_its_files_are_there() -> None:
+    assert "<title>Dropanchor</title>" in ask(APP, "GET", "/").text
+    assert ask(APP, "GET", "/page/main.js").status_code == 200
+
+
+def test_the_service_is_live_but_not_ready() -> None:
+    assert ask(APP, "GET", "/api/v1/health/live").json()["status"] == "live"
+    response = ask(APP, "GET", "/api/v1/health/ready")
+    assert (response.status_code, kind_of(response)) == (503, "not-ready")
+    assert response.json()["reasons"] == [REASON]
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/api/v1/poses"),
+        ("GET", "/api/v1/stream"),
+        ("PUT", "/api/v1/site"),
+        ("POST", "/api/v1/ingest/a%2Fb"),
+        ("DELETE", "/api/v1/anchors/1"),
+        ("GET", "/metrics"),
+    ],
+)
+def test_everything_else_says_what_the_service_still_does(method: str, path: str) -> None:
+    response = ask(APP, method, path)
+    assert (response.status_code, kind_of(response)) == (503, "not-ready")
+    assert response.json()["detail"] == REASON
