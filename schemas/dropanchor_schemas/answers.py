@@ -53,6 +53,13 @@ class TagStatus(_Answer):
     settings: TagSettings
 
 
+class TimedTagStatus(TagStatus):
+    """The status of one tag, whose times people can read, too."""
+
+    first_heard_utc: str | None = Field(description="`first_heard_ns` as ISO 8601.")
+    last_heard_utc: str | None = Field(description="`last_heard_ns` as ISO 8601.")
+
+
 class SamplesReceived(_Answer):
     """What was taken in. Admission, duplicates and the values of samples are judged later: see the tag's counters."""
 

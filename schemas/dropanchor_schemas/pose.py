@@ -100,6 +100,12 @@ class Pose(_Answer):
     )
 
 
+class TimedPose(Pose):
+    """The pose of one tag over REST, whose time people can read, too."""
+
+    t_utc: str = Field(description="`t_ns` as ISO 8601.")
+
+
 class PoseList(_Answer):
     """Poses of many tags."""
 

@@ -13,6 +13,7 @@ class TrackPose(_Answer):
     """A pose as it was stored when it was computed. Numbers have float32 precision."""
 
     t_ns: int = Field(description="UTC, ns: the time of the pose.")
+    t_utc: str = Field(description="The same time as ISO 8601.")
     state: TrackingState
     reason: str = Field(description="Machine-readable reason of the state.")
     frame: Frame = Field(description="`relative`: turned about the anchor by an unknown angle.")

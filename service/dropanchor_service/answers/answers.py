@@ -15,6 +15,7 @@ from dropanchor_service.answers.columns import aged_poses, columns_of, ellipse_9
 from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
 from dropanchor_service.answers.pose_fields import FRAME_FIELDS, POSE_FIELDS, ellipse_values
+from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
 from dropanchor_service.answers.track_pages import pose_in_tracks
 from dropanchor_service.estimation.columns import POSE, Array, State
@@ -28,6 +29,8 @@ from dropanchor_service.store.tags import Tag, TagTable
 from dropanchor_service.store.unknown_anchors import hint_about
 
 Answer = dict[str, Any]
+
+EVERYTHING = PoseFilter()
 
 _AMBIGUOUS = State.AMBIGUOUS.name.lower()
 
@@ -101,15 +104,21 @@ class Answers:
     def _memory(self, latest: Array) -> Array:
         return np.append(self.latest.history(int(latest["row"])), latest)
 
-    def pose_list(self, tags: Sequence[Tag] | None = None) -> Answer:
-        """Return the `PoseList` of these tags, or of all tags. Tags without a pose are left out."""
+    def pose_list(self, tags: Sequence[Tag] | None = None, wanted: PoseFilter = EVERYTHING) -> Answer:
+        """Return the `PoseList` of the wanted poses of these tags, or of all tags. Tags without a pose are left out."""
         now_ns = self.now_ns()
-        return {"t_ns": now_ns, "poses": self.poses_of(self.rows(tags), now_ns)}
+        return {"t_ns": now_ns, "poses": self.poses_of(self._wanted(tags, wanted, now_ns), now_ns)}
 
-    def pose_list_json(self, tags: Sequence[Tag] | None = None) -> Iterator[bytes | memoryview]:
+    def pose_list_json(
+        self, tags: Sequence[Tag] | None = None, wanted: PoseFilter = EVERYTHING
+    ) -> Iterator[bytes | memoryview]:
         """Yield the JSON of `pose_list` in chunks, without an object per tag."""
         now_ns = self.now_ns()
-        return list_json(now_ns, (filled for _, filled in self._filled(self.rows(tags), now_ns)))
+        return list_json(now_ns, (filled for _, filled in self._filled(self._wanted(tags, wanted, now_ns), now_ns)))
+
+    def _wanted(self, tags: Sequence[Tag] | None, wanted: PoseFilter, now_ns: int) -> Array:
+        poses = self.rows(tags)
+        return poses if wanted.is_everything else poses[wanted.matches(poses, self.tags, now_ns)]
 
     def pose_jsons(self, poses: Array, now_ns: int) -> Iterator[tuple[str, bytes]]:
         """Yield the tag and the JSON of its `Pose` for each of these POSE rows, which are the latest."""

@@ -9,6 +9,7 @@ import numpy as np
 from dropanchor_service.answers.columns import FRAMES, REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
+from dropanchor_service.answers.times import isos_utc
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.track_file import StoredPoses
 from dropanchor_service.history.tracks import Tracks
@@ -76,6 +77,7 @@ def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
     covariances = _short(poses["cov"].reshape(-1)).reshape(-1, 3, 3).tolist()
     columns: dict[str, list[Any]] = {
         "t_ns": poses["t_ns"].tolist(),
+        "t_utc": isos_utc(poses["t_ns"]),
         "state": [STATES[state] for state in poses["state"].tolist()],
         "reason": [REASONS[reason] for reason in poses["reason"].tolist()],
         "frame": [FRAMES[frame] for frame in poses["frame"].tolist()],

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -49,7 +50,8 @@ schemathesis.openapi.format("dropanchor-id", IDS)
 schemathesis.openapi.format(
     "dropanchor-ids", st.lists(IDS.filter(lambda one: "," not in one), min_size=1).map(",".join)
 )
-
+TIMES = st.datetimes(datetime(1971, 1, 1), datetime(2200, 1, 1), timezones=st.just(UTC))
+schemathesis.openapi.format("date-time", TIMES.map(datetime.isoformat))
 
 FOLDER = TemporaryDirectory(prefix="dropanchor-contract-")  # deleted together with the module
 

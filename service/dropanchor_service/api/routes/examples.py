@@ -142,9 +142,21 @@ TRACK: dict[str, Any] = {
     "to_ns": 1_800_000_000_000_000_000,
     "poses": [
         {
-            name: POSE[name]
+            name: (POSE | {"t_utc": "2027-01-15T08:00:00.000000000Z"})[name]
             for name in (
-                *("t_ns", "state", "reason", "frame", "x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "p_mode"),
+                *(
+                    "t_ns",
+                    "t_utc",
+                    "state",
+                    "reason",
+                    "frame",
+                    "x",
+                    "y",
+                    "heading_rad",
+                    "speed_mps",
+                    "yaw_rate_radps",
+                    "p_mode",
+                ),
                 *("sigma_pos_m", "sigma_obs_m", "range_m", "covariance", "anchor", "lat", "lon"),
             )
         }

@@ -1,17 +1,21 @@
 """What the routes share: ids in paths, query parameters, and JSON responses."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any
 from urllib.parse import unquote
 
 from fastapi import Depends, Path, Request
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_service.answers.answers import to_json
+from dropanchor_service.answers.pose_filter import PoseFilter
+from dropanchor_service.answers.times import ns_of_iso
 from dropanchor_service.api.http.errors import Kind, ProblemError
 
 
@@ -75,6 +79,7 @@ def _split(values: list[str]) -> list[str]:
     return names
 
 
+_NUMBER = r"-?[0-9]{1,9}(\.[0-9]{1,9})?"
 Ids = Annotated[str, Field(min_length=1, json_schema_extra={"format": "dropanchor-ids"})]
 
 
@@ -91,21 +96,68 @@ class TagFilter(BaseModel):
     )
 
 
+Box = Annotated[str, Field(pattern=rf"^{_NUMBER}(,{_NUMBER}){{3}}$")]
+
+
+class PoseQuery(TagFilter):
+    """The query of a route that can return selected poses."""
+
+    state: list[TrackingState] = Field(
+        default=[],
+        description="Return only tags in this state. Repeat the parameter for several states.",
+        examples=[["tracking"]],
+    )
+    box: Box | None = Field(
+        default=None,
+        description="Return only tags in this box of the site: x_min,y_min,x_max,y_max in m. A pose in a frame of its "
+        "own is in no box.",
+        examples=["-10,-5,30,20"],
+    )
+    text: str = Field(
+        default="", max_length=100, description="Return only tags with this text in their id, in upper or lower case."
+    )
+
+    @property
+    def wanted(self) -> PoseFilter:
+        """Return the conditions on the pose itself."""
+        return PoseFilter(self.state, None if self.box is None else _corners(self.box), self.text)
+
+
+def _corners(box: str) -> tuple[float, float, float, float]:
+    x_min, y_min, x_max, y_max = (float(number) for number in box.split(","))
+    return x_min, y_min, x_max, y_max
+
+
+def _ns(value: Any) -> Any:
+    """Return the time of an ISO 8601 text in ns, and anything else as it is."""
+    if not isinstance(value, str) or re.fullmatch(r"[+-]?[0-9]+", value):
+        return value
+    return ns_of_iso(re.sub(r" (?=\d\d:?\d\d$)", "+", value))  # a plus sign in a URL means a space
+
+
+TimeNs = Annotated[
+    int,
+    BeforeValidator(_ns),
+    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0}, {"type": "string", "format": "date-time"}]}),
+]
+"""A time as UTC in ns, or as ISO 8601 with a time zone."""
+
+
 class AtTime(BaseModel):
     """The query of a route that can return the state at another time."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    at: int | None = Field(
+    at: TimeNs | None = Field(
         default=None,
         ge=0,
         lt=2**63,
-        description="Return the pose at this time (UTC, ns) instead of the latest one. For the last minute (less in a "
-        "very large fleet), the pose is interpolated between two poses in memory that are at most 1 s apart. For "
-        "earlier times, it is interpolated between two stored poses at most 10 s apart, if the service stores a "
-        "history; the covariance then includes how far the tag may have moved off the line between them. Up to 2 s "
-        "after the newest pose, the pose is extrapolated with its speed and yaw rate, and the covariance grows. Such "
-        "poses have no hypotheses.",
+        description="Return the pose at this time (UTC in ns, or ISO 8601 with a time zone) instead of the latest one. "
+        "For the last minute (less in a very large fleet), the pose is interpolated between two poses in memory that "
+        "are at most 1 s apart. For earlier times, it is interpolated between two stored poses at most 10 s apart, if "
+        "the service stores a history; the covariance then includes how far the tag may have moved off the line "
+        "between them. Up to 2 s after the newest pose, the pose is extrapolated with its speed and yaw rate, and the "
+        "covariance grows. Such poses have no hypotheses.",
         examples=[1_800_000_000_000_000_000],
     )
 

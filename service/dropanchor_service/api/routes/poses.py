@@ -10,10 +10,11 @@ from fastapi.routing import APIRoute
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.explain import Explanation
-from dropanchor_schemas.pose import Pose, PoseList
+from dropanchor_schemas.pose import PoseList, TimedPose
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.explain import explanation_of
 from dropanchor_service.answers.pose_at_time import NoPoseThenError, TooFarAheadError
+from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
@@ -21,7 +22,7 @@ from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
     AtTime,
     LastInnovations,
-    TagFilter,
+    PoseQuery,
     TagId,
     example_response,
     id_of,
@@ -48,6 +49,7 @@ def _add_pose_route(router: APIRouter, answers: Answers) -> None:
             pose = _pose_of(answers, tag)
         else:  # may read from disk
             pose = await run_in_threadpool(_pose_at, answers, tag, query.at)
+        pose["t_utc"] = iso_utc(pose["t_ns"])
         return _response(geojson.feature_of(pose), geojson.MEDIA_TYPE) if as_geojson else _response(pose, geojson.JSON)
 
     router.add_api_route(
@@ -57,9 +59,10 @@ def _add_pose_route(router: APIRouter, answers: Answers) -> None:
         route_class_override=PlainPose,
         operation_id="get_pose",
         summary="Get the latest pose of a tag, or its pose at a time",
-        response_model=Pose,
+        response_model=TimedPose,
         responses=_offers(
-            examples.POSE, "A GeoJSON Feature (RFC 7946); `geometry` is null while the position is unknown."
+            examples.POSE | {"t_utc": iso_utc(examples.POSE["t_ns"])},
+            "A GeoJSON Feature (RFC 7946); `geometry` is null while the position is unknown.",
         )
         | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
     )
@@ -89,14 +92,16 @@ def _add_list_route(router: APIRouter, answers: Answers) -> None:
         response_model=PoseList,
         responses=_offers(examples.POSE_LIST, "A GeoJSON FeatureCollection (RFC 7946).") | problems(*_NEGOTIATION),
     )
-    async def list_poses(query: Annotated[TagFilter, Query()], request: Request) -> Response:
+    async def list_poses(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
         as_geojson = geojson.is_preferred(request, answers)
         found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
         tags = found if query.tags else None
         if as_geojson:
-            return _response(geojson.collection_of(answers.pose_list(tags)), geojson.MEDIA_TYPE)
+            return _response(geojson.collection_of(answers.pose_list(tags, query.wanted)), geojson.MEDIA_TYPE)
         headers = {"cache-control": "no-store", "vary": "accept"}
-        return StreamingResponse(_in_pieces(answers.pose_list_json(tags)), media_type=geojson.JSON, headers=headers)
+        return StreamingResponse(
+            _in_pieces(answers.pose_list_json(tags, query.wanted)), media_type=geojson.JSON, headers=headers
+        )
 
 
 class PlainPose(APIRoute):

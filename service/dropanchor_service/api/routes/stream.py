@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 from starlette.responses import Response, StreamingResponse
 
-from dropanchor_service.answers.answers import Answer, Answers, to_json
+from dropanchor_service.answers.answers import EVERYTHING, Answer, Answers, to_json
+from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import TagFilter
+from dropanchor_service.api.routes.parameters import PoseQuery
 
 Array = NDArray[Any]  # POSE rows of the store
 
@@ -29,12 +30,13 @@ _NAP_S = 0.2
 
 _DESCRIPTION = """\
 Server-sent events. The first event, `snapshot`, holds every tag that has a pose. Each `poses` event then holds the tags
-that have changed since. The data of both is a `PoseFrame`. A client that reads slowly gets the newest poses when it is
+that have changed since. The data of both is a `PoseFrame`. A tag that no longer meets the conditions of the query is
+sent once more, so that a client sees it leave. A client that reads slowly gets the newest poses when it is
 ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every
 5 s."""
 
 
-class StreamQuery(TagFilter):
+class StreamQuery(PoseQuery):
     max_hz: float = Field(
         default=10.0, ge=0.1, le=30, allow_inf_nan=False, description="The maximum rate of events, Hz."
     )
@@ -52,7 +54,7 @@ def stream_router(answers: Answers, stopping: Event) -> APIRouter:
         responses=_event_stream() | problems(Kind.INVALID_REQUEST),
     )
     async def stream_poses(query: Annotated[StreamQuery, Query()]) -> Response:
-        events = _events(Changes(answers, query.tags), 1 / query.max_hz, stopping)
+        events = _events(Changes(answers, query.tags, query.wanted), 1 / query.max_hz, stopping)
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
 
@@ -62,16 +64,18 @@ def stream_router(answers: Answers, stopping: Event) -> APIRouter:
 class Changes:
     """Tracks which changes one client has not received yet."""
 
-    def __init__(self, answers: Answers, names: list[str]) -> None:
+    def __init__(self, answers: Answers, names: list[str], wanted: PoseFilter = EVERYTHING) -> None:
         self._answers = answers
         self._names = names
+        self._wanted = wanted
+        self._matching = np.empty(0, np.int64)  # rows that met the conditions when they were last looked at
         self._version = 0
         self._sent: dict[str, tuple[str, bool]] = {}  # tag → (state, online)
         self._checked_s = time.monotonic()
 
     def snapshot(self) -> Answer:
         """Return a frame of all selected tags."""
-        return self._frame(self._newer())
+        return self._frame(self._leaving_and_matching(self._newer()))
 
     def next(self) -> Answer | None:
         """Return a frame of the tags that have changed; None when there are none."""
@@ -79,6 +83,7 @@ class Changes:
         if time.monotonic() - self._checked_s >= STATE_CHECK_S:
             self._checked_s = time.monotonic()
             poses = self._with_state_changes(poses)
+        poses = self._leaving_and_matching(poses)
         return self._frame(poses) if len(poses) else None
 
     def _newer(self) -> Array:
@@ -100,6 +105,15 @@ class Changes:
             return poses
         rows = [tag.row for tag in map(self._answers.tags.find, self._names) if tag is not None]
         return poses[np.isin(poses["row"], rows)]
+
+    def _leaving_and_matching(self, poses: Array) -> Array:
+        """Return the poses that meet the conditions, and those of tags that met them until now."""
+        if self._wanted.is_everything:
+            return poses
+        matching = self._wanted.matches(poses, self._answers.tags, self._answers.now_ns())
+        sent = matching | np.isin(poses["row"], self._matching)
+        self._matching = np.union1d(np.setdiff1d(self._matching, poses["row"]), poses["row"][matching])
+        return poses[sent]
 
     def _frame(self, poses: Array) -> Answer:
         frame = self._answers.frame_of(poses, self._answers.now_ns())

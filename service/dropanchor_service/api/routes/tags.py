@@ -6,11 +6,12 @@ from typing import Annotated
 from fastapi import APIRouter, Body
 from starlette.responses import Response
 
-from dropanchor_schemas.answers import NewcomerList, TagList, TagStatus
+from dropanchor_schemas.answers import NewcomerList, TagList, TimedTagStatus
 from dropanchor_schemas.keys import InvalidKeyError, refuse_pattern
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.care import care_of, health_answer
+from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
@@ -61,13 +62,13 @@ def _add_status_route(router: APIRouter, answers: Answers) -> None:
         "/tags/{tag}",
         operation_id="get_tag",
         summary="Get a tag",
-        response_model=TagStatus,
-        responses=example_response(examples.TAG) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
+        response_model=TimedTagStatus,
+        responses=example_response(_timed(examples.TAG)) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag(tag: TagId) -> Response:
         known, now_ns = known_tag(answers, tag), answers.now_ns()
         offset = answers.clock_offsets.clock_offset(known.row, now_ns)
-        return json_response(next(_statuses(answers, [known], {known.row: offset}, now_ns)))
+        return json_response(_timed(next(_statuses(answers, [known], {known.row: offset}, now_ns))))
 
 
 def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> None:
@@ -85,7 +86,8 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
         "/tags/{tag}/settings",
         operation_id="put_tag_settings",
         summary="Replace the settings of a tag",
-        description="An unknown tag is registered. The estimator of the tag restarts with the new settings, from "
+        description="An unknown tag is registered. What the body leaves out is as in `tag_defaults` of the service's "
+        "settings. The estimator of the tag restarts with the new settings, from "
         "`start` if it is given.",
         response_model=TagSettings,
         responses=example_response(examples.TAG_SETTINGS)
@@ -95,7 +97,7 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
         tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])]
     ) -> Response:
         _register(answers, tag, settings, max_tags)
-        return json_response(settings.model_dump())
+        return json_response(answers.site.tag_settings(tag).model_dump())
 
 
 def _register(answers: Answers, tag: str, settings: TagSettings, max_tags: int) -> None:
@@ -133,11 +135,17 @@ def _newcomers(answers: Answers) -> list[Answer]:
     ]
 
 
+def _timed(status: Answer) -> Answer:
+    """Return the `TimedTagStatus` of a `TagStatus`."""
+    times = {name: status[f"{name}_ns"] for name in ("first_heard", "last_heard")}
+    return status | {f"{name}_utc": None if t_ns is None else iso_utc(t_ns) for name, t_ns in times.items()}
+
+
 def _statuses(
     answers: Answers, tags: list[Tag], offsets: Mapping[int, ClockOffset | None], now_ns: int
 ) -> Iterator[Answer]:
     """Yield the `TagStatus` of each tag. offsets: between its clocks, by row."""
-    default = TagSettings().model_dump()
+    default = answers.site.default_settings.model_dump()
     configured = answers.site.tags
     for tag in tags:
         offset = offsets.get(tag.row)

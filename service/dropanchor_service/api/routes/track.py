@@ -16,7 +16,7 @@ from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import unknown_tag
-from dropanchor_service.api.routes.parameters import TagId
+from dropanchor_service.api.routes.parameters import TagId, TimeNs
 from dropanchor_service.history.tracks import Tracks
 
 HOUR_NS = 3_600_000_000_000
@@ -35,19 +35,20 @@ class TrackQuery(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
-    from_ns: int | None = Field(
+    from_ns: TimeNs | None = Field(
         default=None,
         alias="from",
         ge=0,
         lt=2**62,
-        description="Start of the track, UTC, ns. The default is one hour before `to`.",
+        description="Start of the track, UTC in ns, or ISO 8601 with a time zone. The default is one hour before `to`.",
     )
-    to_ns: int | None = Field(
+    to_ns: TimeNs | None = Field(
         default=None,
         alias="to",
         ge=0,
         lt=2**62,
-        description="End of the track, UTC, ns, at most 31 days after `from`. The default is now.",
+        description="End of the track, UTC in ns, or ISO 8601 with a time zone, "
+        "at most 31 days after `from`. The default is now.",
     )
     limit: int = Field(default=1000, ge=1, le=MAX_POSES, description="The maximum number of poses on a page.")
     cursor: int | None = Field(default=None, ge=0, lt=2**62, description="The value of `next` on the previous page.")

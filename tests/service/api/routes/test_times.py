@@ -1,0 +1,73 @@
+"""Times as people write them, where the interface takes or gives a time."""
+
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+
+from dropanchor_service.answers.times import iso_utc, ns_of_iso
+from dropanchor_service.history.tracks import Retention
+from support.api import T_NS, ask, kind_of, make_api_bench
+
+T_UTC = "2027-01-15T08:00:00.000000000Z"
+
+
+@pytest.mark.parametrize(
+    ("text", "t_ns"),
+    [
+        (T_UTC, T_NS),
+        ("2027-01-15T08:00:00Z", T_NS),
+        ("2027-01-15T08:00Z", T_NS),
+        ("2027-01-15T09:30:00+01:30", T_NS),
+        ("2027-01-15T03:00:00-0500", T_NS),
+        ("2027-01-15T08:00:00.5Z", T_NS + 500_000_000),
+        ("2027-01-15T08:00:00,123456789Z", T_NS + 123_456_789),
+        ("1969-12-31T23:59:59.25Z", -750_000_000),
+    ],
+)
+def test_an_iso_time_is_read_to_the_nanosecond(text: str, t_ns: int) -> None:
+    assert ns_of_iso(text) == t_ns
+
+
+def test_a_time_is_written_as_it_is_read() -> None:
+    assert iso_utc(T_NS) == T_UTC
+    assert ns_of_iso(iso_utc(T_NS + 1)) == T_NS + 1
+
+
+def test_a_pose_at_a_time_and_a_track_take_iso_times_and_give_them(tmp_path: Path) -> None:
+    bench = make_api_bench(folder=tmp_path, retention=Retention(1, 0.0, 0, 10**18, 2**40))
+    bench.move("a", x=1.0)
+    bench.write_history()
+    app = bench.app()
+    assert ask(app, "GET", "/api/v1/tags/a/pose").json()["t_utc"] == T_UTC
+    then = ask(app, "GET", "/api/v1/tags/a/pose?at=2027-01-15T08:00:01Z").json()
+    assert (then["t_ns"], then["t_utc"]) == (T_NS + 10**9, "2027-01-15T08:00:01.000000000Z")
+    window = f"from={quote('2027-01-15T08:59:00+01:00')}&to=2027-01-15T08:01Z"
+    track = ask(app, "GET", f"/api/v1/tags/a/track?{window}").json()
+    assert (track["from_ns"], track["to_ns"]) == (T_NS - 60 * 10**9, T_NS + 60 * 10**9)
+    assert [pose["t_utc"] for pose in track["poses"]] == [T_UTC]
+    unescaped = ask(app, "GET", "/api/v1/tags/a/track?from=2027-01-15T08:59:00+01:00&to=2027-01-15T08:01Z").json()
+    assert unescaped["from_ns"] == track["from_ns"]
+    assert "t_utc" in ask(app, "GET", f"/api/v1/tags/a/track?{window}&format=csv").text.splitlines()[0].split(",")
+
+
+@pytest.mark.parametrize(
+    "text", ["yesterday", "2027-01-15", "2027-01-15T08:00:00", "2027-02-30T08:00Z", "1969-01-01T00:00Z"]
+)
+def test_a_time_without_a_zone_or_that_does_not_exist_is_refused(text: str) -> None:
+    bench = make_api_bench()
+    bench.move("a")
+    answer = ask(bench.app(), "GET", f"/api/v1/tags/a/pose?at={text}")
+    assert kind_of(answer) == "invalid-request"
+    assert "query.at" in answer.text
+
+
+def test_a_tag_was_heard_at_times_that_people_can_read() -> None:
+    bench = make_api_bench()
+    bench.answers.tags.register("a")
+    status = ask(bench.app(), "GET", "/api/v1/tags/a").json()
+    assert (status["first_heard_utc"], status["last_heard_utc"]) == (None, None)
+    bench.answers.tags.count_messages(np.array([0]), T_NS)
+    status = ask(bench.app(), "GET", "/api/v1/tags/a").json()
+    assert (status["first_heard_utc"], status["last_heard_utc"]) == (T_UTC, T_UTC)
