@@ -44,6 +44,9 @@ class TagStatus(_Answer):
         description="What an operator can do about rejected data, for example add a missing anchor to the site; empty "
         "if nothing needs to be done."
     )
+    unknown_anchor: str | None = Field(
+        description="An anchor that the tag ranges to although the site does not have it; null if there is none."
+    )
     health: TagHealth | None = Field(description="What the tag has reported about itself; null if nothing.")
     clock_offset: ClockOffset | None = Field(
         description="null: one program sends motion and ranges, or one of them has not come for a minute."

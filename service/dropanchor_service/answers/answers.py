@@ -26,7 +26,7 @@ from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.pending_tags import PendingTags
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
-from dropanchor_service.store.unknown_anchors import hint_about
+from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
 
 Answer = dict[str, Any]
 
@@ -65,10 +65,18 @@ class Answers:
         self.health = HealthTable() if health is None else health
         self.clock_offsets = NoClockOffsets() if clock_offsets is None else clock_offsets
 
+    def unknown_anchor_of(self, tag: Tag) -> str | None:
+        """Return the id of an anchor that the tag ranges to although the site lacks it, None if there is none."""
+        unknown = self.tags.unknown_anchors.of(tag.row, self.now_ns())
+        return unknown[1] if unknown is not None and self.site.lacks(unknown[0]) else None
+
     def hint_of(self, tag: Tag) -> str:
         """Return what a person can do so that more of the tag's samples are used; empty if there is nothing to do."""
-        unknown = self.tags.unknown_anchors.of(tag.row, self.now_ns())
-        return hint_about(unknown[1]) if unknown is not None and self.site.lacks(unknown[0]) else ""
+        unknown = self.unknown_anchor_of(tag)
+        if unknown is None:
+            return ""
+        range_ns = int(self.tags.arrivals.of(np.array([tag.row]))["range_ns"][0])
+        return hint_about(unknown, hears_others=self.now_ns() - range_ns <= FRESH_NS)
 
     def pose_of(self, tag: Tag) -> Answer | None:
         """Return the `Pose` of a tag, None before its first one."""

@@ -9,40 +9,16 @@ from dropanchor_schemas.pose import Frame as FrameName
 from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.answers.geodesy import lat_lon
+from dropanchor_service.answers.hints import hints_of, past_hints
 from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, age_poses, ellipses
 from dropanchor_service.estimation.columns import Array, Frame, State, StateReason
 from dropanchor_service.store.records import copied
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
-from dropanchor_service.store.unknown_anchors import hint_about
 
 STATES = [TrackingState[state.name].value for state in State]
 FRAMES = [FrameName[frame.name].value for frame in Frame]
 REASONS = [ReasonName[reason.name].value for reason in StateReason]
-
-_MOVE_HINT = "Walk a few metres, but not straight towards the anchor or away from it."
-_HINTS = {
-    StateReason.NO_RANGE: "Too few ranges have arrived: is the anchor on, and is the tag in range?",
-    StateReason.NO_HEADING: "There is no heading yet: the tag must send IMU samples or a platform heading.",
-    StateReason.START_UNKNOWN: "Set where the tag starts (`start` in its settings), or use the engine fleet.",
-    StateReason.SEVERAL_MODES: _MOVE_HINT,
-    StateReason.RESOLVED: "",
-    StateReason.RANGES_MISSING: "No more ranges arrive: is the anchor on, and is the tag in range?",
-    StateReason.IMU_MISSING: "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
-    StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
-    "the site says it is?",
-    StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move the tag away from it.",
-    StateReason.UNCERTAIN: _MOVE_HINT,
-    StateReason.FAULT: "The estimate had to start again. If this repeats, check what the tag sends.",
-    StateReason.HEADING_UNSURE: "North is not known: set where the tag starts, or add a second anchor.",
-}
-HINTS = [_HINTS[reason] for reason in StateReason]
-RELATIVE_HINT = (
-    "North is not known, so this track is turned about the anchor by an unknown angle: set where the tag starts and "
-    "where it looks, or add a second anchor."
-)
-_ALL_HINTS = [*HINTS, RELATIVE_HINT]
-_RANGES_LACKING = [StateReason.NO_RANGE, StateReason.RANGES_MISSING]
 
 
 @dataclass(frozen=True)
@@ -84,7 +60,7 @@ def columns_of(
     aged = poses if historical else aged_poses(poses, age_s)
     of_tags = tags.names(aged["row"].tolist()) if names is None else list(names)
     ellipse = ellipse_95(aged["cov"])
-    hint_texts, hint = (_ALL_HINTS, _hint_of(aged)) if historical else _hints(aged, site, tags, now_ns)
+    hint_texts, hint = past_hints(aged) if historical else hints_of(aged, site, tags, now_ns)
     origin = site.site.georeference
     in_site = aged["frame"] == Frame.SITE
     lat, lon = (
@@ -108,30 +84,6 @@ def columns_of(
         lat=lat,
         lon=lon,
     )
-
-
-def _hint_of(poses: Array) -> Array:
-    """Return the index of the hint of each POSE in `_ALL_HINTS`."""
-    relative = (poses["frame"] == Frame.RELATIVE) & (poses["reason"] == StateReason.RESOLVED)
-    return np.where(relative, len(HINTS), poses["reason"])
-
-
-def _hints(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> tuple[Sequence[str], Array]:
-    """Return all hint texts, and the index of the hint of each POSE.
-
-    A tag that lacks ranges gets a hint about the unknown anchor that it ranges to, if there is one.
-    """
-    unknown = {row: name for row, number, name in tags.unknown_anchors.fresh(now_ns) if site.lacks(number)}
-    lacking = np.isin(poses["reason"], _RANGES_LACKING) if unknown else np.zeros(len(poses), bool)
-    hint = _hint_of(poses).astype(np.int64)
-    if not lacking.any():
-        return _ALL_HINTS, hint
-    places: dict[str, int] = {}
-    for place in np.flatnonzero(lacking).tolist():
-        name = unknown.get(int(poses["row"][place]))
-        if name is not None:
-            hint[place] = places.setdefault(name, len(_ALL_HINTS) + len(places))
-    return [*_ALL_HINTS, *map(hint_about, places)], hint
 
 
 def aged_poses(poses: Array, age_s: Array) -> Array:

@@ -35,7 +35,7 @@ from dropanchor_service.estimation.columns import (
     default_settings,
 )
 from dropanchor_service.ingest.decode import read_forms, read_samples
-from dropanchor_service.ingest.kernels.values import shift_times
+from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE
@@ -184,6 +184,7 @@ def _ingest(payloads: list[bytes]) -> None:
     offsets, _ = publishers.time_offsets(read.forms, sequenced, arrivals, samples)
     for messages, t_ns in samples:
         shift_times(t_ns, messages, offsets)
+        time_spans(t_ns, messages, np.zeros(len(payloads), np.int64), np.zeros(len(payloads), np.int64))
 
 
 def warm_up_answers(progress: CompilationProgress | None = None) -> None:

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from dropanchor_schemas.kinds import SCALARS
-from dropanchor_schemas.wire import Reason
+from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
-from dropanchor_service.ingest.kernels.values import newest_times, shift_times
+from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
@@ -76,8 +76,9 @@ class SampleReader:
             offsets, jumps = self._publishers.time_offsets(read.forms, of_batch, arrived, _times(decoded))
             self._rejections.count_clock_jumps(jumps)
             in_time = _in_time(decoded, offsets, rejected)
-            self._note_replays(in_time, due, of_row, arrived)
-            yield self._batch(in_time, rejected, of_row, arrived)
+            spans = _spans(in_time)
+            self._note_replays(in_time, due, of_row, arrived, spans[1])
+            yield self._batch(in_time, rejected, due, of_row, arrived, spans)
 
     def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
         """Return the arrival until which pending messages have waited long enough.
@@ -96,23 +97,39 @@ class SampleReader:
             self._rejections.decoder_failed(error)
             return read_forms([_if_readable(*pair) for pair in zip(payloads, encodings, strict=True)], encodings)
 
-    def _note_replays(self, decoded: Decoded, due: Array, of_row: Array, arrived: Array) -> None:
+    def _note_replays(self, decoded: Decoded, due: Array, of_row: Array, arrived: Array, newest: Array) -> None:
         """Record how far the newest sample of a replay lies before its arrival.
 
         Answers subtract it from the age of the poses of a replay. The times of samples do not depend on it.
         """
-        newest = np.full(len(of_row), -1, np.int64)
-        for messages, t_ns in _times(decoded) if decoded.forms["replay"][due].any() else ():
-            newest_times(t_ns, messages, newest)
-        self._tags.set_replay_lag(of_row[due], np.where(newest[due] < 0, 0, arrived[due] - newest[due]))
+        replayed = decoded.forms["replay"][due] & (newest[due] >= 0)
+        self._tags.set_replay_lag(of_row[due], np.where(replayed, arrived[due] - newest[due], 0))
 
-    def _batch(self, decoded: Decoded, rejected: list[Rejected], of_row: Array, arrived: Array) -> SampleBatch:
+    def _note_arrivals(
+        self, decoded: Decoded, ranges: Array, due: Array, of_row: Array, arrived: Array, spans: tuple[Array, Array]
+    ) -> None:
+        """Record when the samples of live tags arrived. ranges: those to anchors of the site."""
+        oldest, newest = spans
+        live = due[(newest[due] >= 0) & ~decoded.forms["replay"][due].astype(bool)]
+        counts = np.bincount(ranges["message"], minlength=len(of_row))
+        self._tags.arrivals.record(of_row[live], arrived[live], oldest[live], newest[live], counts[live])
+
+    def _batch(
+        self,
+        decoded: Decoded,
+        rejected: list[Rejected],
+        due: Array,
+        of_row: Array,
+        arrived: Array,
+        spans: tuple[Array, Array],
+    ) -> SampleBatch:
         self._bind_first_anchor(decoded)
         self._note_unknown_anchors(decoded, of_row, arrived)
         scalars = [
             self._anchored(column, rejected) if kind.has_anchor else column
             for kind, column in zip(SCALARS, decoded.columns()[1:], strict=True)
         ]
+        self._note_arrivals(decoded, scalars[0], due, of_row, arrived, spans)
         for entry in rejected:
             self._rejections.count_rejected(entry.reason, of_row[entry.messages])
         return SampleBatch(
@@ -170,6 +187,14 @@ def _in_time(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Deco
         keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected) for column in decoded.columns()
     ]
     return decoded.with_columns(columns)
+
+
+def _spans(decoded: Decoded) -> tuple[Array, Array]:
+    """Return the times of the oldest and the newest sample of each message; the newest is -1 without a sample."""
+    oldest, newest = np.full(len(decoded.forms), MAX_T_NS, np.int64), np.full(len(decoded.forms), -1, np.int64)
+    for messages, t_ns in _times(decoded):
+        time_spans(t_ns, messages, oldest, newest)
+    return oldest, newest
 
 
 def _times(decoded: Decoded) -> list[tuple[Array, Array]]:

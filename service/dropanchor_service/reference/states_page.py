@@ -1,7 +1,8 @@
 """The page of tracking states and their reasons, from the enumerations and the hints that people see."""
 
 from dropanchor_schemas.pose import StateReason, TrackingState
-from dropanchor_service.answers.columns import HINTS, REASONS
+from dropanchor_service.answers.columns import REASONS
+from dropanchor_service.answers.hints import HINTS
 from dropanchor_service.reference.markdown import table
 
 _MEANING = {

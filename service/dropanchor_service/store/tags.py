@@ -10,6 +10,7 @@ import numpy as np
 from dropanchor_schemas import kinds
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.presence import Presence
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.store.unknown_anchors import UnknownAnchors
@@ -77,6 +78,7 @@ class TagTable:
         self.presence = Presence()
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past, by row
         self.unknown_anchors = UnknownAnchors()
+        self.arrivals = Arrivals()
 
     def __len__(self) -> int:
         return len(self._by_row)

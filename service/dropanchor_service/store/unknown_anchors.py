@@ -64,6 +64,11 @@ class UnknownAnchors:
         )
 
 
-def hint_about(name: str) -> str:
-    """Return what an operator can do about an unknown anchor that a tag ranges to."""
-    return f"Hears anchor {name}, which this site does not have: check its id, or add the anchor to the site."
+def hint_about(name: str, hears_others: bool) -> str:
+    """Return what an operator can do about an unknown anchor that a tag ranges to.
+
+    hears_others: whether the tag ranges to anchors of the site, too.
+    """
+    if hears_others:
+        return f"Hears anchor {name}, which this site does not have: check its id, or add the anchor to the site."
+    return f"No anchor that it hears is part of this site: check the id of anchor {name}, or add it to the site."

@@ -10,7 +10,8 @@ import pytest
 from dropanchor_schemas.pose import Pose, PoseList
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.answers.answers import Answers, to_json
-from dropanchor_service.answers.columns import HINTS, REASONS, RELATIVE_HINT, ellipse_95
+from dropanchor_service.answers.columns import REASONS, ellipse_95
+from dropanchor_service.answers.hints import HINTS, RELATIVE_HINT
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, Frame, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 

@@ -110,6 +110,7 @@ TAG: dict[str, Any] = {
     "samples": {"imu": 60000, "range": 6000},
     "rejected": {"range_negative": 2},
     "hint": "",
+    "unknown_anchor": None,
     "health": HEALTH | {"age_s": 12.5},
     "clock_offset": {"offset_s": 0.02, "uncertainty_s": 0.1},
     "needs_care": [{"reason": "battery_low", "hint": "The battery is at 15%: charge it."}],

@@ -159,6 +159,7 @@ def _statuses(
             "samples": {kind: count for kind, count in zip(KINDS, samples.tolist(), strict=True) if count},
             "rejected": {name: count for name, count in zip(_REASON_NAMES, rejected.tolist(), strict=True) if count},
             "hint": answers.hint_of(tag),
+            "unknown_anchor": answers.unknown_anchor_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),
             "clock_offset": None if offset is None else offset._asdict(),
             "needs_care": care_of(tag, answers.health, now_ns, offset),

@@ -21,9 +21,7 @@ export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
 export async function request(url, options) {
-  const key = sessionStorage.getItem(STORAGE_KEY);
-  const headers = key === null ? {} : { authorization: `Bearer ${key}` };
-  const response = await fetch(url, { ...options, headers, cache: "no-store" });
+  const response = await fetch(url, { ...options, headers: authorization(), cache: "no-store" });
   if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
   if (response.status === UNAVAILABLE) {
     const problem = await response.json();
@@ -31,4 +29,20 @@ export async function request(url, options) {
   }
   if (!response.ok) throw new Error(`${url.pathname} returned status ${response.status}`);
   return response;
+}
+
+/**
+ * Send a change as JSON. Throws Error with the sentence of the service when it refuses the change.
+ * @param {URL} url @param {"PUT" | "POST" | "DELETE"} method @param {object} body
+ */
+export async function sendJson(url, method, body) {
+  const headers = { ...authorization(), "content-type": "application/json" };
+  const response = await fetch(url, { method, headers, body: JSON.stringify(body), cache: "no-store" });
+  if (!response.ok) throw new Error((await response.json()).detail);
+}
+
+/** @returns {Record<string, string>} */
+function authorization() {
+  const key = sessionStorage.getItem(STORAGE_KEY);
+  return key === null ? {} : { authorization: `Bearer ${key}` };
 }

@@ -13,6 +13,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {Record<string, number>} samples by kind
  * @property {Record<string, number>} rejected by reason
  * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
+ * @property {string | null} unknown_anchor an anchor that the tag ranges to although the site does not have it
  * @property {Health | null} health what the tag reports about itself
  * @property {{offset_s: number, uncertainty_s: number} | null} clock_offset of motion, ahead of the ranges
  * @property {{reason: string, hint: string}[]} needs_care what a person should do for the tag
@@ -65,12 +66,17 @@ export class Roster {
 
   /** Request the statuses now and then periodically. */
   async start() {
+    await this.refresh();
+    setTimeout(() => this.start(), REQUEST_MS + REQUEST_MS_PER_TAG * this.fleet.size);
+  }
+
+  /** Request the statuses now. */
+  async refresh() {
     try {
       this.#update((await getJson(api("tags"))).tags);
     } catch {
       // The connection reports the failure. The next response will contain everything.
     }
-    setTimeout(() => this.start(), REQUEST_MS + REQUEST_MS_PER_TAG * this.fleet.size);
   }
 
   /** @param {TagStatus[]} statuses */

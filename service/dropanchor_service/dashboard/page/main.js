@@ -1,5 +1,6 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
+import { AddAnchor } from "../panel/add_anchor.js";
 import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
@@ -31,6 +32,7 @@ const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choic
 const chips = new StateChips(byId("chips"), fleet, choice);
 const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
+const addAnchor = new AddAnchor(byId("detail"), roster, choice, () => [map.view.x, map.view.y]);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -98,6 +100,7 @@ function updatePanels() {
   chips.update();
   care.update();
   detail.update();
+  addAnchor.update();
   notices.update();
   byId("crowd").hidden = !map.stats.density;
   map.redraw();

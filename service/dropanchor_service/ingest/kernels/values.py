@@ -91,3 +91,11 @@ def newest_times(t_ns: Any, messages: Any, newest: Any) -> None:
     for i in range(len(t_ns)):
         if t_ns[i] > newest[messages[i]]:
             newest[messages[i]] = t_ns[i]
+
+
+@njit(cache=True, nogil=True)
+def time_spans(t_ns: Any, messages: Any, oldest: Any, newest: Any) -> None:
+    """Widen the span of each message, from `oldest` to `newest`, to the times of its samples."""
+    for i in range(len(t_ns)):
+        oldest[messages[i]] = min(oldest[messages[i]], t_ns[i])
+        newest[messages[i]] = max(newest[messages[i]], t_ns[i])

@@ -1,0 +1,127 @@
+"""What a person can do about a pose: from its reason, and from how the samples of the tag arrive."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_service.estimation.columns import Array, Frame, StateReason
+from dropanchor_service.store.arrivals import FORGOTTEN_BURSTS
+from dropanchor_service.store.site import SiteStore
+from dropanchor_service.store.tags import KINDS, TagTable
+from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
+
+_MOVE_HINT = "Walk a few metres, but not straight towards the anchor or away from it."
+_HINTS = {
+    StateReason.NO_RANGE: "Too few ranges have arrived: is the anchor on, and is the tag in range?",
+    StateReason.NO_HEADING: "There is no heading yet: the tag must send IMU samples or a platform heading.",
+    StateReason.START_UNKNOWN: "Set where the tag starts (`start` in its settings), or use the engine fleet.",
+    StateReason.SEVERAL_MODES: _MOVE_HINT,
+    StateReason.RESOLVED: "",
+    StateReason.RANGES_MISSING: "No more ranges arrive: is the anchor on, and is the tag in range?",
+    StateReason.IMU_MISSING: "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
+    StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
+    "the site says it is?",
+    StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move the tag away from it.",
+    StateReason.UNCERTAIN: _MOVE_HINT,
+    StateReason.FAULT: "The estimate had to start again. If this repeats, check what the tag sends.",
+    StateReason.HEADING_UNSURE: "There is no heading reference, so north is not known: set where the tag starts and "
+    "looks, or add a second anchor.",
+}
+HINTS = [_HINTS[reason] for reason in StateReason]
+RELATIVE_HINT = (
+    "There is no heading reference, so this track is turned about the anchor by an unknown angle: set where the tag "
+    "starts and looks, or add a second anchor."
+)
+LATE = "Samples arrive {0} s late: check the clock of the tag, and its network."
+IN_BURSTS = "Samples come in bursts of {0} s: let the tag send smaller batches, and check its network."
+FEW_RANGES = "One range in {0} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor."
+MOUNT_UNKNOWN = "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`)."
+LATE_S, BURSTS, RANGE_S = 1.0, 3, 1.0  # from which on there is a hint
+SENDING_S = 2.0  # a tag that has sent nothing for so long no longer sends
+
+_ALL_HINTS = [*HINTS, RELATIVE_HINT]
+_NO_RANGES = (StateReason.NO_RANGE, StateReason.RANGES_MISSING)
+_NOTHING_NEW = (StateReason.RESOLVED, *_NO_RANGES, StateReason.IMU_MISSING)
+_LITTLE_KNOWN = (StateReason.RESOLVED, *_NO_RANGES, StateReason.SEVERAL_MODES, StateReason.UNCERTAIN)
+_IMU, _HEADING = KINDS.index("imu"), KINDS.index("heading")
+
+Hints = tuple[Sequence[str], Array]
+"""All texts, and the index of the text of each POSE."""
+
+
+class _About(NamedTuple):
+    """A hint with a number of seconds: its text, and NaN or the seconds for each POSE."""
+
+    text: str
+    seconds: Array
+
+
+def past_hints(poses: Array) -> Hints:
+    """Return the hints about these POSE for their own time."""
+    relative = (poses["frame"] == Frame.RELATIVE) & (poses["reason"] == StateReason.RESOLVED)
+    return _ALL_HINTS, np.where(relative, len(HINTS), poses["reason"]).astype(np.int64)
+
+
+def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hints:
+    """Return the hints about these POSE, which are the latest and have the reasons that they have at `now_ns`.
+
+    A cause that only the arrivals show comes before the reason: to a tag whose samples come late, ranges are missing.
+    """
+    texts, hint = list(_ALL_HINTS), past_hints(poses)[1]
+    for text, where in _mounts(poses, site, tags):
+        hint[where] = len(texts)
+        texts.append(text)
+    for about in _about_arrivals(poses, tags, now_ns):
+        for seconds in np.unique(about.seconds[np.isfinite(about.seconds)]):
+            hint[about.seconds == seconds] = len(texts)
+            texts.append(about.text.format(int(seconds)))
+    for text, place in _unknown_anchors(poses, site, tags, now_ns):
+        hint[place] = len(texts)
+        texts.append(text)
+    return texts, hint
+
+
+def _about_arrivals(poses: Array, tags: TagTable, now_ns: int) -> list[_About]:
+    """Return the hints about arrivals. Of two that apply to a tag the later one counts."""
+    arrivals = tags.arrivals.of(poses["row"])
+    age_s, burst_age_s = ((now_ns - arrivals[name]) * 1e-9 for name in ("arrival_ns", "burst_ns"))
+    sends = (arrivals["arrival_ns"] > 0) & (age_s < np.maximum(SENDING_S, 2.0 * arrivals["burst_s"]))
+    if not sends.any():
+        return []
+    nothing_new, little = np.isin(poses["reason"], _NOTHING_NEW), np.isin(poses["reason"], _LITTLE_KNOWN)
+    in_bursts = (arrivals["bursts"] >= BURSTS) & (burst_age_s < FORGOTTEN_BURSTS * arrivals["burst_s"])
+    late, few = arrivals["delay_s"] >= LATE_S, arrivals["range_s"] > RANGE_S
+    return [
+        _About(FEW_RANGES, _rounded(arrivals["range_s"], sends & few & little)),
+        _About(IN_BURSTS, _rounded(arrivals["burst_s"], sends & in_bursts & nothing_new)),
+        _About(LATE, _rounded(arrivals["delay_s"], sends & late & nothing_new)),
+    ]
+
+
+def _rounded(seconds: Array, where: Array) -> Array:
+    """Return whole seconds, NaN outside of `where`."""
+    return np.where(where, np.round(seconds), np.nan)
+
+
+def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Array]]:
+    """Return the hint for vehicles with an IMU alone, whose mounting angle the engine still has to learn."""
+    places = np.flatnonzero(poses["reason"] == StateReason.UNCERTAIN)
+    samples = tags.counts(poses["row"][places])["samples"]
+    places = places[(samples[:, _IMU] > 0) & (samples[:, _HEADING] == 0)]
+    settings = map(site.tag_settings, tags.names(poses["row"][places].tolist()))
+    unknown = [tag.mount_angle_rad is None and tag.motion != "carried" for tag in settings]
+    return [(MOUNT_UNKNOWN, places[unknown])] if any(unknown) else []
+
+
+def _unknown_anchors(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> list[tuple[str, Array]]:
+    """Return the hints for tags that lack ranges and hear an anchor that the site does not have."""
+    unknown = {row: name for row, number, name in tags.unknown_anchors.fresh(now_ns) if site.lacks(number)}
+    lacking = np.flatnonzero(np.isin(poses["reason"], _NO_RANGES)) if unknown else np.empty(0, np.int64)
+    places: dict[str, list[int]] = {}
+    heard_ns = tags.arrivals.of(poses["row"][lacking])["range_ns"]
+    for place, row, range_ns in zip(lacking.tolist(), poses["row"][lacking].tolist(), heard_ns.tolist(), strict=True):
+        if row in unknown:
+            text = hint_about(unknown[row], hears_others=now_ns - range_ns <= FRESH_NS)
+            places.setdefault(text, []).append(place)
+    return [(text, np.array(where)) for text, where in places.items()]

@@ -1,0 +1,85 @@
+"""How the samples of each tag arrive: how late, in bursts or steadily, and how many ranges."""
+
+import numpy as np
+
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.records import enlarged
+
+BURST_S = 1.0  # least silence before a burst
+RANGE_WINDOW_S = 6.0  # over which the ranges of a tag are counted
+DELAY_GROWTH = 0.5  # s per s: how fast the least delay of late may grow, so that one late message says nothing
+FORGOTTEN_BURSTS = 3.0  # silences without a burst after which a tag no longer sends in bursts
+
+ARRIVAL = np.dtype(
+    [
+        ("arrival_ns", "i8"),  # of the newest message; 0: none yet
+        ("newest_ns", "i8"),  # time of the newest sample
+        ("delay_s", "f8"),  # the least of late from the time of a message's newest sample to its arrival
+        ("burst_ns", "i8"),  # arrival of the newest burst
+        ("burst_s", "f8"),  # the silence before it, which its samples fill
+        ("bursts", "i4"),  # one after another
+        ("counted_ns", "i8"),  # since when ranges are counted
+        ("ranges", "i4"),  # that were counted
+        ("range_s", "f8"),  # mean time between two ranges; 0: not known yet
+        ("range_ns", "i8"),  # arrival of the newest range to an anchor of the site
+    ]
+)
+
+
+class Arrivals:
+    """ARRIVAL by row of a tag. The ingest thread writes; any thread reads."""
+
+    def __init__(self) -> None:
+        self._columns = np.zeros(0, ARRIVAL)
+
+    def of(self, rows: Array) -> Array:
+        """Return ARRIVAL of these rows; zeros for a tag that has sent nothing."""
+        columns, found = self._columns, np.zeros(len(rows), ARRIVAL)
+        known = rows < len(columns)
+        found[known] = columns[rows[known]]
+        return found
+
+    def record(self, rows: Array, arrival_ns: Array, oldest_ns: Array, newest_ns: Array, ranges: Array) -> None:
+        """Record one message of each of these rows, which are distinct.
+
+        oldest_ns, newest_ns: times of its samples. ranges: number of its ranges to anchors of the site.
+        """
+        if not len(rows):
+            return
+        if rows.max() >= len(self._columns):
+            self._columns = enlarged(self._columns, 2 * (int(rows.max()) + 1))
+        was = self._columns[rows]
+        now = was.copy()
+        now["arrival_ns"], now["newest_ns"] = arrival_ns, newest_ns
+        silence_s = np.where(was["arrival_ns"] == 0, 0.0, (arrival_ns - was["arrival_ns"]) * 1e-9)
+        delay_s = (arrival_ns - newest_ns) * 1e-9
+        now["delay_s"] = np.where(
+            was["arrival_ns"] == 0, delay_s, np.minimum(delay_s, was["delay_s"] + DELAY_GROWTH * silence_s)
+        )
+        _count_bursts(now, was, silence_s, oldest_ns)
+        _count_ranges(now, ranges, newest_ns)
+        self._columns[rows] = now
+
+
+def _count_bursts(now: Array, was: Array, silence_s: Array, oldest_ns: Array) -> None:
+    """Update the bursts. A burst follows a silence, and its samples are of that silence."""
+    filled = (oldest_ns - was["newest_ns"]) * 1e-9 < silence_s / 2
+    burst = (silence_s > BURST_S) & filled
+    since_s = (now["arrival_ns"] - was["burst_ns"]) * 1e-9
+    again = since_s < FORGOTTEN_BURSTS * np.maximum(was["burst_s"], BURST_S)
+    now["bursts"] = np.where(again, was["bursts"], 0) + burst
+    now["burst_ns"] = np.where(burst, now["arrival_ns"], was["burst_ns"])
+    now["burst_s"] = np.where(burst, silence_s, was["burst_s"])
+
+
+def _count_ranges(now: Array, ranges: Array, newest_ns: Array) -> None:
+    """Update the mean time between two ranges, which counts from the first one."""
+    now["range_ns"] = np.where(ranges > 0, now["arrival_ns"], now["range_ns"])
+    begins = (now["counted_ns"] == 0) & (ranges > 0)
+    now["ranges"] += np.where(begins, 0, ranges)
+    counted_s = (newest_ns - now["counted_ns"]) * 1e-9
+    full = (now["counted_ns"] > 0) & (counted_s >= RANGE_WINDOW_S) & (ranges > 0)
+    now["range_s"] = np.where(full, counted_s / np.maximum(now["ranges"], 1), now["range_s"])
+    restarts = begins | full
+    now["counted_ns"] = np.where(restarts, newest_ns, now["counted_ns"])
+    now["ranges"] = np.where(restarts, 0, now["ranges"])
