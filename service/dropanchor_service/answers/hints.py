@@ -1,12 +1,11 @@
 """What a person can do about a pose: from its reason, and from how the samples of the tag arrive."""
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array, Frame, StateReason
-from dropanchor_service.store.arrivals import FORGOTTEN_BURSTS
+from dropanchor_service.store.arrivals import BURSTS, FORGOTTEN_BURSTS, LATE_S, RANGE_S
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import KINDS, TagTable
 from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
@@ -37,7 +36,6 @@ LATE = "Samples arrive {0} s late: check the clock of the tag, and its network."
 IN_BURSTS = "Samples come in bursts of {0} s: let the tag send smaller batches, and check its network."
 FEW_RANGES = "One range in {0} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor."
 MOUNT_UNKNOWN = "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`)."
-LATE_S, BURSTS, RANGE_S = 1.0, 3, 1.0  # from which on there is a hint
 SENDING_S = 2.0  # a tag that has sent nothing for so long no longer sends
 
 _ALL_HINTS = [*HINTS, RELATIVE_HINT]
@@ -48,13 +46,6 @@ _IMU, _HEADING = KINDS.index("imu"), KINDS.index("heading")
 
 Hints = tuple[Sequence[str], Array]
 """All texts, and the index of the text of each POSE."""
-
-
-class _About(NamedTuple):
-    """A hint with a number of seconds: its text, and NaN or the seconds for each POSE."""
-
-    text: str
-    seconds: Array
 
 
 def past_hints(poses: Array) -> Hints:
@@ -72,41 +63,42 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     for text, where in _mounts(poses, site, tags):
         hint[where] = len(texts)
         texts.append(text)
-    for about in _about_arrivals(poses, tags, now_ns):
-        for seconds in np.unique(about.seconds[np.isfinite(about.seconds)]):
-            hint[about.seconds == seconds] = len(texts)
-            texts.append(about.text.format(int(seconds)))
+    conspicuous = np.flatnonzero(tags.arrivals.conspicuous(poses["row"]))
+    for text, where in _about_arrivals(poses[conspicuous], tags, now_ns) if len(conspicuous) else ():
+        hint[conspicuous[where]] = len(texts)
+        texts.append(text)
     for text, place in _unknown_anchors(poses, site, tags, now_ns):
         hint[place] = len(texts)
         texts.append(text)
     return texts, hint
 
 
-def _about_arrivals(poses: Array, tags: TagTable, now_ns: int) -> list[_About]:
-    """Return the hints about arrivals. Of two that apply to a tag the later one counts."""
+def _about_arrivals(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, Array]]:
+    """Yield each hint about arrivals, and which of the poses it is for. Of two for one pose the later one counts."""
     arrivals = tags.arrivals.of(poses["row"])
     age_s, burst_age_s = ((now_ns - arrivals[name]) * 1e-9 for name in ("arrival_ns", "burst_ns"))
     sends = (arrivals["arrival_ns"] > 0) & (age_s < np.maximum(SENDING_S, 2.0 * arrivals["burst_s"]))
-    if not sends.any():
-        return []
     nothing_new, little = np.isin(poses["reason"], _NOTHING_NEW), np.isin(poses["reason"], _LITTLE_KNOWN)
     in_bursts = (arrivals["bursts"] >= BURSTS) & (burst_age_s < FORGOTTEN_BURSTS * arrivals["burst_s"])
     late, few = arrivals["delay_s"] >= LATE_S, arrivals["range_s"] > RANGE_S
-    return [
-        _About(FEW_RANGES, _rounded(arrivals["range_s"], sends & few & little)),
-        _About(IN_BURSTS, _rounded(arrivals["burst_s"], sends & in_bursts & nothing_new)),
-        _About(LATE, _rounded(arrivals["delay_s"], sends & late & nothing_new)),
-    ]
+    yield from _with_seconds(FEW_RANGES, arrivals["range_s"], sends & few & little)
+    yield from _with_seconds(IN_BURSTS, arrivals["burst_s"], sends & in_bursts & nothing_new)
+    yield from _with_seconds(LATE, arrivals["delay_s"], sends & late & nothing_new)
 
 
-def _rounded(seconds: Array, where: Array) -> Array:
-    """Return whole seconds, NaN outside of `where`."""
-    return np.where(where, np.round(seconds), np.nan)
+def _with_seconds(text: str, seconds: Array, where: Array) -> Iterator[tuple[str, Array]]:
+    """Yield the text with each whole number of seconds, and the places that have this number."""
+    places = np.flatnonzero(where)
+    whole = np.round(seconds[places]).astype(np.int64)
+    for number in np.unique(whole).tolist():
+        yield text.format(number), places[whole == number]
 
 
 def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Array]]:
     """Return the hint for vehicles with an IMU alone, whose mounting angle the engine still has to learn."""
     places = np.flatnonzero(poses["reason"] == StateReason.UNCERTAIN)
+    if not len(places):
+        return []
     samples = tags.counts(poses["row"][places])["samples"]
     places = places[(samples[:, _IMU] > 0) & (samples[:, _HEADING] == 0)]
     settings = map(site.tag_settings, tags.names(poses["row"][places].tolist()))
@@ -117,7 +109,9 @@ def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Ar
 def _unknown_anchors(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> list[tuple[str, Array]]:
     """Return the hints for tags that lack ranges and hear an anchor that the site does not have."""
     unknown = {row: name for row, number, name in tags.unknown_anchors.fresh(now_ns) if site.lacks(number)}
-    lacking = np.flatnonzero(np.isin(poses["reason"], _NO_RANGES)) if unknown else np.empty(0, np.int64)
+    if not unknown:
+        return []
+    lacking = np.flatnonzero(np.isin(poses["reason"], _NO_RANGES))
     places: dict[str, list[int]] = {}
     heard_ns = tags.arrivals.of(poses["row"][lacking])["range_ns"]
     for place, row, range_ns in zip(lacking.tolist(), poses["row"][lacking].tolist(), heard_ns.tolist(), strict=True):

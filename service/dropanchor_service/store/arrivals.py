@@ -3,11 +3,12 @@
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.store.records import enlarged
+from dropanchor_service.store.records import copied, enlarged, put, take
 
 BURST_S = 1.0  # least silence before a burst
 RANGE_WINDOW_S = 6.0  # over which the ranges of a tag are counted
 DELAY_GROWTH = 0.5  # s per s: how fast the least delay of late may grow, so that one late message says nothing
+LATE_S, BURSTS, RANGE_S = 1.0, 3, 1.0  # delay, bursts and time between ranges from which on a tag is conspicuous
 FORGOTTEN_BURSTS = 3.0  # silences without a burst after which a tag no longer sends in bursts
 
 ARRIVAL = np.dtype(
@@ -30,26 +31,31 @@ class Arrivals:
     """ARRIVAL by row of a tag. The ingest thread writes; any thread reads."""
 
     def __init__(self) -> None:
-        self._columns = np.zeros(0, ARRIVAL)
+        self._columns = np.zeros(16, ARRIVAL)
+        self._conspicuous = np.zeros(16, bool)
 
     def of(self, rows: Array) -> Array:
         """Return ARRIVAL of these rows; zeros for a tag that has sent nothing."""
-        columns, found = self._columns, np.zeros(len(rows), ARRIVAL)
-        known = rows < len(columns)
-        found[known] = columns[rows[known]]
+        return take(self._columns, rows)
+
+    def conspicuous(self, rows: Array) -> Array:
+        """Return whether the samples of these rows arrive late, in bursts or with few ranges."""
+        found: Array = self._conspicuous[rows]
         return found
+
+    def grow(self, rows: int) -> None:
+        """Make room for this many rows."""
+        if rows > len(self._columns):
+            self._columns = enlarged(self._columns, 2 * rows)
+            self._conspicuous = enlarged(self._conspicuous, 2 * rows)
 
     def record(self, rows: Array, arrival_ns: Array, oldest_ns: Array, newest_ns: Array, ranges: Array) -> None:
         """Record one message of each of these rows, which are distinct.
 
         oldest_ns, newest_ns: times of its samples. ranges: number of its ranges to anchors of the site.
         """
-        if not len(rows):
-            return
-        if rows.max() >= len(self._columns):
-            self._columns = enlarged(self._columns, 2 * (int(rows.max()) + 1))
-        was = self._columns[rows]
-        now = was.copy()
+        was = take(self._columns, rows)
+        now = copied(was)
         now["arrival_ns"], now["newest_ns"] = arrival_ns, newest_ns
         silence_s = np.where(was["arrival_ns"] == 0, 0.0, (arrival_ns - was["arrival_ns"]) * 1e-9)
         delay_s = (arrival_ns - newest_ns) * 1e-9
@@ -58,7 +64,8 @@ class Arrivals:
         )
         _count_bursts(now, was, silence_s, oldest_ns)
         _count_ranges(now, ranges, newest_ns)
-        self._columns[rows] = now
+        put(self._columns, rows, now)
+        self._conspicuous[rows] = (now["delay_s"] >= LATE_S) | (now["bursts"] >= BURSTS) | (now["range_s"] > RANGE_S)
 
 
 def _count_bursts(now: Array, was: Array, silence_s: Array, oldest_ns: Array) -> None:

@@ -149,6 +149,7 @@ class TagTable:
         _count(self._counts["rejected"][:, REASONS.index(reason)], rows)
 
     def _grow(self, rows: int) -> None:
+        self.arrivals.grow(rows)
         if rows > len(self._counts):
             self._counts = enlarged(self._counts, 2 * len(self._counts))
             self._replay_lag_ns = enlarged(self._replay_lag_ns, len(self._counts))
