@@ -2,8 +2,9 @@
 
 from dropanchor_schemas.pose import StateReason, TrackingState
 from dropanchor_service.answers.columns import REASONS
-from dropanchor_service.answers.hints import HINTS
+from dropanchor_service.answers.hints import FEW_RANGES, HINTS, IN_BURSTS, LATE, MOUNT_UNKNOWN, RELATIVE_HINT
 from dropanchor_service.reference.markdown import table
+from dropanchor_service.store.unknown_anchors import hint_about
 
 _MEANING = {
     TrackingState.INITIALISING: ("The engine has too little to say anything.", "unknown"),
@@ -20,6 +21,19 @@ Every pose carries a state, a reason for machines and a hint for people. Whoever
 [How to read states](../how-to/read-states.md) explains them with examples.
 """
 
+_CAUSES_INTRODUCTION = """\
+Some causes show only in what the tag sends, and not in its state. A hint about one of them replaces that of the reason.
+"""
+_CAUSES = (
+    ("no message of the last seconds had samples less than a second old", LATE.format(8)),
+    ("three times in a row, silence for more than a second and then the samples of that time", IN_BURSTS.format(3)),
+    ("more than 1.5 s between two ranges, on average over 6 s", FEW_RANGES.format(2)),
+    ("ranges to anchors that the site does not have, and to no other", hint_about("9", hears_others=False)),
+    ("ranges to such an anchor and to others", hint_about("9", hears_others=True)),
+    ("`uncertain`, an IMU alone, and no `mount_angle_rad` in the settings", MOUNT_UNKNOWN),
+    ("`resolved` in the frame `relative`", RELATIVE_HINT),
+)
+
 
 def page() -> str:
     """Return the page as Markdown."""
@@ -28,5 +42,6 @@ def page() -> str:
     reasons = ((f"`{reason}`", hints[reason] or "(nothing is needed)") for reason in StateReason)
     return (
         f"{_INTRODUCTION}\n{table(('state', 'meaning', 'position'), states)}\n"
-        f"## Reasons\n\n{table(('reason', 'hint'), reasons)}"
+        f"## Reasons\n\n{table(('reason', 'hint'), reasons)}\n"
+        f"## Hints about causes\n\n{_CAUSES_INTRODUCTION}\n{table(('cause', 'hint'), _CAUSES)}"
     )

@@ -8,7 +8,7 @@ from dropanchor_service.store.records import copied, enlarged, put, take
 BURST_S = 1.0  # least silence before a burst
 RANGE_WINDOW_S = 6.0  # over which the ranges of a tag are counted
 DELAY_GROWTH = 0.5  # s per s: how fast the least delay of late may grow, so that one late message says nothing
-LATE_S, BURSTS, RANGE_S = 1.0, 3, 1.0  # delay, bursts and time between ranges from which on a tag is conspicuous
+LATE_S, BURSTS, RANGE_S = 1.0, 3, 1.5  # delay, bursts and time between ranges from which on a tag is conspicuous
 FORGOTTEN_BURSTS = 3.0  # silences without a burst after which a tag no longer sends in bursts
 
 ARRIVAL = np.dtype(
