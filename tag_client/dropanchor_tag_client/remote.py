@@ -17,11 +17,11 @@ class RemoteSettings(NamedTuple):
     imu_hz: float | None = None
 
     @property
-    def sentence(self) -> str:
-        """Return what the service sets, for the log."""
-        batch = "none" if self.batch_s is None else f"{self.batch_s:g} s"
-        imu = "none" if self.imu_hz is None else f"{self.imu_hz:g} Hz"
-        return f"the service sets the batch period to {batch} and the IMU rate to {imu} (none: as the program says)"
+    def in_words(self) -> str:
+        """The settings for people."""
+        batch = "as the program says" if self.batch_s is None else f"{self.batch_s:g} s"
+        imu = "as the IMU gives them" if self.imu_hz is None else f"at most {self.imu_hz:g} per second"
+        return f"batches: {batch}, IMU samples: {imu}"
 
 
 def parse(payload: bytes) -> RemoteSettings | None:

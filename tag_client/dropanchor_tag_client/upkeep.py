@@ -93,8 +93,8 @@ class Upkeep:
         settings = parse(payload)
         if settings is None or settings == client.wanted:
             return
-        if client.wanted is not None or settings != RemoteSettings():
-            _log.info("tag %s: %s", client.tag, settings.sentence)
+        if client.wanted is not None or settings != RemoteSettings():  # a service that sets nothing is not worth a line
+            _log.info("tag %s: the service sets %s", client.tag, settings.in_words)
         client.apply(settings)
         self._report(client, HealthValues())
 

@@ -44,3 +44,8 @@ def test_an_imu_slower_than_the_wanted_rate_keeps_every_sample() -> None:
     decimator = Decimator(100.0)
     found = [decimator.add(ImuSample(i * 40 * MS, (0, 0, 0), (0, 0, 0))) for i in range(5)]
     assert [mean.t_ns for mean in found if mean is not None] == [0, 40 * MS, 80 * MS, 120 * MS]
+
+
+def test_what_the_service_sets_is_said_in_words() -> None:
+    assert RemoteSettings(0.5, 50.0).in_words == "batches: 0.5 s, IMU samples: at most 50 per second"
+    assert RemoteSettings().in_words == "batches: as the program says, IMU samples: as the IMU gives them"

@@ -102,7 +102,10 @@ def _window(query: TrackQuery, now_ns: int) -> tuple[int, int]:
 def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
     tracks = answers.tracks
     if tracks is None:
-        raise ProblemError(Kind.NO_HISTORY, "Set `data_dir`, and leave `history.enabled` at true.")
+        raise ProblemError(
+            Kind.NO_HISTORY,
+            "Start the service with `--data-dir FOLDER`, or set `data_dir`, and leave `history.enabled` at true.",
+        )
     try:
         _require_known(answers, tracks, tag)
         return track_page(tracks, answers.site, tag, from_ns, to_ns, limit)
