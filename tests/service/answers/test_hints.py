@@ -89,8 +89,15 @@ def test_one_late_message_among_others_is_not_called_late() -> None:
     cart = Listener()
     for i in range(100):
         cart.send(0.1 * i + 0.05, [0.1 * i])
-    cart.send(10.1, [2.0])
+    cart.send(10.1, [8.4])
     assert cart.hint() == ""
+
+
+def test_single_samples_far_apart_are_few_and_no_bursts() -> None:
+    cart = Listener()
+    for i in range(10):
+        cart.send(3.0 * i + 0.05, [3.0 * i])
+    assert cart.hint(StateReason.RANGES_MISSING).startswith("One range in 3 s is too few")
 
 
 def test_samples_that_come_in_bursts_are_said_to_come_in_bursts() -> None:
