@@ -73,10 +73,7 @@ class CompilationProgress:
         """What the service does before it is ready, for people."""
         if not self._what:
             return "The service is starting."
-        return (
-            f"The service compiles {self._what} on this machine: {self.elapsed_s:.0f} s so far. "
-            "This happens once after an update."
-        )
+        return f"The service compiles {self._what}: {self.elapsed_s:.0f} s so far. This happens once after an update."
 
 
 @contextmanager
