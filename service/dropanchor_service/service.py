@@ -138,19 +138,17 @@ class Service:
 
     def _compiled_engine(self) -> Engine:
         """Return the engine. Compile whatever the service will run, so that no sample waits for it."""
-        progress = self._progress
-        progress.page = f"{self.url}/"
+        self._progress.page = f"{self.url}/"
         with self._compiling:
-            warm_up_ingest(progress)
-            warm_up_answers(progress)
-            return create_engine(self._settings, progress)
+            warm_up_ingest(self._progress)
+            warm_up_answers(self._progress)
+            return create_engine(self._settings, self._progress)
 
     def _build_ingest(self, engine: Engine) -> None:
-        settings = self._settings
         guarded = GuardedEngine(engine, self.site, self.tags, self.metrics)
         self._ingest = Ingest(
             self._buffer,
-            Admission(settings, self.site, self.tags, self._pending_tags),
+            Admission(self._settings, self.site, self.tags, self._pending_tags),
             guarded,
             self._publishers,
             self.site,
@@ -159,7 +157,7 @@ class Service:
             self.metrics,
             self.clock,
             observers=self._persistence.observers,
-            reorder_ns=round(settings.ingest.reorder_ms * 1e6),
+            reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
             health=self._health,
         )
         self._checkpoints = self._checkpointer(guarded)
@@ -167,7 +165,7 @@ class Service:
             self._ingest,
             self._buffer,
             self.metrics,
-            settings.ingest.period_ms * 1e-3,
+            self._settings.ingest.period_ms * 1e-3,
             self._checkpoints.between_turns if self._checkpoints else lambda: None,
         )
 
