@@ -2,7 +2,6 @@
 
 import argparse
 import logging
-import os
 import shlex
 import signal
 import sys
@@ -184,20 +183,6 @@ def parser(*commands: str) -> argparse.ArgumentParser:
             _source(name).add_arguments(one)
     add_completion_arguments(actions.add_parser("completion", help=COMPLETION), _PROGRAM)
     return top
-
-
-class _Formatter(argparse.RawDescriptionHelpFormatter):
-    """Help as wide as the terminal. Without a width, argparse loads shutil, which loads 1 MB of compression."""
-
-    def __init__(self, prog: str) -> None:
-        super().__init__(prog, width=_width() - 2)
-
-
-def _width() -> int:
-    try:
-        return int(os.environ.get("COLUMNS", "")) or os.get_terminal_size().columns
-    except (ValueError, OSError):
-        return 80
 
 
 def _source(command: str) -> ModuleType:

@@ -35,7 +35,7 @@ def test_a_signal_ends_a_first_start_while_it_compiles(tmp_path: Path, subcomman
 
 def test_a_first_start_serves_the_page_at_once_and_loses_no_sample(tmp_path: Path) -> None:
     url, zenoh = f"http://127.0.0.1:{free_port()}", free_endpoint()
-    arguments = command("serve", "--port", url.rpartition(":")[2], "--zenoh-listen", zenoh)
+    arguments = command("serve", "--engine", "paper", "--port", url.rpartition(":")[2], "--zenoh-listen", zenoh)
 
     def status(path: str) -> int:
         try:
