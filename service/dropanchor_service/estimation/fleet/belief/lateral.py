@@ -31,10 +31,6 @@ from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
 
 BOUND: Final = 3.0  # standard deviations beyond which a sideways increment is a skid or a bump and counts less
 SMOOTH: Final = 0.015  # (m/s)^2/s, roughness of dv above which the sideways axis tells more of jolts than of the course
-RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
-RIGID_BELOW: Final = 0.35  # mean square of its normalised innovation below which a mount is rigid
-RIGID_TAU: Final = 5.0  # s
-RIGID_CLIP: Final = 25.0  # limit of what one innovation counts
 MIN_VAR: Final = 1e-6  # (m/s)^2
 SHARE: Final = 0.05  # of the increment, error of scale and timing: the body turns while a sharp turn is integrated
 
@@ -73,35 +69,13 @@ def lateral_variance(s: Floats, node: Node, row: Row, slip_std: float) -> float:
 
 
 @njit(nogil=True)
-def is_rigid(row: Row) -> bool:
-    """Return whether nothing speaks against a rigid mount: only then the sideways axis tells of the course."""
-    return bool(row.lateral_misfit < RIGID_BELOW)
-
-
-@njit(nogil=True)
-def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None:
-    """Learn from a node whether the mount is rigid. one: the best hypothesis, before the node.
-
-    A hand, or a cart on grass, moves sideways more than a rigid mount explains. While several hypotheses compete, the
-    innovations tell of a wrong hypothesis and not of the mount.
-    """
-    if row.publication.resolved == 0:
-        return
-    s = one.mean
-    e = lateral_residual(s, node, scratch.H)
-    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, RIGID_SLIP)
-    share = node.dt_s / (RIGID_TAU + node.dt_s)
-    row.lateral_misfit += share * (min(e * e / S, RIGID_CLIP) - row.lateral_misfit)
-
-
-@njit(nogil=True)
-def update_lateral(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None:
+def update_lateral(one: Hypothesis, scratch: Scratch, node: Node, row: Row, slip_std: float) -> None:
     """Update one hypothesis, predicted over the node, with the sideways increment of its velocity.
 
-    An increment beyond `BOUND` counts as one of that size.
+    slip_std: rad, of the mount in use. An increment beyond `BOUND` counts as one of that size.
     """
     s = one.mean
     e = -lateral_residual(s, node, scratch.H)
-    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, row.settings.slip_std)
+    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, slip_std)
     S = max(S, e * e / BOUND**2)
     update_pda(s, one.cov, scratch.PH, S, e, 1.0)

@@ -135,6 +135,14 @@ WALK: Final = np.dtype(
     ]
 )
 
+MOUNTING: Final = np.dtype(
+    [
+        ("rigid", np.uint8),  # 1: nothing speaks for a loose mount
+        ("rigid_log_odds", np.float64),
+        ("lateral_misfit", np.float64),  # mean square of the sideways innovation of a rigid mount, in its variance
+    ]
+)
+
 PUBLICATION: Final = np.dtype(
     [
         ("state", np.uint8),
@@ -167,6 +175,7 @@ ROW: Final = np.dtype(
         ("publication", PUBLICATION),
         ("stuck", STUCK),
         ("walk", WALK),
+        ("mount", MOUNTING),
         ("first_slot", np.int32),  # of this row in the pool, -1: none
         ("count", np.int32),  # hypotheses
         ("t_ns", np.int64),
@@ -178,7 +187,6 @@ ROW: Final = np.dtype(
         ("since_turnabout_s", np.float64),  # s since a tag that reversed was last offered to drive ahead
         ("quiet_share", np.float64),  # share of the time in certain motion in which the IMU looked like rest
         ("since_class_check_s", np.float64),
-        ("lateral_misfit", np.float64),  # mean square of the sideways innovation of a rigid mount, in its variance
         ("lever_rate", np.float64),  # rad/s, mean yaw rate of the last node
     ],
     align=True,

@@ -33,6 +33,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
     V,
 )
+from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, NO_HEADING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -172,7 +173,7 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     else:
         growth[V] = t.q_speed_no_acc * dt
     growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
-    growth[SLIP] = row.settings.slip_std**2 * (1.0 - decay[SLIP] ** 2)
+    growth[SLIP] = slip_std_of(row) ** 2 * (1.0 - decay[SLIP] ** 2)
     lost, rough_var = 1.0 - decay[ACC_BIAS] ** 2, t.acc_bias_roughness * rough
     growth[ACC_BIAS] = (t.acc_bias_std**2 + rough_var) * lost
     growth[LEFT_BIAS] = (t.left_bias_std**2 + rough_var) * lost

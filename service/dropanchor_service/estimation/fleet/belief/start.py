@@ -31,6 +31,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
 from dropanchor_service.estimation.fleet.belief.states import NO_HEADING_YET, NO_RANGE
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import (
@@ -65,7 +66,7 @@ def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_
     s[RANGE_BIAS] = settings.range_bias
     P[YAW, YAW] = yaw_var
     P[MOUNT, MOUNT] = settings.mount_angle_std**2
-    P[SLIP, SLIP] = settings.slip_std**2
+    P[SLIP, SLIP] = slip_std_of(row) ** 2
     P[GYRO_BIAS, GYRO_BIAS] = max(settings.gyro_bias_std**2, node.gyro_bias_var)
     P[ACC_BIAS, ACC_BIAS], P[LEFT_BIAS, LEFT_BIAS] = t.acc_bias_std**2, t.left_bias_std**2
     P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2

@@ -12,7 +12,7 @@ from dropanchor_service.estimation.fleet.belief.gap import (
     restart_from_gap,
 )
 from dropanchor_service.estimation.fleet.belief.heading_classes import keep_both_classes
-from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, is_rigid, judge_mount, update_lateral
+from dropanchor_service.estimation.fleet.belief.lateral import update_lateral
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
     MAX_HYPOTHESES,
@@ -58,6 +58,7 @@ from dropanchor_service.estimation.fleet.belief.predict import (
     predict_state,
 )
 from dropanchor_service.estimation.fleet.belief.publish import publish
+from dropanchor_service.estimation.fleet.belief.rigidity import follow_mount, slip_std_of
 from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_turnabout
 from dropanchor_service.estimation.fleet.belief.start import (
     collect_start,
@@ -90,11 +91,8 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
     if _is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
+    lateral, slip_std = follow_mount(work, count, row, node, scratch), slip_std_of(row)
     fill_noise(decay, growth, node, row, t)
-    lateral = is_lateral_known(node)
-    if lateral:
-        judge_mount(work[best_of(work, count)], scratch, node, row)
-        lateral = is_rigid(row)
     for heading_class in range(CLASSES):
         filled = False
         for h in range(count):
@@ -106,7 +104,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 predict_covariance(work[h].cov, F, decay, FP)
                 add_process_noise(work[h].mean, work[h].cov, F, growth, node, t, work[h].nlos)
                 if lateral:
-                    update_lateral(work[h], scratch, node, row)
+                    update_lateral(work[h], scratch, node, row, slip_std)
 
 
 @njit(nogil=True)

@@ -8,7 +8,6 @@ from dropanchor_service.estimation.fleet.belief.heading_models import class_refe
 from dropanchor_service.estimation.fleet.belief.lateral import (
     BOUND,
     is_lateral_known,
-    is_rigid,
     lateral_residual,
     lateral_variance,
 )
@@ -23,6 +22,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
     V,
 )
+from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of, tells_course
 from dropanchor_service.estimation.fleet.belief.start import uses_heading
 from dropanchor_service.estimation.fleet.belief.update import project, pseudo_measurement_variance, update_pda
 from dropanchor_service.estimation.fleet.compiled import njit
@@ -58,9 +58,9 @@ def _component(track: Track, k: int, index: int, z: float, variance: float, H: F
 def update_inertial(track: Track, k: int, node: Node, row: Row, heading_class: int, t: Tuning, H: Floats) -> None:
     """Fuse heading, sideways acceleration, standstill and the bounds on the speed."""
     s = track.reference[k]
-    if is_lateral_known(node) and is_rigid(row):
+    if is_lateral_known(node) and tells_course(row):
         e = -lateral_residual(s, node, H)
-        measure(track, k, H, e, max(lateral_variance(s, node, row, row.settings.slip_std), e * e / BOUND**2))
+        measure(track, k, H, e, max(lateral_variance(s, node, row, slip_std_of(row)), e * e / BOUND**2))
     if uses_heading(row, node) and (row.heading.model != PLATFORM_MODEL or heading_class == EXACT):
         white, _, _ = class_reference_error(row, heading_class, node.heading_var, t)
         H[:] = 0.0

@@ -1,0 +1,98 @@
+"""Decide from the sideways increments of velocity whether the mount is rigid or loose.
+
+A loose mount lets course minus body yaw wander (`slip_std`), which limits the position more than all else: nothing but
+the ranges corrects a course that wanders. Most mounts are rigid, but nobody says so. A course that wanders shows as an
+increment of velocity across the body, so the innovation of `lateral` has another variance in each of the two classes,
+
+    S_loose = S_rigid + (slip_std^2 - RIGID_SLIP^2) 2 v^2 dt / tau,
+
+and the log likelihood ratio of the innovations decides. It does not count where the two variances are alike, as at low
+speed or on a rough ride: there, an error of the noise model would decide.
+"""
+
+import math
+from typing import Final
+
+from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, lateral_residual, lateral_variance
+from dropanchor_service.estimation.fleet.belief.layout import SLIP, Hypotheses, Hypothesis, Row, Scratch, V
+from dropanchor_service.estimation.fleet.belief.mixture import best_of
+from dropanchor_service.estimation.fleet.belief.update import project, update_pda
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import Node
+
+RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
+JOLTS_BELOW: Final = 0.35  # mean square of its normalised innovation below which the axis tells of the course
+JOLTS_TAU: Final = 5.0  # s
+JOLTS_CLIP: Final = 25.0  # limit of what one innovation counts
+TELLING: Final = 2.0  # ratio of the two variances from which on an innovation tells between the classes
+POWER: Final = 0.3  # of each likelihood: the errors of consecutive nodes are alike
+LEAST: Final = -10.0  # log likelihood ratio of one node: a skid is no loose mount
+LOG_ODDS_LIMIT: Final = 10.0  # so that a mount that comes loose is noticed
+RIGID_ABOVE: Final = 5.0  # log odds at which a mount becomes rigid
+LOOSE_BELOW: Final = 0.0  # and at which it is loose again
+
+
+@njit(nogil=True)
+def tells_course(row: Row) -> bool:
+    """Return whether the sideways axis tells of the course and not of jolts: only then it may correct the belief."""
+    return bool(row.mount.lateral_misfit < JOLTS_BELOW)
+
+
+@njit(nogil=True)
+def slip_std_of(row: Row) -> float:
+    """Return the standard deviation of course minus body yaw in use, rad: a given one, or that of the class."""
+    given, configured = row.settings.slip_given == 1, float(row.settings.slip_std)
+    return configured if given or row.mount.rigid == 0 else min(configured, RIGID_SLIP)
+
+
+@njit(nogil=True)
+def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None:
+    """Weigh what a node tells of the mount. one: the best hypothesis, before the node.
+
+    A hand, or a cart on grass, moves sideways more than a rigid mount explains. While several hypotheses compete, the
+    innovations tell of a wrong hypothesis and not of the mount.
+    """
+    if row.publication.resolved == 0:
+        return
+    s, mount, settings = one.mean, row.mount, row.settings
+    e = lateral_residual(s, node, scratch.H)
+    S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, RIGID_SLIP)
+    share = node.dt_s / (JOLTS_TAU + node.dt_s)
+    mount.lateral_misfit += share * (min(e * e / S, JOLTS_CLIP) - mount.lateral_misfit)
+    loose = S + (settings.slip_std**2 - RIGID_SLIP**2) * s[V] * s[V] * 2.0 * node.dt_s / settings.slip_tau
+    if loose > TELLING * S:
+        ratio = 0.5 * (math.log(loose / S) - e * e * (1.0 / S - 1.0 / loose))
+        log_odds = mount.rigid_log_odds + POWER * max(ratio, LEAST)
+        mount.rigid_log_odds = min(max(log_odds, -LOG_ODDS_LIMIT), LOG_ODDS_LIMIT)
+
+
+@njit(nogil=True)
+def decide_mount(work: Hypotheses, count: int, row: Row, scratch: Scratch) -> None:
+    """Put the mount of a row in the class that its log odds tell, with hysteresis."""
+    mount = row.mount
+    if mount.rigid == 0 and mount.rigid_log_odds > RIGID_ABOVE:
+        mount.rigid = 1
+        if row.settings.slip_given == 0:
+            for h in range(count):
+                _rule_out_slip(work[h], scratch)
+    elif mount.rigid == 1 and mount.rigid_log_odds < LOOSE_BELOW:
+        mount.rigid = 0
+
+
+@njit(nogil=True)
+def follow_mount(work: Hypotheses, count: int, row: Row, node: Node, scratch: Scratch) -> bool:
+    """Judge the mount by a node. Return whether its sideways increment may correct the hypotheses."""
+    if not is_lateral_known(node):
+        return False
+    judge_mount(work[best_of(work, count)], scratch, node, row)
+    decide_mount(work, count, row, scratch)
+    return tells_course(row)
+
+
+@njit(nogil=True)
+def _rule_out_slip(one: Hypothesis, scratch: Scratch) -> None:
+    """Update a hypothesis with a slip of zero: what it has taken for slip is the mounting angle."""
+    scratch.H[:] = 0.0
+    scratch.H[SLIP] = 1.0
+    S = project(one.cov, scratch.H, scratch.PH) + RIGID_SLIP**2
+    update_pda(one.mean, one.cov, scratch.PH, S, -one.mean[SLIP], 1.0)
