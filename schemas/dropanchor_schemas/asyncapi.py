@@ -8,13 +8,22 @@ from typing import Any
 from pydantic import BaseModel
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.events import Event
 from dropanchor_schemas.pose import Pose, PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, RemoteSettings
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER, MAX_PAYLOAD_BYTES
 
-_MODELS: tuple[type[BaseModel], ...] = (SamplesMessage, TagHealthMessage, Pose, PoseFrame, Anchor, RemoteSettings)
+_MODELS: tuple[type[BaseModel], ...] = (
+    SamplesMessage,
+    TagHealthMessage,
+    Pose,
+    PoseFrame,
+    Anchor,
+    RemoteSettings,
+    Event,
+)
 _PARAMETERS = {
     "site": "Id of the site; `default` unless the settings say otherwise.",
     "tag": "Id of the tag.",
@@ -89,6 +98,12 @@ def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
             "The poses of all tags in columns.",
             {"kind": "put", "put": "at most 10 Hz, while there is a subscriber"},
         ),
+        "event": (
+            _readable(keys.event_key("{site}", "{tag}")),
+            ["event"],
+            "Events of one tag, in their order. What was missed is in `GET /api/v1/events`.",
+            {"kind": "put", "put": "when an event is stored"},
+        ),
         "anchor": (
             _readable(keys.anchor_key("{site}", "{anchor}")),
             ["anchor"],
@@ -126,7 +141,7 @@ def _channel(address: str, messages: list[str], description: str, zenoh: dict[st
 def _operations() -> dict[str, Any]:
     """Return the operations of the service: it receives the tags' messages and sends poses."""
     received = ("samples", "tagAlive", "health")
-    sent = ("settings", "pose", "poses", "anchor", "serviceAlive")
+    sent = ("settings", "pose", "poses", "event", "anchor", "serviceAlive")
     return {
         f"{action}{name[0].upper()}{name[1:]}": {"action": action, "channel": {"$ref": f"#/channels/{name}"}}
         for action, names in (("receive", received), ("send", sent))
@@ -152,6 +167,7 @@ def _messages() -> dict[str, Any]:
         "settings": _json_message(RemoteSettings, "What is null is up to the program."),
         "pose": _json_message(Pose, "One pose with its state, reason and covariance."),
         "poseFrame": _json_message(PoseFrame, "Entry i of every column belongs to tag i."),
+        "event": _json_message(Event, "A CloudEvent 1.0 in structured JSON."),
         "anchor": _json_message(Anchor, "One anchor in the site frame."),
     }
 

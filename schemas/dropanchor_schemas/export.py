@@ -7,11 +7,13 @@ from pathlib import Path
 from pydantic import BaseModel
 
 from dropanchor_schemas import asyncapi
+from dropanchor_schemas.events import Event
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import Pose, PoseFrame, PoseList
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.tag_health import TagHealthMessage
+from dropanchor_schemas.zones import Zone
 
 FOLDER = Path(__file__).parent / "json"
 ASYNCAPI = "asyncapi.json"
@@ -26,6 +28,8 @@ MODELS: dict[str, type[BaseModel]] = {
     "site": Site,
     "anchor": Anchor,
     "tag_settings": TagSettings,
+    "event": Event,
+    "zone": Zone,
 }
 
 

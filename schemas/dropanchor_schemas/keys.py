@@ -63,6 +63,10 @@ def pose_key(site: str, tag: str) -> str:
     return f"{_tag_prefix(site, tag)}/pose"
 
 
+def event_key(site: str, tag: str) -> str:
+    return f"{_tag_prefix(site, tag)}/event"
+
+
 def poses_key(site: str) -> str:
     return f"{_site_prefix(site)}/poses"
 

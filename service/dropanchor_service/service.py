@@ -24,7 +24,7 @@ from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest
+from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest, warm_up_zones
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
@@ -44,12 +44,14 @@ from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
+from dropanchor_service.zenoh_io.events import ZenohEvents
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
 from dropanchor_service.zenoh_io.intake import ZenohIntake
 from dropanchor_service.zenoh_io.link import ZenohLink
 from dropanchor_service.zenoh_io.publishers import ZenohPoses
 from dropanchor_service.zenoh_io.queryables import ZenohAnswers
 from dropanchor_service.zenoh_io.remote_settings import ZenohRemoteSettings
+from dropanchor_service.zone_events import ZoneEvents
 
 HTTP_STOP_S = 1.5
 
@@ -96,6 +98,9 @@ class Service:
             self._health,
             self._publishers,
         )
+        self._zone_events = ZoneEvents(
+            settings, self.site.site.id, self.tags, self.latest, self._health, self.clock.now_ns, self.metrics
+        )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
@@ -121,6 +126,7 @@ class Service:
                 self._opened.callback(self._write_last_checkpoint, self._checkpoints)
             self._thread.start()
             self._opened.callback(self._thread.stop)
+            self._opened.enter_context(self._zone_events)
             self._opened.enter_context(self._link)
             self._app.app = self._full_app()
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
@@ -142,6 +148,7 @@ class Service:
         with self._compiling:
             warm_up_ingest(self._progress)
             warm_up_answers(self._progress)
+            warm_up_zones(self._progress)
             return create_engine(self._settings, self._progress)
 
     def _build_ingest(self, engine: Engine) -> None:
@@ -191,7 +198,8 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        found = [*self._persistence.problems(), self._checkpoints.problem if self._checkpoints else None]
+        stored = [*self._persistence.problems(), *self._zone_events.problems()]
+        found = [*stored, self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -234,6 +242,7 @@ class Service:
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),
             ZenohRemoteSettings(session, self.site, self.metrics),
+            ZenohEvents(session, self._zone_events.store, self.metrics),
         ]
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:
@@ -280,6 +289,7 @@ class Service:
             ready=lambda: (not (found := self.problems()), found),
             impaired=self.impairments,
             recorder=self._persistence.recorder,
+            events=self._zone_events.parts,
             registry=self.metrics.registry,
             stopping=self._stopping,
             receive=self._receive,

@@ -21,6 +21,8 @@ from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
+from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.api.routes.events import events_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
@@ -33,6 +35,8 @@ from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
+from dropanchor_service.api.routes.webhooks import webhooks_router
+from dropanchor_service.api.routes.zones import zones_router
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
@@ -60,6 +64,7 @@ def create_app(
     authenticator: Authenticator | None = None,
     rate_limiter: RateLimiter | None = None,
     cors_origins: Sequence[str] = (),
+    events: EventParts | None = None,
 ) -> FastAPI:
     """Return the application with all routes and middleware.
 
@@ -68,8 +73,10 @@ def create_app(
     recorder: None when there is no folder for recordings. dashboard: the folder of the page; None for no page.
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
-    no limit. cors_origins: of other web pages that may use the interface.
+    no limit. cors_origins: of other web pages that may use the interface. events:
+    zones, events and webhooks; None keeps them in memory and watches nothing.
     """
+    events = events or EventParts.in_memory(answers.site.site.id)
     app = _app_without_routes(authenticator, rate_limiter, cors_origins)
     for router in (
         poses_router(answers),
@@ -84,6 +91,9 @@ def create_app(
         ingest_health_router(receive_health),
         ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
         recordings_router(recorder),
+        zones_router(events.items),
+        events_router(events.store, stopping),
+        webhooks_router(events),
         health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
@@ -155,6 +165,9 @@ _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
+    {"name": "zones", "description": "Areas of the site, groups of tags, and the rules that make events."},
+    {"name": "events", "description": "What has happened, as CloudEvents."},
+    {"name": "webhooks", "description": "Events over HTTP to other systems."},
     {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},

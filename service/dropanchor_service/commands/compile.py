@@ -4,7 +4,7 @@ import argparse
 
 from dropanchor_service.commands.options import add_log_option
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest
+from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest, warm_up_zones
 from dropanchor_service.runtime import logs
 from dropanchor_service.settings.model import Settings
 
@@ -29,4 +29,5 @@ def run(arguments: argparse.Namespace) -> int:
     create_engine(Settings(engine="fleet"))
     warm_up_ingest()
     warm_up_answers()
+    warm_up_zones()
     return 0

@@ -21,6 +21,7 @@ from dropanchor_schemas.wire import (
     RangeSample,
     encode_packed,
 )
+from dropanchor_schemas.zones import Circle, TooCloseRule, Zone
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import (
     ANCHOR,
@@ -40,6 +41,9 @@ from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.zones.modes import placed
+from dropanchor_service.zones.pair_watch import PairWatch
+from dropanchor_service.zones.zone_watch import ZoneWatch
 
 PROGRESS_S = 5.0
 IMPORT_BLOCKED: Final[Any] = None  # in sys.modules it makes an import fail
@@ -196,3 +200,20 @@ def warm_up_answers(progress: CompilationProgress | None = None) -> None:
     answers.latest.write(poses, hypotheses)
     with _compiling("the encoder of answers", progress or CompilationProgress()):
         b"".join(answers.pose_list_json())
+
+
+def warm_up_zones(progress: CompilationProgress | None = None) -> None:
+    """Compile the kernels of zones and pairs with two tags at the same place."""
+    poses, names = np.zeros(2, POSE), ["a", "b"]
+    poses["row"], poses["t_ns"], poses["state"], poses["p_mode"] = (0, 1), 1, State.TRACKING, 1.0
+    poses["cov"][:, :2, :2] = np.eye(2)
+    with _compiling("the zones", progress or CompilationProgress()):
+        found = placed(poses, np.zeros(2), LatestPoses())
+        zones = ZoneWatch()
+        zones.set_zones([Zone(id="a", shape=Circle(type="circle", x=0.0, y=0.0, radius_m=9.0))], {})
+        zones.add_tags(names)
+        list(zones.judge(found))
+        rule = TooCloseRule(id="a", type="too_close", distance_m=9.0, delay_s=0.0)
+        pairs = PairWatch(rule, {})
+        for _ in range(2):
+            list(pairs.judge(found, names, 1))

@@ -69,15 +69,20 @@ def truth_of(simulation: Simulation) -> Truth:
 
 def run_engine(engine: Engine, simulations: Sequence[Simulation], known: PriorKnowledge) -> Timed:
     """Run a fresh engine on all runs, run i as row i, one second at a time. All runs must have the same anchors."""
-    engine.set_anchors(np.array([(a.x, a.y, a.z) for a in simulations[0].anchors], ANCHOR))
-    for row, simulation in enumerate(simulations):
-        engine.configure(row, _settings(simulation, known))
+    configure(engine, simulations, known)
     started = time.process_time()
     steps = [engine.process(batch).poses for batch in batches(_together(simulations, known))]
     seconds = time.process_time() - started
     poses = np.concatenate([np.empty(0, POSE), *steps])
     by_row = [poses[poses["row"] == row] for row in range(len(simulations))]
     return Timed([Track(own["t_ns"] / NS_PER_S, own) for own in by_row], seconds)
+
+
+def configure(engine: Engine, simulations: Sequence[Simulation], known: PriorKnowledge) -> None:
+    """Set the anchors of a fresh engine, and make run i its row i. All runs must have the same anchors."""
+    engine.set_anchors(np.array([(a.x, a.y, a.z) for a in simulations[0].anchors], ANCHOR))
+    for row, simulation in enumerate(simulations):
+        engine.configure(row, _settings(simulation, known))
 
 
 def _settings(simulation: Simulation, known: PriorKnowledge) -> Array:

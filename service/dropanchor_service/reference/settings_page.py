@@ -32,6 +32,7 @@ _UNITS = {
     "mps": "m/s",
     "mib": "MiB",
     "days": "d",
+    "hours": "h",
     "minutes": "min",
     "per_s": "1/s",
 }

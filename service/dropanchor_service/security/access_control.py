@@ -98,7 +98,7 @@ def _service(site: str) -> list[Section]:
 
 
 def _reader(site: str) -> list[Section]:
-    poses = [keys.all_tags(site, "pose"), keys.poses_key(site), keys.all_anchors(site)]
+    poses = [keys.all_tags(site, leaf) for leaf in ("pose", "event")] + [keys.poses_key(site), keys.all_anchors(site)]
     alive = [keys.all_tags(site, "alive"), keys.all_services_alive(site)]
     liveliness = ["liveliness_query", "declare_liveliness_subscriber"]
     return [

@@ -13,6 +13,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_patte
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
+from dropanchor_service.settings.events import EventSettings, WebhookSettings
 
 
 def _is_endpoint(text: str) -> str:
@@ -263,6 +264,8 @@ class Settings(_Section):
     ingest: IngestSettings = IngestSettings()
     history: HistorySettings = HistorySettings()
     recording: RecordingSettings = RecordingSettings()
+    events: EventSettings = EventSettings()
+    webhooks: WebhookSettings = WebhookSettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}
     tag_defaults: TagSettings = Field(

@@ -20,6 +20,7 @@ KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
 _SITE = "/api/v1/site"
+_WEBHOOKS = "/api/v1/webhooks/"
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
     "`dropanchor key add NAME --scope read`."
@@ -125,10 +126,11 @@ def _is_protected(path: str) -> bool:
 
 
 def required_scope(method: str, path: str) -> AccessScope:
-    """Return READ for reading, ADMIN for deleting and for changing the site, and WRITE for other changes."""
+    """Return READ for reading, ADMIN for deleting and for changing the site or a webhook, WRITE for other changes."""
     if method in ("GET", "HEAD", "OPTIONS"):
         return AccessScope.READ
-    return AccessScope.ADMIN if method == "DELETE" or path == _SITE else AccessScope.WRITE
+    is_admin = method == "DELETE" or path == _SITE or path.startswith(_WEBHOOKS)
+    return AccessScope.ADMIN if is_admin else AccessScope.WRITE
 
 
 def _forbidden(request: Request, identity: Identity | None) -> Response | None:

@@ -72,7 +72,8 @@ TagId = Annotated[str, Depends(_tag_id)]
 AnchorId = Annotated[str, Depends(_anchor_id)]
 
 
-def _split(values: list[str]) -> list[str]:
+def split_ids(values: list[str]) -> list[str]:
+    """Return the ids in these texts, which commas separate. Raises ValueError."""
     names = [name for value in values for name in value.split(",")]
     for name in names:
         chunk_from_id(name)
@@ -88,7 +89,7 @@ class TagFilter(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    tags: Annotated[list[Ids], AfterValidator(_split)] = Field(
+    tags: Annotated[list[Ids], AfterValidator(split_ids)] = Field(
         default=[],
         description="Return only these tags. Separate ids with commas, or repeat the parameter. Unknown tags are left "
         "out. The default is all tags.",

@@ -125,7 +125,7 @@ class Changes:
 async def _events(changes: Changes, period_s: float, stopping: Event) -> AsyncIterator[bytes]:
     yield _event("snapshot", changes.snapshot())
     sent_s = time.monotonic()
-    while not await _stopped_within(period_s, stopping):
+    while not await stopped_within(period_s, stopping):
         frame = changes.next()
         if frame is not None:
             yield _event("poses", frame)
@@ -136,7 +136,7 @@ async def _events(changes: Changes, period_s: float, stopping: Event) -> AsyncIt
         sent_s = time.monotonic()
 
 
-async def _stopped_within(period_s: float, stopping: Event) -> bool:
+async def stopped_within(period_s: float, stopping: Event) -> bool:
     """Sleep for the period and return False; return True within _NAP_S once the service stops."""
     end_s = time.monotonic() + period_s
     while not stopping.is_set():

@@ -1,0 +1,64 @@
+"""Models of events: CloudEvents 1.0 in JSON."""
+
+from enum import StrEnum
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class EventType(StrEnum):
+    """What has happened."""
+
+    ZONE_ENTER = "dropanchor.zone.enter"
+    ZONE_EXIT = "dropanchor.zone.exit"
+    ZONE_DWELL = "dropanchor.zone.dwell"
+    ZONE_SPEED = "dropanchor.zone.speed"
+    TAGS_TOO_CLOSE = "dropanchor.tags.too_close"
+    TAG_BATTERY_LOW = "dropanchor.tag.battery_low"
+    TAG_LOST = "dropanchor.tag.lost"
+    TAG_AMBIGUOUS = "dropanchor.tag.ambiguous"
+    WEBHOOK_TEST = "dropanchor.webhook.test"
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+
+class EventData(_Answer):
+    """What is known about the event. Fields that do not belong to its type are null."""
+
+    t_ns: int = Field(description="UTC, ns: when the event was certain. `time` of the envelope is the same.")
+    since_ns: int = Field(description="UTC, ns: since when its condition has held.")
+    zone: str | None = Field(default=None, description="Id of the zone.")
+    rule: str | None = Field(default=None, description="Id of the rule, of events without a zone.")
+    name: str = Field(default="", description="Name of the zone or rule.")
+    x: float | None = Field(default=None, description="Position of the tag in the site frame, m.")
+    y: float | None = None
+    probability: float | None = Field(
+        default=None, description="Probability that the tag is inside (exit: outside), or that the tags are too close."
+    )
+    other_tag: str | None = Field(default=None, description="The other of two tags that are too close.")
+    distance_m: float | None = Field(default=None, description="Distance of their estimated positions.")
+    speed_mps: float | None = None
+    battery_fraction: float | None = None
+
+
+class Event(_Answer):
+    """An event in the JSON format of CloudEvents 1.0. `id` stays the same however often the event is delivered."""
+
+    specversion: Literal["1.0"] = "1.0"
+    id: str = Field(description="Unique. A receiver that has seen it drops the event.")
+    source: str = Field(description="`urn:dropanchor:site:` and the id of the site.")
+    type: EventType
+    subject: str = Field(description="Id of the tag.")
+    time: str = Field(description="RFC 3339, UTC.")
+    sequence: str = Field(description="Position in the order of all events of the service: 20 digits, which sort.")
+    datacontenttype: Literal["application/json"] = "application/json"
+    data: EventData
+
+
+class EventList(_Answer):
+    """One page of stored events, oldest first."""
+
+    events: list[Event]
+    next: str | None = Field(description="`after` of the next page; null when there are no more events now.")

@@ -1,0 +1,129 @@
+"""Models of zones, groups of tags, and the rules that make events."""
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from dropanchor_schemas.site import Id, Number, StrictBool
+
+MAX_POINTS = 200
+MAX_COORDINATE_M = 100_000.0
+MAX_TAGS = 10_000
+
+Coordinate = Annotated[Number, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Ids = Annotated[list[Id], Field(max_length=MAX_TAGS)]
+
+
+class _Edited(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Polygon(_Edited):
+    """A polygon in the site frame. Its last point connects to its first."""
+
+    type: Literal["polygon"]
+    points: list[Annotated[list[Coordinate], Field(min_length=2, max_length=2)]] = Field(
+        min_length=3,
+        max_length=MAX_POINTS,
+        description="The corners as [x, y], m, in either direction. Edges must not cross, and corners not repeat.",
+    )
+
+
+class Circle(_Edited):
+    """A circle in the site frame."""
+
+    type: Literal["circle"]
+    x: Coordinate = Field(description="Centre, m.")
+    y: Coordinate = Field(description="Centre, m.")
+    radius_m: Annotated[Number, Field(ge=0.1, le=10_000)]
+
+
+class Concerned(_Edited):
+    """The tags that a zone or a rule concerns. If both lists are empty, it concerns all tags."""
+
+    tags: Ids = Field(default=[], description="Ids of tags.")
+    groups: Annotated[list[Id], Field(max_length=1000)] = Field(default=[], description="Ids of groups of tags.")
+
+
+class Zone(Concerned):
+    """An area of the site, and the events that tags make there."""
+
+    id: Id = Field(description="Id of the zone, as in its path.")
+    name: str = Field(default="", max_length=100, description="Name for people.")
+    colour: str = Field(default="#2f6fde", pattern="^#[0-9a-fA-F]{6}$", description="Colour on the map, #rrggbb.")
+    shape: Polygon | Circle = Field(discriminator="type")
+    enter: StrictBool = Field(default=True, description="Whether entering makes an event.")
+    exit: StrictBool = Field(default=True, description="Whether leaving makes an event.")
+    dwell_s: Annotated[Number, Field(ge=1, le=31_536_000)] | None = Field(
+        default=None, description="A tag that stays for so long makes an event, once per stay; null: never."
+    )
+    speed_mps: Annotated[Number, Field(ge=0.1, le=100)] | None = Field(
+        default=None, description="A tag inside that moves faster than this makes an event; null: never."
+    )
+    delay_s: Annotated[Number, Field(ge=0, le=600)] = Field(
+        default=1.0,
+        description="How long a tag must be inside or outside, or too fast, before the event.",
+    )
+
+
+class ZoneList(BaseModel):
+    """The zones of the site."""
+
+    zones: list[Zone]
+
+
+class TagGroup(_Edited):
+    """Tags with a common name. A tag may be in several groups."""
+
+    id: Id = Field(description="Id of the group, as in its path.")
+    name: str = Field(default="", max_length=100, description="Name for people.")
+    tags: Ids = Field(default=[], description="Ids of its tags. They need not exist yet.")
+
+
+class TagGroupList(BaseModel):
+    """The groups of tags."""
+
+    groups: list[TagGroup]
+
+
+class _Rule(Concerned):
+    id: Id = Field(description="Id of the rule, as in its path.")
+    name: str = Field(default="", max_length=100, description="Name for people.")
+
+
+class TooCloseRule(_Rule):
+    """Two of the tags are closer than `distance_m`. One event per approach, about the tag whose id comes first."""
+
+    type: Literal["too_close"]
+    distance_m: Annotated[Number, Field(ge=0.1, le=1000)]
+    delay_s: Annotated[Number, Field(ge=0, le=600)] = Field(default=1.0, description="How long they must be so close.")
+
+
+class BatteryLowRule(_Rule):
+    """The charge that a tag reports is below `fraction`. The rule is ready again 0.05 above it."""
+
+    type: Literal["battery_low"]
+    fraction: Annotated[Number, Field(ge=0.01, le=0.9)] = 0.2
+
+
+class LostRule(_Rule):
+    """A tag has been `lost` for `after_s`."""
+
+    type: Literal["lost"]
+    after_s: Annotated[Number, Field(ge=0, le=86_400)] = 60.0
+
+
+class AmbiguousRule(_Rule):
+    """A tag has been `ambiguous` for `after_s`."""
+
+    type: Literal["ambiguous"]
+    after_s: Annotated[Number, Field(ge=0, le=86_400)] = 120.0
+
+
+EventRule = Annotated[TooCloseRule | BatteryLowRule | LostRule | AmbiguousRule, Field(discriminator="type")]
+
+
+class EventRuleList(BaseModel):
+    """The rules that need no zone."""
+
+    rules: list[EventRule]

@@ -1,0 +1,139 @@
+"""The routes for events: pages of stored ones, and a stream of new ones."""
+
+import asyncio
+import re
+import sqlite3
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
+from threading import Event as ThreadEvent
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Header, Query
+from pydantic import AfterValidator, Field
+from starlette.responses import Response, StreamingResponse
+
+from dropanchor_schemas.events import EventList, EventType
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import event_examples as examples
+from dropanchor_service.api.routes.parameters import Ids, TagFilter, example_response, json_response, split_ids
+from dropanchor_service.api.routes.stream import HEARTBEAT_S, MEDIA_TYPE, stopped_within
+from dropanchor_service.events.store import EventStore, Selection, StoredEvent
+
+MAX_EVENTS = 1000  # per page, and at once in a stream
+POLL_S = 0.1
+MAX_SEQUENCE = 2**63 - 1
+
+SEQUENCE = "^[0-9]{1,20}$"
+
+_STREAM = """\
+Server-sent events, one for each new event: `id` is its `sequence`, `event` its type, and the data the event. A browser
+that connects again sends the last id by itself and misses nothing; another client can use `after`. Without either, the
+stream begins with what comes next. While nothing happens, the service sends a comment every 5 s."""
+
+
+class EventFilter(TagFilter):
+    types: list[EventType] = Field(default=[], description="Return only events of these types. The default is all.")
+    zones: Annotated[list[Ids], AfterValidator(split_ids)] = Field(
+        default=[], description="Return only events of these zones. Separate ids with commas."
+    )
+    after: Annotated[str, Field(pattern=SEQUENCE)] | None = Field(
+        default=None, description="Return events that follow the one with this `sequence`."
+    )
+
+    def selection(self, since_ns: int | None = None) -> Selection:
+        return Selection(self.tags, [kind.value for kind in self.types], self.zones, since_ns)
+
+    def position(self) -> int | None:
+        return None if self.after is None else min(int(self.after), MAX_SEQUENCE)
+
+
+class EventQuery(EventFilter):
+    since: int | None = Field(
+        default=None, ge=0, lt=2**63, description="Return events from this time on (UTC, ns), the oldest first."
+    )
+    limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")
+
+
+def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
+    router = APIRouter(tags=["events"])
+
+    @router.get(
+        "/events",
+        operation_id="list_events",
+        summary="List stored events",
+        description="With `since` or `after`, the page begins there and `next` leads on. Without them, it holds the "
+        "newest events. Events are always in order.",
+        response_model=EventList,
+        responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
+    )
+    def list_events(query: Annotated[EventQuery, Query()]) -> Response:
+        selection, after = query.selection(query.since), query.position()
+        with reading():
+            if query.since is None and after is None:
+                found, leads_on = store.last(query.limit, selection), False
+            else:
+                found = store.after(after or 0, query.limit, selection)
+                leads_on = len(found) == query.limit
+        following = f"{found[-1].sequence:020}" if leads_on else None
+        return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
+
+    @router.get(
+        "/events/stream",
+        operation_id="stream_events",
+        summary="Stream events as they happen",
+        description=_STREAM,
+        response_class=StreamingResponse,
+        responses=_event_stream() | problems(Kind.INVALID_REQUEST),
+    )
+    async def stream_events(
+        query: Annotated[EventFilter, Query()],
+        last_event_id: Annotated[
+            str | None, Header(description="The last id that the client has. Another text than an id is ignored.")
+        ] = None,
+    ) -> Response:
+        if last_event_id is not None and re.fullmatch(SEQUENCE, last_event_id):
+            query = query.model_copy(update={"after": last_event_id})
+        headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+        return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
+
+    return router
+
+
+@contextmanager
+def reading() -> Iterator[None]:
+    """Turn a failed read of the events into a problem."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise ProblemError(Kind.EVENTS_UNREADABLE, f"The events cannot be read: {error}.") from error
+
+
+async def _stream(store: EventStore, query: EventFilter, stopping: ThreadEvent) -> AsyncIterator[bytes]:
+    after = query.position()
+    position, selection = store.newest if after is None else after, query.selection()
+    yield b": alive\n\n"
+    sent_s = time.monotonic()
+    while True:
+        newest = store.newest
+        found = await asyncio.to_thread(store.after, position, MAX_EVENTS, selection) if newest > position else []
+        if found:
+            yield b"".join(map(_message, found))
+        elif time.monotonic() - sent_s >= HEARTBEAT_S:
+            yield b": alive\n\n"
+        if found or time.monotonic() - sent_s >= HEARTBEAT_S:
+            sent_s = time.monotonic()
+        position = found[-1].sequence if len(found) == MAX_EVENTS else max(position, newest)
+        if await stopped_within(POLL_S, stopping):
+            return
+
+
+def _message(event: StoredEvent) -> bytes:
+    kind = orjson.loads(event.body)["type"]
+    return f"id: {event.sequence:020}\nevent: {kind}\ndata: ".encode() + event.body + b"\n\n"
+
+
+def _event_stream() -> dict[int | str, dict[str, Any]]:
+    example = _message(StoredEvent(42, orjson.dumps(examples.EVENT))).decode()
+    return {200: {"content": {MEDIA_TYPE: {"example": example}}}}

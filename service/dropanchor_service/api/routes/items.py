@@ -1,0 +1,101 @@
+"""What the routes of edited items share: ETags, and problems for items that are unknown, changed or too many."""
+
+import hashlib
+from collections.abc import Callable
+from typing import Annotated, TypeVar
+
+from fastapi import Depends, Header, Path
+from pydantic import BaseModel
+from starlette.responses import Response
+
+from dropanchor_schemas.site import ID_SCHEMA
+from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.routes.parameters import id_of, json_response, saving
+from dropanchor_service.store.items import FullError, NamedItems
+
+Item = TypeVar("Item", bound=BaseModel)
+
+IfMatch = Annotated[str | None, Header(description="Change nothing unless it is the `ETag` of the present one.")]
+
+CHANGE_KINDS = (Kind.ID_DIFFERS, Kind.ITEMS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
+
+
+def path_id(what: str, example: str) -> Callable[..., str]:
+    """Return the dependency that reads the id of an item from the path."""
+
+    def read(
+        name: Annotated[
+            str,
+            Path(
+                alias=what,
+                description=f"The {what}'s id, percent-escaped.",
+                examples=[example],
+                json_schema_extra=ID_SCHEMA,
+            ),
+        ],
+    ) -> str:
+        return id_of(name)
+
+    return read
+
+
+ZoneId = Annotated[str, Depends(path_id("zone", "dock"))]
+GroupId = Annotated[str, Depends(path_id("group", "forklifts"))]
+RuleId = Annotated[str, Depends(path_id("rule", "apart"))]
+WebhookId = Annotated[str, Depends(path_id("webhook", "mes"))]
+
+
+def etag_of(item: BaseModel) -> str:
+    return f'"{hashlib.sha256(item.model_dump_json().encode()).hexdigest()[:16]}"'
+
+
+def item_response(item: BaseModel, answer: BaseModel | None = None) -> Response:
+    """Return the item, or the answer that stands for it, with the ETag of the item."""
+    response = json_response((answer or item).model_dump(mode="json"))
+    response.headers["etag"] = etag_of(item)
+    return response
+
+
+def found(items: NamedItems[Item], name: str, unknown: Kind) -> Item:
+    """Return the item. Raises ProblemError when there is none."""
+    item = items.all.get(name)
+    if item is None:
+        raise ProblemError(unknown, f"There is none with the id {name!r}.")
+    return item
+
+
+def put(items: NamedItems[Item], name: str, body_id: str, item: Item, if_match: str | None) -> None:
+    """Save the item. Raises ProblemError."""
+    if body_id != name:
+        raise ProblemError(Kind.ID_DIFFERS, f"The id is {name!r} in the path and {body_id!r} in the body.")
+    present = items.all.get(name)
+    with saving():
+        try:
+            done = _matches(present, if_match) and items.put(name, item, present if if_match else None)
+        except FullError as error:
+            raise ProblemError(Kind.ITEMS_FULL, f"There are {len(items.all)} already. Delete one first.") from error
+    if not done:
+        raise _changed()
+
+
+def delete(items: NamedItems[Item], name: str, if_match: str | None, unknown: Kind) -> Response:
+    """Delete the item. Raises ProblemError."""
+    present = found(items, name, unknown)
+    with saving():
+        try:
+            done = _matches(present, if_match) and items.remove(name, present if if_match else None)
+        except KeyError as error:
+            raise ProblemError(unknown, f"There is none with the id {name!r}.") from error
+    if not done:
+        raise _changed()
+    return Response(status_code=204)
+
+
+def _matches(present: BaseModel | None, if_match: str | None) -> bool:
+    if if_match is None:
+        return True
+    return present is not None and if_match in ("*", etag_of(present))
+
+
+def _changed() -> ProblemError:
+    return ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed it: get it and try again.")

@@ -1,0 +1,182 @@
+"""The routes for zones, groups of tags, and rules without a zone."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body
+from starlette.responses import Response
+
+from dropanchor_schemas.zones import EventRule, EventRuleList, TagGroup, TagGroupList, Zone, ZoneList
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import event_examples as examples
+from dropanchor_service.api.routes.items import (
+    CHANGE_KINDS,
+    GroupId,
+    IfMatch,
+    RuleId,
+    ZoneId,
+    delete,
+    found,
+    item_response,
+    put,
+)
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.zones.items import ZoneItems
+from dropanchor_service.zones.shapes import ShapeError, vertices_of
+
+_READ = (Kind.INVALID_REQUEST,)
+
+
+def zones_router(items: ZoneItems) -> APIRouter:
+    router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
+    _add_zone_routes(router, items)
+    _add_group_routes(router, items)
+    _add_rule_routes(router, items)
+    return router
+
+
+def _add_zone_routes(router: APIRouter, items: ZoneItems) -> None:
+    zones = items.zones
+
+    @router.get(
+        "/zones",
+        operation_id="list_zones",
+        summary="List the zones",
+        response_model=ZoneList,
+        responses=example_response({"zones": [examples.ZONE]}) | problems(*_READ),
+    )
+    async def list_zones() -> Response:
+        return json_response({"zones": [zone.model_dump() for zone in zones.all.values()]})
+
+    @router.get(
+        "/zones/{zone}",
+        operation_id="get_zone",
+        summary="Get a zone",
+        response_model=Zone,
+        responses=example_response(examples.ZONE) | problems(Kind.UNKNOWN_ZONE, *_READ),
+    )
+    async def get_zone(zone: ZoneId) -> Response:
+        return item_response(found(zones, zone, Kind.UNKNOWN_ZONE))
+
+    @router.put(
+        "/zones/{zone}",
+        operation_id="put_zone",
+        summary="Create or replace a zone",
+        description="Tags that are inside stay inside if the zone keeps its id. Edges of a polygon must not cross.",
+        response_model=Zone,
+        responses=example_response(examples.ZONE) | problems(Kind.SHAPE_REFUSED, *CHANGE_KINDS, *_READ),
+    )
+    def put_zone(
+        zone: ZoneId, body: Annotated[Zone, Body(examples=[examples.ZONE])], if_match: IfMatch = None
+    ) -> Response:
+        try:
+            vertices_of(body.shape)
+        except ShapeError as error:
+            raise ProblemError(Kind.SHAPE_REFUSED, f"body.shape: {error}.") from error
+        put(zones, zone, body.id, body, if_match)
+        return item_response(body)
+
+    @router.delete(
+        "/zones/{zone}",
+        operation_id="delete_zone",
+        summary="Delete a zone",
+        description="Its events stay. Tags inside make no exit.",
+        status_code=204,
+        responses=problems(Kind.UNKNOWN_ZONE, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_READ),
+    )
+    def delete_zone(zone: ZoneId, if_match: IfMatch = None) -> Response:
+        return delete(zones, zone, if_match, Kind.UNKNOWN_ZONE)
+
+
+def _add_group_routes(router: APIRouter, items: ZoneItems) -> None:
+    groups = items.groups
+
+    @router.get(
+        "/tag-groups",
+        operation_id="list_tag_groups",
+        summary="List the groups of tags",
+        response_model=TagGroupList,
+        responses=example_response({"groups": [examples.GROUP]}) | problems(*_READ),
+    )
+    async def list_tag_groups() -> Response:
+        return json_response({"groups": [group.model_dump() for group in groups.all.values()]})
+
+    @router.get(
+        "/tag-groups/{group}",
+        operation_id="get_tag_group",
+        summary="Get a group of tags",
+        response_model=TagGroup,
+        responses=example_response(examples.GROUP) | problems(Kind.UNKNOWN_GROUP, *_READ),
+    )
+    async def get_tag_group(group: GroupId) -> Response:
+        return item_response(found(groups, group, Kind.UNKNOWN_GROUP))
+
+    @router.put(
+        "/tag-groups/{group}",
+        operation_id="put_tag_group",
+        summary="Create or replace a group of tags",
+        response_model=TagGroup,
+        responses=example_response(examples.GROUP) | problems(*CHANGE_KINDS, *_READ),
+    )
+    def put_tag_group(
+        group: GroupId, body: Annotated[TagGroup, Body(examples=[examples.GROUP])], if_match: IfMatch = None
+    ) -> Response:
+        put(groups, group, body.id, body, if_match)
+        return item_response(body)
+
+    @router.delete(
+        "/tag-groups/{group}",
+        operation_id="delete_tag_group",
+        summary="Delete a group of tags",
+        description="Zones and rules that name it concern none of its tags from then on.",
+        status_code=204,
+        responses=problems(Kind.UNKNOWN_GROUP, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_READ),
+    )
+    def delete_tag_group(group: GroupId, if_match: IfMatch = None) -> Response:
+        return delete(groups, group, if_match, Kind.UNKNOWN_GROUP)
+
+
+def _add_rule_routes(router: APIRouter, items: ZoneItems) -> None:
+    rules = items.rules
+
+    @router.get(
+        "/event-rules",
+        operation_id="list_event_rules",
+        summary="List the rules without a zone",
+        response_model=EventRuleList,
+        responses=example_response({"rules": [examples.RULE]}) | problems(*_READ),
+    )
+    async def list_event_rules() -> Response:
+        return json_response({"rules": [rule.model_dump() for rule in rules.all.values()]})
+
+    @router.get(
+        "/event-rules/{rule}",
+        operation_id="get_event_rule",
+        summary="Get a rule",
+        response_model=EventRule,
+        responses=example_response(examples.RULE) | problems(Kind.UNKNOWN_RULE, *_READ),
+    )
+    async def get_event_rule(rule: RuleId) -> Response:
+        return item_response(found(rules, rule, Kind.UNKNOWN_RULE))
+
+    @router.put(
+        "/event-rules/{rule}",
+        operation_id="put_event_rule",
+        summary="Create or replace a rule",
+        response_model=EventRule,
+        responses=example_response(examples.RULE) | problems(*CHANGE_KINDS, *_READ),
+    )
+    def put_event_rule(
+        rule: RuleId, body: Annotated[EventRule, Body(examples=[examples.RULE])], if_match: IfMatch = None
+    ) -> Response:
+        put(rules, rule, body.id, body, if_match)
+        return item_response(body)
+
+    @router.delete(
+        "/event-rules/{rule}",
+        operation_id="delete_event_rule",
+        summary="Delete a rule",
+        status_code=204,
+        responses=problems(Kind.UNKNOWN_RULE, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_READ),
+    )
+    def delete_event_rule(rule: RuleId, if_match: IfMatch = None) -> Response:
+        return delete(rules, rule, if_match, Kind.UNKNOWN_RULE)

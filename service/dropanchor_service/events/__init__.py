@@ -1,0 +1,1 @@
+"""Events: CloudEvents about tags, stored durably."""

@@ -1,0 +1,163 @@
+"""Store events durably, together with the states behind them and their deliveries: one transaction for all three."""
+
+import uuid
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+import orjson
+
+from dropanchor_schemas.events import EventData
+from dropanchor_service.events.database import Database
+from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue
+
+PRUNED = 5_000  # events per transaction
+
+_UNKNOWN = {
+    name: field.default for name, field in EventData.model_fields.items() if not field.is_required()
+}  # every event has every field
+
+Addressees = Callable[[Draft], Sequence[str]]
+
+
+class StoredEvent(NamedTuple):
+    """sequence: its position. body: the CloudEvent as JSON."""
+
+    sequence: int
+    body: bytes
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which events. An empty list selects all."""
+
+    tags: Sequence[str] = ()
+    types: Sequence[str] = ()
+    zones: Sequence[str] = ()
+    since_ns: int | None = None
+
+    def where(self) -> tuple[str, list[Any]]:
+        """Return the condition in SQL and its values."""
+        parts, values = ["sequence > ?"], list[Any]()
+        for column, names in (("tag", self.tags), ("type", self.types), ("zone", self.zones)):
+            if names:
+                parts.append(f"{column} IN ({','.join('?' * len(names))})")
+                values += names
+        if self.since_ns is not None:
+            parts.append("t_ns >= ?")
+            values.append(self.since_ns)
+        return " AND ".join(parts), values
+
+
+EVERYTHING = Selection()
+
+
+class EventStore:
+    """The stored events. Any thread may use it. Every method raises sqlite3.Error."""
+
+    def __init__(self, database: Database, site: str, addressees: Addressees = lambda _: ()) -> None:
+        """addressees: returns the webhooks that an event goes to."""
+        self.database = database
+        self.site = site
+        self._addressees = addressees
+        self.newest = int(database.rows("SELECT coalesce(max(seq), 0) FROM sqlite_sequence")[0][0])
+        """The sequence of the newest event. Readers poll it."""
+        self.dropped_deliveries = 0
+
+    def commit(self, drafts: Sequence[Draft], states: States) -> None:
+        """Store events and states, and queue the events for their webhooks."""
+        with self.database.transaction() as connection:
+            found = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence").fetchone()
+            first = int(found[0]) + 1
+            rows = [
+                (number, draft.type.value, draft.tag, draft.zone, draft.t_ns, cloud_event(draft, number, self.site))
+                for number, draft in enumerate(drafts, first)
+            ]
+            connection.executemany("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", rows)
+            connection.executemany(
+                "INSERT INTO deliveries (webhook, sequence) VALUES (?, ?)",
+                [
+                    (webhook, number)
+                    for number, draft in enumerate(drafts, first)
+                    for webhook in self._addressees(draft)
+                ],
+            )
+            connection.executemany(
+                "INSERT OR REPLACE INTO states VALUES (?, ?, ?, ?, ?, ?)",
+                [(*key, *value) for key, value in states.items() if value is not None],
+            )
+            connection.executemany(
+                "DELETE FROM states WHERE source = ? AND item = ? AND tag = ? AND other = ?",
+                [key for key, value in states.items() if value is None],
+            )
+        self.newest = first + len(drafts) - 1
+
+    def states(self) -> dict[StateKey, StateValue]:
+        """Return all states."""
+        rows = self.database.rows("SELECT source, item, tag, other, flags, since_ns FROM states")
+        return {StateKey(*row[:4]): StateValue(*row[4:]) for row in rows}
+
+    def forget(self, source: str, items: Sequence[str]) -> None:
+        """Delete the states of zones or rules that no longer exist."""
+        with self.database.transaction() as connection:
+            connection.executemany(
+                "DELETE FROM states WHERE source = ? AND item = ?", [(source, item) for item in items]
+            )
+
+    def after(self, sequence: int, limit: int, selection: Selection = EVERYTHING) -> list[StoredEvent]:
+        """Return up to `limit` selected events that follow this sequence, in order."""
+        where, values = selection.where()
+        sql = f"SELECT sequence, body FROM events WHERE {where} ORDER BY sequence LIMIT ?"
+        return [StoredEvent(*row) for row in self.database.rows(sql, sequence, *values, limit)]
+
+    def last(self, limit: int, selection: Selection = EVERYTHING) -> list[StoredEvent]:
+        """Return the newest selected events, at most `limit`, in order."""
+        where, values = selection.where()
+        sql = f"SELECT sequence, body FROM events WHERE {where} ORDER BY sequence DESC LIMIT ?"
+        return [StoredEvent(*row) for row in reversed(self.database.rows(sql, 0, *values, limit))]
+
+    def prune(self, keep_from_ns: int, max_bytes: int) -> int:
+        """Delete the oldest events that are too old or too many, at most PRUNED. Return how many.
+
+        What is still queued of them is lost, and counted.
+        """
+        oversized = self.database.used_bytes() > max_bytes
+        condition = "1" if oversized else "t_ns < ?"
+        values = [] if oversized else [keep_from_ns]
+        with self.database.transaction() as connection:
+            end = connection.execute(
+                f"SELECT max(sequence) FROM (SELECT sequence, t_ns FROM events ORDER BY sequence LIMIT {PRUNED}) "
+                f"WHERE {condition}",
+                values,
+            ).fetchone()[0]
+            if end is None:
+                return 0
+            self.dropped_deliveries += connection.execute(
+                "DELETE FROM deliveries WHERE sequence <= ? AND dead IS NULL", (end,)
+            ).rowcount
+            connection.execute("DELETE FROM deliveries WHERE sequence <= ?", (end,))
+            return connection.execute("DELETE FROM events WHERE sequence <= ?", (end,)).rowcount
+
+
+def cloud_event(draft: Draft, sequence: int, site: str) -> bytes:
+    """Return the CloudEvent as JSON."""
+    return orjson.dumps(
+        {
+            "specversion": "1.0",
+            "id": uuid.uuid4().hex,
+            "source": f"urn:dropanchor:site:{site}",
+            "type": draft.type.value,
+            "subject": draft.tag,
+            "time": rfc3339(draft.t_ns),
+            "sequence": f"{sequence:020}",
+            "datacontenttype": "application/json",
+            "data": _UNKNOWN | dict(draft.data),
+        }
+    )
+
+
+def rfc3339(t_ns: int) -> str:
+    """Return the time in UTC, to the microsecond."""
+    at = datetime.fromtimestamp(t_ns // 1_000_000_000, UTC).replace(microsecond=t_ns // 1000 % 1_000_000)
+    return at.isoformat(timespec="microseconds").replace("+00:00", "Z")

@@ -1,0 +1,87 @@
+"""Named items that are edited over REST, such as zones: kept in memory and saved in a file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Any, Generic, TypeVar
+
+from pydantic import TypeAdapter
+
+from dropanchor_service.runtime.atomic_file import write_atomically
+
+Item = TypeVar("Item")
+
+_UP_TO_UMASK = 0o666
+PRIVATE = 0o600
+
+
+class FullError(Exception):
+    """There are as many items as allowed."""
+
+
+class NamedItems(Generic[Item]):
+    """Items by id. Any thread may use it. `version` grows with every change."""
+
+    def __init__(
+        self, adapter: TypeAdapter[dict[str, Item]], path: Path | None, limit: int, mode: int = _UP_TO_UMASK
+    ) -> None:
+        """Load the file if it exists.
+
+        path: where changes are saved; None: nowhere. limit: most items. mode: the permissions of the file.
+        Raises OSError or pydantic's ValidationError when the file cannot be read.
+        """
+        self._adapter = adapter
+        self._path = path
+        self._limit = limit
+        self._mode = mode
+        self._lock = Lock()
+        self._items: dict[str, Item] = {}
+        if path is not None and path.exists():
+            self._items = adapter.validate_json(path.read_bytes())
+        self.version = 1
+
+    @property
+    def all(self) -> Mapping[str, Item]:
+        """The items by id, in the order in which they were made. The mapping never changes."""
+        return self._items
+
+    def put(self, name: str, item: Item, expected: Item | None = None) -> bool:
+        """Add or replace an item and save. Raises FullError, or OSError; then nothing has changed.
+
+        Return False, and change nothing, unless `expected` is None or the present item.
+        """
+        with self._lock:
+            if expected is not None and self._items.get(name) != expected:
+                return False
+            if name not in self._items and len(self._items) >= self._limit:
+                raise FullError
+            self._replace(self._items | {name: item})
+            return True
+
+    def remove(self, name: str, expected: Item | None = None) -> bool:
+        """Remove an item and save. Raises KeyError when there is none, or OSError.
+
+        Return False, and change nothing, unless `expected` is None or the present item.
+        """
+        with self._lock:
+            if expected is not None and self._items[name] != expected:
+                return False
+            self._replace({key: item for key, item in self._items.items() if key != self._present(name)})
+            return True
+
+    def _present(self, name: str) -> str:
+        if name not in self._items:
+            raise KeyError(name)
+        return name
+
+    def _replace(self, items: dict[str, Item]) -> None:
+        """Save first, then apply: a restart never loses an acknowledged change."""
+        if self._path is not None:
+            write_atomically(self._path, [self._adapter.dump_json(items, indent=2)], self._mode)
+        self._items = items
+        self.version += 1
+
+
+def adapter_of(model: Any) -> TypeAdapter[dict[str, Any]]:
+    """Return the adapter of a file with items of this model."""
+    return TypeAdapter(dict[str, model])

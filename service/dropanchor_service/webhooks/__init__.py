@@ -1,0 +1,1 @@
+"""Webhooks: events delivered over HTTP."""

@@ -1,0 +1,1 @@
+"""Zones and rules: which tags are where, by probability."""

@@ -1,0 +1,77 @@
+"""Follow a condition of single tags, such as a low battery, by row."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TagGroup
+from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.store.records import enlarged
+from dropanchor_service.zones.concerned import concerned
+
+TagRule = BatteryLowRule | LostRule | AmbiguousRule
+RECHARGED = 0.05  # above its limit, a battery can be low again
+
+
+class TagChange(NamedTuple):
+    """The condition began (`is_on`) or ended."""
+
+    row: int
+    is_on: bool
+    since_ns: int
+
+
+class FleetState(NamedTuple):
+    """The state of all tags by row. state: State at this time, -1 without a pose. battery: fraction, NaN: unknown."""
+
+    state: Array
+    battery: Array
+
+
+class TagWatch:
+    """One rule and the tags for which it holds. One thread owns it.
+
+    Delays count from what this process has seen, so that a restart makes no event.
+    """
+
+    def __init__(self, rule: TagRule, groups: Mapping[str, TagGroup]) -> None:
+        self.rule = rule
+        self._groups = groups
+        self._on = np.zeros(0, bool)
+        self._pending_ns = np.zeros(0, np.int64)
+        self._delay_ns = 0 if isinstance(rule, BatteryLowRule) else round(rule.after_s * 1e9)
+
+    def restore(self, row: int) -> None:
+        self._grow(row + 1)
+        self._on[row] = True
+
+    def judge(self, fleet: FleetState, names: Sequence[str], now_ns: int) -> list[TagChange]:
+        """Return what has changed. names: by row."""
+        n = len(names)
+        self._grow(n)
+        starts, ends = self._conditions(fleet)
+        on, pending = self._on[:n], self._pending_ns[:n]
+        begins = starts & ~on & concerned([self.rule], self._groups, names)[:, 0]
+        pending[~begins] = 0
+        pending[begins & (pending == 0)] = now_ns
+        begun = np.flatnonzero(begins & (now_ns - pending >= self._delay_ns))
+        ended = np.flatnonzero(on & ends)
+        changes = [TagChange(row, True, int(pending[row])) for row in begun.tolist()]
+        on[begun], on[ended], pending[begun] = True, False, 0
+        return changes + [TagChange(row, False, now_ns) for row in ended.tolist()]
+
+    def _conditions(self, fleet: FleetState) -> tuple[Array, Array]:
+        """Return for which tags the condition holds, and for which it surely does not."""
+        match self.rule:
+            case BatteryLowRule(fraction=limit):
+                return fleet.battery < limit, fleet.battery > limit + RECHARGED
+            case LostRule():
+                return fleet.state == State.LOST, (fleet.state >= 0) & (fleet.state != State.LOST)
+            case AmbiguousRule():
+                return fleet.state == State.AMBIGUOUS, fleet.state == State.TRACKING
+
+    def _grow(self, rows: int) -> None:
+        if rows > len(self._on):
+            self._on = enlarged(self._on, 2 * rows)
+            self._pending_ns = enlarged(self._pending_ns, 2 * rows)
