@@ -16,6 +16,7 @@ from dropanchor_service.events.thread import EventThread, Retention
 from dropanchor_service.events.watcher import Fleet, Watcher
 from dropanchor_service.metrics.events import EventMetrics
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.settings.events import WebhookSettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import HealthTable, LatestPoses, TagTable
@@ -49,8 +50,7 @@ class ZoneEvents:
             states = self.store.states()
         except (OSError, ValidationError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
-        deliveries = Deliveries(self._database)
-        sender = Sender(settings.webhooks.timeout_s, settings.webhooks.allow_networks)
+        deliveries, sender = Deliveries(self._database), _sender(settings.webhooks)
         patience = Patience(settings.webhooks.retry_s, round(settings.webhooks.give_up_hours * 3600e9))
         self._webhooks = WebhookThread(webhooks, deliveries, sender, patience, now_ns)
         self._events = EventThread(
@@ -75,3 +75,10 @@ class ZoneEvents:
     def problems(self) -> Sequence[str]:
         """Return why events cannot be stored; empty when they can."""
         return [] if self._events.problem is None else [self._events.problem]
+
+
+def _sender(settings: WebhookSettings) -> Sender:
+    try:
+        return Sender(settings.timeout_s, settings.allow_networks, settings.authorities)
+    except OSError as error:
+        raise SettingsError(f"webhooks.authorities: {settings.authorities} cannot be read: {error}") from error

@@ -10,6 +10,7 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+import httpx
 import orjson
 import zenoh
 
@@ -18,7 +19,7 @@ from support.receiver import Receiver, running_receiver
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, free_port, wait_until
 
-TAGS = [f"tag-{number}" for number in range(20)]
+TAGS = [f"tag-{number}" for number in range(10)]
 DOWN_S = float(os.environ.get("DROPANCHOR_RECEIVER_DOWN_S", "5"))
 SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="
 NEAR_M, FAR_M = 4.0, 40.0
@@ -40,20 +41,24 @@ def start_at(service: Running, x: float) -> None:
         service.put(f"/api/v1/tags/{tag}/settings", {"start": start})
 
 
-def stand(service: Running, x: float, until: Any, timeout_s: float = 30.0) -> None:
+def stand(service: Running, x: float, until: Any, timeout_s: float = 90.0) -> None:
     """Send samples of all tags, which stand there, until the condition holds."""
     end_s = time.monotonic() + timeout_s
-    while not until():
-        assert time.monotonic() < end_s, "the condition did not come true"
-        t_ns = time.time_ns()
-        for tag in TAGS:
-            body = {
-                "imu": [{"t_ns": t_ns, "acc": [0, 0, 9.81], "gyro": [0, 0, 0], "mag": [20, 0, -40]}],
-                "range": [{"t_ns": t_ns, "anchor": 7, "range_m": x, "std_m": 0.05}],
-                "heading": [{"t_ns": t_ns, "heading_rad": 0.0, "std_rad": 0.05}],
-            }
-            service.ask("POST", f"/api/v1/ingest/samples?tag={tag}", json=body).raise_for_status()
-        time.sleep(0.05)
+    with httpx.Client(base_url=service.url, timeout=60.0, trust_env=False) as client:
+        while not until():
+            assert time.monotonic() < end_s, "the condition did not come true"
+            for tag in TAGS:
+                samples = standing(time.time_ns(), x)
+                client.post("/api/v1/ingest/samples", params={"tag": tag}, json=samples).raise_for_status()
+            time.sleep(0.05)  # the rate of the samples
+
+
+def standing(t_ns: int, x: float) -> dict[str, Any]:
+    return {
+        "imu": [{"t_ns": t_ns, "acc": [0, 0, 9.81], "gyro": [0, 0, 0], "mag": [20, 0, -40]}],
+        "range": [{"t_ns": t_ns, "anchor": 7, "range_m": x, "std_m": 0.05}],
+        "heading": [{"t_ns": t_ns, "heading_rad": 0.0, "std_rad": 0.05}],
+    }
 
 
 def stored(service: Running) -> list[dict[str, Any]]:

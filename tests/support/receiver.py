@@ -1,5 +1,6 @@
 """A receiver of webhooks on loopback, in a process of the test."""
 
+import ssl
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,8 +43,8 @@ class Receiver:
 
 
 @contextmanager
-def running_receiver(receiver: Receiver) -> Iterator[None]:
-    """Serve on the port of the receiver, or on a free one, until the block ends."""
+def running_receiver(receiver: Receiver, tls: ssl.SSLContext | None = None) -> Iterator[None]:
+    """Serve on the port of the receiver, or on a free one, until the block ends. tls: None serves plain HTTP."""
     receiver.release.set()
 
     class Handler(BaseHTTPRequestHandler):
@@ -68,6 +69,8 @@ def running_receiver(receiver: Receiver) -> Iterator[None]:
 
     server = Server(("127.0.0.1", receiver.port), Handler)
     receiver.port = server.server_address[1]
+    if tls is not None:
+        server.socket = tls.wrap_socket(server.socket, server_side=True)
     thread = threading.Thread(target=server.serve_forever, args=(0.05,))
     thread.start()
     try:

@@ -1,5 +1,6 @@
 """The settings of events and webhooks."""
 
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, IPvAnyNetwork
@@ -33,6 +34,9 @@ class WebhookSettings(BaseModel):
         default=(),
         description='Networks of receivers inside, such as "10.1.0.0/16". Other addresses must be public, so that '
         "nobody can reach internal machines through a webhook.",
+    )
+    authorities: Path | None = Field(
+        default=None, description="PEM file with authorities that are trusted beside the public ones, for https://."
     )
     timeout_s: Annotated[float, Field(ge=0.1, le=120)] = Field(
         default=10.0, description="Time that a receiver has to answer."

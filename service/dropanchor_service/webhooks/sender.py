@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Sequence
 from enum import Enum
+from pathlib import Path
 from typing import NamedTuple
 
 import httpx
@@ -34,13 +35,20 @@ class Outcome(NamedTuple):
 class Sender:
     """Sends events within a time limit, to allowed addresses only."""
 
-    def __init__(self, timeout_s: float, allow_networks: Sequence[Network]) -> None:
+    def __init__(self, timeout_s: float, allow_networks: Sequence[Network], authorities: Path | None = None) -> None:
+        """authorities: certificates of authorities that are trusted beside the public ones.
+
+        Raises OSError when the file cannot be read.
+        """
         self.allow_networks = tuple(allow_networks)
         self._timeout_s = timeout_s
+        self._tls = httpx.create_ssl_context(trust_env=False)
+        if authorities is not None:
+            self._tls.load_verify_locations(authorities)
 
     def client(self) -> httpx.AsyncClient:
-        """Return a client that follows no redirects and no proxy settings."""
-        return httpx.AsyncClient(timeout=self._timeout_s, follow_redirects=False, trust_env=False)
+        """Return a client for one URL. It follows no redirects and no proxy settings."""
+        return httpx.AsyncClient(verify=self._tls, timeout=self._timeout_s, follow_redirects=False, trust_env=False)
 
     async def send(self, client: httpx.AsyncClient, webhook: Webhook, body: bytes) -> Outcome:
         """Post the event, a CloudEvent in JSON, and return what became of it."""

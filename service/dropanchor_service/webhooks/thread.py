@@ -36,6 +36,7 @@ class WebhookThread:
         self._sender = sender
         self._patience = patience
         self._now_ns = now_ns
+        self._urls: dict[str, str] = {}  # a connection is checked for the host of one URL, so each URL gets its own
         self._queues: dict[str, Queue] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._stop = threading.Event()
@@ -59,12 +60,12 @@ class WebhookThread:
 
     async def _run(self) -> None:
         while not self._stop.is_set():
-            known = self._webhooks.all
-            for name in [name for name in self._tasks if name not in known]:
+            urls = {name: webhook.url for name, webhook in self._webhooks.all.items()}
+            for name in [name for name, url in self._urls.items() if urls.get(name) != url]:
                 await self._end(name)
-            for name in known:
-                if name not in self._tasks:
-                    self._tasks[name] = asyncio.create_task(self._deliver(name))
+            for name in urls.keys() - self._urls.keys():
+                self._urls[name] = urls[name]
+                self._tasks[name] = asyncio.create_task(self._deliver(name))
             for task in self._tasks.values():
                 if task.done():
                     task.result()  # raises what ended it: the supervision ends the process
@@ -77,6 +78,7 @@ class WebhookThread:
         task.cancel()
         await asyncio.wait([task])
         self._queues.pop(name, None)
+        del self._urls[name]
 
     async def _deliver(self, name: str) -> None:
         """Empty the queue of one webhook, again and again."""

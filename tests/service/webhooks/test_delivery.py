@@ -1,10 +1,13 @@
 """Events reach a real receiver in order per tag, through refusals, outages and slow answers."""
 
+import asyncio
 import ipaddress
+import ssl
 import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -14,10 +17,11 @@ from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.events.store import EventStore
+from dropanchor_service.security.authority import Authority, Issued
 from dropanchor_service.webhooks import queue
 from dropanchor_service.webhooks.queue import Patience
 from dropanchor_service.webhooks.registry import addressees, open_webhooks
-from dropanchor_service.webhooks.sender import Sender
+from dropanchor_service.webhooks.sender import Outcome, Sender, Verdict
 from dropanchor_service.webhooks.signature import headers
 from dropanchor_service.webhooks.thread import WebhookThread
 from support.receiver import Receiver, running_receiver
@@ -169,3 +173,32 @@ def test_a_webhook_gets_only_what_it_wants() -> None:
         bench.happen("a", "b")
         wait_until(lambda: receiver.subjects() == ["a"])
     assert bench.deliveries.counts() == {}
+
+
+def test_a_certificate_must_be_of_the_host_in_the_url_although_the_address_is_what_is_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dropanchor_service.webhooks.sender.resolved", lambda _: ["127.0.0.1"])
+    authority, receiver = Authority.make("yard"), Receiver()
+    (tmp_path / "ca.pem").write_bytes(authority.issued.certificate)
+    sender = Sender(2.0, LOOPBACK, tmp_path / "ca.pem")
+    body = b'{"id": "1", "subject": "a"}'
+
+    async def send_to(host: str) -> Outcome:
+        async with sender.client() as client:
+            webhook = Webhook(id="mes", url=f"https://{host}:{receiver.port}/", secret=SECRET)
+            return await sender.send(client, webhook, body)
+
+    with running_receiver(receiver, server_context(authority.server("mes", ["mes.example.com"], 1), tmp_path)):
+        assert asyncio.run(send_to("mes.example.com")).verdict is Verdict.ACCEPTED
+        refused = asyncio.run(send_to("other.example.com"))
+    assert refused.verdict is Verdict.UNAVAILABLE
+    assert "other.example.com" in refused.detail
+    assert len(receiver.accepted) == 1
+
+
+def server_context(issued: Issued, folder: Path) -> ssl.SSLContext:
+    (folder / "server.pem").write_bytes(issued.certificate + issued.key)
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(folder / "server.pem")
+    return context

@@ -13,9 +13,11 @@ from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.events import EventList, EventType
 from dropanchor_service.api import create_app
+from dropanchor_service.api.http.access import required_scope
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.events.drafts import Draft
+from dropanchor_service.security.identity import Scope
 from dropanchor_service.webhooks.registry import FILE_NAME, open_webhooks
 from dropanchor_service.webhooks.sender import Sender
 from dropanchor_service.zones.items import ZoneItems
@@ -207,6 +209,13 @@ def test_dead_letters_are_listed_and_retried_and_go_with_their_webhook() -> None
     assert ask(app, "DELETE", "/api/v1/webhooks/mes").status_code == 204
     assert parts.deliveries.counts() == {}
     assert kind_of(ask(app, "POST", "/api/v1/webhooks/mes/test")) == "unknown-webhook"
+
+
+def test_only_an_administrator_changes_a_webhook() -> None:
+    assert required_scope("PUT", "/api/v1/webhooks/mes") is Scope.ADMIN
+    assert required_scope("POST", "/api/v1/webhooks/mes/test") is Scope.ADMIN
+    assert required_scope("GET", "/api/v1/webhooks") is Scope.READ
+    assert required_scope("PUT", "/api/v1/zones/dock") is Scope.WRITE
 
 
 def test_there_is_a_limit_of_webhooks() -> None:
