@@ -71,7 +71,7 @@ def test_the_simplest_message_decodes() -> None:
 
 
 def test_the_keys_are_those_of_the_code() -> None:
-    of_tag = [keys.samples_key, keys.tag_alive_key, keys.health_key, keys.settings_key, keys.pose_key]
+    of_tag = [keys.samples_key, keys.tag_alive_key, keys.health_key, keys.settings_key, keys.pose_key, keys.event_key]
     spelled = [*of_tag, None, keys.anchor_key, keys.service_alive_key]
     for (key, *_), make in zip(rows("Keys"), spelled, strict=True):
         made = keys.poses_key("S") if make is None else make("S", "I")

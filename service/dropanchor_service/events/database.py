@@ -7,6 +7,7 @@ storm of events.
 import logging
 import sqlite3
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,10 +60,11 @@ class Database:
             name = move_aside(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
             _log.error("%s is damaged (%s): it was renamed to %s and new events start", self._path, error, name)
             self._connection = self._opened()
+        self._close = weakref.finalize(self, self._connection.close)
 
     def close(self) -> None:
         with self._lock:
-            self._connection.close()
+            self._close()
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
@@ -109,5 +111,6 @@ class Database:
             )
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")  # an event that was answered with survives a power failure
+        connection.execute("PRAGMA journal_size_limit = 67108864")
         if version == 0:
             connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")

@@ -29,7 +29,7 @@ class Draft:
 def webhook_test(webhook: str) -> Draft:
     """Return an event that only shows that a webhook works."""
     now_ns = time.time_ns()
-    return Draft(EventType.WEBHOOK_TEST, "", {"t_ns": now_ns, "since_ns": now_ns, "name": webhook})
+    return Draft(EventType.WEBHOOK_TEST, webhook, {"t_ns": now_ns, "since_ns": now_ns, "name": webhook})
 
 
 class StateKey(NamedTuple):
