@@ -72,7 +72,7 @@ class PairWatch:
         self.rule = rule
         self._groups = groups
         self._around = disc(rule.distance_m)
-        self._close: dict[Pair, int] = {}  # since when they are too close, or surely apart again
+        self._close: dict[Pair, int] = {}  # since when they are too close
         self._pending: dict[Pair, int] = {}
         self.is_full = False
 
