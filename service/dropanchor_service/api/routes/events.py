@@ -10,7 +10,7 @@ from threading import Event as ThreadEvent
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Header, Query
+from fastapi import APIRouter, Depends, Header, Query, Request
 from pydantic import AfterValidator, Field
 from starlette.responses import Response, StreamingResponse
 
@@ -57,7 +57,7 @@ class EventQuery(EventFilter):
 
 
 def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
-    router = APIRouter(tags=["events"])
+    router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
 
     @router.get(
         "/events",
@@ -99,6 +99,13 @@ def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
         return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
 
     return router
+
+
+async def _refuse_repeated(request: Request) -> None:
+    """Refuse a parameter that takes one value but has several."""
+    for name in ("after", "since", "limit"):
+        if len(request.query_params.getlist(name)) > 1:
+            raise ProblemError(Kind.INVALID_REQUEST, f"query.{name}: is given more than once")
 
 
 @contextmanager

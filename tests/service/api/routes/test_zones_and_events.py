@@ -126,6 +126,7 @@ def test_events_come_in_pages_and_by_filter() -> None:
     assert found(zones="gate").events == []
     assert found(since=6).events == []
     assert kind_of(ask(app, "GET", "/api/v1/events", params={"after": "x"})) == "invalid-request"
+    assert kind_of(ask(app, "GET", "/api/v1/events?after=1&after=2")) == "invalid-request"
 
 
 def test_a_stream_begins_after_the_last_id_and_goes_on_with_new_events() -> None:
