@@ -115,7 +115,8 @@ def test_a_kill_while_events_are_delivered_repeats_some_and_loses_none(tmp_path:
             receiver.release.clear()
             start_at(service, NEAR_M)
             stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
-            service.stop(signal.SIGKILL)  # every request is on its way, and none is answered
+            wait_until(lambda: receiver.arrived > 0)
+            service.stop(signal.SIGKILL)  # requests are on their way, and none is answered
         receiver.release.set()
         with running_service(*options) as service:
             wait_until(lambda: service.get("/api/v1/webhooks/mes")["pending"] == 0, 60.0)

@@ -13,10 +13,11 @@ import orjson
 
 @dataclass
 class Receiver:
-    """What came, in order of arrival. answer: the status for an event; it may wait."""
+    """What came, in order of arrival. status: the answer. arrived: all requests, answered or not."""
 
     port: int = 0
     status: int = 200
+    arrived: int = 0
     requests: list[tuple[dict[str, str], bytes]] = field(default_factory=list)
     accepted: list[dict[str, Any]] = field(default_factory=list)
     refused_subjects: set[str] = field(default_factory=set)
@@ -28,6 +29,8 @@ class Receiver:
         return f"http://127.0.0.1:{self.port}/events"
 
     def take(self, headers: dict[str, str], body: bytes) -> int:
+        with self.lock:
+            self.arrived += 1
         self.release.wait(30.0)
         event = orjson.loads(body)
         with self.lock:
