@@ -1,8 +1,10 @@
-"""The pose history and the recordings, as the settings enable them."""
+"""What the service keeps on disk: the site, the pose history and the recordings, as the settings enable them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Self
+
+from pydantic import ValidationError
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
@@ -12,6 +14,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
+from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import SiteStore, TagTable
 
 
@@ -91,3 +94,11 @@ def file_limits_of(settings: RecordingSettings) -> Limits:
         keep_ns=round(settings.keep_days * 86_400e9),
         max_bytes=int(settings.most_mib * 2**20),
     )
+
+
+def open_site(settings: Settings) -> SiteStore:
+    """Return the site, as the settings and the data folder have it. Raises SettingsError."""
+    try:
+        return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
+    except (OSError, ValidationError) as error:
+        raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error

@@ -11,7 +11,6 @@ from typing import Self
 
 import zenoh
 from fastapi import FastAPI
-from pydantic import ValidationError
 
 from dropanchor_schemas.keys import health_key, samples_key
 from dropanchor_service.answers.answers import Answers
@@ -35,13 +34,12 @@ from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.persistence import Persistence
+from dropanchor_service.persistence import Persistence, open_site
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, TagTable
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.events import ZenohEvents
@@ -85,7 +83,7 @@ class Service:
         self.latest = LatestPoses()
         self._health = HealthTable()
         self._pending_tags = PendingTags(settings.max_tags)
-        self.site = _site_store(settings)
+        self.site = open_site(settings)
         self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
         self._publishers = Publishers()
         self.answers = Answers(
@@ -134,10 +132,9 @@ class Service:
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
         if self._checkpoints is None:
+            folder = self._settings.data_dir
             reason = (
-                "data_dir is not set"
-                if self._settings.data_dir is None
-                else f"the engine {self._settings.engine} does not support them"
+                "data_dir is not set" if folder is None else f"not possible with the engine {self._settings.engine}"
             )
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
@@ -301,10 +298,3 @@ class Service:
             rate_limiter=RateLimiter(self._settings.http.requests_per_s, self._settings.http.burst),
             cors_origins=self._settings.http.cors_origins,
         )
-
-
-def _site_store(settings: Settings) -> SiteStore:
-    try:
-        return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
-    except (OSError, ValidationError) as error:
-        raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error
