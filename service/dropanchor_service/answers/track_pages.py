@@ -11,7 +11,7 @@ from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
 from dropanchor_service.answers.times import isos_utc
 from dropanchor_service.estimation.columns import Array, Frame
-from dropanchor_service.history.track_file import StoredPoses
+from dropanchor_service.history.records import StoredPoses
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.site import SiteStore
 

@@ -5,44 +5,21 @@ The oldest lie at the beginning, where deleting is cheap. Reading a track takes 
 """
 
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import POSE, Array, Frame
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.history.overview import EMPTY, Overview, read_overview
+from dropanchor_service.history.records import NO_POSES, SLOT_NS, StoredPoses, records_of, stored_poses
+from dropanchor_service.history.summary_table import SCHEMA as SUMMARY_SCHEMA
+from dropanchor_service.history.summary_table import SummaryTable
 
-VERSION = 1
-SLOT_NS = 10_000_000_000
+VERSION = 2  # 1: without summaries
 MAX_ROWS = 512  # per statement: sqlite3 releases the interpreter's lock in each one and must win it back
 BUSY_S = 5.0
-
-# The content of a row beside its key, 66 bytes. At 3 km float32 is exact to 0.2 mm.
-RECORD = np.dtype(
-    [
-        *(("state", "u1"), ("reason", "u1"), ("anchor", "<i4")),  # state: bit 7 is the frame; anchor: its id, -1: none
-        *((name, "<f4") for name in ("range", "x", "y", "heading", "speed", "yaw_rate")),
-        ("cov", "<f4", 6),  # xx, xy, xh, yy, yh, hh
-        *((name, "<f4") for name in ("p_mode", "sigma_pos", "sigma_obs")),
-    ]
-)
-_SAME_IN_POSE = (
-    "state",
-    "reason",
-    "range",
-    "x",
-    "y",
-    "heading",
-    "speed",
-    "yaw_rate",
-    "p_mode",
-    "sigma_pos",
-    "sigma_obs",
-)
-_RELATIVE = 0x80  # bit of the state that says that the pose is in a frame of the tag's own
-_UPPER_TRIANGLE = np.triu_indices(3)
 
 _SCHEMA = f"""
 CREATE TABLE tags (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
@@ -52,24 +29,15 @@ CREATE TABLE poses (
     slot INTEGER NOT NULL, tag INTEGER NOT NULL, t_ns INTEGER NOT NULL, pose BLOB NOT NULL,
     PRIMARY KEY (slot, tag, t_ns)
 ) WITHOUT ROWID;
+{SUMMARY_SCHEMA}
 PRAGMA user_version = {VERSION};
 """
+_UPGRADE = f"{SUMMARY_SCHEMA} PRAGMA user_version = {VERSION};"
 _FORWARD = """
 SELECT t_ns, pose FROM slots CROSS JOIN poses USING (slot)
 WHERE slots.slot BETWEEN ? AND ? AND tag = ? AND t_ns BETWEEN ? AND ? ORDER BY slots.slot, t_ns LIMIT ?
 """
 _BACKWARD = _FORWARD.replace("slots.slot, t_ns", "slots.slot DESC, t_ns DESC")
-
-
-@dataclass(frozen=True)
-class StoredPoses:
-    """Poses from the file. poses: POSE with rows and anchor indices of -1; anchors: the anchor id of each pose."""
-
-    poses: Array
-    anchors: list[str | None]
-
-
-NO_POSES = StoredPoses(np.empty(0, POSE), [])
 
 
 class TrackFileError(sqlite3.Error):
@@ -84,6 +52,7 @@ class TrackWriter:
         self._connection = sqlite3.connect(path, BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             self._prepare()
+            self._summaries = SummaryTable(self._connection)
         except sqlite3.Error:
             self._connection.close()
             raise
@@ -105,7 +74,8 @@ class TrackWriter:
             self._connection.executemany(
                 "INSERT OR IGNORE INTO slots VALUES (?)", [(slot,) for slot in np.unique(slots).tolist()]
             )
-            blobs = _records(poses[order], anchor_ids[order])
+            blobs = records_of(poses[order], anchor_ids[order])
+            self._summaries.delete(slots)
             self._insert(slots.tolist(), tag_ids[order].tolist(), poses["t_ns"][order].tolist(), blobs)
 
     def prune(self, keep_from_ns: int, max_bytes: int) -> int:
@@ -119,7 +89,13 @@ class TrackWriter:
         with self._transaction():
             self._connection.execute("DELETE FROM poses WHERE slot <= ?", (oldest,))
             self._connection.execute("DELETE FROM slots WHERE slot <= ?", (oldest,))
+            self._summaries.prune(oldest)
         return 1
+
+    def summarise(self) -> bool:
+        """Write one missing summary, the newest first. Return whether there was one to write."""
+        with self._transaction():
+            return self._summaries.write_next()
 
     def used_bytes(self) -> int:
         """Return the size of the file without its free pages."""
@@ -144,7 +120,7 @@ class TrackWriter:
     def _prepare(self) -> None:
         version = self._connection.execute("PRAGMA user_version").fetchone()[0]
         tables = self._connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        if version not in (0, VERSION) or (version == 0 and tables):
+        if version not in (0, 1, VERSION) or (version == 0 and tables):
             raise TrackFileError(
                 f"the file has schema version {version}, but this service needs {VERSION}: move the file away"
             )
@@ -153,6 +129,8 @@ class TrackWriter:
         self._connection.execute("PRAGMA journal_size_limit = 67108864")
         if version == 0:
             self._connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")
+        elif version == 1:
+            self._connection.executescript(f"BEGIN; {_UPGRADE} COMMIT;")
 
     def _insert(self, slots: list[int], tags: list[int], times: list[int], blobs: list[bytes]) -> None:
         flat = [value for row in zip(slots, tags, times, blobs, strict=True) for value in row]
@@ -196,7 +174,18 @@ class TrackReader:
             window = (from_ns // SLOT_NS, to_ns // SLOT_NS, tag_id, from_ns, to_ns, limit)
             rows = connection.execute(sql, window).fetchall()
             names = dict(connection.execute("SELECT id, name FROM anchors"))
-        return _stored(rows, names)
+        return stored_poses(rows, names)
+
+    def overview(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int) -> Overview:
+        """Return the figures of these tags, or of all, and at most `max_points` points of each.
+
+        Raises sqlite3.Error and TooMuchError.
+        """
+        if not self._path.exists():
+            return EMPTY
+        with self._connected() as connection:
+            connection.execute("BEGIN")  # one state of the file for all statements
+            return read_overview(connection, tags, from_ns, to_ns, max_points)
 
     def has_tag(self, tag: str) -> bool:
         """Return whether the file ever held a pose of this tag. Raises sqlite3.Error."""
@@ -223,29 +212,3 @@ def _powers(count: int) -> Iterator[int]:
 def _tag_id(connection: sqlite3.Connection, tag: str) -> int | None:
     found = connection.execute("SELECT id FROM tags WHERE name = ?", (tag,)).fetchone()
     return None if found is None else int(found[0])
-
-
-def _records(poses: Array, anchors: Array) -> list[bytes]:
-    """Return the RECORD of each POSE as bytes."""
-    records = np.zeros(len(poses), RECORD)
-    for name in _SAME_IN_POSE:
-        records[name] = poses[name]
-    records["anchor"] = anchors
-    records["state"] |= np.where(poses["frame"] == Frame.RELATIVE, _RELATIVE, 0).astype(np.uint8)
-    records["cov"] = poses["cov"][:, *_UPPER_TRIANGLE]
-    packed, size = records.tobytes(), RECORD.itemsize
-    return [packed[start : start + size] for start in range(0, len(packed), size)]
-
-
-def _stored(rows: Sequence[tuple[int, bytes]], anchor_names: Mapping[int, str]) -> StoredPoses:
-    records = np.frombuffer(b"".join([blob for _, blob in rows]), RECORD)
-    poses = np.zeros(len(rows), POSE)
-    poses["row"], poses["anchor"] = -1, -1
-    poses["t_ns"] = [t_ns for t_ns, _ in rows]
-    for name in _SAME_IN_POSE:
-        poses[name] = records[name]
-    poses["frame"] = np.where(records["state"] & _RELATIVE, Frame.RELATIVE, Frame.SITE)
-    poses["state"] &= ~np.uint8(_RELATIVE)
-    poses["cov"][:, *_UPPER_TRIANGLE] = records["cov"]
-    poses["cov"][:, *_UPPER_TRIANGLE[::-1]] = records["cov"]
-    return StoredPoses(poses, [anchor_names.get(anchor_id) for anchor_id in records["anchor"].tolist()])

@@ -11,7 +11,9 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.history.damaged_file import damaged_files, is_damage, move_aside
-from dropanchor_service.history.track_file import StoredPoses, TrackReader, TrackWriter
+from dropanchor_service.history.overview import Overview
+from dropanchor_service.history.records import StoredPoses
+from dropanchor_service.history.track_file import TrackReader, TrackWriter
 from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.decimation import Decimation
 from dropanchor_service.store.site import SiteStore
@@ -20,6 +22,7 @@ from dropanchor_service.store.tags import TagTable
 FILE_NAME = "history.sqlite"
 WRITE_S = 2.0
 MAX_PRUNE_S = 0.5  # per write
+MAX_SUMMARISE_S = 0.2  # per write
 MAX_QUEUED_BYTES = 64 * 2**20
 MAX_DAMAGED_FILES = 3  # that are moved aside: a disk that keeps damaging files must not fill up with them
 
@@ -78,6 +81,13 @@ class Tracks:
         """Return up to `limit` poses of the tag between the two times. Raises sqlite3.Error."""
         return self._reader.poses(tag, from_ns, to_ns, limit, newest_first)
 
+    def overview(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int) -> Overview:
+        """Return the figures of these tags, or of all, and at most `max_points` points of each.
+
+        Raises sqlite3.Error and TooMuchError.
+        """
+        return self._reader.overview(tags, from_ns, to_ns, max_points)
+
     def has_tag(self, tag: str) -> bool:
         """Return whether poses of this tag were ever stored. Raises sqlite3.Error."""
         return self._reader.has_tag(tag)
@@ -105,6 +115,7 @@ class Tracks:
         try:
             self._insert(self._file, np.concatenate([np.empty(0, POSE), *batches]))
             self._prune(self._file)
+            self._summarise(self._file)
         except sqlite3.Error:
             self._file.close()  # the next attempt opens the file again, which may be repaired by then
             self._file = None
@@ -130,3 +141,8 @@ class Tracks:
         while file.prune(keep_from_ns, self._retention.max_bytes) and time.monotonic() < end_s:
             pass
         self.used_bytes = file.used_bytes()
+
+    def _summarise(self, file: TrackWriter) -> None:
+        end_s = time.monotonic() + MAX_SUMMARISE_S
+        while file.summarise() and time.monotonic() < end_s:
+            pass

@@ -1,0 +1,155 @@
+"""Summaries of tracks: what a stretch of time holds of each tag, so that a month can be read without its poses.
+
+Two neighbouring stretches have the summary of the whole: their sums, and what lies between the last pose of the one
+and the first pose of the other. A single pose is the summary of its instant.
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+from dropanchor_service.estimation.columns import Array, State
+
+GAP_NS = 10_000_000_000  # nothing is known between two poses that are further apart
+MOVING_MPS = 0.1  # the noise of a tag that stands is no distance
+RELATIVE = 0x80  # bit of the state that says that the pose is in a frame of the tag's own
+
+POINT = np.dtype(
+    [
+        ("t_ns", "<i8"),
+        ("state", "u1"),  # State, and the bit RELATIVE
+        *((name, "<f4") for name in ("x", "y", "heading", "speed", "cov_xx", "cov_xy", "cov_yy")),
+    ]
+)
+SUMMARY = np.dtype(
+    [
+        ("tag", "<u4"),
+        ("first", POINT),
+        ("last", POINT),
+        ("poses", "<u4"),
+        ("between", "u1"),  # Between: the worst from the first to the last pose
+        ("distance_m", "<f4"),
+        ("tracked_s", "<f4"),
+        ("max_speed", "<f4"),  # m/s, NaN: never tracked
+    ]
+)
+TRACK_POINT = np.dtype([("tag", "<u4"), ("point", POINT), ("since_previous", "u1")])
+
+
+class Between(IntEnum):
+    """What is known of the way of a tag between two points."""
+
+    TRACKING = 0
+    DOUBTFUL = 1  # some poses were coasting or degraded
+    UNKNOWN = 2  # some poses were at no place of the map, or there was no pose for `GAP_NS`
+
+
+def summary_of_each(tags: Array, points: Array) -> Array:
+    """Return the SUMMARY of each single pose. tags: number of the tag of each POINT."""
+    summaries = np.zeros(len(points), SUMMARY)
+    summaries["tag"], summaries["first"], summaries["last"], summaries["poses"] = tags, points, points, 1
+    summaries["max_speed"] = np.where(_tracked(points), np.abs(points["speed"]), np.nan)
+    return summaries
+
+
+def in_order(summaries: Array) -> Array:
+    """Return the summaries ordered by tag and time."""
+    ordered: Array = summaries[np.lexsort((summaries["first"]["t_ns"], summaries["tag"]))]
+    return ordered
+
+
+def summary_per_tag(summaries: Array) -> Array:
+    """Return one SUMMARY for each tag. summaries: those of disjoint stretches of time, in order."""
+    if len(summaries) == 0:
+        return summaries
+    begins = _begins(summaries["tag"])
+    starts, ends = np.flatnonzero(begins), np.append(np.flatnonzero(begins)[1:], len(summaries)) - 1
+    between, distance, tracked = _since_previous(summaries)
+    inner = np.where(begins, Between.TRACKING, between)
+    whole = summaries[starts]
+    whole["last"] = summaries["last"][ends]
+    whole["poses"] = np.add.reduceat(summaries["poses"], starts)
+    whole["between"] = np.maximum.reduceat(np.maximum(summaries["between"], inner), starts)
+    whole["distance_m"] = np.add.reduceat(summaries["distance_m"] + distance, starts)
+    whole["tracked_s"] = np.add.reduceat(summaries["tracked_s"] + tracked, starts)
+    whole["max_speed"] = np.fmax.reduceat(summaries["max_speed"], starts)
+    return whole
+
+
+def points_of(summaries: Array) -> Array:
+    """Return the TRACK_POINT at both ends of each SUMMARY, in the same order."""
+    points = np.zeros((len(summaries), 2), TRACK_POINT)
+    points["tag"] = summaries["tag"][:, None]
+    points["point"][:, 0], points["point"][:, 1] = summaries["first"], summaries["last"]
+    points["since_previous"][:, 0] = _since_previous(summaries)[0] if len(summaries) else Between.UNKNOWN
+    points["since_previous"][:, 1] = summaries["between"]
+    several = np.column_stack([np.ones(len(summaries), bool), summaries["poses"] > 1])
+    kept: Array = points[several]
+    return kept
+
+
+def thinned(points: Array, from_ns: int, to_ns: int, max_points: int) -> Array:
+    """Return at most `max_points` of each tag: the first, the last, changes of state, and points evenly in time.
+
+    points: TRACK_POINT, in order. Changes of state beyond half of the points are left out; `since_previous` of a point
+    always tells the worst since the previous point that is left.
+    """
+    if len(points) == 0:
+        return points
+    begins = _begins(points["tag"])
+    kept = begins | np.append(begins[1:], True)
+    kept |= _first_of_bin(points, begins, from_ns, to_ns, max(1, (max_points - 2) // 2))
+    kept |= _state_changes(points, begins, (max_points - 2) // 2)
+    places = np.flatnonzero(kept)
+    left = points[places]
+    worst = np.maximum.reduceat(np.where(begins, 0, points["since_previous"]), np.append(0, places[:-1] + 1))
+    left["since_previous"] = np.where(begins[places], Between.UNKNOWN, worst)
+    return left
+
+
+def _first_of_bin(points: Array, begins: Array, from_ns: int, to_ns: int, bins: int) -> Array:
+    length = max(1, -(-(to_ns - from_ns + 1) // bins))
+    number = (points["point"]["t_ns"] - from_ns) // length
+    first: Array = begins | np.append(True, number[1:] != number[:-1])
+    return first
+
+
+def _state_changes(points: Array, begins: Array, limit: int) -> Array:
+    state = points["point"]["state"]
+    changes = ~begins & np.append(False, state[1:] != state[:-1])
+    count = np.cumsum(changes)
+    before_tag = np.repeat((count - changes)[begins], np.diff(np.append(np.flatnonzero(begins), len(points))))
+    limited: Array = changes & (count - before_tag <= limit)
+    return limited
+
+
+def _since_previous(summaries: Array) -> tuple[Array, Array, Array]:
+    """Return Between, distance [m] and tracked time [s] from the end of the previous SUMMARY of the tag to each."""
+    end, start = np.roll(summaries["last"], 1), summaries["first"]
+    elapsed_ns = start["t_ns"] - end["t_ns"]
+    known = ~_begins(summaries["tag"]) & (elapsed_ns <= GAP_NS) & _placed(end) & _placed(start)
+    tracked = known & _tracked(end) & _tracked(start)
+    between = np.where(tracked, Between.TRACKING, np.where(known, Between.DOUBTFUL, Between.UNKNOWN))
+    with np.errstate(invalid="ignore"):
+        moving = ~(np.maximum(np.abs(end["speed"]), np.abs(start["speed"])) < MOVING_MPS)
+        distance = np.hypot(start["x"] - end["x"], start["y"] - end["y"])
+    return between, np.where(tracked & moving, distance, 0.0), np.where(tracked, elapsed_ns * 1e-9, 0.0)
+
+
+def _begins(tags: Array) -> Array:
+    """Return whether each entry is the first of its tag."""
+    return np.append(True, tags[1:] != tags[:-1])
+
+
+def _tracked(points: Array) -> Array:
+    tracked: Array = (points["state"] == State.TRACKING) & np.isfinite(points["x"])
+    return tracked
+
+
+def _placed(points: Array) -> Array:
+    """Return whether the position of each POINT is a place of the map."""
+    placed: Array = np.isin(points["state"], _PLACED) & np.isfinite(points["x"])
+    return placed
+
+
+_PLACED = (State.TRACKING, State.COASTING, State.DEGRADED)  # without the bit RELATIVE

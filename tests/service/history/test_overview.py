@@ -1,0 +1,227 @@
+"""The overview of many tracks: figures, a few points of each tag, and what is known between them."""
+
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import POSE, Array, Frame, State
+from dropanchor_service.history.overview import Overview, OverviewError, TooMuchError
+from dropanchor_service.history.summaries import Between
+from dropanchor_service.history.summary_table import LENGTHS_NS
+from dropanchor_service.history.track_file import TrackReader, TrackWriter
+
+SECOND = 1_000_000_000
+T_NS = 1_800_000_000 * SECOND // LENGTHS_NS[1] * LENGTHS_NS[1]
+HOUR = 3600
+
+
+def drive(seconds: Array, speed: float = 2.0, state: State = State.TRACKING, **fields: object) -> Array:
+    """Return poses of a tag that drives east, at these seconds after T_NS."""
+    made = np.zeros(len(seconds), POSE)
+    made["t_ns"] = T_NS + np.round(np.asarray(seconds) * SECOND).astype(np.int64)
+    made["x"], made["speed"], made["state"] = speed * np.asarray(seconds), speed, state
+    made["cov"] = np.diag([0.04, 0.01, 0.001])
+    for name, value in fields.items():
+        made[name] = value
+    return made
+
+
+def store(path: Path, **tracks: Array) -> TrackWriter:
+    """Write tracks by tag, and every summary that can be written."""
+    writer = TrackWriter(path)
+    for tag, made in tracks.items():
+        writer.insert(made, [tag] * len(made), [None] * len(made))
+    summarise(writer)
+    return writer
+
+
+def summarise(writer: TrackWriter) -> None:
+    for _ in range(2):  # the stretches rest after the first round
+        while writer.summarise():
+            pass
+
+
+def overview(path: Path, from_s: float, to_s: float, tags: list[str] | None = None, max_points: int = 100) -> Overview:
+    return TrackReader(path).overview(tags, T_NS + round(from_s * SECOND), T_NS + round(to_s * SECOND), max_points)
+
+
+def figures(found: Overview, tag: str) -> dict[str, float]:
+    (row,) = (row for row in found.figures if found.names[row["tag"]] == tag)
+    return {name: float(row[name]) for name in ("poses", "distance_m", "tracked_s", "max_speed")}
+
+
+def points(found: Overview, tag: str) -> Array:
+    numbers = [number for number, name in found.names.items() if name == tag]
+    return found.points[np.isin(found.points["tag"], numbers)]
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "h.sqlite"
+
+
+def test_figures_of_a_drive_are_its_distance_time_and_speeds(path: Path) -> None:
+    store(path, a=drive(np.arange(0.0, 601.0)), b=drive(np.arange(0.0, 601.0), speed=-1.0)).close()
+    found = overview(path, 0, 600)
+    assert figures(found, "a") == {"poses": 601, "distance_m": 1200, "tracked_s": 600, "max_speed": 2}
+    assert figures(found, "b") == {"poses": 601, "distance_m": 600, "tracked_s": 600, "max_speed": 1}
+
+
+def test_the_noise_of_a_standing_tag_is_no_distance(path: Path) -> None:
+    noisy = drive(np.arange(0.0, 300.0), speed=0.0, x=np.random.default_rng(1).normal(0, 0.2, 300))
+    store(path, a=noisy).close()
+    assert figures(overview(path, 0, 300), "a")["distance_m"] == 0
+
+
+@pytest.mark.parametrize("hours", [(0.0, 0.5), (0.001, 7.9), (0.4999, 7.51), (0.0, 24.0)])
+def test_every_level_gives_the_figures_of_the_poses(
+    path: Path, hours: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = drive(np.arange(0.0, 8 * HOUR, 5.0))
+    made["state"][300:310], made["state"][1000:1005] = State.AMBIGUOUS, State.COASTING
+    made["frame"][2000:2010] = Frame.RELATIVE
+    store(path, a=made[made["t_ns"] // SECOND % 4000 > 60], b=drive(np.arange(0.0, 8 * HOUR, 7.0))).close()
+    with sqlite3.connect(path) as file:
+        written = file.execute("SELECT level, count(*) FROM summaries GROUP BY level ORDER BY level").fetchall()
+    file.close()
+    assert written == [(0, 239), (1, 15)]
+    seen = []
+    for poses, fine in ((10**9, 0), (0, 10**9), (0, 0)):
+        monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", poses)
+        monkeypatch.setattr("dropanchor_service.history.overview.MAX_FINE", fine)
+        found = overview(path, hours[0] * HOUR, hours[1] * HOUR)
+        seen.append([figures(found, tag) for tag in ("a", "b")])
+    assert seen[0][0]["tracked_s"] > 1000
+    for other in seen[1:]:
+        for expected, actual in zip(seen[0], other, strict=True):
+            assert actual == pytest.approx(expected, rel=1e-5)
+
+
+def test_late_poses_of_a_summarised_time_are_in_the_summary(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_FINE", 0)
+    whole = drive(np.arange(0.0, 2 * HOUR, 5.0))
+    writer = store(path, a=np.delete(whole, slice(100, 200)))
+    before = figures(overview(path, 0, 2 * HOUR), "a")
+    writer.insert(whole[100:200], ["a"] * 100, [None] * 100)
+    unwritten = figures(overview(path, 0, 2 * HOUR), "a")
+    summarise(writer)
+    written = figures(overview(path, 0, 2 * HOUR), "a")
+    assert (before["poses"], unwritten["poses"], written["poses"]) == (len(whole) - 100, len(whole), len(whole))
+    assert (
+        before["tracked_s"]
+        < unwritten["tracked_s"]
+        == written["tracked_s"]
+        == whole["t_ns"][-1] / SECOND - T_NS / SECOND
+    )
+    writer.close()
+
+
+def test_summaries_that_a_kill_left_unwritten_are_written_after_the_next_start(path: Path) -> None:
+    writer = TrackWriter(path)
+    writer.insert(drive(np.arange(0.0, HOUR, 5.0)), ["a"] * 720, [None] * 720)
+    writer.close()
+    again = TrackWriter(path)
+    assert again.summarise()
+    again.close()
+
+
+def test_thinned_points_keep_the_first_the_last_and_changes_of_state(path: Path) -> None:
+    made = drive(np.arange(0.0, 1000.0))
+    made["state"][501] = State.COASTING
+    store(path, a=made).close()
+    found = points(overview(path, 0, 2000, max_points=20), "a")
+    seconds = ((found["point"]["t_ns"] - T_NS) // SECOND).tolist()
+    assert len(found) <= 20
+    assert (seconds[0], seconds[-1]) == (0, 999)
+    assert {501, 502} <= set(seconds)
+    between = dict(zip(seconds, found["since_previous"].tolist(), strict=True))
+    assert (between[501], between[502], between[999]) == (Between.DOUBTFUL, Between.DOUBTFUL, Between.TRACKING)
+
+
+@pytest.mark.parametrize("max_points", [2, 3, 7, 50])
+def test_a_tag_that_flaps_between_states_has_no_more_points_than_allowed(path: Path, max_points: int) -> None:
+    made = drive(np.arange(0.0, 1000.0))
+    made["state"][::2] = State.AMBIGUOUS
+    store(path, a=made, b=drive(np.arange(0.0, 1000.0))).close()
+    found = overview(path, 0, 1000, max_points=max_points)
+    assert 2 <= len(points(found, "a")) <= max_points
+    assert 2 <= len(points(found, "b")) <= max_points
+    assert set(points(found, "a")["since_previous"].tolist()) == {Between.UNKNOWN}
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"state": State.AMBIGUOUS}, Between.UNKNOWN),
+        ({"state": State.LOST}, Between.UNKNOWN),
+        ({"frame": Frame.RELATIVE}, Between.UNKNOWN),
+        ({"x": np.nan}, Between.UNKNOWN),
+        ({"state": State.DEGRADED}, Between.DOUBTFUL),
+        ({"t_ns": 0}, Between.UNKNOWN),
+        ({}, Between.TRACKING),
+    ],
+)
+def test_one_pose_that_is_no_place_breaks_the_line_at_every_level(
+    path: Path, change: dict[str, object], expected: Between, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = drive(np.arange(0.0, 4 * HOUR, 5.0))
+    for name, value in change.items():
+        made[name][1005] = value
+    if "t_ns" in change:  # a gap
+        made = np.delete(made, slice(1005, 1008))
+    store(path, a=made).close()
+    for poses, fine in ((10**9, 0), (0, 10**9), (0, 0)):
+        monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", poses)
+        monkeypatch.setattr("dropanchor_service.history.overview.MAX_FINE", fine)
+        found = points(overview(path, 0, 4 * HOUR, max_points=2), "a")
+        assert found["since_previous"].tolist() == [Between.UNKNOWN, expected]
+
+
+def test_only_the_named_tags_are_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store(path, **{f"t{i}": drive(np.arange(0.0, HOUR, 10.0)) for i in range(5)}).close()
+    for most in (0, 100):
+        monkeypatch.setattr("dropanchor_service.history.bulk_reading.MAX_NAMED", most)
+        found = overview(path, 0, HOUR, ["t1", "t3", "nobody"])
+        assert {found.names[row["tag"]] for row in found.figures} == {"t1", "t3"}
+    assert len(overview(path, 0, HOUR, ["nobody"]).points) == 0
+
+
+def test_a_long_period_without_summaries_is_refused_with_a_reason(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = TrackWriter(path)
+    writer.insert(drive(np.arange(0.0, HOUR, 10.0)), ["a"] * 360, [None] * 360)
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_TAG_SLOTS", 100)
+    with pytest.raises(OverviewError, match="still being made"):
+        overview(path, 0, HOUR)
+    writer.close()
+    again = TrackWriter(path)
+    summarise(again)
+    assert figures(overview(path, 0, 720 * HOUR), "a")["poses"] == 360
+    again.close()
+
+
+def test_a_period_with_too_many_summaries_is_refused_with_a_reason(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store(path, a=drive(np.arange(0.0, 200 * HOUR, 60.0))).close()
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_BYTES", 10_000)
+    with pytest.raises(TooMuchError, match="name the tags"):
+        overview(path, 0, 200 * HOUR)
+    assert figures(overview(path, 0, 20 * HOUR), "a")["poses"] == 1201
+
+
+def test_a_file_without_summaries_gets_them(path: Path) -> None:
+    TrackWriter(path).close()
+    old = sqlite3.connect(path)
+    old.executescript("DROP TABLE summaries; PRAGMA user_version = 1;")
+    old.close()
+    store(path, a=drive(np.arange(0.0, HOUR, 10.0))).close()
+    assert figures(overview(path, 0, HOUR), "a")["poses"] == 360
+
+
+def test_summaries_end_with_the_poses_that_they_summarise(path: Path) -> None:
+    writer = store(path, a=drive(np.arange(0.0, 4 * HOUR, 10.0)))
+    while writer.prune(T_NS + 3 * HOUR * SECOND, 2**40):
+        pass
+    assert figures(overview(path, 0, 720 * HOUR), "a")["poses"] == 360
+    writer.close()
