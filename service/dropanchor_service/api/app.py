@@ -35,6 +35,8 @@ from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
+from dropanchor_service.api.routes.track_file import track_file_router
+from dropanchor_service.api.routes.tracks import tracks_router
 from dropanchor_service.api.routes.webhooks import webhooks_router
 from dropanchor_service.api.routes.zones import zones_router
 from dropanchor_service.phones.intake import Receive
@@ -83,6 +85,8 @@ def create_app(
         tags_router(answers, max_tags),
         remote_settings_router(answers),
         track_router(answers),
+        track_file_router(answers),
+        tracks_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),
         connect_router(answers.site, endpoints, credentials),

@@ -12,6 +12,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.records import RECORD, SLOT_NS
 from dropanchor_service.history.summaries import POINT, SUMMARY, summary_of_each
+from dropanchor_service.store.records import take
 
 _JOINED = np.dtype([("tag", ">u4"), ("t_ns", ">i8"), ("pose", RECORD)])
 _SQL = """
@@ -33,13 +34,13 @@ def summaries_of_poses(
     window = (from_ns // SLOT_NS, to_ns // SLOT_NS, from_ns, to_ns)
     for (text,) in connection.execute(_SQL.format(tags=named), window):
         joined = np.frombuffer(bytes.fromhex(text), _JOINED)
-        yield _summaries(joined if tags is None or few else joined[np.isin(joined["tag"], tags)])
+        yield _summaries(joined if tags is None or few else take(joined, np.isin(joined["tag"], tags)))
 
 
 def summaries_in(blobs: Sequence[bytes], tags: Sequence[int] | None) -> Array:
     """Return the SUMMARY records in these blobs, only those of the tags with these numbers."""
     summaries = np.frombuffer(b"".join(blobs), SUMMARY)
-    return summaries if tags is None else summaries[np.isin(summaries["tag"], tags)]
+    return summaries if tags is None else take(summaries, np.isin(summaries["tag"], tags))
 
 
 def _summaries(joined: Array) -> Array:

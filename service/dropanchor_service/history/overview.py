@@ -25,6 +25,7 @@ from dropanchor_service.history.summary_table import COARSE, FINE, LENGTHS_NS
 
 MAX_POSES = 200_000  # that are read one by one: a second of work
 MAX_FINE = 300_000  # summaries of the fine level
+MAX_POINTS = 200_000  # of all tags together
 MAX_BYTES = 512 * 2**20  # of all summaries
 MAX_TAG_SLOTS = 500_000  # tags times slots without summaries
 
@@ -64,7 +65,8 @@ def read_overview(
     reader = _Reader(connection, None if tags is None else sorted(names), len(names))
     level = _level(len(names), to_ns - from_ns)
     summaries = in_order(np.concatenate([np.empty(0, SUMMARY), *reader.cover(level, from_ns, to_ns)]))
-    points = thinned(points_of(summaries), from_ns, to_ns, max_points)
+    allowed = min(max_points, max(2, MAX_POINTS // len(names)))
+    points = thinned(points_of(summaries), allowed)
     return Overview(names, summary_per_tag(summaries), points)
 
 

@@ -9,6 +9,7 @@ from enum import IntEnum
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.store.records import put, take
 
 GAP_NS = 10_000_000_000  # nothing is known between two poses that are further apart
 MOVING_MPS = 0.1  # the noise of a tag that stands is no distance
@@ -54,8 +55,7 @@ def summary_of_each(tags: Array, points: Array) -> Array:
 
 def in_order(summaries: Array) -> Array:
     """Return the summaries ordered by tag and time."""
-    ordered: Array = summaries[np.lexsort((summaries["first"]["t_ns"], summaries["tag"]))]
-    return ordered
+    return take(summaries, np.lexsort((summaries["first"]["t_ns"], summaries["tag"])))
 
 
 def summary_per_tag(summaries: Array) -> Array:
@@ -66,7 +66,7 @@ def summary_per_tag(summaries: Array) -> Array:
     starts, ends = np.flatnonzero(begins), np.append(np.flatnonzero(begins)[1:], len(summaries)) - 1
     between, distance, tracked = _since_previous(summaries)
     inner = np.where(begins, Between.TRACKING, between)
-    whole = summaries[starts]
+    whole = take(summaries, starts)
     whole["last"] = summaries["last"][ends]
     whole["poses"] = np.add.reduceat(summaries["poses"], starts)
     whole["between"] = np.maximum.reduceat(np.maximum(summaries["between"], inner), starts)
@@ -80,15 +80,15 @@ def points_of(summaries: Array) -> Array:
     """Return the TRACK_POINT at both ends of each SUMMARY, in the same order."""
     points = np.zeros((len(summaries), 2), TRACK_POINT)
     points["tag"] = summaries["tag"][:, None]
-    points["point"][:, 0], points["point"][:, 1] = summaries["first"], summaries["last"]
+    for column, end in enumerate(("first", "last")):
+        put(points["point"][:, column], slice(None), summaries[end])
     points["since_previous"][:, 0] = _since_previous(summaries)[0] if len(summaries) else Between.UNKNOWN
     points["since_previous"][:, 1] = summaries["between"]
     several = np.column_stack([np.ones(len(summaries), bool), summaries["poses"] > 1])
-    kept: Array = points[several]
-    return kept
+    return take(points, several)
 
 
-def thinned(points: Array, from_ns: int, to_ns: int, max_points: int) -> Array:
+def thinned(points: Array, max_points: int) -> Array:
     """Return at most `max_points` of each tag: the first, the last, changes of state, and points evenly in time.
 
     points: TRACK_POINT, in order. Changes of state beyond half of the points are left out; `since_previous` of a point
@@ -97,24 +97,29 @@ def thinned(points: Array, from_ns: int, to_ns: int, max_points: int) -> Array:
     if len(points) == 0:
         return points
     begins = _begins(points["tag"])
-    kept = begins | np.append(begins[1:], True)
-    kept |= _first_of_bin(points, begins, from_ns, to_ns, max(1, (max_points - 2) // 2))
-    kept |= _state_changes(points, begins, (max_points - 2) // 2)
+    changes = _state_changes(points, begins, (max_points - 2) // 2)
+    bins = np.maximum(1, max_points - 2 - np.add.reduceat(changes, np.flatnonzero(begins), dtype=np.int64))
+    kept = changes | _first_of_bin(points["point"]["t_ns"], begins, bins) | np.append(begins[1:], True)
     places = np.flatnonzero(kept)
-    left = points[places]
+    left = take(points, places)
     worst = np.maximum.reduceat(np.where(begins, 0, points["since_previous"]), np.append(0, places[:-1] + 1))
     left["since_previous"] = np.where(begins[places], Between.UNKNOWN, worst)
     return left
 
 
-def _first_of_bin(points: Array, begins: Array, from_ns: int, to_ns: int, bins: int) -> Array:
-    length = max(1, -(-(to_ns - from_ns + 1) // bins))
-    number = (points["point"]["t_ns"] - from_ns) // length
+def _first_of_bin(t_ns: Array, begins: Array, bins: Array) -> Array:
+    """Return whether each point is the first in its bin. bins: into how many the time of each tag is divided."""
+    starts = np.flatnonzero(begins)
+    ends = np.append(starts[1:], len(t_ns)) - 1
+    length = -(-(t_ns[ends] - t_ns[starts] + 1) // bins)
+    counts = ends - starts + 1
+    number = (t_ns - np.repeat(t_ns[starts], counts)) // np.repeat(length, counts)
     first: Array = begins | np.append(True, number[1:] != number[:-1])
     return first
 
 
 def _state_changes(points: Array, begins: Array, limit: int) -> Array:
+    """Return whether the state changes with each point. Only the first `limit` changes of a tag count."""
     state = points["point"]["state"]
     changes = ~begins & np.append(False, state[1:] != state[:-1])
     count = np.cumsum(changes)
@@ -125,15 +130,16 @@ def _state_changes(points: Array, begins: Array, limit: int) -> Array:
 
 def _since_previous(summaries: Array) -> tuple[Array, Array, Array]:
     """Return Between, distance [m] and tracked time [s] from the end of the previous SUMMARY of the tag to each."""
-    end, start = np.roll(summaries["last"], 1), summaries["first"]
+    end, start = summaries["last"][:-1], summaries["first"][1:]
     elapsed_ns = start["t_ns"] - end["t_ns"]
-    known = ~_begins(summaries["tag"]) & (elapsed_ns <= GAP_NS) & _placed(end) & _placed(start)
+    known = ~_begins(summaries["tag"])[1:] & (elapsed_ns <= GAP_NS) & _placed(end) & _placed(start)
     tracked = known & _tracked(end) & _tracked(start)
     between = np.where(tracked, Between.TRACKING, np.where(known, Between.DOUBTFUL, Between.UNKNOWN))
     with np.errstate(invalid="ignore"):
         moving = ~(np.maximum(np.abs(end["speed"]), np.abs(start["speed"])) < MOVING_MPS)
-        distance = np.hypot(start["x"] - end["x"], start["y"] - end["y"])
-    return between, np.where(tracked & moving, distance, 0.0), np.where(tracked, elapsed_ns * 1e-9, 0.0)
+        distance = np.where(tracked & moving, np.hypot(start["x"] - end["x"], start["y"] - end["y"]), 0.0)
+    elapsed_s = np.where(tracked, elapsed_ns * 1e-9, 0.0)
+    return np.append(Between.UNKNOWN, between), np.append(0.0, distance), np.append(0.0, elapsed_s)
 
 
 def _begins(tags: Array) -> Array:

@@ -1,9 +1,9 @@
-"""A page of a track as JSON, GeoJSON, CSV or GPX."""
+"""Pages of a track as JSON, GeoJSON, CSV or GPX."""
 
 import csv
 import io
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any
 from xml.sax.saxutils import escape
@@ -40,15 +40,32 @@ def negotiate(request: Request, requested: str | None) -> str:
 
 def encode(page: TrackPage, head: Head, form: str) -> bytes:
     """Return the page in the format `form`."""
-    return _WRITERS[form](page, head)
+    return b"".join(stream([page], head, form))
 
 
-def _json(page: TrackPage, head: Head) -> bytes:
-    return to_json({**head, "poses": page.rows()})
+def stream(pages: Iterable[TrackPage], head: Head, form: str) -> Iterator[bytes]:
+    """Yield one document in the format `form` that holds all pages."""
+    return _WRITERS[form](pages, head)
 
 
-def _geojson(page: TrackPage, head: Head) -> bytes:
-    return to_json({"type": "FeatureCollection", **head, "features": [_feature(pose) for pose in page.rows()]})
+def _json(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
+    return _document(head, "poses", (page.rows() for page in pages))
+
+
+def _geojson(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
+    features = ([_feature(pose) for pose in page.rows()] for page in pages)
+    return _document({"type": "FeatureCollection", **head}, "features", features)
+
+
+def _document(head: Head, name: str, parts: Iterable[list[dict[str, Any]]]) -> Iterator[bytes]:
+    """Yield a JSON object with the members of `head` and one array that holds all parts."""
+    yield to_json(head)[:-1] + f',"{name}":['.encode()
+    separator = b""
+    for part in parts:
+        if part:
+            yield separator + to_json(part)[1:-1]
+            separator = b","
+    yield b"]}"
 
 
 def _feature(pose: dict[str, Any]) -> dict[str, Any]:
@@ -57,40 +74,42 @@ def _feature(pose: dict[str, Any]) -> dict[str, Any]:
     return {"type": "Feature", "geometry": geometry, "properties": pose}
 
 
-def _csv(page: TrackPage, head: Head) -> bytes:  # noqa: ARG001 - a table has no place for the head
-    names = [name for name in page.columns if name != "covariance"]
-    text = io.StringIO(newline="")
-    writer = csv.writer(text)
-    writer.writerow([*names, *_COVARIANCES])
-    for pose in page.rows():
-        cov = pose["covariance"]
-        variances = ["" if cov is None else cov[i][j] for i, j in _COVARIANCES.values()]
-        writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *variances])
-    return text.getvalue().encode()
+def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: ARG001 - a table has no place for the head
+    for number, page in enumerate(pages):
+        names = [name for name in page.columns if name != "covariance"]
+        text = io.StringIO(newline="")
+        writer = csv.writer(text)
+        if number == 0:
+            writer.writerow([*names, *_COVARIANCES])
+        for pose in page.rows():
+            cov = pose["covariance"]
+            variances = ["" if cov is None else cov[i][j] for i, j in _COVARIANCES.values()]
+            writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *variances])
+        yield text.getvalue().encode()
 
 
-def _gpx(page: TrackPage, head: Head) -> bytes:
-    """Return the page as GPX 1.1.
+def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
+    """Yield a GPX 1.1 document.
 
     GPX cannot express uncertainty. So `type` holds the state of a pose, and ambiguous poses are left out.
     """
-    return "".join(_gpx_lines(page, head["tag"])).encode()
-
-
-def _gpx_lines(page: TrackPage, tag: str) -> Iterator[str]:
-    yield '<?xml version="1.0" encoding="UTF-8"?>\n'
-    yield '<gpx version="1.1" creator="Dropanchor" xmlns="http://www.topografix.com/GPX/1/1">\n'
-    yield f"<trk><name>{escape(tag)}</name><trkseg>\n"
+    yield b'<?xml version="1.0" encoding="UTF-8"?>\n'
+    yield b'<gpx version="1.1" creator="Dropanchor" xmlns="http://www.topografix.com/GPX/1/1">\n'
+    yield f"<trk><name>{escape(head['tag'])}</name><trkseg>\n".encode()
     last_ns = None
-    for pose in page.rows():
-        if pose["state"] not in _PLACED or not math.isfinite(pose["lat"]):
-            continue
-        if last_ns is not None and pose["t_ns"] - last_ns > GAP_NS:
-            yield "</trkseg><trkseg>\n"
-        last_ns = pose["t_ns"]
-        yield f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}"><time>{_utc(last_ns)}</time>'
-        yield f"<type>{pose['state']}</type></trkpt>\n"
-    yield "</trkseg></trk></gpx>\n"
+    for page in pages:
+        points = [pose for pose in page.rows() if pose["state"] in _PLACED and math.isfinite(pose["lat"])]
+        times = [last_ns, *(pose["t_ns"] for pose in points)]
+        yield "".join(map(_gpx_point, points, times)).encode()
+        last_ns = times[-1]
+    yield b"</trkseg></trk></gpx>\n"
+
+
+def _gpx_point(pose: dict[str, Any], last_ns: int | None) -> str:
+    """Return a point, in a new segment if it comes long after the one of `last_ns`."""
+    apart = last_ns is not None and pose["t_ns"] - last_ns > GAP_NS
+    point = f'<trkpt lat="{pose["lat"]:.9f}" lon="{pose["lon"]:.9f}"><time>{_utc(pose["t_ns"])}</time>'
+    return ("</trkseg><trkseg>\n" if apart else "") + f"{point}<type>{pose['state']}</type></trkpt>\n"
 
 
 def _utc(t_ns: int) -> str:
@@ -98,4 +117,9 @@ def _utc(t_ns: int) -> str:
     return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{rest // 1_000_000:03d}Z"
 
 
-_WRITERS: Mapping[str, Callable[[TrackPage, Head], bytes]] = {JSON: _json, GEOJSON: _geojson, CSV: _csv, GPX: _gpx}
+_WRITERS: Mapping[str, Callable[[Iterable[TrackPage], Head], Iterator[bytes]]] = {
+    JSON: _json,
+    GEOJSON: _geojson,
+    CSV: _csv,
+    GPX: _gpx,
+}

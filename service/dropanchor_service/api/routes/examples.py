@@ -164,6 +164,33 @@ TRACK: dict[str, Any] = {
     ],
     "next": None,
 }
+TRACKS: dict[str, Any] = {
+    "from_ns": 1_799_996_400_000_000_000,
+    "to_ns": 1_800_000_000_000_000_000,
+    "tracks": [
+        {
+            "tag": "tag-1",
+            "poses": 3480,
+            "tracked_s": 3475.0,
+            "distance_m": 1240.5,
+            "mean_speed_mps": 0.357,
+            "max_speed_mps": 1.92,
+            "points": {
+                "t_ns": [1_799_996_400_000_000_000, 1_800_000_000_000_000_000],
+                "state": ["tracking", "tracking"],
+                "frame": ["site", "site"],
+                "x": [3.25, 4.5],
+                "y": [-1.5, 2.0],
+                "heading_rad": [1.57, 0.0],
+                "speed_mps": [1.1, 0.0],
+                "semi_major_m": [0.5, 0.4],
+                "semi_minor_m": [0.2, 0.2],
+                "angle_rad": [0.0, 0.0],
+                "since_previous": ["unknown", "tracking"],
+            },
+        }
+    ],
+}
 CONNECT: dict[str, Any] = {
     "endpoints": ["tcp/192.168.1.10:7447"],
     "credentials": False,

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from starlette.responses import Response
 
 from dropanchor_schemas.track import Track
@@ -13,14 +13,11 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.track_pages import TrackPage, track_page
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
-from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.known_tag import unknown_tag
-from dropanchor_service.api.routes.parameters import TagId, TimeNs
-from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.api.routes.parameters import TagId
+from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
 
-HOUR_NS = 3_600_000_000_000
-MAX_WINDOW_NS = 31 * 24 * HOUR_NS
 MAX_POSES = 10_000
 
 _DESCRIPTION = """\
@@ -30,26 +27,9 @@ rel="next", lead to the next page. GeoJSON and GPX need a georeferenced site. GP
 `coasting` or `degraded`, and gives the state in `type`."""
 
 
-class TrackQuery(BaseModel):
+class TrackQuery(Period):
     """The part of a track to return, and its format."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-    from_ns: TimeNs | None = Field(
-        default=None,
-        alias="from",
-        ge=0,
-        lt=2**62,
-        description="Start of the track, UTC in ns, or ISO 8601 with a time zone. The default is one hour before `to`.",
-    )
-    to_ns: TimeNs | None = Field(
-        default=None,
-        alias="to",
-        ge=0,
-        lt=2**62,
-        description="End of the track, UTC in ns, or ISO 8601 with a time zone, "
-        "at most 31 days after `from`. The default is now.",
-    )
     limit: int = Field(default=1000, ge=1, le=MAX_POSES, description="The maximum number of poses on a page.")
     cursor: int | None = Field(default=None, ge=0, lt=2**62, description="The value of `next` on the previous page.")
     format: Literal["json", "geojson", "csv", "gpx"] | None = Field(
@@ -76,7 +56,7 @@ def track_router(answers: Answers) -> APIRouter:
         form = track_formats.negotiate(request, query.format)
         if form in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
-        from_ns, to_ns = _window(query, answers.now_ns())
+        from_ns, to_ns = limits_of(query, answers.now_ns())
         page = _page(answers, tag, max(from_ns, query.cursor or 0), to_ns, query.limit)
         following = None if page.next_ns is None else str(page.next_ns)
         head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": following}
@@ -89,34 +69,13 @@ def track_router(answers: Answers) -> APIRouter:
     return router
 
 
-def _window(query: TrackQuery, now_ns: int) -> tuple[int, int]:
-    to_ns = now_ns if query.to_ns is None else query.to_ns
-    from_ns = max(0, to_ns - HOUR_NS) if query.from_ns is None else query.from_ns
-    if from_ns > to_ns:
-        raise ProblemError(Kind.INVALID_REQUEST, "query.from: is later than `to`")
-    if to_ns - from_ns > MAX_WINDOW_NS:
-        raise ProblemError(Kind.INVALID_REQUEST, "query.from: is more than 31 days before `to`")
-    return from_ns, to_ns
-
-
 def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
-    tracks = answers.tracks
-    if tracks is None:
-        raise ProblemError(
-            Kind.NO_HISTORY,
-            "Start the service with `--data-dir FOLDER`, or set `data_dir`, and leave `history.enabled` at true.",
-        )
+    tracks = history_of(answers)
     try:
-        _require_known(answers, tracks, tag)
+        require_known(answers, tracks, tag)
         return track_page(tracks, answers.site, tag, from_ns, to_ns, limit)
     except sqlite3.Error as error:
-        raise ProblemError(Kind.HISTORY_UNREADABLE, f"The history file cannot be read: {error}.") from error
-
-
-def _require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
-    """Raise ProblemError when neither this process nor the stored history has seen the tag."""
-    if answers.tags.find(tag) is None and not tracks.has_tag(tag):
-        raise unknown_tag(tag)
+        raise unreadable(error) from error
 
 
 def _link(query: dict[str, Any], form: str) -> str:

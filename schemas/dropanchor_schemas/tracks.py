@@ -1,0 +1,62 @@
+"""Models of the tracks of many tags over a period: figures, and a few points of each."""
+
+from enum import StrEnum
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from dropanchor_schemas.pose import Frame, TrackingState
+
+
+class _Answer(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+
+class Between(StrEnum):
+    """What is known of the way of a tag between two points."""
+
+    TRACKING = "tracking"
+    DOUBTFUL = "doubtful"
+    UNKNOWN = "unknown"
+
+
+class TrackPoints(_Answer):
+    """Points of a track in order of time, as columns of equal length. Each point is a stored pose."""
+
+    t_ns: list[int] = Field(description="UTC, ns.")
+    state: list[TrackingState]
+    frame: list[Frame] = Field(
+        description="`relative`: turned about the anchor by an unknown angle, no place of the map."
+    )
+    x: list[float | None] = Field(description="East, m.")
+    y: list[float | None] = Field(description="North, m.")
+    heading_rad: list[float | None]
+    speed_mps: list[float | None]
+    semi_major_m: list[float | None] = Field(description="Of the 95 % ellipse.")
+    semi_minor_m: list[float | None]
+    angle_rad: list[float | None]
+    since_previous: list[Between] = Field(
+        description="The worst of all stored poses since the previous point. `doubtful`: some were coasting or "
+        "degraded. `unknown`: some were at no place of the map, or there was none for over 10 s; draw no line then."
+    )
+
+
+class TagTrack(_Answer):
+    """The track of a tag over the period."""
+
+    tag: str
+    poses: int = Field(description="Stored poses in the period.")
+    tracked_s: float = Field(description="How long the tag was `tracking` in the frame of the site.")
+    distance_m: float = Field(
+        description="Length of the way while tracking. A tag that is slower than 0.1 m/s counts as standing."
+    )
+    mean_speed_mps: float | None = Field(description="Distance by tracked time; null if the tag was never tracking.")
+    max_speed_mps: float | None = Field(description="Of the stored poses that were tracking.")
+    points: TrackPoints
+
+
+class Tracks(_Answer):
+    """The tracks of many tags over a period."""
+
+    from_ns: int = Field(description="UTC, ns: start of the period, inclusive.")
+    to_ns: int = Field(description="UTC, ns: end of the period, inclusive.")
+    tracks: list[TagTrack] = Field(description="One for each tag with a stored pose in the period, ordered by name.")

@@ -1,0 +1,59 @@
+"""Answer with the tracks of many tags over a period, from the history on disk."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from dropanchor_schemas.tracks import Between as BetweenName
+from dropanchor_service.answers.columns import FRAMES, STATES, ellipse_95
+from dropanchor_service.estimation.columns import Array, Frame
+from dropanchor_service.history.summaries import RELATIVE, Between
+from dropanchor_service.history.tracks import Tracks
+
+_BETWEEN = [BetweenName[between.name].value for between in Between]
+
+
+def many_tracks(
+    tracks: Tracks, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int
+) -> dict[str, Any]:
+    """Return the `Tracks` of these tags, or of all. Raises sqlite3.Error and TooMuchError."""
+    found = tracks.overview(tags, from_ns, to_ns, max_points)
+    columns = _columns(found.points["point"], found.points["since_previous"])
+    begins = np.searchsorted(found.points["tag"], found.figures["tag"])
+    ends = np.searchsorted(found.points["tag"], found.figures["tag"], side="right")
+    each = [
+        {"tag": found.names[int(figures["tag"])], **_figures(figures)}
+        | {"points": {name: column[begin:end] for name, column in columns.items()}}
+        for figures, begin, end in zip(found.figures, begins.tolist(), ends.tolist(), strict=True)
+    ]
+    return {"from_ns": from_ns, "to_ns": to_ns, "tracks": sorted(each, key=lambda track: str(track["tag"]))}
+
+
+def _figures(summary: Array) -> dict[str, Any]:
+    tracked_s, distance_m = float(summary["tracked_s"]), float(summary["distance_m"])
+    return {
+        "poses": int(summary["poses"]),
+        "tracked_s": round(tracked_s, 3),
+        "distance_m": round(distance_m, 3),
+        "mean_speed_mps": round(distance_m / tracked_s, 4) if tracked_s > 0 else None,
+        "max_speed_mps": round(float(summary["max_speed"]), 4),
+    }
+
+
+def _columns(points: Array, since_previous: Array) -> dict[str, Any]:
+    """Return the columns of `TrackPoints`."""
+    relative = np.where(points["state"] & RELATIVE, Frame.RELATIVE, Frame.SITE)
+    covariances = np.empty((len(points), 2, 2))
+    covariances[:, 0, 0], covariances[:, 1, 1] = points["cov_xx"], points["cov_yy"]
+    covariances[:, 0, 1] = covariances[:, 1, 0] = points["cov_xy"]
+    major, minor, angle = ellipse_95(covariances)
+    numbers = {"x": points["x"], "y": points["y"], "heading_rad": points["heading"], "speed_mps": points["speed"]}
+    numbers |= {"semi_major_m": major, "semi_minor_m": minor, "angle_rad": angle}
+    return {
+        "t_ns": np.ascontiguousarray(points["t_ns"]),
+        "state": [STATES[state] for state in (points["state"] & ~np.uint8(RELATIVE)).tolist()],
+        "frame": [FRAMES[frame] for frame in relative.tolist()],
+        **{name: np.ascontiguousarray(values, np.float32) for name, values in numbers.items()},
+        "since_previous": [_BETWEEN[between] for between in since_previous.tolist()],
+    }

@@ -1,0 +1,88 @@
+"""The route that exports the whole track of a tag over a period as a file."""
+
+import sqlite3
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+from starlette.responses import StreamingResponse
+
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.answers.track_pages import TrackPage, track_page
+from dropanchor_service.api.formats import geojson
+from dropanchor_service.api.formats import track as track_formats
+from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.routes.parameters import TagId
+from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
+
+PAGE = 5000
+
+_DESCRIPTION = """\
+Every stored pose of a tag over a period, in one file. GeoJSON and GPX need a georeferenced site. GPX holds only poses
+in the frame of the site that are `tracking`, `coasting` or `degraded`, and gives the state in `type`."""
+
+
+class FileQuery(Period):
+    """The period to export, and the format of the file."""
+
+    format: Literal["csv", "geojson", "gpx", "json"] = Field(default="csv", description="The format of the file.")
+
+
+def track_file_router(answers: Answers) -> APIRouter:
+    router = APIRouter(tags=["poses"])
+
+    @router.get(
+        "/tags/{tag}/track/file",
+        operation_id="export_track",
+        summary="Export the track of a tag as a file",
+        description=_DESCRIPTION,
+        response_class=StreamingResponse,
+        responses=_offers()
+        | problems(
+            *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_GEOREFERENCED),
+            *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+        ),
+    )
+    def export_track(tag: TagId, query: Annotated[FileQuery, Query()]) -> StreamingResponse:
+        if query.format in track_formats.GEOREFERENCED:
+            geojson.require_georeference(answers, track_formats.GEOREFERENCED[query.format])
+        from_ns, to_ns = limits_of(query, answers.now_ns())
+        head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": None}
+        pages = _pages(answers, tag, from_ns, to_ns)
+        return StreamingResponse(
+            track_formats.stream(pages, head, query.format),
+            media_type=track_formats.MEDIA_TYPES[query.format],
+            headers={"cache-control": "no-store", "content-disposition": _attachment(f"{tag}.{query.format}")},
+        )
+
+    return router
+
+
+def _pages(answers: Answers, tag: str, from_ns: int, to_ns: int) -> Iterator[TrackPage]:
+    """Read the first page, and return an iterator over all pages. Raises ProblemError before it returns."""
+    tracks = history_of(answers)
+    try:
+        require_known(answers, tracks, tag)
+        first = track_page(tracks, answers.site, tag, from_ns, to_ns, PAGE)
+    except sqlite3.Error as error:
+        raise unreadable(error) from error
+
+    def every() -> Iterator[TrackPage]:
+        page = first
+        yield page
+        while page.next_ns is not None:
+            page = track_page(tracks, answers.site, tag, page.next_ns, to_ns, PAGE)
+            yield page
+
+    return every()
+
+
+def _attachment(name: str) -> str:
+    return f"attachment; filename*=UTF-8''{quote(name, safe='')}"
+
+
+def _offers() -> dict[int | str, dict[str, Any]]:
+    media_types = track_formats.MEDIA_TYPES.values()
+    return {200: {"content": {media_type: {"schema": {"type": "string"}} for media_type in media_types}}}

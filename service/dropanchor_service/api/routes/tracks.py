@@ -1,0 +1,53 @@
+"""The route for the tracks of many tags over a period: figures, and a few points of each."""
+
+import sqlite3
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from pydantic import Field
+from starlette.responses import Response
+
+from dropanchor_schemas.tracks import Tracks
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.answers.many_tracks import many_tracks
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
+from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
+from dropanchor_service.history.overview import TooMuchError
+
+_DESCRIPTION = """\
+The distance, the tracked time and the speeds of each tag over a period, and a few of its stored poses: the first, the
+last, those with which the state changes, and others evenly in time. The tags share 200,000 points, so each has fewer
+than `max_points` where there are very many. Poses appear about two seconds after they are computed."""
+
+
+class TracksQuery(TagFilter, Period):
+    """The tags, the period and the number of points."""
+
+    max_points: int = Field(default=300, ge=2, le=5000, description="The maximum number of points of a tag.")
+
+
+def tracks_router(answers: Answers) -> APIRouter:
+    router = APIRouter(tags=["poses"])
+
+    @router.get(
+        "/tracks",
+        operation_id="get_tracks",
+        summary="Get figures and points of the tracks of many tags",
+        description=_DESCRIPTION,
+        response_model=Tracks,
+        responses=example_response(examples.TRACKS)
+        | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+    )
+    def get_tracks(query: Annotated[TracksQuery, Query()]) -> Response:
+        from_ns, to_ns = limits_of(query, answers.now_ns())
+        tracks = history_of(answers)
+        try:
+            return json_response(many_tracks(tracks, query.tags or None, from_ns, to_ns, query.max_points))
+        except TooMuchError as error:
+            raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
+        except sqlite3.Error as error:
+            raise unreadable(error) from error
+
+    return router

@@ -1,0 +1,82 @@
+"""Measure how long it takes to open a month of 200 tags, from the file to the response."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+
+import httpx
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import POSE, Array, State
+from dropanchor_service.history.track_file import TrackWriter
+from dropanchor_service.history.tracks import FILE_NAME, Retention
+from support.api import T_NS, ApiBench, make_api_bench
+from support.http_server import running_server
+
+pytestmark = pytest.mark.benchmark
+
+TAGS = 200
+DAY_S = 86_400
+DAYS = 30
+DENSE_S = 2 * 3600
+SECOND = 1_000_000_000
+MAX_OPEN_S = 1.0
+PERIODS_S = {"30 days": DAYS * DAY_S, "1 day": DAY_S, "1 hour": 3600, "10 minutes": 600}
+
+
+def poses_at(seconds: Array) -> Array:
+    """Return a pose of each tag for each of these seconds after the start, in order of time."""
+    phase = seconds[:, None] / 300 + np.arange(TAGS)
+    made = np.zeros(len(seconds) * TAGS, POSE)
+    made["t_ns"] = T_NS - DAYS * DAY_S * SECOND + np.repeat(seconds, TAGS) * SECOND
+    made["x"], made["y"] = (50 * np.cos(phase)).ravel(), (30 * np.sin(phase)).ravel()
+    made["speed"], made["state"] = 0.2, State.TRACKING
+    made["cov"] = np.diag([0.04, 0.01, 0.001])
+    return made
+
+
+def hours() -> Iterator[Array]:
+    """Yield poses hour by hour: one per tag and two minutes, and in the last two hours one per second.
+
+    A summary is as large with one pose as with 120, so the month costs as much as one with a pose per second.
+    """
+    for begin in range(0, DAYS * DAY_S, 3600):
+        step = 1 if begin >= DAYS * DAY_S - DENSE_S else 120
+        yield poses_at(np.arange(begin, begin + 3600, step))
+
+
+@pytest.fixture(scope="module")
+def month(tmp_path_factory: pytest.TempPathFactory) -> ApiBench:
+    folder: Path = tmp_path_factory.mktemp("month")
+    writer = TrackWriter(folder / FILE_NAME)
+    names = [f"tag-{number}" for number in range(TAGS)]
+    for poses in hours():
+        count = len(poses) // TAGS
+        writer.insert(poses, names * count, ["1"] * len(poses))
+        for _ in range(2):  # the stretches of these poses rest after the first round
+            while writer.summarise():
+                pass
+    writer.close()
+    return make_api_bench(folder=folder, retention=Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40))
+
+
+def test_a_month_of_200_tags_opens_within_a_second(month: ApiBench) -> None:
+    with running_server(month.app(), month.stopping) as port, httpx.Client(timeout=60) as client:
+        for name, period_s in PERIODS_S.items():
+            url = f"http://127.0.0.1:{port}/api/v1/tracks?from={T_NS - period_s * SECOND}&to={T_NS}"
+            taken = []
+            for _ in range(5):
+                begun = time.perf_counter()
+                response = client.get(url)
+                taken.append(time.perf_counter() - begun)
+                assert response.status_code == 200, response.text
+            tracks = response.json()["tracks"]
+            points = sum(len(track["points"]["t_ns"]) for track in tracks)
+            print(
+                f"\n{name} of {len(tracks)} tags: {median(taken):.2f} s, first {taken[0]:.2f} s, {points:,} points, "
+                f"{len(response.content) / 1e6:.1f} MB"
+            )
+            assert len(tracks) == TAGS
+            assert median(taken) < MAX_OPEN_S

@@ -1,0 +1,127 @@
+"""Tracks of many tags over REST: figures, points, and a file with every pose."""
+
+import csv
+import io
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from dropanchor_schemas.track import Track
+from dropanchor_schemas.tracks import Tracks
+from dropanchor_service.api.routes import track_file
+from dropanchor_service.estimation.columns import Frame, State
+from service.api.routes.test_track import GEOREFERENCED, RETENTION, SECOND, SECONDS, driven
+from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
+
+
+def tracks(bench: ApiBench, query: str = "") -> Tracks:
+    response = ask(bench.app(), "GET", f"/api/v1/tracks?{query}")
+    assert response.status_code == 200, response.text
+    return Tracks.model_validate(response.json())
+
+
+def test_figures_and_points_of_each_tag(tmp_path: Path) -> None:
+    bench = driven(tmp_path)
+    bench.move("b", x=1.0, state=State.AMBIGUOUS, speed=9.0)
+    bench.write_history()
+    first, second = tracks(bench).tracks
+    assert (first.tag, first.poses, first.distance_m, first.tracked_s) == ("a", SECONDS + 1, 1200, 600)
+    assert (first.mean_speed_mps, first.max_speed_mps) == (2, 2)
+    assert (second.tag, second.tracked_s, second.mean_speed_mps, second.max_speed_mps) == ("b", 0, None, None)
+    points = first.points
+    assert 100 < len(points.t_ns) <= 300
+    assert (points.t_ns[0], points.t_ns[-1]) == (T_NS - SECONDS * SECOND, T_NS)
+    assert points.x[-1] == 1200
+    assert points.since_previous == ["unknown", *["tracking"] * (len(points.t_ns) - 1)]
+    assert points.semi_major_m[0] == pytest.approx(0.2 * 2.4477, rel=1e-3)
+    assert second.points.state == ["ambiguous"]
+
+
+def test_a_point_in_a_frame_of_its_own_says_so(tmp_path: Path) -> None:
+    bench = make_api_bench(folder=tmp_path, retention=RETENTION)
+    bench.move("a", frame=Frame.RELATIVE)
+    bench.write_history()
+    (track,) = tracks(bench, f"from={T_NS}&to={T_NS}").tracks
+    assert (track.points.frame, track.points.state, track.tracked_s) == (["relative"], ["tracking"], 0)
+
+
+def test_a_period_can_be_given_as_iso_8601(tmp_path: Path) -> None:
+    (track,) = tracks(driven(tmp_path), "from=2027-01-15T07:59:00Z&to=2027-01-15T08:00:00Z").tracks
+    assert track.poses == 61
+
+
+def test_a_period_tags_and_the_number_of_points_can_be_chosen(tmp_path: Path) -> None:
+    bench = driven(tmp_path)
+    (track,) = tracks(bench, f"from={T_NS - 100 * SECOND}&to={T_NS - 50 * SECOND}&max_points=6&tags=a,x").tracks
+    assert (track.poses, track.distance_m, len(track.points.t_ns)) == (51, 100, 5)
+    assert tracks(bench, "tags=x").tracks == []
+
+
+@pytest.mark.parametrize(
+    "query", ["from=2&to=1", "max_points=1", "max_points=5001", "from=-1", "tags=", "points=3", "from=0"]
+)
+def test_invalid_parameters_are_refused(tmp_path: Path, query: str) -> None:
+    assert kind_of(ask(driven(tmp_path).app(), "GET", f"/api/v1/tracks?{query}")) == "invalid-request"
+
+
+def test_too_much_a_missing_history_and_a_damaged_one_are_different_problems(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = driven(tmp_path)
+    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tracks")) == "no-history"
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
+    monkeypatch.setattr("dropanchor_service.history.overview.MAX_BYTES", -1)
+    refused = ask(bench.app(), "GET", "/api/v1/tracks")
+    assert (kind_of(refused), "name the tags" in refused.text) == ("invalid-request", True)
+    for file in tmp_path.glob("history.sqlite*"):
+        file.write_bytes(b"torn " * 1000)
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tracks")) == "history-unreadable"
+
+
+def exported(bench: ApiBench, form: str) -> str:
+    response = ask(bench.app(), "GET", f"/api/v1/tags/a/track/file?format={form}")
+    assert response.status_code == 200, response.text
+    assert response.headers["content-disposition"] == f"attachment; filename*=UTF-8''a.{form}"
+    return response.text
+
+
+@pytest.mark.parametrize("size", [10_000, 250, 601, 600])
+def test_a_file_holds_every_pose_once_however_many_pages_that_takes(
+    tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = driven(tmp_path, GEOREFERENCED)
+    monkeypatch.setattr(track_file, "PAGE", size)
+    expected = [T_NS - second * SECOND for second in range(SECONDS, -1, -1)]
+    rows = list(csv.DictReader(io.StringIO(exported(bench, "csv"))))
+    assert [int(row["t_ns"]) for row in rows] == expected
+    features = json.loads(exported(bench, "geojson"))["features"]
+    assert [feature["properties"]["t_ns"] for feature in features] == expected
+    assert [pose.t_ns for pose in Track.model_validate_json(exported(bench, "json")).poses] == expected
+    gpx = ElementTree.fromstring(exported(bench, "gpx"))
+    assert len(list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkpt"))) == len(expected)
+    assert len(list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkseg"))) == 1
+
+
+def test_a_track_without_poses_is_an_empty_file(tmp_path: Path) -> None:
+    bench = driven(tmp_path, GEOREFERENCED)
+    for form in ("csv", "json", "geojson", "gpx"):
+        response = ask(bench.app(), "GET", f"/api/v1/tags/a/track/file?format={form}&from=0&to=1")
+        assert response.status_code == 200
+        if "json" in form:
+            assert response.json()["features" if form == "geojson" else "poses"] == []
+
+
+@pytest.mark.parametrize("form", ["geojson", "gpx"])
+def test_a_site_without_a_georeference_says_what_to_do(tmp_path: Path, form: str) -> None:
+    refused = ask(driven(tmp_path).app(), "GET", f"/api/v1/tags/a/track/file?format={form}")
+    assert kind_of(refused) == "not-georeferenced"
+    assert "Set `georeference`" in refused.text
+
+
+def test_a_file_of_an_unknown_tag_or_of_no_history_is_a_problem(tmp_path: Path) -> None:
+    bench = driven(tmp_path)
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/nobody/track/file")) == "unknown-tag"
+    assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track/file")) == "no-history"
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/a/track/file?format=kml")) == "invalid-request"
