@@ -60,3 +60,11 @@ class Tracks(_Answer):
     from_ns: int = Field(description="UTC, ns: start of the period, inclusive.")
     to_ns: int = Field(description="UTC, ns: end of the period, inclusive.")
     tracks: list[TagTrack] = Field(description="One for each tag with a stored pose in the period, ordered by name.")
+
+
+class History(_Answer):
+    """Whether poses are stored, and which time they cover."""
+
+    enabled: bool = Field(description="Whether the service stores a history.")
+    from_ns: int | None = Field(description="UTC, ns: the oldest pose is up to 10 s younger. Null without a pose.")
+    to_ns: int | None = Field(description="UTC, ns: the newest pose is up to 10 s older.")

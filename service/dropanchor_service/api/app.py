@@ -24,6 +24,7 @@ from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import events_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
+from dropanchor_service.api.routes.history import history_router
 from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
 from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
@@ -87,6 +88,7 @@ def create_app(
         track_router(answers),
         track_file_router(answers),
         tracks_router(answers),
+        history_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),
         connect_router(answers.site, endpoints, credentials),

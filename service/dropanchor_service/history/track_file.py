@@ -187,6 +187,14 @@ class TrackReader:
             connection.execute("BEGIN")  # one state of the file for all statements
             return read_overview(connection, tags, from_ns, to_ns, max_points)
 
+    def span(self) -> tuple[int, int] | None:
+        """Return the time that the stored poses cover, ns; None without poses. Raises sqlite3.Error."""
+        if not self._path.exists():
+            return None
+        with self._connected() as connection:
+            oldest, newest = connection.execute("SELECT min(slot), max(slot) FROM slots").fetchone()
+        return None if oldest is None else (oldest * SLOT_NS, (newest + 1) * SLOT_NS)
+
     def has_tag(self, tag: str) -> bool:
         """Return whether the file ever held a pose of this tag. Raises sqlite3.Error."""
         if not self._path.exists():

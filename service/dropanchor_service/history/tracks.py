@@ -88,6 +88,10 @@ class Tracks:
         """
         return self._reader.overview(tags, from_ns, to_ns, max_points)
 
+    def span(self) -> tuple[int, int] | None:
+        """Return the time that the stored poses cover, ns; None without poses. Raises sqlite3.Error."""
+        return self._reader.span()
+
     def has_tag(self, tag: str) -> bool:
         """Return whether poses of this tag were ever stored. Raises sqlite3.Error."""
         return self._reader.has_tag(tag)

@@ -2,9 +2,11 @@
 
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from dropanchor_schemas.site import Site
+from dropanchor_service.history.tracks import Retention
 from support.api import ApiBench, make_api_bench
 
 
@@ -20,8 +22,10 @@ class Place:
         self.bench.move(*names, **({"t_ns": time.time_ns()} | fields))
 
 
-def live_api_bench(site: Site | None = None) -> ApiBench:
-    """Return a bench on the clock of the host."""
-    bench = make_api_bench(site)
+def live_api_bench(
+    site: Site | None = None, folder: Path | None = None, retention: Retention | None = None
+) -> ApiBench:
+    """Return a bench on the clock of the host. folder, retention: see `make_api_bench`."""
+    bench = make_api_bench(site, folder, retention)
     bench.answers.now_ns = time.time_ns
     return bench

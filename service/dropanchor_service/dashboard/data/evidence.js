@@ -35,13 +35,17 @@ export class Evidence extends EventTarget {
   #requestedAt = -Infinity;
   #isWaiting = false;
 
+  /** True while the page shows the past: the explanation is about the present. */
+  hidden = false;
+
   /** @param {string | null} tag @returns {Explanation | null} */
   of(tag) {
-    return tag === this.#tag ? this.#explanation : null;
+    return !this.hidden && tag === this.#tag ? this.#explanation : null;
   }
 
   /** Request the explanation of a tag, unless that was done a moment ago. @param {string} tag */
   async request(tag) {
+    if (this.hidden) return;
     if (tag !== this.#tag) [this.#tag, this.#explanation] = [tag, null];
     else if (this.#isWaiting || performance.now() - this.#requestedAt < REQUEST_MS) return;
     this.#requestedAt = performance.now();

@@ -30,6 +30,8 @@ export class Fleet {
   size = 0;
   /** False from the loss of the connection until the service has sent all poses again. */
   current = true;
+  /** True while the poses are those of a time in the past. */
+  past = false;
   /** Grows whenever tags come or go. */
   membership = 0;
   /** @type {string[]} */

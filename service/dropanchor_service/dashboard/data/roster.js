@@ -37,6 +37,9 @@ export class Roster {
   /** @type {Map<string, TagStatus>} */
   #statuses = new Map();
 
+  /** True while the page shows the past: what the service knows now is not about that. */
+  hidden = false;
+
   /** @param {import("./fleet.js").Fleet} fleet */
   constructor(fleet) {
     this.fleet = fleet;
@@ -44,7 +47,7 @@ export class Roster {
 
   /** @param {string} tag */
   of(tag) {
-    return this.#statuses.get(tag) ?? null;
+    return this.hidden ? null : (this.#statuses.get(tag) ?? null);
   }
 
   /** Return whether a person should do something for a tag. @param {string} tag */
@@ -73,7 +76,8 @@ export class Roster {
   /** Request the statuses now. */
   async refresh() {
     try {
-      this.#update((await getJson(api("tags"))).tags);
+      const { tags } = await getJson(api("tags"));
+      if (!this.hidden) this.#update(tags);
     } catch {
       // The connection reports the failure. The next response will contain everything.
     }

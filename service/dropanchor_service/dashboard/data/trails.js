@@ -65,6 +65,27 @@ export class Trails {
     }
   }
 
+  /**
+   * Put stored points before those that were noted.
+   * @param {import("./tracks.js").Track} track @param {number} zero_ms time 0 of the track on the clock of the page
+   */
+  prepend(track, zero_ms) {
+    const noted = this.#trails.get(track.tag);
+    const end_ms = noted?.length ? noted.time[noted.at(0)] : Infinity;
+    const trail = new Trail();
+    for (let i = 0; i < track.time.length && zero_ms + track.time[i] < end_ms; i++) {
+      const time_ms = zero_ms + track.time[i];
+      if (trail.length > 0 && track.points.since_previous[i] === "unknown") trail.add(NaN, NaN, false, time_ms);
+      trail.add(track.x[i], track.y[i], track.points.since_previous[i] === "tracking", time_ms);
+    }
+    for (let i = 0; i < (noted?.length ?? 0); i++) {
+      const at = /** @type {Trail} */ (noted).at(i);
+      const { x, y, trusted, time } = /** @type {Trail} */ (noted);
+      trail.add(x[at], y[at], trusted[at] === 1, time[at]);
+    }
+    this.#trails.set(track.tag, trail);
+  }
+
   /** Delete the trails of tags that no longer exist. @param {import("./fleet.js").Fleet} fleet */
   prune(fleet) {
     for (const name of this.#trails.keys()) if (fleet.row(name) < 0) this.#trails.delete(name);

@@ -24,6 +24,8 @@ export class LiveMap extends EventTarget {
   /** @type {readonly import("./draw_site.js").Anchor[]} */
   anchors = [];
   hovered = -1;
+  /** Drawn below the trails. @type {((scene: import("./scene.js").Scene) => void)[]} */
+  underlays = [];
   /** Keep all tags in view until the user moves the map. */
   autoFit = true;
   /** For tests and the console: figures of the last drawing. */
@@ -221,6 +223,7 @@ export class LiveMap extends EventTarget {
     if (density) drawDensity(scene);
     else drawEllipses(scene);
     drawEvidence(scene, this.evidence.of(this.choice.selected));
+    for (const draw of this.underlays) draw(scene);
     drawTrails(scene);
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, isShown);

@@ -12,6 +12,7 @@ import { fixed } from "../data/format.js";
 import { listen } from "../map/gestures.js";
 import { LiveMap } from "../map/map.js";
 import { Notices } from "../panel/notices.js";
+import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
 import { TagTable } from "../panel/table.js";
 import { installTheme } from "./theme.js";
@@ -35,6 +36,8 @@ const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const addAnchor = new AddAnchor(byId("detail"), roster, choice, () => [map.view.x, map.view.y]);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
+
+const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
 
 /** @param {string | null} tag */
 function select(tag) {
@@ -64,6 +67,7 @@ function announce(tag) {
 /** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} update @returns {(event: Event) => void} */
 function receiver(update) {
   return (event) => {
+    if (past.active) return;
     const now_ms = performance.now();
     const frame = /** @type {CustomEvent} */ (event).detail;
     const membership = fleet.membership;
@@ -81,7 +85,7 @@ connection.addEventListener("snapshot", receiver((frame, now_ms) => {
 }));
 connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
 connection.addEventListener("status", () => {
-  if (connection.status === "live") return;
+  if (connection.status === "live" || past.active) return;
   fleet.current = false;
   byId("spoken").textContent = "";
   updatePanels();
@@ -89,6 +93,7 @@ connection.addEventListener("status", () => {
 connection.addEventListener("site", (event) => {
   const site = /** @type {CustomEvent} */ (event).detail;
   map.setAnchors(site.anchors);
+  past.figures.georeferenced = site.georeference !== null;
   detail.rotation_rad = site.georeference?.rotation_rad ?? 0;
   byId("site").textContent = site.name || site.id;
 });
@@ -101,6 +106,7 @@ function updatePanels() {
   care.update();
   detail.update();
   addAnchor.update();
+  past.update();
   notices.update();
   byId("crowd").hidden = !map.stats.density;
   map.redraw();
@@ -132,12 +138,18 @@ installTheme(byId("theme"), () => map.recolour());
 setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();
+connection.addEventListener("snapshot", () => past.start(), { once: true });
 
 /** Read-only access for tests and for the console. */
 Object.defineProperty(window, "dropanchor", {
   value: Object.freeze({
     status: () => connection.status,
     streaming: () => ({ ...connection.stats }),
+    past: () => past.active && { time_ms: past.replay.time_ms, playing: past.replay.playing, loading: past.replay.loading },
+    trail: (/** @type {string} */ tag) => {
+      const trail = map.trails.of(tag);
+      return Array.from({ length: trail?.length ?? 0 }, (_, i) => /** @type {any} */ (trail).x[/** @type {any} */ (trail).at(i)]);
+    },
     drawing: () => ({ ...map.stats, still: map.still }),
     tags: () => fleet.names.map((tag, row) => ({
       tag,

@@ -85,7 +85,7 @@ export class Detail {
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
-    this.#part("json").hidden = hasKey() || !this.fleet.hasPose(row); // a link carries no key
+    this.#part("json").hidden = hasKey() || this.fleet.past || !this.fleet.hasPose(row); // a link carries no key
   }
 
   /** @param {number} row */
@@ -106,7 +106,7 @@ export class Detail {
       mode: percent(number("p_mode")),
       sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : `± ${sigma(number("sigma_obs_m"))} m`,
       age: age(this.fleet.age(row, performance.now())),
-      online: !this.fleet.current ? UNKNOWN : this.fleet.online[row] ? "Online" : "Offline",
+      online: !this.fleet.current || this.fleet.past ? UNKNOWN : this.fleet.online[row] ? "Online" : "Offline",
     };
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
   }

@@ -21,17 +21,18 @@ export class Notices {
 
   update() {
     const { status, lostAt, progress } = this.connection;
+    const isPast = this.fleet.past;
     const label = { connecting: "Connecting", starting: "Starting", live: "Live", lost: "Disconnected", locked: "Locked" }[status];
-    byId("status").dataset.status = status;
-    write(byId("status-text"), label);
-    byId("lost").hidden = status !== "lost";
-    document.title = status === "lost" ? "Connection lost · Dropanchor" : "Dropanchor";
+    byId("status").dataset.status = isPast ? "past" : status;
+    write(byId("status-text"), isPast ? "Past" : label);
+    byId("lost").hidden = status !== "lost" || isPast;
+    document.title = isPast ? "Past · Dropanchor" : status === "lost" ? "Connection lost · Dropanchor" : "Dropanchor";
     write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
     byId("starting").hidden = status !== "starting";
     write(byId("progress"), progress);
     byId("locked").hidden = status !== "locked";
     byId("refused").hidden = !hasKey();
-    const isEmpty = status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
+    const isEmpty = !isPast && status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
     if (isEmpty && byId("empty").hidden) this.#requestCommand();
     byId("empty").hidden = !isEmpty;
   }

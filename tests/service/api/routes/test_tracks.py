@@ -125,3 +125,21 @@ def test_a_file_of_an_unknown_tag_or_of_no_history_is_a_problem(tmp_path: Path) 
     assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/nobody/track/file")) == "unknown-tag"
     assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track/file")) == "no-history"
     assert kind_of(ask(bench.app(), "GET", "/api/v1/tags/a/track/file?format=kml")) == "invalid-request"
+
+
+def test_the_history_says_which_time_it_covers(tmp_path: Path) -> None:
+    bench = make_api_bench(folder=tmp_path, retention=RETENTION)
+    empty = {"enabled": True, "from_ns": None, "to_ns": None}
+    assert ask(bench.app(), "GET", "/api/v1/history").json() == empty
+    bench.write_history()
+    assert ask(bench.app(), "GET", "/api/v1/history").json() == empty
+    found = ask(driven(tmp_path).app(), "GET", "/api/v1/history").json()
+    assert found == {"enabled": True, "from_ns": T_NS - 600 * SECOND, "to_ns": T_NS + 10 * SECOND}
+    assert ask(make_api_bench().app(), "GET", "/api/v1/history").json() == empty | {"enabled": False}
+
+
+def test_a_damaged_history_covers_no_time(tmp_path: Path) -> None:
+    bench = driven(tmp_path)
+    for file in tmp_path.glob("history.sqlite*"):
+        file.write_bytes(b"torn " * 1000)
+    assert kind_of(ask(bench.app(), "GET", "/api/v1/history")) == "history-unreadable"

@@ -1,0 +1,37 @@
+"""The route that says whether there is a history, and which time it covers."""
+
+import sqlite3
+
+from fastapi import APIRouter
+from starlette.responses import Response
+
+from dropanchor_schemas.tracks import History
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.api.routes.period import unreadable
+
+_EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
+
+
+def history_router(answers: Answers) -> APIRouter:
+    router = APIRouter(tags=["poses"], dependencies=[NO_QUERY])
+
+    @router.get(
+        "/history",
+        operation_id="get_history",
+        summary="Get whether poses are stored, and which time they cover",
+        response_model=History,
+        responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+    )
+    def get_history() -> Response:
+        if answers.tracks is None:
+            return json_response({"enabled": False, "from_ns": None, "to_ns": None})
+        try:
+            span = answers.tracks.span()
+        except sqlite3.Error as error:
+            raise unreadable(error) from error
+        from_ns, to_ns = (None, None) if span is None else span
+        return json_response({"enabled": True, "from_ns": from_ns, "to_ns": to_ns})
+
+    return router

@@ -1,0 +1,178 @@
+/** Switch the page between the present and the past. In the past the fleet is fed from stored tracks instead of the stream. */
+
+import { hashWith, momentIn } from "./address.js";
+import { api, getJson } from "../data/connection.js";
+import { PastBar } from "../panel/past_bar.js";
+import { PastFigures } from "../panel/past_figures.js";
+import { PastTrails } from "../data/past_trails.js";
+import { RecentTrack } from "../data/recent.js";
+import { Replay, tracksUrl } from "../data/replay.js";
+import { Track, frameAt } from "../data/tracks.js";
+import { TRAIL_S } from "../data/trails.js";
+import { drawTrack } from "../map/draw_track.js";
+
+const TICK_MS = 100;
+/** With reduced motion the dots move once a second. */
+const CALM_TICK_MS = 1000;
+const TRAIL_POINTS = 60;
+const ADDRESS_MS = 1000;
+
+/**
+ * @typedef {object} Page what the past needs of the page
+ * @property {import("../data/fleet.js").Fleet} fleet
+ * @property {import("../data/trails.js").Trails} trails
+ * @property {import("../data/roster.js").Roster} roster
+ * @property {import("../data/evidence.js").Evidence} evidence
+ * @property {import("../map/map.js").LiveMap} map
+ * @property {import("./choice.js").Choice} choice
+ * @property {import("../data/connection.js").Connection} connection
+ * @property {() => void} updatePanels
+ * @property {(id: string) => HTMLElement} byId
+ */
+
+export class Past {
+  active = false;
+  replay = new Replay();
+  #trails = new PastTrails();
+  #recent = new RecentTrack();
+  #hasHistory = false;
+  #shownAt = 0;
+  #wroteAt = 0;
+
+  /** @param {Page} page */
+  constructor(page) {
+    this.page = page;
+    this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay);
+    this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
+    page.map.underlays.push((scene) => this.#drawTrack(scene));
+    page.byId("history").addEventListener("click", () => (this.active ? this.leave() : this.enter()));
+    this.bar.addEventListener("leave", () => this.leave());
+    this.replay.addEventListener("time", () => this.#show());
+    for (const name of ["period", "state"]) this.replay.addEventListener(name, () => this.#writeAddress());
+    page.choice.addEventListener("change", () => this.#writeAddress());
+    this.#recent.addEventListener("change", () => page.map.redraw());
+    addEventListener("hashchange", () => this.#readAddress());
+    document.addEventListener("keydown", (event) => this.#onKey(event));
+    this.#tick(performance.now());
+  }
+
+  /** Ask whether there is a history, fill the trails from it, and go where the address points. */
+  async start() {
+    const { fleet, trails, map } = this.page;
+    const history = await getJson(api("history")).catch(() => null);
+    this.#hasHistory = history?.enabled === true;
+    this.#readAddress();
+    if (!this.#hasHistory) return;
+    const end_ms = Date.now();
+    const zero_ms = performance.now() - end_ms;
+    const { tracks } = await getJson(tracksUrl(end_ms - TRAIL_S * 1000, end_ms, TRAIL_POINTS)).catch(() => ({ tracks: [] }));
+    for (const track of tracks) trails.prepend(new Track(track), zero_ms);
+    if (!fleet.past) map.redraw();
+  }
+
+  /** Request the recent track of the selected tag while the page shows the present. */
+  update() {
+    if (this.#hasHistory && !this.active) this.#recent.request(this.page.choice.selected);
+  }
+
+  enter() {
+    this.#become(true);
+    if (!this.#hasHistory) this.bar.explain("This service keeps no history. Start it with --data-dir FOLDER.");
+    const now_ms = Date.now();
+    this.bar.suggest(now_ms);
+    if (this.#hasHistory) this.replay.open(now_ms - 3_600_000, now_ms);
+    this.page.byId("past").querySelector("input")?.focus();
+  }
+
+  leave() {
+    if (!this.active) return;
+    this.replay.close();
+    this.#become(false);
+    this.#writeAddress();
+    this.page.connection.retry(); // the service sends all poses again
+    this.page.byId("history").focus();
+  }
+
+  /** @param {boolean} active */
+  #become(active) {
+    const { byId, evidence, fleet, map, roster, trails } = this.page;
+    this.active = fleet.past = roster.hidden = evidence.hidden = active;
+    map.trails = active ? /** @type {any} */ (this.#trails) : trails;
+    byId("past").hidden = !active;
+    byId("history").setAttribute("aria-pressed", String(active));
+    document.body.dataset.time = active ? "past" : "present";
+    if (active) fleet.replace({ t_ns: 0, tags: [] }, 0);
+    else fleet.current = false;
+    byId("spoken").textContent = active ? "The page shows the past." : "The page shows the present again.";
+    byId("past-figures").hidden = true;
+    this.page.updatePanels();
+  }
+
+  /** Put the poses of the shown time into the fleet. */
+  #show() {
+    if (!this.active) return;
+    const { fleet, map } = this.page;
+    const { tracks, time_ms } = this.replay;
+    const membership = fleet.membership;
+    fleet.replace(frameAt(tracks, time_ms), performance.now());
+    this.#trails.show(tracks, time_ms);
+    this.#shownAt = performance.now();
+    if (this.#shownAt - this.#wroteAt > ADDRESS_MS) this.#writeAddress();
+    if (membership !== fleet.membership) this.page.updatePanels();
+    map.redraw();
+  }
+
+  #tick(/** @type {number} */ before_ms) {
+    const now_ms = performance.now();
+    if (this.active) {
+      this.replay.advance(now_ms - before_ms);
+      if (now_ms - this.#shownAt > TICK_MS / 2) this.#show(); // ages count from the shown time, not from now
+    }
+    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches && this.replay.playing;
+    setTimeout(() => this.#tick(now_ms), calm ? CALM_TICK_MS : TICK_MS);
+  }
+
+  /** @param {import("../map/scene.js").Scene} scene */
+  #drawTrack(scene) {
+    const tag = this.page.choice.selected;
+    const period = this.replay.figures.get(tag ?? "");
+    const track = this.active ? period && new Track(period) : this.#recent.of(tag);
+    if (track) drawTrack(scene, track);
+  }
+
+  #readAddress() {
+    const moment = momentIn(location.hash);
+    if (!moment || (this.active && this.#isShown(moment))) return;
+    this.#become(true);
+    if (!this.#hasHistory) return this.bar.explain("This service keeps no history. Start it with --data-dir FOLDER.");
+    this.replay.speed = moment.speed;
+    this.page.choice.select(moment.tag);
+    this.replay.open(moment.from_ms, moment.to_ms, moment.time_ms);
+    return undefined;
+  }
+
+  /** @param {import("./address.js").Moment} moment */
+  #isShown({ from_ms, to_ms, time_ms }) {
+    const { replay } = this;
+    return from_ms === replay.from_ms && to_ms === replay.to_ms && Math.abs(time_ms - replay.time_ms) < 2000;
+  }
+
+  #writeAddress() {
+    this.#wroteAt = performance.now();
+    const { from_ms, to_ms, time_ms, speed } = this.replay;
+    const isChosen = this.active && to_ms > from_ms;
+    if (!isChosen && this.active) return;
+    const moment = isChosen ? { from_ms, to_ms, time_ms, speed, tag: this.page.choice.selected } : null;
+    const hash = isChosen || momentIn(location.hash) ? hashWith(location.hash, moment) : location.hash;
+    if (hash !== location.hash) history.replaceState(null, "", hash || location.pathname + location.search);
+  }
+
+  /** @param {KeyboardEvent} event */
+  #onKey(event) {
+    const target = /** @type {HTMLElement} */ (event.target);
+    const isFree = !target.closest("input:not([type=range]), button, select, textarea, a, [role=grid]");
+    if (!this.active || event.key !== " " || !isFree) return;
+    event.preventDefault();
+    this.replay.play(!this.replay.playing);
+  }
+}

@@ -1,0 +1,65 @@
+/** What the selected tag did in the shown period, and its track as a file. */
+
+import { request } from "../data/access.js";
+import { api } from "../data/connection.js";
+import { UNKNOWN, age, distance, fixed } from "../data/format.js";
+import { nanoseconds } from "../data/replay.js";
+
+export class PastFigures {
+  /** @param {HTMLElement} box @param {import("../data/replay.js").Replay} replay @param {import("../page/choice.js").Choice} choice */
+  constructor(box, replay, choice) {
+    this.box = box;
+    this.replay = replay;
+    this.choice = choice;
+    for (const button of box.querySelectorAll("button")) {
+      button.addEventListener("click", () => this.#save(button.dataset.format ?? "csv"));
+    }
+    choice.addEventListener("change", () => this.update());
+    replay.addEventListener("period", () => this.update());
+  }
+
+  /** Whether the site has a georeference, without which there are no latitudes and longitudes. @param {boolean} is */
+  set georeferenced(is) {
+    for (const button of this.box.querySelectorAll("button")) button.disabled = !is && button.dataset.format !== "csv";
+    this.#part("no-georeference").hidden = is;
+  }
+
+  update() {
+    const track = this.replay.figures.get(this.choice.selected ?? "");
+    this.box.hidden = !track;
+    this.#part("answer").textContent = "";
+    if (!track) return;
+    const texts = {
+      distance: distance(Number(track.distance_m.toPrecision(4))),
+      tracked: age(track.tracked_s),
+      mean: `${fixed(track.mean_speed_mps, 2)} m/s`,
+      max: `${fixed(track.max_speed_mps, 2)} m/s`,
+      poses: track.poses.toLocaleString("en"),
+    };
+    for (const [name, text] of Object.entries(texts)) this.#part(name).textContent = text || UNKNOWN;
+  }
+
+  /** Save the whole track. A link could not carry a key. @param {string} format */
+  async #save(format) {
+    const tag = this.choice.selected ?? "";
+    const url = api(`tags/${encodeURIComponent(tag)}/track/file`);
+    url.search = new URLSearchParams({
+      format, from: nanoseconds(this.replay.from_ms), to: nanoseconds(this.replay.to_ms),
+    }).toString();
+    this.#part("answer").textContent = "Preparing the file …";
+    try {
+      const content = await (await request(url, {})).blob();
+      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(content), download: `${tag}.${format}` });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+      this.#part("answer").textContent = `Saved ${tag}.${format}.`;
+    } catch {
+      this.#part("answer").textContent = "The file could not be loaded. Try again.";
+    }
+  }
+
+  /** @param {string} name */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.box.querySelector(`[data-part="${name}"]`));
+  }
+}

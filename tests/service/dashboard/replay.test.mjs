@@ -1,0 +1,75 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { hashWith, momentIn } from "../../../service/dropanchor_service/dashboard/page/address.js";
+import { Track, frameAt, poseAt } from "../../../service/dropanchor_service/dashboard/data/tracks.js";
+import { trailOf } from "../../../service/dropanchor_service/dashboard/data/past_trails.js";
+import { Trails } from "../../../service/dropanchor_service/dashboard/data/trails.js";
+
+/** @param {Record<string, any[]>} columns @returns {any} points one second apart from 0 s, at x = 0, 1, 2 … */
+function track(columns = {}, length = 4) {
+  const column = (/** @type {(i: number) => any} */ value) => Array.from({ length }, (_, i) => value(i));
+  return new Track({ tag: "a", points: {
+    t_ns: column((i) => i * 1e9), state: column(() => "tracking"), frame: column(() => "site"), x: column((i) => i),
+    y: column(() => 5), heading_rad: column(() => 0), speed_mps: column(() => 1), semi_major_m: column((i) => 1 + i),
+    semi_minor_m: column(() => 1), angle_rad: column(() => 0),
+    since_previous: column((i) => (i === 0 ? "unknown" : "tracking")), ...columns,
+  } });
+}
+
+test("between two points of a known way the tag is between them, with the larger ellipse and no age", () => {
+  const pose = poseAt(track(), 1500);
+  assert.deepEqual([pose.x, pose.y, pose.semi_major_m, pose.age_s, pose.state], [1.5, 5, 3, 0, "tracking"]);
+});
+
+test("before its first point a tag is not in the frame", () => {
+  assert.deepEqual(frameAt([track()], -1).tags, []);
+  assert.deepEqual(frameAt([track()], 0).tags, ["a"]);
+});
+
+test("where the way is unknown the tag stays at its last point and grows old", () => {
+  const broken = track({ since_previous: ["unknown", "tracking", "unknown", "tracking"] });
+  const pose = poseAt(broken, 1750);
+  assert.deepEqual([pose.x, pose.age_s], [1, 0.75]);
+  assert.deepEqual([poseAt(track(), 63_000).x, poseAt(track(), 63_000).age_s], [3, 60]);
+});
+
+test("thinned points that are far apart are not joined by a straight line", () => {
+  const sparse = track({ t_ns: [0, 60e9, 120e9, 180e9] });
+  assert.deepEqual([poseAt(sparse, 30_000).x, poseAt(sparse, 30_000).age_s], [0, 30]);
+});
+
+test("a heading turns the short way round", () => {
+  const pose = poseAt(track({ heading_rad: [3.0, -3.0, 0, 0] }), 500);
+  assert.ok(Math.abs(Math.cos(pose.heading_rad) + 1) < 1e-9);
+});
+
+test("a pose in a frame of the tag's own has no place on the map, but keeps its state", () => {
+  const frame = frameAt([track({ frame: ["relative", "relative", "site", "site"] })], 500);
+  assert.deepEqual([frame.x[0], frame.y[0], frame.frame[0], frame.state[0]], [null, null, "relative", "tracking"]);
+});
+
+test("a past trail breaks where the way is unknown and is doubtful where poses were", () => {
+  const trail = trailOf(track({ since_previous: ["unknown", "doubtful", "unknown", "tracking"] }), 3000, 100_000);
+  assert.deepEqual(trail.x, [NaN, 0, 1, NaN, 2, 3]);
+  assert.deepEqual(trail.trusted, [0, 0, 0, 0, 0, 1]);
+  assert.deepEqual(trail.time.slice(-2), [99_000, 100_000]);
+});
+
+test("stored points come before the live ones of a trail", () => {
+  const trails = new Trails();
+  const fleet = { row: () => 0, state: [2], number: { x: [9], y: [5] } };
+  trails.note(/** @type {any} */ (fleet), ["a"], 10_000);
+  trails.prepend(track({ since_previous: ["unknown", "tracking", "unknown", "tracking"] }), 7_000);
+  const trail = trails.of("a");
+  const x = Array.from({ length: trail?.length ?? 0 }, (_, i) => trail?.x[trail.at(i)]);
+  assert.deepEqual(x, [0, 1, NaN, 2, 9]); // the point at 10 s is as old as the live one
+});
+
+test("a link leads to the same moment, and other values in the address stay", () => {
+  const moment = { from_ms: 1e12, to_ms: 1e12 + 3_600_000, time_ms: 1e12 + 1500, speed: 5, tag: "Süd & 1" };
+  const hash = hashWith("#zoom=3", moment);
+  assert.deepEqual(momentIn(hash), moment);
+  assert.equal(hashWith(hash, null), "#zoom=3");
+  for (const bad of ["", "#from=x&to=y", "#from=2026-01-02T00:00Z&to=2026-01-01T00:00Z"]) assert.equal(momentIn(bad), null);
+});

@@ -1,0 +1,251 @@
+"""The page shows the past: a period of stored tracks, at any time and speed, and never as the present."""
+
+import json
+import math
+import re
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from dropanchor_schemas.site import Anchor, Georeference, Site
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.estimation.columns import Frame, State
+from dropanchor_service.history.tracks import Retention
+from service.dashboard.place import Place, live_api_bench
+from support.axe import axe_source, violations
+from support.browser import Scheme, WatchedPage, watched_page
+from support.http_server import running_server
+
+pytestmark = pytest.mark.browser
+
+SECOND = 1_000_000_000
+RETENTION = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
+MINUTES = 5
+SIZES = [(1280, 800), (820, 1180), (390, 844)]
+
+
+def write_past(place: Place, end_ns: int, *, minutes: int = MINUTES) -> None:
+    """Store minutes of two tags that drive east at 1 m/s, one 5 m north of the other, and of one without north.
+
+    The second tag is ambiguous for 10 s in the middle.
+    """
+    seconds = 60 * minutes
+    for second in range(seconds + 1):
+        t_ns = end_ns - (seconds - second) * SECOND
+        unsure = seconds // 2 <= second < seconds // 2 + 10
+        place.bench.move("first", x=float(second), y=0.0, speed=1.0, sigma_pos=0.2, t_ns=t_ns)
+        state = State.AMBIGUOUS if unsure else State.TRACKING
+        place.bench.move("second", x=float(second), y=5.0, speed=1.0, state=state, t_ns=t_ns)
+        place.bench.move("turned", x=50.0, y=80.0, frame=Frame.RELATIVE, t_ns=t_ns)
+    place.bench.write_history()
+
+
+@pytest.fixture
+def past(tmp_path: Path) -> Iterator[tuple[Place, int]]:
+    """A page whose service stores the past until one hour ago, and the end of that past in ns."""
+    bench = live_api_bench(folder=tmp_path, retention=RETENTION)
+    end_ns = time.time_ns() // SECOND * SECOND - 3600 * SECOND
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
+        write_past(place, end_ns)
+        place.move("first", x=-3.0, y=-3.0)
+        yield place, end_ns
+
+
+def iso(t_ns: int) -> str:
+    return datetime.fromtimestamp(t_ns / SECOND, UTC).strftime("%Y-%m-%dT%H:%M:%S.%f")[:-3] + "Z"
+
+
+def link_to(place: Place, end_ns: int, at_s: float, **more: str) -> str:
+    """Return the address of a moment, seconds after the start of the stored past."""
+    from_ns = end_ns - 60 * MINUTES * SECOND
+    values = {"from": iso(from_ns), "to": iso(end_ns), "at": iso(from_ns + round(at_s * SECOND))} | more
+    return f"{place.url}#" + "&".join(f"{name}={value}" for name, value in values.items())
+
+
+def wait_for_past(page: WatchedPage, tags: int) -> None:
+    page.wait_for(f"dropanchor.past() && !dropanchor.past().loading && dropanchor.tags().length === {tags}")
+
+
+def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
+    chromium: Browser, past: tuple[Place, int]
+) -> None:
+    place, end_ns = past
+    with watched_page(chromium, link_to(place, end_ns, 30.5, tag="first")) as page:
+        wait_for_past(page, 3)
+        tags = page.tags()
+        assert tags["first"]["x"] == pytest.approx(30.5, abs=0.01)
+        assert tags["turned"]["state"] == "turned"
+        assert math.isnan(tags["turned"]["x"])  # it is no place of the map
+        assert tags["first"]["semiMajor"] == pytest.approx(0.2 * 2.4477, rel=1e-2)
+        expect(page.page.locator("#status-text")).to_have_text("Past")
+        expect(page.page.locator(".past .note")).to_contain_text("not the present")
+        assert page.page.title() == "Past · Dropanchor"
+        expect(page.page.locator("[data-part='v-online']")).to_have_text("–")
+        place.move("first", x=-4.0)  # the present goes on, but the past does not show it
+        page.page.wait_for_timeout(600)
+        assert page.tags()["first"]["x"] == pytest.approx(30.5, abs=0.01)
+        page.page.locator("[data-part='leave']").click()
+        page.wait_for("dropanchor.past() === false && dropanchor.tags()[0].x === -4")
+        expect(page.page.locator("#status-text")).to_have_text("Live")
+        assert "from=" not in page.page.url
+        assert page.errors == []
+
+
+def test_an_ambiguous_stretch_is_ambiguous_in_the_past_too(chromium: Browser, past: tuple[Place, int]) -> None:
+    place, end_ns = past
+    with watched_page(chromium, link_to(place, end_ns, 155)) as page:
+        wait_for_past(page, 3)
+        tags = page.tags()
+        assert (tags["second"]["state"], tags["first"]["state"]) == ("ambiguous", "tracking")
+
+
+def test_the_keyboard_plays_and_moves_the_clock(chromium: Browser, past: tuple[Place, int]) -> None:
+    place, end_ns = past
+    with watched_page(chromium, link_to(place, end_ns, 0, speed="50")) as page:
+        wait_for_past(page, 3)
+        slider = page.page.locator("[data-part='slider']")
+        slider.focus()
+        page.page.keyboard.press("ArrowRight")
+        page.page.keyboard.press("ArrowRight")
+        page.wait_for("dropanchor.tags()[0].x === 2")
+        assert re.search(r"\d\d:\d\d:\d\d", slider.get_attribute("aria-valuetext") or "")
+        page.page.keyboard.press(" ")
+        page.wait_for("dropanchor.past().playing")
+        page.wait_for("dropanchor.tags()[0].x > 20")
+        page.page.keyboard.press(" ")
+        page.wait_for("!dropanchor.past().playing")
+        stopped = page.tags()["first"]["x"]
+        page.page.wait_for_timeout(400)
+        assert page.tags()["first"]["x"] == stopped
+        page.page.keyboard.press(" ")
+        page.wait_for("!dropanchor.past().playing && dropanchor.tags()[0].x === 300")  # it stops at the end
+        page.wait_for(f"location.hash.includes('at={iso(end_ns)}')")
+        assert page.errors == []
+
+
+def test_the_map_follows_a_tag_through_the_past(chromium: Browser, past: tuple[Place, int]) -> None:
+    place, end_ns = past
+    with watched_page(chromium, link_to(place, end_ns, 0, speed="20", tag="first"), reduced_motion="reduce") as page:
+        wait_for_past(page, 3)
+        page.page.locator("[data-part='follow']").click()
+        page.page.locator("[data-part='play']").click()
+        page.wait_for("dropanchor.tags()[0].x > 60")
+        page.page.locator("[data-part='play']").click()
+        page.wait_for("!dropanchor.past().playing && dropanchor.drawing().still")
+        box = page.page.locator("#map").bounding_box()
+        assert box is not None
+        x, y = page.tags()["first"]["pixel"]
+        assert (x, y) == pytest.approx((box["width"] / 2, box["height"] / 2), abs=3)
+
+
+def test_figures_and_the_file_of_a_tag(chromium: Browser, past: tuple[Place, int]) -> None:
+    place, end_ns = past
+    with watched_page(chromium, link_to(place, end_ns, 10, tag="first")) as page:
+        wait_for_past(page, 3)
+        figures = page.page.locator("#past-figures")
+        expect(figures.locator("[data-part='distance']")).to_have_text("300 m")
+        expect(figures.locator("[data-part='tracked']")).to_have_text("5 min")
+        expect(figures.locator("[data-part='mean']")).to_have_text("1.00 m/s")
+        expect(figures.locator("[data-format='gpx']")).to_be_disabled()
+        expect(figures.locator("[data-part='no-georeference']")).to_be_visible()
+        with page.page.expect_download() as download:
+            figures.locator("[data-format='csv']").click()
+        assert download.value.suggested_filename == "first.csv"
+        assert len(download.value.path().read_text().splitlines()) == 60 * MINUTES + 2
+        assert page.errors == []
+
+
+def test_a_georeferenced_site_gives_gpx_and_geojson(chromium: Browser, tmp_path: Path) -> None:
+    site = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=52.0, lon=13.0))
+    bench = live_api_bench(site, tmp_path, RETENTION)
+    end_ns = time.time_ns() // SECOND * SECOND - 3600 * SECOND
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
+        write_past(place, end_ns, minutes=1)
+        with watched_page(chromium, link_to(place, end_ns, 299, tag="first")) as page:
+            wait_for_past(page, 3)
+            for form in ("gpx", "geojson"):
+                with page.page.expect_download() as download:
+                    page.page.locator(f"[data-format='{form}']").click()
+                text = download.value.path().read_text()
+                assert text.count("<trkpt") == 61 if form == "gpx" else len(json.loads(text)["features"]) == 61
+
+
+def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
+    chromium: Browser, past: tuple[Place, int]
+) -> None:
+    place, end_ns = past
+    with watched_page(chromium, place.url) as page:
+        page.wait_for_map(3)
+        page.page.locator("#history").click()
+        page.page.locator("#past").wait_for()
+        page.page.locator("[data-part='to']").fill("2020-01-02T00:00:00")
+        page.page.locator("[data-part='from']").fill("2020-01-01T00:00:00")
+        page.page.locator(".period button").click()
+        wait_for_past(page, 0)
+        problem = page.page.locator(".past [data-part='problem']")
+        expect(problem).to_have_text("No poses are stored in this period.")
+        local = [
+            datetime.fromtimestamp(t / SECOND).strftime("%Y-%m-%dT%H:%M:%S") for t in (end_ns - 60 * SECOND, end_ns)
+        ]
+        page.page.locator("[data-part='from']").fill(local[1])
+        page.page.locator("[data-part='to']").fill(local[0])
+        page.page.locator(".period button").click()
+        expect(problem).to_contain_text("end must come after the start")
+        page.page.locator("[data-part='from']").fill(local[0])
+        page.page.locator("[data-part='to']").fill(local[1])
+        page.page.locator(".period button").click()
+        wait_for_past(page, 3)
+        expect(problem).to_have_text("")
+        assert page.errors == []
+
+
+def test_a_service_without_a_history_says_how_to_keep_one(chromium: Browser, place: Place) -> None:
+    place.move("a", x=1.0)
+    with watched_page(chromium, place.url) as page:
+        page.wait_for_map(1)
+        page.page.locator("#history").click()
+        expect(page.page.locator(".past [data-part='problem']")).to_contain_text("--data-dir FOLDER")
+        assert page.errors == []
+
+
+def test_the_trail_of_a_tag_begins_before_the_page_was_opened(chromium: Browser, tmp_path: Path) -> None:
+    bench = live_api_bench(folder=tmp_path, retention=RETENTION)
+    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+        place = Place(bench, f"http://127.0.0.1:{port}/")
+        now_ns = time.time_ns()
+        for second in range(20):
+            place.move("a", x=float(second - 19), y=2.0, speed=1.0, t_ns=now_ns - (19 - second) * SECOND)
+        place.bench.write_history()
+        with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+            page.wait_for("dropanchor.trail('a').length >= 18")
+            xs = [x for x in page.page.evaluate("dropanchor.trail('a')") if x is not None]
+            assert xs == sorted(xs)
+            assert (xs[0], xs[-1]) == (-19.0, 0.0)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_the_past_is_accessible_and_nothing_is_cut_off(
+    chromium: Browser, past: tuple[Place, int], axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
+) -> None:
+    place, end_ns = past
+    link = link_to(place, end_ns, 155, tag="second")
+    with watched_page(chromium, link, scheme=scheme, size=size, reduced_motion="reduce") as page:
+        wait_for_past(page, 3)
+        page.page.screenshot(path=tmp_path / f"past-{size[0]}-{scheme}.png")
+        assert violations(page.page, axe) == []
+        script = "[...document.querySelectorAll('.past *, #past-figures *')].filter((e) => e.checkVisibility() "
+        script += "&& e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML)"
+        assert page.page.evaluate(script) == []
+        assert page.errors == []
+
+
+@pytest.fixture(scope="module")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return axe_source(tmp_path_factory.mktemp("axe"))
