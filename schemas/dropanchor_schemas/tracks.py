@@ -31,6 +31,7 @@ class TrackPoints(_Answer):
     y: list[float | None] = Field(description="North, m.")
     heading_rad: list[float | None]
     speed_mps: list[float | None]
+    sigma_pos_m: list[float | None] = Field(description="One standard deviation of the position.")
     semi_major_m: list[float | None] = Field(description="Of the 95 % ellipse.")
     semi_minor_m: list[float | None]
     angle_rad: list[float | None]

@@ -49,7 +49,7 @@ def _columns(points: Array, since_previous: Array) -> dict[str, Any]:
     covariances[:, 0, 1] = covariances[:, 1, 0] = points["cov_xy"]
     major, minor, angle = ellipse_95(covariances)
     numbers = {"x": points["x"], "y": points["y"], "heading_rad": points["heading"], "speed_mps": points["speed"]}
-    numbers |= {"semi_major_m": major, "semi_minor_m": minor, "angle_rad": angle}
+    numbers |= {"sigma_pos_m": points["sigma_pos"], "semi_major_m": major, "semi_minor_m": minor, "angle_rad": angle}
     return {
         "t_ns": np.ascontiguousarray(points["t_ns"]),
         "state": [STATES[state] for state in (points["state"] & ~np.uint8(RELATIVE)).tolist()],

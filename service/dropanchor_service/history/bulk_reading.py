@@ -46,7 +46,7 @@ def summaries_in(blobs: Sequence[bytes], tags: Sequence[int] | None) -> Array:
 def _summaries(joined: Array) -> Array:
     points, poses = np.zeros(len(joined), POINT), joined["pose"]
     points["t_ns"] = joined["t_ns"]
-    for name in ("state", "x", "y", "heading", "speed"):
+    for name in ("state", "x", "y", "heading", "speed", "sigma_pos"):
         points[name] = poses[name]
     points["cov_xx"], points["cov_xy"], points["cov_yy"] = poses["cov"][:, 0], poses["cov"][:, 1], poses["cov"][:, 3]
     return summary_of_each(joined["tag"], points)

@@ -19,7 +19,7 @@ POINT = np.dtype(
     [
         ("t_ns", "<i8"),
         ("state", "u1"),  # State, and the bit RELATIVE
-        *((name, "<f4") for name in ("x", "y", "heading", "speed", "cov_xx", "cov_xy", "cov_yy")),
+        *((name, "<f4") for name in ("x", "y", "heading", "speed", "sigma_pos", "cov_xx", "cov_xy", "cov_yy")),
     ]
 )
 SUMMARY = np.dtype(

@@ -3,6 +3,7 @@ import { test } from "node:test";
 
 import { hashWith, momentIn } from "../../../service/dropanchor_service/dashboard/page/address.js";
 import { Track, frameAt, poseAt } from "../../../service/dropanchor_service/dashboard/data/tracks.js";
+import { drawTrack } from "../../../service/dropanchor_service/dashboard/map/draw_track.js";
 import { trailOf } from "../../../service/dropanchor_service/dashboard/data/past_trails.js";
 import { Trails } from "../../../service/dropanchor_service/dashboard/data/trails.js";
 
@@ -11,8 +12,8 @@ function track(columns = {}, length = 4) {
   const column = (/** @type {(i: number) => any} */ value) => Array.from({ length }, (_, i) => value(i));
   return new Track({ tag: "a", points: {
     t_ns: column((i) => i * 1e9), state: column(() => "tracking"), frame: column(() => "site"), x: column((i) => i),
-    y: column(() => 5), heading_rad: column(() => 0), speed_mps: column(() => 1), semi_major_m: column((i) => 1 + i),
-    semi_minor_m: column(() => 1), angle_rad: column(() => 0),
+    y: column(() => 5), heading_rad: column(() => 0), speed_mps: column(() => 1), sigma_pos_m: column(() => 0.2),
+    semi_major_m: column((i) => 1 + i),    semi_minor_m: column(() => 1), angle_rad: column(() => 0),
     since_previous: column((i) => (i === 0 ? "unknown" : "tracking")), ...columns,
   } });
 }
@@ -72,4 +73,17 @@ test("a link leads to the same moment, and other values in the address stay", ()
   assert.deepEqual(momentIn(hash), moment);
   assert.equal(hashWith(hash, null), "#zoom=3");
   for (const bad of ["", "#from=x&to=y", "#from=2026-01-02T00:00Z&to=2026-01-01T00:00Z"]) assert.equal(momentIn(bad), null);
+});
+
+test("the line of a period is dashed where poses were doubtful and broken where the way is unknown", () => {
+  /** @type {any[]} */
+  const drawn = [];
+  let dash = "";
+  const ctx = {
+    setLineDash: (/** @type {number[]} */ pattern) => (dash = pattern.length ? "dashed" : "solid"), beginPath() {}, stroke() {},
+    moveTo: (/** @type {number} */ x) => drawn.push([dash, x]), lineTo: (/** @type {number} */ x) => drawn.at(-1).push(x),
+  };
+  const view = { screenX: (/** @type {number} */ x) => x, screenY: (/** @type {number} */ y) => y };
+  drawTrack(/** @type {any} */ ({ ctx, view, palette: {} }), track({ since_previous: ["unknown", "tracking", "unknown", "doubtful"] }));
+  assert.deepEqual(drawn, [["solid", 0, 1], ["dashed", 2, 3]]);
 });

@@ -82,6 +82,8 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         assert tags["turned"]["state"] == "turned"
         assert math.isnan(tags["turned"]["x"])  # it is no place of the map
         assert tags["first"]["semiMajor"] == pytest.approx(0.2 * 2.4477, rel=1e-2)
+        expect(page.page.locator("[data-part='v-sigma']")).to_have_text("± 0.20 m")
+        expect(page.page.locator("[data-part='v-anchor']")).to_be_hidden()  # not stored
         expect(page.page.locator("#status-text")).to_have_text("Past")
         expect(page.page.locator(".past .note")).to_contain_text("not the present")
         assert page.page.title() == "Past · Dropanchor"

@@ -183,6 +183,7 @@ TRACKS: dict[str, Any] = {
                 "y": [-1.5, 2.0],
                 "heading_rad": [1.57, 0.0],
                 "speed_mps": [1.1, 0.0],
+                "sigma_pos_m": [0.2, 0.17],
                 "semi_major_m": [0.5, 0.4],
                 "semi_minor_m": [0.2, 0.2],
                 "angle_rad": [0.0, 0.0],

@@ -9,6 +9,7 @@
  * @property {(number | null)[]} y
  * @property {(number | null)[]} heading_rad
  * @property {(number | null)[]} speed_mps
+ * @property {(number | null)[]} sigma_pos_m
  * @property {(number | null)[]} semi_major_m
  * @property {(number | null)[]} semi_minor_m
  * @property {(number | null)[]} angle_rad
@@ -73,8 +74,8 @@ export function frameAt(tracks, time_ms) {
 }
 
 const FIELDS = [
-  "state", "frame", "x", "y", "heading_rad", "speed_mps", "semi_major_m", "semi_minor_m", "angle_rad", "sigma_pos_m",
-  "age_s", "reason", "hint", "anchor", "hypotheses", "yaw_rate_radps", "p_mode", "range_m", "sigma_obs_m", "online",
+  "state", "frame", "x", "y", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad", "age_s",
+  ...["reason", "hint", "anchor", "hypotheses", "yaw_rate_radps", "p_mode", "range_m", "sigma_obs_m", "online"], // not stored: unknown
 ];
 
 /** Return the pose at a time: between two points if the tag was known all the way, else the last point with its age.
@@ -94,6 +95,7 @@ export function poseAt(track, time_ms) {
     y: mixed(track.y, i, share),
     heading_rad: turned(points.heading_rad[i], points.heading_rad[i + 1], share),
     speed_mps: mixed(points.speed_mps, i, share),
+    sigma_pos_m: points.sigma_pos_m[wider],
     semi_major_m: points.semi_major_m[wider],
     semi_minor_m: points.semi_minor_m[wider],
     angle_rad: points.angle_rad[wider],

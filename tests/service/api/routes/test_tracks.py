@@ -36,6 +36,7 @@ def test_figures_and_points_of_each_tag(tmp_path: Path) -> None:
     assert points.x[-1] == 1200
     assert points.since_previous == ["unknown", *["tracking"] * (len(points.t_ns) - 1)]
     assert points.semi_major_m[0] == pytest.approx(0.2 * 2.4477, rel=1e-3)
+    assert points.sigma_pos_m[0] == pytest.approx(0.2)
     assert second.points.state == ["ambiguous"]
 
 
