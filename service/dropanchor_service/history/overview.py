@@ -26,7 +26,7 @@ from dropanchor_service.history.summary_table import COARSE, FINE, LENGTHS_NS
 MAX_POSES = 200_000  # that are read one by one: a second of work
 MAX_FINE = 300_000  # summaries of the fine level
 MAX_POINTS = 200_000  # of all tags together
-MAX_BYTES = 512 * 2**20  # of all summaries
+MAX_BYTES = 128 * 2**20  # of all summaries
 MAX_TAG_SLOTS = 500_000  # tags times slots without summaries
 
 
@@ -62,8 +62,8 @@ def read_overview(
     names = every if wanted is None else {number: name for number, name in every.items() if name in wanted}
     if not names:
         return EMPTY
-    reader = _Reader(connection, None if tags is None else sorted(names), len(names))
     level = _level(len(names), to_ns - from_ns)
+    reader = _Reader(connection, None if tags is None else sorted(names), len(names), single=level < FINE)
     summaries = in_order(np.concatenate([np.empty(0, SUMMARY), *reader.cover(level, from_ns, to_ns)]))
     allowed = min(max_points, max(2, MAX_POINTS // len(names)))
     points = thinned(points_of(summaries), allowed)
@@ -78,10 +78,14 @@ def _level(tags: int, span_ns: int) -> int:
 
 
 class _Reader:
-    def __init__(self, connection: sqlite3.Connection, tags: Sequence[int] | None, tag_count: int) -> None:
+    def __init__(
+        self, connection: sqlite3.Connection, tags: Sequence[int] | None, tag_count: int, single: bool
+    ) -> None:
+        """tags: their numbers, None for all. single: whether to give each pose, rather than a summary of each slot."""
         self._connection = connection
         self._tags = tags
         self._tag_count = tag_count
+        self._single = single
         self._bytes = 0
         self._slots = 0
 
@@ -115,4 +119,5 @@ class _Reader:
         self._slots += self._connection.execute(count, (from_ns // SLOT_NS, to_ns // SLOT_NS)).fetchone()[0]
         if self._slots * self._tag_count > MAX_TAG_SLOTS:
             raise OverviewError("the summary of the history is still being made: try again in a few minutes")
-        yield from summaries_of_poses(self._connection, from_ns, to_ns, self._tags)
+        for poses in summaries_of_poses(self._connection, from_ns, to_ns, self._tags):
+            yield poses if self._single else summary_per_tag(in_order(poses))

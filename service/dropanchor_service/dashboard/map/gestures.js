@@ -82,6 +82,7 @@ class Pointers {
 
   /** @param {PointerEvent} event @param {Point} at */
   #click(event, at) {
+    if (this.map.pressed(at.x, at.y)) return;
     const row = this.map.tagAt(at.x, at.y);
     const double = event.timeStamp - this.#lastTap.time_ms < DOUBLE_TAP_MS && apart(at, this.#lastTap) < DOUBLE_TAP_PX;
     this.#lastTap = { ...at, time_ms: event.timeStamp };

@@ -26,6 +26,8 @@ export class LiveMap extends EventTarget {
   hovered = -1;
   /** Drawn below the trails. @type {((scene: import("./scene.js").Scene) => void)[]} */
   underlays = [];
+  /** Return whether a click was meant for something else than the tags. */
+  pressed = (/** @type {number} */ _px, /** @type {number} */ _py) => false;
   /** Keep all tags in view until the user moves the map. */
   autoFit = true;
   /** For tests and the console: figures of the last drawing. */

@@ -11,6 +11,7 @@ import { Fleet } from "../data/fleet.js";
 import { fixed } from "../data/format.js";
 import { listen } from "../map/gestures.js";
 import { LiveMap } from "../map/map.js";
+import { Measure } from "../map/measure.js";
 import { Notices } from "../panel/notices.js";
 import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
@@ -37,6 +38,8 @@ const addAnchor = new AddAnchor(byId("detail"), roster, choice, () => [map.view.
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
+const measure = new Measure(map, byId("measure"), byId("measured"));
+map.pressed = (px, py) => measure.press(px, py);
 const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
 
 /** @param {string | null} tag */
@@ -93,8 +96,8 @@ connection.addEventListener("status", () => {
 connection.addEventListener("site", (event) => {
   const site = /** @type {CustomEvent} */ (event).detail;
   map.setAnchors(site.anchors);
+  measure.rotation_rad = detail.rotation_rad = site.georeference?.rotation_rad ?? 0;
   past.figures.georeferenced = site.georeference !== null;
-  detail.rotation_rad = site.georeference?.rotation_rad ?? 0;
   byId("site").textContent = site.name || site.id;
 });
 
@@ -127,7 +130,8 @@ map.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
   byId("cursor").textContent = `${fixed(map.view.worldX(offsetX), 2)}, ${fixed(map.view.worldY(offsetY), 2)} m`;
 });
 document.addEventListener("keydown", (event) => {
-  if (event.key === "Escape") select(null);
+  if (event.key === "Escape" && measure.active) measure.turn(false);
+  else if (event.key === "Escape") select(null);
   if (event.key !== "/" || event.target === filter) return;
   event.preventDefault();
   filter.focus();
