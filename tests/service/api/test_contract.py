@@ -31,6 +31,8 @@ EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
 
 BEYOND_THE_SCHEMA = {
     "get_track": [positive_data_acceptance],
+    "get_tracks": [positive_data_acceptance],
+    "export_track": [positive_data_acceptance],
     "patch_remote_settings": [positive_data_acceptance],
     "put_site": [positive_data_acceptance],
     "put_zone": [positive_data_acceptance],
