@@ -3,8 +3,7 @@
 import argparse
 import math
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,13 +12,12 @@ import numpy as np
 from dropanchor_schemas.wire import ImuSample
 from dropanchor_tag_client.calibration import Calibration, write_calibration
 from dropanchor_tag_client.sources.axes import mounting
-from dropanchor_tag_client.sources.calibration_fit import NotEnoughError, fit, fit_rest
+from dropanchor_tag_client.sources.calibration_fit import fit
+from dropanchor_tag_client.sources.guidance import Guide
 from dropanchor_tag_client.sources.imu import add_chip_arguments, opened_readings
 from dropanchor_tag_client.sources.publish import BadLineError, imu_of
 
-_CHECK_S = 2.0
-_MIN_DURATION_S = 30.0
-_NS = 1_000_000_000
+_LINES = 'lines on standard input, such as {"acc": [0, 0, 9.81], "gyro": [0, 0, 0.1], "mag": [0, 20, -44]}'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,42 +31,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate and write the file. Raises ChipError, NotEnoughError, BadLineError, and ValueError for the folder."""
     if arguments.device is None:
-        samples = list(samples_of_lines(sys.stdin.buffer))
+        stream, source = samples_of_lines(sys.stdin.buffer), _LINES
     else:
-        samples = guided(_samples_of_chip(arguments))
-    found = fit(samples)
+        stream, source = _samples_of_chip(arguments), f"the {arguments.device} on I²C bus {arguments.bus}"
+    found = fit(Guide(source).collect(stream))
     try:
         path = write_calibration(arguments.folder, found)
     except OSError as error:
         raise ValueError(f"{arguments.folder} cannot be written: {error.strerror}") from error
     sys.stderr.write(f"{path}: {described(found)}\n")
     return 0
-
-
-def guided(stream: Iterable[ImuSample]) -> list[ImuSample]:
-    """Guide a person through the motions. Return the samples once they suffice, or at Ctrl-C."""
-    samples: list[ImuSample] = []
-    said, rests, check_ns = "", False, 0
-    _say("Leave the tag alone.")
-    with suppress(KeyboardInterrupt):
-        for sample in stream:
-            samples.append(sample)
-            if sample.t_ns < check_ns:
-                continue
-            check_ns = sample.t_ns + round(_CHECK_S * _NS)
-            try:
-                if not rests:
-                    fit_rest(samples)
-                    rests = True
-                    _say("Now turn it through full circles, then swing it in figures of eight. Ctrl-C ends.")
-                fit(samples)
-                if sample.t_ns - samples[0].t_ns > _MIN_DURATION_S * _NS or all(one.mag is None for one in samples):
-                    break
-            except NotEnoughError as error:
-                if rests and str(error) != said:
-                    said = str(error)
-                    _say(f"{said[0].upper()}{said[1:]}.")
-    return samples
 
 
 def samples_of_lines(lines: BinaryIO) -> Iterator[ImuSample]:
@@ -98,7 +70,3 @@ def _samples_of_chip(arguments: argparse.Namespace) -> Iterator[ImuSample]:
     for reading in opened_readings(arguments):
         mag = None if reading.mag is None else mounted.to_body(reading.mag)
         yield ImuSample(reading.t_ns, mounted.to_body(reading.acc), mounted.to_body(reading.gyro), mag)
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(f"{text}\n")

@@ -17,7 +17,7 @@ from dropanchor_tag_client.calibration import Calibration
 GRAVITY_MPS2 = 9.80665
 REST_S = 3.0
 _STILL_GYRO_RADPS, _STILL_ACC_MPS2 = 0.03, 0.25  # standard deviations while it rests
-_MAX_BIAS_RADPS, _MAX_SCALE_ERROR = 0.2, 0.1
+_MAX_BIAS_RADPS, _MAX_SCALE_ERROR, _MIN_REST = 0.2, 0.1, 30
 _SPATIAL = 0.15  # least spread in the thinnest direction, of that in the widest, for an ellipsoid
 _MIN_MAG, _SECTORS, _MAX_RESIDUAL = 150, 12, 0.08
 _FIELD_UT = (10.0, 100.0)  # the Earth's is 25 to 65 µT, and 10 in the plane
@@ -60,7 +60,7 @@ def fit_rest(samples: list[ImuSample]) -> tuple[Array, float]:
     for end in range(1, len(t_s) + 1):
         while t_s[end - 1] - t_s[begin] > REST_S:
             begin += 1
-        if end - begin < 30 or end % 10 or t_s[end - 1] - t_s[begin] < 0.9 * REST_S:
+        if end - begin < _MIN_REST or end % 10 or t_s[end - 1] - t_s[begin] < 0.9 * REST_S:
             continue
         part = slice(begin, end)
         moves = max(gyro[part].std(0).max() / _STILL_GYRO_RADPS, acc[part].std(0).max() / _STILL_ACC_MPS2)
@@ -69,8 +69,30 @@ def fit_rest(samples: list[ImuSample]) -> tuple[Array, float]:
         if moves < 1 and plausible and (best is None or moves < best[0]):
             best = moves, bias, GRAVITY_MPS2 / length
     if best is None:
-        raise NotEnoughError(f"the tag did not rest: leave it alone for {REST_S:.0f} s")
+        raise NotEnoughError(f"the tag did not rest: {_why_no_rest(t_s, gyro, acc)}")
     return best[1], best[2]
+
+
+def _why_no_rest(t_s: NDArray[np.floating], gyro: Array, acc: Array) -> str:
+    """Return what the newest `REST_S` lack, and what to do."""
+    if not len(t_s):
+        return "no IMU sample arrived"
+    newest = t_s >= t_s[-1] - REST_S
+    if t_s[-1] - t_s[0] < 0.9 * REST_S:
+        return f"the samples cover {t_s[-1] - t_s[0]:.1f} s by their times; leave it alone for {REST_S:.0f} s"
+    if newest.sum() < _MIN_REST:
+        return f"{newest.sum() / REST_S:.0f} samples per second are too few; {_MIN_REST / REST_S:.0f} are needed"
+    turns, shakes = gyro[newest].std(0).max(), acc[newest].std(0).max()
+    if turns >= _STILL_GYRO_RADPS or shakes >= _STILL_ACC_MPS2:
+        return (
+            f"the gyroscope varies by {turns:.2f} rad/s and the acceleration by {shakes:.2f} m/s²; less than "
+            f"{_STILL_GYRO_RADPS} and {_STILL_ACC_MPS2} is rest; leave it alone for {REST_S:.0f} s"
+        )
+    length, bias = float(np.linalg.norm(acc[newest].mean(0))), float(np.abs(gyro[newest].mean(0)).max())
+    return (
+        f"it reads {length:.2f} m/s² and {bias:.2f} rad/s; about {GRAVITY_MPS2:.1f} and less than {_MAX_BIAS_RADPS} "
+        "are possible at rest; check the units"
+    )
 
 
 def fit_mag(mag: Array) -> MagFit:

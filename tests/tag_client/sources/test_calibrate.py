@@ -17,10 +17,10 @@ from dropanchor_tag_client.calibration import (
     write_calibration,
 )
 from dropanchor_tag_client.cli import main
-from dropanchor_tag_client.sources.calibrate import guided
 from dropanchor_tag_client.sources.calibration_fit import NotEnoughError, fit
+from dropanchor_tag_client.sources.guidance import Guide
 from support.chips import FakeLibraries
-from support.commands import python
+from support.commands import python, start_python
 from support.ingest import IngestBench
 from support.magnetism import FIELD_UT, Errors, rotation, samples
 from support.zenoh_router import connected_session, wait_until
@@ -86,7 +86,12 @@ def test_a_tag_without_a_magnetometer_gets_bias_and_scale() -> None:
         (samples(Errors(), 1)[:600], "turn the tag"),
         (samples(Errors(mag_noise_ut=8.0), 1), "the magnetic field changes"),
         (samples(Errors(hard_iron=(0.0, 0.0, 0.0), soft_iron=6 * np.eye(3)), 1), "is not the Earth's"),
-        ([], "did not rest"),
+        ([], "did not rest: no IMU sample arrived"),
+        ([one._replace(t_ns=5) for one in samples(Errors(), 1)], "did not rest: the samples cover 0.0 s"),
+        (samples(Errors(), 1)[:500:20], "did not rest: 5 samples per second are too few; 10 are needed"),
+        (samples(Errors(acc_scale=9.80665), 1)[:500], r"it reads 1.00 m/s² and 0.03 rad/s; .* check the units"),
+        (samples(Errors(gyro_bias=(1.2, 0.0, 0.0)), 1)[:500], r"it reads 9.61 m/s² and 1.20 rad/s; .* check the units"),
+        (samples(Errors(), 1)[600:], r"the gyroscope varies by .* less than 0.03 and 0.25 is rest; leave it alone"),
     ],
 )
 def test_samples_that_do_not_suffice_say_what_to_do(measured: list[ImuSample], why: str) -> None:
@@ -96,11 +101,33 @@ def test_samples_that_do_not_suffice_say_what_to_do(measured: list[ImuSample], w
 
 def test_a_person_is_guided_and_the_stream_ends_when_it_suffices(capsys: pytest.CaptureFixture[str]) -> None:
     everything = samples(Errors(), 2)
-    used = guided(iter(everything))
+    used = Guide("a list").collect(iter(everything))
     assert len(used) < len(everything)
     fit(used)
     said = capsys.readouterr().err
     assert said.index("Leave the tag alone") < said.index("Now turn it") < said.index("Turn the tag")
+
+
+def test_lines_on_a_pipe_that_stays_open_are_calibrated_as_soon_as_they_suffice(tmp_path: Path) -> None:
+    process = start_python("-m", "dropanchor_tag_client", "calibrate", str(tmp_path))
+    assert process.stdin is not None and process.stderr is not None
+    try:
+        assert process.stderr.readline() == "Leave the tag alone.\n"
+        assert process.stderr.readline().startswith("No IMU sample yet. Waiting for lines on standard input")
+        moving, everything = samples(Errors(), 3)[600:1200], samples(Errors(), 3)
+        process.stdin.write("".join(f"{line(one)}\n" for one in moving))
+        process.stdin.flush()
+        seen = next(text for text in process.stderr if "samples, " in text)
+        assert "The tag did not rest: the gyroscope varies by" in seen
+        later = [one._replace(t_ns=one.t_ns + 60_000_000_000) for one in everything]
+        with pytest.raises(BrokenPipeError):  # it ends before it has read all of them
+            process.stdin.write("".join(f"{line(one)}\n" for one in later))
+            process.stdin.flush()
+        assert process.wait(timeout=30) == 0
+        assert read_calibration(tmp_path) is not None
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def test_lines_are_calibrated_into_a_folder_and_a_program_with_it_publishes_corrected_samples(
