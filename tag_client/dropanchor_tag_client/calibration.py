@@ -5,9 +5,8 @@ All vectors are in the axes of the tag: x forward, y left, z up.
 
 import json
 import math
-from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dropanchor_schemas.wire import ImuSample, Vector
 
@@ -20,8 +19,7 @@ class CalibrationError(ValueError):
     """The file is not a calibration. The message says what to do."""
 
 
-@dataclass(frozen=True)
-class Calibration:
+class Calibration(NamedTuple):
     """acc_scale: factor. mag_offset_ut: hard iron. mag_matrix: undoes soft iron; its determinant is 1.
 
     has_mag: whether the magnetometer was calibrated.
@@ -75,7 +73,7 @@ def write_calibration(folder: str | Path, calibration: Calibration) -> Path:
     path = Path(folder, FILE_NAME)
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_suffix(".new")
-    new.write_text(json.dumps({"version": _VERSION, **asdict(calibration)}, indent=2) + "\n")
+    new.write_text(json.dumps({"version": _VERSION, **calibration._asdict()}, indent=2) + "\n")
     new.replace(path)
     return path
 

@@ -1,7 +1,6 @@
 """The command-line parser of both programs: it suggests the nearest name for a misspelt one."""
 
 import argparse
-import difflib
 import os
 from collections.abc import Iterable
 from typing import Any
@@ -49,6 +48,8 @@ class Parser(argparse.ArgumentParser):
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:
     """Return "; did you mean NAME?" for the name that is nearest to a word, and nothing if none is near."""
+    import difflib  # 0.2 MB, and only a misspelt name needs it
+
     nearest = difflib.get_close_matches(word, list(names), 1)
     return f"; did you mean {nearest[0]}?" if nearest else ""
 

@@ -1,14 +1,13 @@
 """Read the folder that `dropanchor tag add` creates for a tag: its id, its endpoint and its certificate."""
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from dropanchor_tag_client.session import SessionSettings
 
 
-@dataclass(frozen=True, slots=True)
-class Credentials:
+class Credentials(NamedTuple):
     """Identity and session settings of one tag."""
 
     tag: str

@@ -4,8 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import zenoh
 
@@ -18,8 +17,7 @@ _ATTEMPT_S, _LOG_EVERY_S = 1.0, 60.0
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class TagKeys:
+class TagKeys(NamedTuple):
     """The keys of a tag: of its samples, its liveliness token, its pose, its health and its settings."""
 
     samples: str

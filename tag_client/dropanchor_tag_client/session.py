@@ -4,7 +4,6 @@ import json
 import logging
 import math
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ class ConnectError(Exception):
     """The router did not answer in time, or it rejected the client. Zenoh does not report which."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SessionSettings:
     """How to reach the router. Raises ValueError for settings that cannot work.
 
@@ -32,15 +30,23 @@ class SessionSettings:
     thin_link: use small send buffers. A link that is too slow for the data then delivers fewer but newer samples.
     """
 
-    connect: str = DEFAULT_CONNECT
-    ca: str | Path | None = None
-    cert: str | Path | None = None
-    key: str | Path | None = None
-    user: str | None = None
-    password: str | None = field(default=None, repr=False)
-    thin_link: bool = False
+    def __init__(
+        self,
+        *,
+        connect: str = DEFAULT_CONNECT,
+        ca: str | Path | None = None,
+        cert: str | Path | None = None,
+        key: str | Path | None = None,
+        user: str | None = None,
+        password: str | None = None,
+        thin_link: bool = False,
+    ) -> None:
+        self.connect, self.thin_link = connect, thin_link
+        self.ca, self.cert, self.key = ca, cert, key
+        self.user, self.password = user, password
+        self._check()
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         protocol, slash, address = self.connect.partition("/")
         if protocol not in _PROTOCOLS or not slash or not address:
             raise ValueError(f"connect is {self.connect!r}; an endpoint such as {DEFAULT_CONNECT} was expected")

@@ -5,7 +5,6 @@ import random
 import struct
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -158,7 +157,7 @@ def by_two(messages: Iterable[Message]) -> list[Message]:
         assert isinstance(frame, Frame)
         ranges = [sample._replace(t_ns=sample.t_ns - 77 * S) for sample in frame.ranges]
         # The ranges are not numbered, because not every message has one.
-        for part in (replace(frame, ranges=[]), replace(frame, imu=[], ranges=ranges, boot_id=0)):
+        for part in (frame.replaced(ranges=[]), frame.replaced(imu=[], ranges=ranges, boot_id=0)):
             if part.imu or part.ranges:
                 parts.append(message._replace(payload=encode_packed(part)))
     return parts

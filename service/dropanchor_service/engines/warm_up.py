@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -170,7 +169,7 @@ def warm_up_ingest(progress: CompilationProgress | None = None) -> None:
         boot_id=1,
         boot_clock=True,
     )
-    payloads = [encode_packed(replace(frame, sequence=number)) for number in (0, 2)]
+    payloads = [encode_packed(frame.replaced(sequence=number)) for number in (0, 2)]
     with _compiling("the decoder of messages", progress or CompilationProgress()):
         for batch in (payloads, payloads[:1]):
             _ingest(batch)

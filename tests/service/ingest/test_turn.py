@@ -1,7 +1,6 @@
 """The way from messages to poses: order, duplicates, clocks, settings. Losses are counted, and no fault spreads."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -240,7 +239,7 @@ def test_the_age_of_a_replay_counts_from_its_arrival_and_that_of_a_live_tag_from
         return pose["state"], pose["age_s"]
 
     bench.send("live", ranges(1.0))
-    bench.send("replayed", replace(ranges(1.0), replay=True))
+    bench.send("replayed", ranges(1.0).replaced(replay=True))
     assert state_of("live")[0] == "lost"
     state, age_s = state_of("replayed")
     assert state == "tracking"

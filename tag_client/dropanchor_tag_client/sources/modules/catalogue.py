@@ -1,7 +1,7 @@
 """The supported modules: how to reach each of them, and how to start its reports."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from dropanchor_tag_client.sources.modules.dwm1001 import Dwm1001
 from dropanchor_tag_client.sources.modules.dwm3001 import Dwm3001
@@ -11,8 +11,7 @@ from dropanchor_tag_client.sources.modules.report import Parser
 from dropanchor_tag_client.sources.modules.trek1000 import Trek1000
 
 
-@dataclass(frozen=True, slots=True)
-class Module:
+class Module(NamedTuple):
     """A supported module.
 
     baud: as delivered. start_commands: written to a silent module, one per second. hint: what its owner can do if it

@@ -3,7 +3,6 @@
 import errno
 
 import serial
-from serial.tools.list_ports import comports
 
 READ_TIMEOUT_S = 0.1
 
@@ -23,6 +22,8 @@ def open_port(name: str, baud: int) -> serial.Serial:
 def _what_to_do(name: str, baud: int, error: Exception) -> str:
     match getattr(error, "errno", None):
         case errno.ENOENT | errno.ENODEV | errno.ENXIO:
+            from serial.tools.list_ports import comports  # memory that a working tag does not need
+
             there = ", ".join(f"{port.device} ({port.description})" for port in comports()) or "none"
             return f"there is no serial port {name}. Ports that are plugged in: {there}"
         case errno.EACCES | errno.EPERM:
