@@ -125,6 +125,9 @@ def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(serv
         assert abs(attachments[-1][1] - t_ns) < 60 * 10**9
         assert abs(heading - pi / 2) < 0.7
     assert any("a range that is not finite" in line for line in said)
+    told = [line.strip() for line in said if "published" in line]
+    assert f"no pose is published: the service has none of tag {TAG}" in told[0]
+    assert told[-1].endswith("poses are published")
     assert "samples sent" in said[-1]
 
 
@@ -151,6 +154,22 @@ def test_the_node_announces_itself_and_its_topics_while_it_runs(service: Running
             assert sum("/MS/" in token for token in tokens) == 2
             assert sum("/MP/" in token for token in tokens) == 3
         wait_until(lambda: not robot.tokens())
+
+
+def test_it_says_why_no_pose_is_published(service: Running, ros_router: str) -> None:
+    with (
+        connected_session(ros_router) as session,
+        running_bridge(service, ros_router, "--tag", "other", *OPTIONS) as said,
+    ):
+        robot = Robot(session, DOMAIN)
+        wait_until(lambda: any("the service has none of tag other" in line for line in said))
+        wait_until(lambda: len(robot.tokens()) == 6)
+
+        def is_told() -> bool:
+            robot.publish("uwb/range", RANGE, range_cdr(time.time_ns(), 3.0))
+            return any("no pose is published while the state is initialising. " in line for line in said)
+
+        wait_until(is_told)
 
 
 def test_damaged_and_foreign_messages_are_named_and_harm_nothing(service: Running, ros_router: str) -> None:

@@ -201,6 +201,7 @@ class PoseOutput:
         self._height_m = 0.0
         self._settings_s = 0.0
         self._away = False
+        self._told = ""
 
     def run(self, stop: Event) -> None:
         """Ask the service until `stop` is set. Say once that it is away, and once that it is back."""
@@ -221,13 +222,25 @@ class PoseOutput:
     def update(self) -> None:
         """Publish the latest pose if it is new and usable. Raises RefusedError."""
         tag = quote(self._arguments.tag, safe="")
-        for pose in asked(self._arguments, "GET", f"/poses?tags={tag}")["poses"]:
+        poses = asked(self._arguments, "GET", f"/poses?tags={tag}")["poses"]
+        self._tell(poses)
+        for pose in poses:
             if time.monotonic() >= self._settings_s:
                 self._height_m = asked(self._arguments, "GET", f"/tags/{tag}")["settings"]["height_m"]
                 self._settings_s = time.monotonic() + _SETTINGS_S
             if pose["t_ns"] != self._t_ns and is_usable(pose):
                 self._t_ns = pose["t_ns"]
                 self._publish(pose)
+
+    def _tell(self, poses: list[Json]) -> None:
+        """Say whether poses are published, and why not, when that changes."""
+        text = f"no pose is published: the service has none of tag {self._arguments.tag}"
+        for pose in poses:
+            why_not = f"no pose is published while the state is {pose['state']}. {pose['hint']}"
+            text = "poses are published" if is_usable(pose) else why_not.strip()
+        if text != self._told:
+            self._told = text
+            _say(text)
 
     def _publish(self, pose: Json) -> None:
         self._pose(self._messages.pose_cdr(pose, self._height_m))

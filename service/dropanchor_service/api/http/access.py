@@ -23,7 +23,7 @@ _SITE = "/api/v1/site"
 _WEBHOOKS = "/api/v1/webhooks/"
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
-    "`dropanchor key add NAME --scope read`."
+    "`dropanchor key add NAME --scope read`; for the samples of a tag, with `--tag TAG` instead of `--scope`."
 )
 
 
