@@ -1,5 +1,6 @@
 """Every kind of sample passes from a payload to the engine. A failure says which file does not know the kind yet."""
 
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 

@@ -110,7 +110,8 @@ def test_a_person_is_guided_and_the_stream_ends_when_it_suffices(capsys: pytest.
 
 def test_lines_on_a_pipe_that_stays_open_are_calibrated_as_soon_as_they_suffice(tmp_path: Path) -> None:
     process = start_python("-m", "dropanchor_tag_client", "calibrate", str(tmp_path))
-    assert process.stdin is not None and process.stderr is not None
+    assert process.stdin is not None
+    assert process.stderr is not None
     try:
         assert process.stderr.readline() == "Leave the tag alone.\n"
         assert process.stderr.readline().startswith("No IMU sample yet. Waiting for lines on standard input")
@@ -122,7 +123,6 @@ def test_lines_on_a_pipe_that_stays_open_are_calibrated_as_soon_as_they_suffice(
         later = [one._replace(t_ns=one.t_ns + 60_000_000_000) for one in everything]
         with pytest.raises(BrokenPipeError):  # it ends before it has read all of them
             process.stdin.write("".join(f"{line(one)}\n" for one in later))
-            process.stdin.flush()
         assert process.wait(timeout=30) == 0
         assert read_calibration(tmp_path) is not None
     finally:
