@@ -1,5 +1,7 @@
 """Models of the service's answers other than poses: tags, anchors, lists and problems."""
 
+from typing import Literal
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.site import Anchor, RemoteSettings, TagSettings
@@ -61,6 +63,14 @@ class TimedTagStatus(TagStatus):
 
     first_heard_utc: str | None = Field(description="`first_heard_ns` as ISO 8601.")
     last_heard_utc: str | None = Field(description="`last_heard_ns` as ISO 8601.")
+
+
+class ClientAccess(_Answer):
+    """What the client of this request may do."""
+
+    scope: Literal["read", "write", "admin"] = Field(
+        description="read: read; write: also set anchors and tags; admin: also delete, and replace the site."
+    )
 
 
 class SamplesReceived(_Answer):

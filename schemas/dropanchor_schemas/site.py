@@ -21,6 +21,20 @@ ID_SCHEMA: JsonDict = {"format": "dropanchor-id", "minLength": 1, "maxLength": 6
 Id = Annotated[str, Field(min_length=1, max_length=64, json_schema_extra=ID_SCHEMA), AfterValidator(_validate_id)]
 
 
+def _require_printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("only printable characters are allowed")
+    return text
+
+
+Label = Annotated[
+    str,
+    Field(max_length=64, json_schema_extra={"format": "dropanchor-label"}),
+    AfterValidator(_require_printable),
+]
+"""A short text for people."""
+
+
 class Typed(str):
     """A string that may hold a number, such as an environment variable. JSON and TOML numbers are never strings."""
 
@@ -89,6 +103,11 @@ class StartPose(_Settings):
 class TagSettings(_Settings):
     """What an operator knows about a tag. A measured range is range_scale · distance + range_bias_m."""
 
+    name: Label = Field(default="", description="Display name; empty: the id of the tag.")
+    colour: Annotated[str, Field(pattern=r"^#[0-9a-f]{6}$")] | None = Field(
+        default=None, description="Colour that marks the tag on the map, such as #0b62b8; null: none."
+    )
+    group: Label = Field(default="", description="Group that lists and streams can select; empty: none.")
     height_m: Number = Field(default=0.0, description="Height of the tag's antenna, along the anchors' z axis.")
     range_std_m: Positive | None = Field(
         default=None, description="Standard deviation of one range; null: the engine's default."

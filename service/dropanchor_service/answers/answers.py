@@ -78,6 +78,11 @@ class Answers:
         range_ns = int(self.tags.arrivals.of(np.array([tag.row]))["range_ns"][0])
         return hint_about(unknown, hears_others=self.now_ns() - range_ns <= FRESH_NS)
 
+    def forget(self, tag: Tag) -> None:
+        """Remove a tag from the answers until it sends again."""
+        self.tags.delete(tag.row)
+        self.latest.forget(tag.row)
+
     def pose_of(self, tag: Tag) -> Answer | None:
         """Return the `Pose` of a tag, None before its first one."""
         row = self.latest.row(tag.row)
@@ -126,7 +131,7 @@ class Answers:
 
     def _wanted(self, tags: Sequence[Tag] | None, wanted: PoseFilter, now_ns: int) -> Array:
         poses = self.rows(tags)
-        return poses if wanted.is_everything else poses[wanted.matches(poses, self.tags, now_ns)]
+        return poses if wanted.is_everything else poses[wanted.matches(poses, self.tags, self.site, now_ns)]
 
     def pose_jsons(self, poses: Array, now_ns: int) -> Iterator[tuple[str, bytes]]:
         """Yield the tag and the JSON of its `Pose` for each of these POSE rows, which are the latest."""

@@ -1,4 +1,4 @@
-"""Select the poses that an answer holds: by state, by place and by the name of the tag."""
+"""Select the poses that an answer holds: by state, by place, and by the name and the group of the tag."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 
 from dropanchor_service.answers.columns import STATES, aged_poses
 from dropanchor_service.estimation.columns import Array, Frame
+from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 
 
@@ -15,18 +16,19 @@ class PoseFilter:
     """The conditions that a pose has to meet, all of them.
 
     states: one of these; empty: any. box: x_min, y_min, x_max, y_max of the site, m. text: part of the tag's name, in
-    upper or lower case.
+    upper or lower case. groups: one of these; empty: any.
     """
 
     states: Sequence[str] = ()
     box: tuple[float, float, float, float] | None = None
     text: str = ""
+    groups: Sequence[str] = ()
 
     @property
     def is_everything(self) -> bool:
-        return not self.states and self.box is None and not self.text
+        return not self.states and self.box is None and not self.text and not self.groups
 
-    def matches(self, poses: Array, tags: TagTable, now_ns: int) -> Array:
+    def matches(self, poses: Array, tags: TagTable, site: SiteStore, now_ns: int) -> Array:
         """Return whether each of these POSE rows, which are the latest, meets the conditions now."""
         matching = np.ones(len(poses), bool)
         if self.states:
@@ -41,4 +43,7 @@ class PoseFilter:
             text, rows = self.text.casefold(), np.flatnonzero(matching)
             names = tags.names(poses["row"][rows].tolist())
             matching[rows] = [text in name.casefold() for name in names]
+        if self.groups:
+            rows = np.flatnonzero(matching)
+            matching[rows] = site.are_in(tags.names(poses["row"][rows].tolist()), self.groups)
         return matching

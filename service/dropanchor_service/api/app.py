@@ -19,6 +19,7 @@ from dropanchor_service.api.http.errors import Kind, add_error_handlers, problem
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.event_parts import EventParts
@@ -91,6 +92,7 @@ def create_app(
         history_router(answers),
         stream_router(answers, stopping),
         site_router(answers.site),
+        access_router(),
         connect_router(answers.site, endpoints, credentials),
         ingest_router(receive, receive_health),
         ingest_phyphox_router(receive, receive_health),

@@ -65,7 +65,15 @@ class ServiceState:
         self._publishers.columns = snapshot.arrays["publishers"]
         self._publishers.times = snapshot.arrays["times"]
         self._latest.restore(_part(snapshot, "latest"))
+        self._forget_deleted()
         self._engine.restore(_part(snapshot, "engine"))
+
+    def _forget_deleted(self) -> None:
+        """Delete the tags that were deleted after this snapshot was made."""
+        for tag in self._tags.all():
+            if self._site.was_deleted_after(tag.name, tag.last_heard_ns or 0):
+                self._tags.delete(tag.row)
+                self._latest.forget(tag.row)
 
 
 def _part(snapshot: Snapshot, part: str) -> dict[str, Array]:

@@ -104,8 +104,11 @@ class GuardedEngine:
         self._numbers = np.array([number for number, _ in known], np.int64)
         self._indices = np.array([index for _, index in known], np.int32)
         for row, configured in list(self._configured.items()):
-            if moved or configured != self._current(row):
+            current = self._current(row)
+            if moved or (configured != current and _differ(configured, current)):
                 self._configure(row)
+            else:
+                self._configured[row] = current
         return True
 
     def anchor_indices(self, numbers: Array) -> Array:
@@ -189,6 +192,11 @@ class GuardedEngine:
     def _current(self, row: int) -> _Configured:
         """Return the settings that the site has now for this row."""
         return _Configured(self._site.tag_settings(self._tags.at(row).name), self._site.site.declination_rad)
+
+
+def _differ(before: _Configured, now: _Configured) -> bool:
+    """Return whether the change matters to the engine. A name, a colour and a group do not."""
+    return tag_columns(*before).tobytes() != tag_columns(*now).tobytes()
 
 
 def _lost(row: int, t_ns: int) -> Array:

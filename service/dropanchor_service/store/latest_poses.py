@@ -54,6 +54,13 @@ class LatestPoses:
             if innovations is not None:
                 self._innovations.write(innovations)
 
+    def forget(self, row: int) -> None:
+        """Remove the pose of a row until the next one is written."""
+        with self._lock:
+            if row < len(self._changed):
+                self._changed[row] = 0
+                self._hypothesis_counts[row] = 0
+
     def state(self) -> dict[str, Array]:
         """Return copies of the latest poses and their hypotheses, for a checkpoint."""
         with self._lock:

@@ -1,7 +1,7 @@
 """The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -15,6 +15,17 @@ FILE_NAME = "site.json"
 
 _log = logging.getLogger(__name__)
 
+Allows = Callable[[BaseModel | None], bool]
+"""Returns whether a change may replace what there is now; None: there is nothing yet."""
+
+
+class ChangedMeanwhileError(Exception):
+    """Somebody has changed a resource since the client read it."""
+
+
+def _always(_current: BaseModel | None) -> bool:
+    return True
+
 
 class SiteDocument(BaseModel):
     """The content of the file."""
@@ -24,6 +35,7 @@ class SiteDocument(BaseModel):
     site: Site
     tags: dict[str, TagSettings] = {}
     remote: dict[str, RemoteSettings] = {}
+    deleted_ns: dict[str, int] = {}  # tags that were deleted, and when, UTC
 
 
 class SiteStore:
@@ -119,25 +131,68 @@ class SiteStore:
                 raise ValueError(f"the site's id is {self.site.id!r} and cannot change while the service runs")
             self._replace(self._document.model_copy(update={"site": site}))
 
-    def set_anchor(self, anchor: Anchor) -> None:
-        """Add the anchor, or replace the one with its number, and save the site. Raises OSError."""
+    def anchor(self, anchor: str) -> Anchor | None:
+        """Return the anchor with this id, or None."""
+        return next((known for known in self.site.anchors if known.number == anchor_number(anchor)), None)
+
+    def set_anchor(self, anchor: Anchor, allows: Allows = _always) -> None:
+        """Add the anchor, or replace the one with its number, and save the site.
+
+        Raises OSError, and ChangedMeanwhileError when `allows` refuses.
+        """
         with self._lock:
+            _require(allows, self.anchor(anchor.id))
             self._replace(self._document.model_copy(update={"site": _with_anchor(self.site, anchor)}))
 
-    def remove_anchor(self, anchor: str) -> None:
-        """Remove the anchor with this id and save the site. Raises KeyError when there is none, and OSError."""
+    def remove_anchor(self, anchor: str, allows: Allows = _always) -> None:
+        """Remove the anchor with this id and save the site.
+
+        Raises KeyError when there is none, OSError, and ChangedMeanwhileError when `allows` refuses.
+        """
         with self._lock:
-            left = [other for other in self.site.anchors if other.number != anchor_number(anchor)]
-            if len(left) == len(self.site.anchors):
+            known = self.anchor(anchor)
+            if known is None:
                 raise KeyError(anchor)
+            _require(allows, known)
+            left = [other for other in self.site.anchors if other != known]
             site = self.site.model_copy(update={"anchors": left})
             self._replace(self._document.model_copy(update={"site": site}))
 
-    def set_tag(self, tag: str, settings: TagSettings) -> None:
-        """Replace the settings of the tag and save them. What is not given becomes the default. Raises OSError."""
+    def set_tag(self, tag: str, settings: TagSettings, allows: Allows = _always) -> None:
+        """Replace the settings of the tag and save them. What is not given becomes the default.
+
+        Raises OSError, and ChangedMeanwhileError when `allows` refuses.
+        """
         with self._lock:
+            _require(allows, self.tag_settings(tag))
             complete = settings.over(self.default_settings)
-            self._replace(self._document.model_copy(update={"tags": self.tags | {tag: complete}}))
+            update = {"tags": self.tags | {tag: complete}, "deleted_ns": self._deleted_without(tag)}
+            self._replace(self._document.model_copy(update=update))
+
+    def remove_tag(self, tag: str, now_ns: int, allows: Allows = _always) -> None:
+        """Remove everything that is set for the tag, note when it was deleted, and save that.
+
+        Raises OSError, and ChangedMeanwhileError when `allows` refuses.
+        """
+        with self._lock:
+            _require(allows, self.tag_settings(tag))
+            tags, remote = dict(self.tags), dict(self._document.remote)
+            tags.pop(tag, None)
+            remote.pop(tag, None)
+            update = {"tags": tags, "remote": remote, "deleted_ns": self._document.deleted_ns | {tag: now_ns}}
+            self._replace(self._document.model_copy(update=update))
+
+    def was_deleted_after(self, tag: str, heard_ns: int) -> bool:
+        """Return whether the tag was deleted after it had last sent something."""
+        return self._document.deleted_ns.get(tag, -1) >= heard_ns
+
+    def _deleted_without(self, tag: str) -> dict[str, int]:
+        return {name: t_ns for name, t_ns in self._document.deleted_ns.items() if name != tag}
+
+    def are_in(self, tags: Sequence[str], groups: Collection[str]) -> list[bool]:
+        """Return whether the group of each tag is one of these."""
+        by_name, otherwise = self.tags, self.default_settings
+        return [by_name.get(tag, otherwise).group in groups for tag in tags]
 
     def remote_settings(self, tag: str) -> RemoteSettings:
         """Return what the program of the tag should apply."""
@@ -172,6 +227,11 @@ class SiteStore:
         for anchor in self.site.anchors:
             index = self._anchors.get(anchor.number, (len(self._anchors),))[0]
             self._anchors[anchor.number] = (index, anchor)
+
+
+def _require(allows: Allows, current: BaseModel | None) -> None:
+    if not allows(current):
+        raise ChangedMeanwhileError
 
 
 def _with_anchor(site: Site, anchor: Anchor) -> Site:

@@ -77,6 +77,7 @@ class TagTable:
         self._counts = np.zeros(16, _COUNTS)
         self.presence = Presence()
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past, by row
+        self._deleted: set[int] = set()
         self.unknown_anchors = UnknownAnchors()
         self.arrivals = Arrivals()
 
@@ -92,7 +93,23 @@ class TagTable:
         return self._by_row[row]
 
     def all(self) -> list[Tag]:
+        """Return every tag that has a row, in the order of the rows."""
         return self._by_row[:]
+
+    def listed(self) -> list[Tag]:
+        """Return every tag that is not deleted."""
+        deleted = self._deleted
+        return [tag for tag in self._by_row if tag.row not in deleted]
+
+    def is_deleted(self, row: int) -> bool:
+        """Return whether the tag of this row was deleted and has sent nothing since."""
+        return row in self._deleted
+
+    def delete(self, row: int) -> None:
+        """Clear the counters of a row, and take its tag off the list until it sends again or is registered."""
+        with self._lock:
+            self._counts[row] = 0
+            self._deleted.add(row)
 
     def names(self, rows: Sequence[int]) -> list[str]:
         by_row = self._by_row
@@ -108,6 +125,7 @@ class TagTable:
                 self.presence.add_row(name, tag.row)
                 self._by_row.append(tag)
                 self._by_name[name] = tag
+            self._deleted.discard(tag.row)
             return tag
 
     def set_replay_lag(self, rows: Array, lag_ns: Array) -> None:
@@ -135,6 +153,8 @@ class TagTable:
 
     def count_messages(self, rows: Array, now_ns: int) -> None:
         """Count one message for each entry of `rows`, and note the time. A row may appear several times."""
+        if self._deleted:
+            self._deleted.difference_update(rows.tolist())
         first = self._counts["first_heard_ns"]
         first[rows[first[rows] == 0]] = now_ns
         self._counts["last_heard_ns"][rows] = now_ns

@@ -30,11 +30,15 @@ EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
 """Valid requests per operation, and as many invalid ones. The seed is fixed, so that every run sends the same."""
 
 BEYOND_THE_SCHEMA = {
+    "delete_anchor": [positive_data_acceptance],
+    "delete_tag": [positive_data_acceptance],
     "get_track": [positive_data_acceptance],
     "get_tracks": [positive_data_acceptance],
     "export_track": [positive_data_acceptance],
     "patch_remote_settings": [positive_data_acceptance],
+    "put_anchor": [positive_data_acceptance],
     "put_site": [positive_data_acceptance],
+    "put_tag_settings": [positive_data_acceptance],
     "put_zone": [positive_data_acceptance],
     "put_webhook": [positive_data_acceptance],
     "put_tag_group": [positive_data_acceptance],
@@ -60,6 +64,8 @@ schemathesis.openapi.format("dropanchor-id", IDS)
 schemathesis.openapi.format(
     "dropanchor-ids", st.lists(IDS.filter(lambda one: "," not in one), min_size=1).map(",".join)
 )
+LABELS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), max_size=64)
+schemathesis.openapi.format("dropanchor-label", LABELS.filter(str.isprintable))
 TIMES = st.datetimes(datetime(1971, 1, 1), datetime(2200, 1, 1), timezones=st.just(UTC))
 schemathesis.openapi.format("date-time", TIMES.map(datetime.isoformat))
 

@@ -154,6 +154,29 @@ def test_settings_of_a_tag_reach_the_engine_before_its_first_message_and_when_th
     assert len(bench.engine.configured[1]) == 1
 
 
+def test_a_name_a_colour_and_a_group_do_not_restart_a_tag_and_a_start_does() -> None:
+    bench = IngestBench()
+    bench.send("a", ranges(1.0))
+    bench.site.set_tag("a", TagSettings(name="Forklift", colour="#0b62b8", group="forklifts"))
+    bench.ingest.turn()
+    assert len(bench.engine.configured[0]) == 1
+    start = StartPose(x=2.0, y=3.0, heading_rad=0.5)
+    bench.site.set_tag("a", TagSettings(name="Forklift", start=start))
+    bench.ingest.turn()
+    _, settings = bench.engine.configured[0]
+    assert [float(settings[f"start_{name}"]) for name in ("x", "y", "heading")] == [2.0, 3.0, 0.5]
+
+
+def test_a_deleted_tag_is_back_with_its_next_message() -> None:
+    bench = IngestBench()
+    bench.send("a", ranges(1.0))
+    tag = bench.tags.at(0)
+    bench.tags.delete(0)
+    assert (bench.tags.listed(), tag.messages) == ([], 0)
+    bench.send("a", ranges(2.0))
+    assert (bench.tags.listed(), tag.messages) == ([tag], 1)
+
+
 def poison_row(row: int) -> Callable[[SampleBatch], bool]:
     def poisoned(samples: SampleBatch) -> bool:
         return row in samples.ranges["row"]

@@ -50,7 +50,7 @@ class Access:
         elif identity is None:
             await self._app(scope, receive, send)
         else:
-            scope.setdefault("state", {})["tag"] = identity.tag
+            scope.setdefault("state", {}).update(tag=identity.tag, scope=identity.scope)
             await self._app(scope, receive, self._while_valid(identity, send))
 
     async def _authenticate(self, request: Request) -> tuple[Identity | None, Response | None]:

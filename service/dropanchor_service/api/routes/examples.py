@@ -78,6 +78,9 @@ POSE_FRAME: dict[str, Any] = {
     "hypotheses": [None, None],
 }
 TAG_SETTINGS: dict[str, Any] = {
+    "name": "Forklift 1",
+    "colour": "#0b62b8",
+    "group": "forklifts",
     "height_m": 1.1,
     "range_std_m": 0.1,
     "range_bias_m": 0.0,

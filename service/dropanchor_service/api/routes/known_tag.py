@@ -8,7 +8,7 @@ from dropanchor_service.store.tags import Tag
 def known_tag(answers: Answers, name: str) -> Tag:
     """Return the tag with this name. Raises ProblemError."""
     tag = answers.tags.find(name)
-    if tag is None:
+    if tag is None or answers.tags.is_deleted(tag.row):
         raise unknown_tag(name)
     return tag
 

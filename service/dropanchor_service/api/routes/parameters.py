@@ -12,15 +12,24 @@ from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.pose import TrackingState
-from dropanchor_schemas.site import ID_SCHEMA
+from dropanchor_schemas.site import ID_SCHEMA, Label
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.answers.times import ns_of_iso
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.etags import etag_of
+from dropanchor_service.store.site import ChangedMeanwhileError
 
 
 def json_response(answer: Any, media_type: str = "application/json", status: int = 200) -> Response:
     return Response(to_json(answer), status, media_type=media_type, headers={"cache-control": "no-store"})
+
+
+def resource_response(resource: BaseModel) -> Response:
+    """Return a resource with its `ETag`, to which a change can refer."""
+    response = json_response(resource.model_dump())
+    response.headers["etag"] = etag_of(resource)
+    return response
 
 
 async def refuse_query(request: Request) -> None:
@@ -117,11 +126,18 @@ class PoseQuery(TagFilter):
     text: str = Field(
         default="", max_length=100, description="Return only tags with this text in their id, in upper or lower case."
     )
+    group: list[Label] = Field(
+        default=[],
+        max_length=100,
+        description="Return only tags whose settings name this group. Repeat the parameter for several groups; "
+        "an empty one stands for tags without a group.",
+        examples=[["forklifts"]],
+    )
 
     @property
     def wanted(self) -> PoseFilter:
         """Return the conditions on the pose itself."""
-        return PoseFilter(self.state, None if self.box is None else _corners(self.box), self.text)
+        return PoseFilter(self.state, None if self.box is None else _corners(self.box), self.text, self.group)
 
 
 def _corners(box: str) -> tuple[float, float, float, float]:
@@ -176,5 +192,7 @@ def saving() -> Iterator[None]:
     """Turn a failed write of the site into a problem. The site does not change when it cannot be written."""
     try:
         yield
+    except ChangedMeanwhileError as error:
+        raise ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed this meanwhile: get it and try again.") from error
     except OSError as error:
         raise ProblemError(Kind.NOT_SAVED, f"The change was not made: {error.strerror or error}.") from error

@@ -1,6 +1,5 @@
 """What the service sets in the programs of tags: batch period and rates."""
 
-import hashlib
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Header
@@ -11,6 +10,7 @@ from dropanchor_schemas.answers import RemoteSettingsStatus
 from dropanchor_schemas.site import RemoteSettings
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.etags import etag_of, matches
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
@@ -74,9 +74,9 @@ def _change(answers: Answers, tag: Tag, patch: dict[str, Any], if_match: str | N
     """Replace the values in the patch, unless the current ones differ from `if_match`. Raises ProblemError."""
     current = answers.site.remote_settings(tag.name)
     wanted = _patched(current, patch)
-    matches = if_match in (None, "*", _etag(current))
+    is_expected = matches(if_match, current)
     with saving():
-        if not matches or not answers.site.set_remote(tag.name, wanted, expected=current):
+        if not is_expected or not answers.site.set_remote(tag.name, wanted, expected=current):
             raise ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed the settings: get them and try again.")
 
 
@@ -92,9 +92,5 @@ def _patched(current: RemoteSettings, patch: dict[str, Any]) -> RemoteSettings:
 
 def _response(answers: Answers, tag: Tag) -> Response:
     response = json_response(remote_answer(answers, tag))
-    response.headers["etag"] = _etag(answers.site.remote_settings(tag.name))
+    response.headers["etag"] = etag_of(answers.site.remote_settings(tag.name))
     return response
-
-
-def _etag(settings: RemoteSettings) -> str:
-    return f'"{hashlib.sha256(settings.model_dump_json().encode()).hexdigest()[:16]}"'

@@ -7,10 +7,17 @@ from starlette.responses import Response
 
 from dropanchor_schemas.answers import AnchorList
 from dropanchor_schemas.site import Anchor, Site
-from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.etags import Conditions
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, AnchorId, example_response, json_response, saving
+from dropanchor_service.api.routes.parameters import (
+    NO_QUERY,
+    AnchorId,
+    example_response,
+    json_response,
+    resource_response,
+    saving,
+)
 from dropanchor_service.store.site import SiteStore
 
 _BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
@@ -66,14 +73,15 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
         "/anchors/{anchor}",
         operation_id="get_anchor",
         summary="Get an anchor",
+        description="The `ETag` of the answer can go into the `If-Match` of a change.",
         response_model=Anchor,
         responses=example_response(examples.ANCHOR) | problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST),
     )
     async def get_anchor(anchor: AnchorId) -> Response:
-        for candidate in store.site.anchors:
-            if candidate.number == anchor_number(anchor):
-                return json_response(candidate.model_dump())
-        raise _unknown(anchor)
+        known = store.anchor(anchor)
+        if known is None:
+            raise _unknown(anchor)
+        return resource_response(known)
 
 
 def _add_anchor_change_routes(router: APIRouter, store: SiteStore) -> None:
@@ -82,26 +90,29 @@ def _add_anchor_change_routes(router: APIRouter, store: SiteStore) -> None:
         operation_id="put_anchor",
         summary="Create or move an anchor",
         response_model=Anchor,
-        responses=example_response(examples.ANCHOR) | problems(Kind.ANCHOR_ID_DIFFERS, *_BAD_CHANGE),
+        responses=example_response(examples.ANCHOR)
+        | problems(Kind.ANCHOR_ID_DIFFERS, Kind.CHANGED_MEANWHILE, *_BAD_CHANGE),
     )
-    def put_anchor(anchor: AnchorId, body: Annotated[Anchor, Body(examples=[examples.ANCHOR])]) -> Response:
+    def put_anchor(
+        anchor: AnchorId, body: Annotated[Anchor, Body(examples=[examples.ANCHOR])], allows: Conditions
+    ) -> Response:
         if body.id != anchor:
             raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The id is {anchor!r} in the path and {body.id!r} in the body.")
         with saving():
-            store.set_anchor(body)
-        return json_response(body.model_dump())
+            store.set_anchor(body, allows)
+        return resource_response(body)
 
     @router.delete(
         "/anchors/{anchor}",
         operation_id="delete_anchor",
         summary="Remove an anchor from the site",
         status_code=204,
-        responses=problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+        responses=problems(Kind.UNKNOWN_ANCHOR, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
-    def delete_anchor(anchor: AnchorId) -> Response:
+    def delete_anchor(anchor: AnchorId, allows: Conditions) -> Response:
         with saving():
             try:
-                store.remove_anchor(anchor)
+                store.remove_anchor(anchor, allows)
             except KeyError as error:
                 raise _unknown(anchor) from error
         return Response(status_code=204)

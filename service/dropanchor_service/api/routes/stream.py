@@ -31,7 +31,8 @@ _NAP_S = 0.2
 _DESCRIPTION = """\
 Server-sent events. The first event, `snapshot`, holds every tag that has a pose. Each `poses` event then holds the tags
 that have changed since. The data of both is a `PoseFrame`. A tag that no longer meets the conditions of the query is
-sent once more, so that a client sees it leave. A client that reads slowly gets the newest poses when it is
+sent once more, so that a client sees it leave. An event `settings` says that the site, an anchor or the settings of a
+tag have changed; its data holds the time alone. A client that reads slowly gets the newest poses when it is
 ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every
 5 s."""
 
@@ -71,6 +72,7 @@ class Changes:
         self._matching = np.empty(0, np.int64)  # rows that met the conditions when they were last looked at
         self._version = 0
         self._sent: dict[str, tuple[str, bool]] = {}  # tag → (state, online)
+        self._site_version = answers.site.version
         self._checked_s = time.monotonic()
 
     def snapshot(self) -> Answer:
@@ -85,6 +87,12 @@ class Changes:
             poses = self._with_state_changes(poses)
         poses = self._leaving_and_matching(poses)
         return self._frame(poses) if len(poses) else None
+
+    def settings(self) -> Answer | None:
+        """Return an answer with the time if the site or the settings of a tag have changed, otherwise None."""
+        version, before = self._answers.site.version, self._site_version
+        self._site_version = version
+        return None if version == before else {"t_ns": self._answers.now_ns()}
 
     def _newer(self) -> Array:
         self._version, poses = self._answers.latest.since(self._version)
@@ -110,7 +118,7 @@ class Changes:
         """Return the poses that meet the conditions, and those of tags that met them until now."""
         if self._wanted.is_everything:
             return poses
-        matching = self._wanted.matches(poses, self._answers.tags, self._answers.now_ns())
+        matching = self._wanted.matches(poses, self._answers.tags, self._answers.site, self._answers.now_ns())
         sent = matching | np.isin(poses["row"], self._matching)
         self._matching = np.union1d(np.setdiff1d(self._matching, poses["row"]), poses["row"][matching])
         return poses[sent]
@@ -126,12 +134,14 @@ async def _events(changes: Changes, period_s: float, stopping: Event) -> AsyncIt
     yield _event("snapshot", changes.snapshot())
     sent_s = time.monotonic()
     while not await stopped_within(period_s, stopping):
-        frame = changes.next()
+        frame, settings = changes.next(), changes.settings()
+        if settings is not None:
+            yield _event("settings", settings)
         if frame is not None:
             yield _event("poses", frame)
-        elif time.monotonic() - sent_s >= HEARTBEAT_S:
+        elif settings is None and time.monotonic() - sent_s >= HEARTBEAT_S:
             yield b": alive\n\n"
-        else:
+        elif settings is None:
             continue
         sent_s = time.monotonic()
 

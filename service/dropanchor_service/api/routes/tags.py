@@ -13,9 +13,17 @@ from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.care import care_of, health_answer
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.etags import Conditions, Precondition
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
-from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
+from dropanchor_service.api.routes.parameters import (
+    NO_QUERY,
+    TagId,
+    example_response,
+    json_response,
+    resource_response,
+    saving,
+)
 from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
 
@@ -27,6 +35,7 @@ def tags_router(answers: Answers, max_tags: int) -> APIRouter:
     _add_list_routes(router, answers)
     _add_status_route(router, answers)
     _add_settings_routes(router, answers, max_tags)
+    _add_delete_route(router, answers)
     return router
 
 
@@ -41,7 +50,7 @@ def _add_list_routes(router: APIRouter, answers: Answers) -> None:
     def list_tags() -> Response:
         now_ns = answers.now_ns()
         offsets = answers.clock_offsets.clock_offsets(now_ns)
-        return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, answers.tags.all(), offsets, now_ns))})
+        return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, answers.tags.listed(), offsets, now_ns))})
 
     @router.get(
         "/newcomers",
@@ -80,7 +89,7 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
         responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
     async def get_tag_settings(tag: TagId) -> Response:
-        return json_response(answers.site.tag_settings(known_tag(answers, tag).name).model_dump())
+        return resource_response(answers.site.tag_settings(known_tag(answers, tag).name))
 
     @router.put(
         "/tags/{tag}/settings",
@@ -88,19 +97,37 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
         summary="Replace the settings of a tag",
         description="An unknown tag is registered. What the body leaves out is as in `tag_defaults` of the service's "
         "settings. The estimator of the tag restarts with the new settings, from "
-        "`start` if it is given.",
+        "`start` if it is given, unless only `name`, `colour` and `group` have changed.",
         response_model=TagSettings,
         responses=example_response(examples.TAG_SETTINGS)
-        | problems(Kind.TAGS_FULL, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+        | problems(Kind.TAGS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
     def put_tag_settings(
-        tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])]
+        tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])], allows: Conditions
     ) -> Response:
-        _register(answers, tag, settings, max_tags)
-        return json_response(answers.site.tag_settings(tag).model_dump())
+        _register(answers, tag, settings, max_tags, allows)
+        return resource_response(answers.site.tag_settings(tag))
 
 
-def _register(answers: Answers, tag: str, settings: TagSettings, max_tags: int) -> None:
+def _add_delete_route(router: APIRouter, answers: Answers) -> None:
+    @router.delete(
+        "/tags/{tag}",
+        operation_id="delete_tag",
+        summary="Delete a tag: its settings, its counters and its pose",
+        description="Its stored tracks stay. A tag that still sends is back with its next message, with the settings "
+        "in `tag_defaults`.",
+        status_code=204,
+        responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+    )
+    def delete_tag(tag: TagId, allows: Conditions) -> Response:
+        known = known_tag(answers, tag)
+        with saving():
+            answers.site.remove_tag(known.name, answers.now_ns(), allows)
+        answers.forget(known)
+        return Response(status_code=204)
+
+
+def _register(answers: Answers, tag: str, settings: TagSettings, max_tags: int, allows: Precondition) -> None:
     """Store the settings of a tag, and register it if it is unknown. Raises ProblemError."""
     try:
         refuse_pattern(tag)
@@ -109,7 +136,7 @@ def _register(answers: Answers, tag: str, settings: TagSettings, max_tags: int) 
     if answers.tags.find(tag) is None and len(answers.tags) >= max_tags:
         raise ProblemError(Kind.TAGS_FULL, f"{max_tags} tags are registered already. Raise `max_tags` to allow more.")
     with saving():
-        answers.site.set_tag(tag, settings)
+        answers.site.set_tag(tag, settings, allows)
     answers.tags.register(tag)
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 
+from dropanchor_schemas.site import TagSettings
 from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.api.routes.stream import Changes
 from dropanchor_service.estimation.columns import Frame, State
@@ -15,6 +16,7 @@ def bench() -> ApiBench:
     bench = make_api_bench()
     bench.move("cart-1", x=1.0, y=1.0)
     bench.move("Cart-2", x=5.0, y=-2.5, state=State.DEGRADED)
+    bench.answers.site.set_tag("cart-1", TagSettings(group="carts"))
     bench.move("drone", x=1.5, y=1.5, frame=Frame.RELATIVE)
     return bench
 
@@ -30,6 +32,9 @@ def bench() -> ApiBench:
         ("text=CART", ["cart-1", "Cart-2"]),
         ("text=cart&state=tracking&box=0,0,2,2", ["cart-1"]),
         ("tags=drone,Cart-2&text=rt", ["Cart-2"]),
+        ("group=carts", ["cart-1"]),
+        ("group=carts&group=", ["cart-1", "Cart-2", "drone"]),
+        ("group=nobody", []),
     ],
 )
 def test_a_list_holds_the_tags_that_meet_every_condition(bench: ApiBench, query: str, tags: list[str]) -> None:
@@ -43,7 +48,7 @@ def test_a_state_is_that_of_the_answer_and_not_of_the_estimator(bench: ApiBench)
     assert ask(bench.app(), "GET", "/api/v1/poses?state=tracking").json()["poses"] == []
 
 
-@pytest.mark.parametrize("query", ["state=fine", "box=1,2,3", "box=a,b,c,d", "box=1,2,3,nan", "group=a"])
+@pytest.mark.parametrize("query", ["state=fine", "box=1,2,3", "box=a,b,c,d", "box=1,2,3,nan", "team=a"])
 def test_a_condition_that_cannot_be_understood_is_refused(bench: ApiBench, query: str) -> None:
     assert kind_of(ask(bench.app(), "GET", f"/api/v1/poses?{query}")) == "invalid-request"
 

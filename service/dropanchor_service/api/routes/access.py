@@ -1,0 +1,26 @@
+"""The route that tells a client what it may do, so that a page offers only what works."""
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from dropanchor_schemas.answers import ClientAccess
+from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.security.identity import Scope
+
+
+def access_router() -> APIRouter:
+    router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
+
+    @router.get(
+        "/access",
+        operation_id="get_access",
+        summary="Get what the credentials of this request allow",
+        response_model=ClientAccess,
+        responses=example_response({"scope": "admin"}) | problems(Kind.INVALID_REQUEST),
+    )
+    async def get_access(request: Request) -> Response:
+        scope: Scope = getattr(request.state, "scope", Scope.ADMIN)  # without authentication everybody may do all
+        return json_response({"scope": scope.word})
+
+    return router
