@@ -8,6 +8,7 @@ export class KeyRequiredError extends Error {}
 export class StartingError extends Error {}
 
 const UNAVAILABLE = 503;
+const CHANGED_MEANWHILE = 412;
 const NOT_READY = "urn:dropanchor:problem:not-ready";
 
 export const hasKey = () => sessionStorage.getItem(STORAGE_KEY) !== null;
@@ -31,14 +32,21 @@ export async function request(url, options) {
   return response;
 }
 
+/** Somebody changed the resource since this page has read it. */
+export class ChangedMeanwhileError extends Error {}
+
 /**
- * Send a change as JSON. Throws Error with the sentence of the service when it refuses the change.
- * @param {URL} url @param {"PUT" | "POST" | "DELETE"} method @param {object} body
+ * Send a change. Return the ETag of the new resource, empty after a deletion. Throws ChangedMeanwhileError when the
+ * conditions are not met, and Error with the sentence of the service when it refuses the change.
+ * @param {URL} url @param {"PUT" | "DELETE"} method @param {object | null} body
+ * @param {Record<string, string>} conditions headers
  */
-export async function sendJson(url, method, body) {
-  const headers = { ...authorization(), "content-type": "application/json" };
-  const response = await fetch(url, { method, headers, body: JSON.stringify(body), cache: "no-store" });
-  if (!response.ok) throw new Error((await response.json()).detail);
+export async function sendChange(url, method, body, conditions) {
+  const headers = { ...authorization(), ...conditions, "content-type": "application/json" };
+  const response = await fetch(url, { method, headers, body: body && JSON.stringify(body), cache: "no-store" });
+  if (response.ok) return response.headers.get("etag") ?? "";
+  const { detail } = await response.json();
+  throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
 }
 
 /** @returns {Record<string, string>} */

@@ -21,7 +21,8 @@ export async function getJson(url) {
 }
 
 /**
- * Events: "snapshot" and "change" (detail: Frame), "site" (detail: Site), "status" (see `status`).
+ * Events: "snapshot" and "change" (detail: Frame), "site" (detail: Site), "settings" (some have changed), "status" (see
+ * `status`).
  * The site is requested every few seconds, since its anchors may have moved and a silent stream may be dead.
  */
 export class Connection extends EventTarget {
@@ -72,7 +73,8 @@ export class Connection extends EventTarget {
       const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal });
       this.#opened();
       for await (const { name, data } of eventsOf(response)) {
-        this.#dispatch(name === "snapshot" ? "snapshot" : "change", data);
+        if (name === "settings") this.refresh();
+        else this.#dispatch(name === "snapshot" ? "snapshot" : "change", data);
       }
       this.#failed();
     } catch (error) {
@@ -108,12 +110,22 @@ export class Connection extends EventTarget {
     this.#timer = setTimeout(() => this.#open(), RETRY_MS[Math.min(this.#attempt++, RETRY_MS.length - 1)]);
   }
 
-  async #probe() {
+  /** Request the site now, since it or the settings of a tag have changed. */
+  refresh() {
+    this.dispatchEvent(new Event("settings"));
+    this.#requestSite();
+  }
+
+  async #requestSite() {
     try {
       if (this.status !== "locked") this.dispatchEvent(new CustomEvent("site", { detail: await getJson(api("site")) }));
     } catch (error) {
       if (this.status === "live") this.#failed(error);
     }
+  }
+
+  async #probe() {
+    await this.#requestSite();
     setTimeout(() => this.#probe(), PROBE_MS);
   }
 

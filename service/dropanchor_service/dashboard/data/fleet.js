@@ -21,6 +21,8 @@ const VALUES = /** @type {const} */ (["reason", "hint", "frame", "anchor", "hypo
  * @property {{semi_major_m: number, semi_minor_m: number, angle_rad: number} | null} [ellipse_95]
  */
 
+/** @typedef {{name?: string, group?: string, colour?: string | null}} Given by an operator to a tag */
+
 /**
  * A frame of the stream: `tags` and columns beside it. Values of a missing column stay unchanged.
  * @typedef {{t_ns: number, tags: string[]} & Record<string, any>} Frame
@@ -36,6 +38,14 @@ export class Fleet {
   membership = 0;
   /** @type {string[]} */
   names = [];
+  /** What people call the tag: its display name, or its id. @type {string[]} */
+  labels = [];
+  /** Empty: none. @type {string[]} */
+  groups = [];
+  /** Empty: none. @type {string[]} */
+  colours = [];
+  /** @type {ReadonlyMap<string, {settings: Given}>} */
+  #described = new Map();
   /** @type {Map<string, number>} */
   #rows = new Map();
   state = new Uint8Array(0);
@@ -80,6 +90,22 @@ export class Fleet {
     return row >= 0 && !Number.isNaN(this.poseTime[row]);
   }
 
+  /** Set what an operator has given to the tags, by name. @param {ReadonlyMap<string, {settings: Given}>} statuses */
+  describe(statuses) {
+    this.#described = statuses;
+    for (let row = 0; row < this.size; row++) this.#describeRow(row);
+  }
+
+  /** @param {number} row */
+  #describeRow(row) {
+    const { name = "", group = "", colour = null } = this.#described.get(this.names[row])?.settings ?? {};
+    const label = name || this.names[row];
+    if (label !== this.labels[row] || group !== this.groups[row]) this.membership++;
+    this.labels[row] = label;
+    this.groups[row] = group;
+    this.colours[row] = colour ?? "";
+  }
+
   /** Apply a frame that changes some tags. @param {Frame} frame @param {number} now_ms */
   apply(frame, now_ms) {
     const rows = this.#rowsOf(frame.tags);
@@ -101,6 +127,9 @@ export class Fleet {
   #clear() {
     this.size = 0;
     this.names = [];
+    this.labels = [];
+    this.groups = [];
+    this.colours = [];
     this.#rows.clear();
     this.membership++;
   }
@@ -117,6 +146,7 @@ export class Fleet {
     const row = this.size++;
     if (row >= this.state.length) this.#grow();
     this.names.push(name);
+    this.#describeRow(row);
     this.#rows.set(name, row);
     this.membership++;
     for (const column of Object.values(this.number)) column[row] = NaN;

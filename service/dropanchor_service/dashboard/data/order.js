@@ -33,7 +33,7 @@ export class Order {
   #updateKeys(fleet) {
     if (fleet.membership === this.#membership) return;
     this.#membership = fleet.membership;
-    this.#keys = fleet.names.map(nameKey);
+    this.#keys = fleet.labels.map(nameKey);
   }
 
   /** @param {number} a @param {number} b */

@@ -17,7 +17,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {Health | null} health what the tag reports about itself
  * @property {{offset_s: number, uncertainty_s: number} | null} clock_offset of motion, ahead of the ranges
  * @property {{reason: string, hint: string}[]} needs_care what a person should do for the tag
- * @property {{height_m: number}} settings
+ * @property {{height_m: number, name: string, group: string, colour: string | null}} settings
  */
 
 /**
@@ -33,7 +33,8 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {number} [lost_messages]
  */
 
-export class Roster {
+/** Event: "removed", when tags are no longer known to the service. */
+export class Roster extends EventTarget {
   /** @type {Map<string, TagStatus>} */
   #statuses = new Map();
 
@@ -42,6 +43,7 @@ export class Roster {
 
   /** @param {import("./fleet.js").Fleet} fleet */
   constructor(fleet) {
+    super();
     this.fleet = fleet;
   }
 
@@ -85,9 +87,12 @@ export class Roster {
 
   /** @param {TagStatus[]} statuses */
   #update(statuses) {
+    const before = this.#statuses;
     this.#statuses = new Map(statuses.map((status) => [status.tag, status]));
     const poseless = statuses.filter(({ tag }) => !this.fleet.hasPose(this.fleet.row(tag)));
     const tags = poseless.map(({ tag }) => tag);
     this.fleet.apply({ t_ns: 0, tags, online: poseless.map(({ online }) => online) }, 0);
+    this.fleet.describe(this.#statuses);
+    if ([...before.keys()].some((tag) => !this.#statuses.has(tag))) this.dispatchEvent(new Event("removed"));
   }
 }

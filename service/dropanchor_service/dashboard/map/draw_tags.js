@@ -118,7 +118,7 @@ function drawLabel({ ctx, view, palette, fleet, now_ms }, row, important, taken)
 /** Return the name, and a note about the age or the ambiguity of the pose. @param {import("../data/fleet.js").Fleet} fleet
  * @param {number} row @param {number} now_ms @returns {{name: string, note: string}} */
 function labelOf(fleet, row, now_ms) {
-  const name = fleet.names[row];
+  const name = fleet.labels[row];
   if (fleet.staleness(row, now_ms)) return { name, note: ` · ${age(fleet.age(row, now_ms))} ago` };
   return { name, note: fleet.state[row] === AMBIGUOUS ? " ?" : "" };
 }
@@ -139,6 +139,18 @@ function movedInto(box, free) {
 
 /** @param {number[]} a @param {number[]} b left, top, right, bottom */
 const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+
+/** Draw a ring in the colour that an operator has given to a tag. The dot keeps the colour of its state. @param {Scene} scene */
+export function drawColours({ ctx, view, fleet, rows }) {
+  ctx.lineWidth = 2.5;
+  for (const row of rows) {
+    if (!fleet.colours[row] || hasGhosts(fleet, row)) continue;
+    ctx.beginPath();
+    ctx.arc(view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), markerRadius(rows.length) + 3, 0, 2 * Math.PI);
+    ctx.strokeStyle = fleet.colours[row];
+    ctx.stroke();
+  }
+}
 
 /** @param {Scene} scene */
 export function drawSelection({ ctx, view, palette, fleet, selected, hovered, rows }) {

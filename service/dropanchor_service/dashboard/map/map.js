@@ -3,7 +3,7 @@
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
 import { drawEvidence } from "./draw_evidence.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
-import { drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
+import { drawColours, drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
 import { follow } from "../data/motion.js";
 import { readPalette, withoutStates } from "./palette.js";
@@ -28,6 +28,8 @@ export class LiveMap extends EventTarget {
   underlays = [];
   /** Return whether a click was meant for something else than the tags. */
   pressed = (/** @type {number} */ _px, /** @type {number} */ _py) => false;
+  /** Draw over everything else. @type {((ctx: CanvasRenderingContext2D, view: View, palette: import("./palette.js").Palette) => void)[]} */
+  overlays = [];
   /** Keep all tags in view until the user moves the map. */
   autoFit = true;
   /** For tests and the console: figures of the last drawing. */
@@ -214,6 +216,7 @@ export class LiveMap extends EventTarget {
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
     if (centre) drawRings(this.#ctx, view, palette, centre);
     this.#drawTags(scene, isShown);
+    for (const drawOver of this.overlays) drawOver(this.#ctx, view, palette);
     drawScaleBar(this.#ctx, view, palette);
   }
 
@@ -230,6 +233,7 @@ export class LiveMap extends EventTarget {
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, isShown);
     const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
+    drawColours(apart);
     drawSelection(apart);
     this.stats.labels = drawLabels(apart);
     drawMarkers(apart);

@@ -8,6 +8,7 @@ export class Choice extends EventTarget {
   #follow = false;
   #text = "";
   #onlyCare = false;
+  #group = "";
   /** @type {Set<number>} */
   hiddenStates = new Set();
 
@@ -65,22 +66,34 @@ export class Choice extends EventTarget {
     this.#changed();
   }
 
+  /** The group that is shown; empty: all tags. */
+  get group() {
+    return this.#group;
+  }
+
+  set group(group) {
+    this.#group = group;
+    this.#changed();
+  }
+
   showAll() {
     this.#text = "";
+    this.#group = "";
     this.#onlyCare = false;
     this.hiddenStates.clear();
     this.#changed();
   }
 
   get isFiltered() {
-    return this.#text !== "" || this.#onlyCare || this.hiddenStates.size > 0;
+    return this.#text !== "" || this.#group !== "" || this.#onlyCare || this.hiddenStates.size > 0;
   }
 
   /** @param {import("../data/fleet.js").Fleet} fleet @param {number} row */
   shows(fleet, row) {
     if (this.hiddenStates.size > 0 && this.hiddenStates.has(fleet.state[row])) return false;
     if (this.#onlyCare && !this.needsCare(fleet.names[row])) return false;
-    return this.#text === "" || fleet.names[row].toLowerCase().includes(this.#text);
+    if (this.#group !== "" && fleet.groups[row] !== this.#group) return false;
+    return this.#text === "" || `${fleet.labels[row]}\n${fleet.names[row]}`.toLowerCase().includes(this.#text);
   }
 
   #changed() {

@@ -1,6 +1,5 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
-import { AddAnchor } from "../panel/add_anchor.js";
 import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
@@ -15,6 +14,7 @@ import { Measure } from "../map/measure.js";
 import { Notices } from "../panel/notices.js";
 import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
+import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
 import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
@@ -34,7 +34,7 @@ const map = new LiveMap(byId("map"), byId("tools"), fleet, trails, roster, choic
 const chips = new StateChips(byId("chips"), fleet, choice);
 const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
-const addAnchor = new AddAnchor(byId("detail"), roster, choice, () => [map.view.x, map.view.y]);
+const setup = new Setup(map, fleet, roster, choice, connection);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -64,7 +64,7 @@ function announce(tag) {
   const row = fleet.row(tag);
   const { x, y } = fleet.number;
   const place = `x ${fixed(x[row], 1)} m, y ${fixed(y[row], 1)} m`;
-  byId("spoken").textContent = `${tag} selected: ${fleet.style(row).label}, ${place}`;
+  byId("spoken").textContent = `${fleet.labels[row]} selected: ${fleet.style(row).label}, ${place}`;
 }
 
 /** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} update @returns {(event: Event) => void} */
@@ -87,6 +87,8 @@ connection.addEventListener("snapshot", receiver((frame, now_ms) => {
   connection.slowDownFor(fleet.size);
 }));
 connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(frame, now_ms)));
+connection.addEventListener("settings", () => roster.refresh());
+roster.addEventListener("removed", () => connection.retry());
 connection.addEventListener("status", () => {
   if (connection.status === "live" || past.active) return;
   fleet.current = false;
@@ -95,7 +97,7 @@ connection.addEventListener("status", () => {
 });
 connection.addEventListener("site", (event) => {
   const site = /** @type {CustomEvent} */ (event).detail;
-  map.setAnchors(site.anchors);
+  setup.setSite(site);
   measure.rotation_rad = detail.rotation_rad = site.georeference?.rotation_rad ?? 0;
   past.figures.georeferenced = site.georeference !== null;
   byId("site").textContent = site.name || site.id;
@@ -108,8 +110,8 @@ function updatePanels() {
   chips.update();
   care.update();
   detail.update();
-  addAnchor.update();
   past.update();
+  setup.update();
   notices.update();
   byId("crowd").hidden = !map.stats.density;
   map.redraw();
@@ -155,8 +157,10 @@ Object.defineProperty(window, "dropanchor", {
       return Array.from({ length: trail?.length ?? 0 }, (_, i) => /** @type {any} */ (trail).x[/** @type {any} */ (trail).at(i)]);
     },
     drawing: () => ({ ...map.stats, still: map.still }),
+    anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),
     tags: () => fleet.names.map((tag, row) => ({
       tag,
+      label: fleet.labels[row],
       state: fleet.style(row).name,
       x: fleet.number.x[row],
       y: fleet.number.y[row],

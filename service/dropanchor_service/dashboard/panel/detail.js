@@ -73,7 +73,8 @@ export class Detail {
     const state = this.fleet.style(row);
     const name = this.fleet.names[row];
     this.panel.dataset.state = state.name;
-    put(this.#part("name"), name);
+    put(this.#part("name"), this.fleet.labels[row]);
+    put(this.#part("id"), this.fleet.labels[row] === name ? "" : name);
     put(this.#part("state"), state.label);
     this.#part("symbol").replaceChildren(symbol(state.name).svg);
     const { current, value } = this.fleet;

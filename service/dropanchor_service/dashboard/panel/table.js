@@ -108,6 +108,7 @@ export class TagTable {
     const state = fleet.style(row);
     const seconds = fleet.age(row, now_ms);
     const name = fleet.names[row];
+    const label = fleet.labels[row];
     set(line.element.dataset, "tag", name);
     set(line.element.dataset, "state", state.name);
     set(line.element.dataset, "stale", String(fleet.staleness(row, now_ms)));
@@ -115,12 +116,14 @@ export class TagTable {
     attribute(line.element, "aria-selected", String(name === this.choice.selected));
     attribute(line.use, "href", `#s-${state.name}`);
     const texts = [
-      this.#names.of(name), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
+      this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
       age(seconds), !fleet.current ? UNKNOWN : fleet.online[row] ? "online" : "offline",
     ];
     texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));
-    attribute(line.cells[0], "title", name);
-    attribute(line.cells[0], "aria-label", name);
+    const full = label === name ? name : `${label} (${name})`;
+    attribute(line.cells[0], "title", full);
+    attribute(line.cells[0], "aria-label", full);
+    line.cells[0].style.setProperty("--mark", fleet.colours[row] || "transparent");
     line.cells[7].classList.toggle("yes", fleet.current && fleet.online[row] === 1);
   }
 

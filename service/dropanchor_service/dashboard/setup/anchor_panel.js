@@ -1,0 +1,102 @@
+/** The panel of the anchors: a list, and a form for the one that is being edited. */
+
+import { fixed } from "../data/format.js";
+import { nameKey } from "../data/order.js";
+import { confirmed } from "./confirm.js";
+
+const FIELDS = /** @type {const} */ (["x", "y", "z"]);
+
+export class AnchorPanel {
+  /** @param {HTMLElement} panel @param {HTMLButtonElement} toggle @param {HTMLDialogElement} dialog
+   * @param {import("./anchors.js").AnchorEditor} editor @param {import("../data/changes.js").Changes} changes */
+  constructor(panel, toggle, dialog, editor, changes) {
+    this.panel = panel;
+    this.toggle = toggle;
+    this.editor = editor;
+    this.changes = changes;
+    this.dialog = dialog;
+    this.list = this.#part("list");
+    this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
+    toggle.addEventListener("click", () => (editor.isOpen ? editor.close() : editor.open()));
+    this.#part("close").addEventListener("click", () => editor.close());
+    this.#part("new").addEventListener("click", () => this.add());
+    this.#part("delete").addEventListener("click", () => this.#delete());
+    this.form.addEventListener("input", () => this.#typed());
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      editor.save();
+    });
+    this.form.addEventListener("reset", (event) => {
+      event.preventDefault();
+      editor.cancel();
+    });
+    this.list.addEventListener("click", (event) => {
+      const id = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset.anchor;
+      if (id !== undefined) editor.select(id);
+    });
+    for (const source of [editor, changes]) for (const name of ["change", "access"]) source.addEventListener(name, () => this.#update());
+    this.#update();
+  }
+
+  /** Begin a new anchor. @param {string} [id] */
+  add(id) {
+    this.editor.add(id);
+    this.#field(id ? "x" : "id").select();
+  }
+
+  /** @param {string} name */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
+  }
+
+  /** @param {string} name */
+  #field(name) {
+    return /** @type {HTMLInputElement} */ (this.form.elements.namedItem(name));
+  }
+
+  #update() {
+    const { editor, changes } = this;
+    const { draft } = editor;
+    this.toggle.hidden = !changes.mayWrite;
+    this.toggle.setAttribute("aria-pressed", String(editor.isOpen));
+    this.panel.hidden = !editor.isOpen;
+    this.#fillList();
+    this.form.hidden = draft === null;
+    this.#part("delete").hidden = editor.isNew || !changes.mayDelete;
+    this.#part("save").textContent = editor.isNew ? "Add" : "Save";
+    this.#field("id").readOnly = !editor.isNew;
+    if (!draft) return;
+    if (this.#field("id").value !== draft.id) this.#field("id").value = draft.id;
+    for (const name of FIELDS) if (this.#field(name).valueAsNumber !== draft[name]) this.#field(name).value = String(draft[name]);
+  }
+
+  #fillList() {
+    const { draft, isNew } = this.editor;
+    const anchors = [...this.editor.anchors].sort((a, b) => (nameKey(a.id) < nameKey(b.id) ? -1 : 1));
+    const texts = anchors.map(({ id, x, y, z }) => `${id}: ${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(z, 2)} m`);
+    const shown = JSON.stringify([texts, draft?.id, isNew]);
+    if (this.list.dataset.shown === shown) return;
+    this.list.dataset.shown = shown;
+    const focused = /** @type {HTMLElement | null} */ (document.activeElement)?.dataset.anchor;
+    this.list.replaceChildren(...anchors.map(({ id }, i) => {
+      const button = Object.assign(document.createElement("button"), { type: "button", textContent: texts[i] });
+      button.dataset.anchor = id;
+      button.setAttribute("aria-pressed", String(!isNew && id === draft?.id));
+      const line = document.createElement("li");
+      line.append(button);
+      return line;
+    }));
+    for (const button of this.list.querySelectorAll("button")) if (button.dataset.anchor === focused) button.focus();
+  }
+
+  #typed() {
+    const values = Object.fromEntries(FIELDS.map((name) => [name, this.#field(name).valueAsNumber]));
+    if (FIELDS.some((name) => Number.isNaN(values[name]))) return; // the form says what is missing when it is sent
+    this.editor.change({ id: this.#field("id").value, ...values });
+  }
+
+  async #delete() {
+    const question = `Delete anchor ${this.editor.draft?.id}? Its ranges are no longer used.`;
+    if (await confirmed(this.dialog, question, "Delete")) await this.editor.remove();
+  }
+}

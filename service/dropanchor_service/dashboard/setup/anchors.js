@@ -1,0 +1,203 @@
+/** Place, move, add and delete anchors. A draft is on the map only until it is saved or cancelled. */
+
+import { toCentimetre } from "./gestures.js";
+
+/** @typedef {import("../map/draw_site.js").Anchor} Anchor */
+/** @typedef {import("../data/changes.js").Seen} Seen */
+
+const REACH_PX = 18;
+const DRAG_PX = 4;
+const STEP_M = 0.1;
+const LARGE_STEP_M = 1;
+/** Arrow keys save once no other key has followed for this time. */
+const PAUSE_MS = 700;
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
+/** @param {string} id */
+const pathOf = (id) => `anchors/${encodeURIComponent(id)}`;
+
+/** Event: "change". */
+export class AnchorEditor extends EventTarget {
+  isOpen = false;
+  /** Whether the draft is an anchor that the site does not have yet. */
+  isNew = false;
+  /** @type {readonly Anchor[]} */
+  anchors = [];
+  /** The anchor that is being edited. @type {Anchor | null} */
+  draft = null;
+  #isDirty = false;
+  /** @type {Promise<Seen | null>} */
+  #seen = Promise.resolve(null);
+  /** 0: nothing waits to be saved. */
+  #timer = 0;
+  /** Where the draft was grabbed, and how far from its centre. */
+  #grab = { px: 0, py: 0, dx: 0, dy: 0, moves: false };
+
+  /** @param {import("../map/map.js").LiveMap} map @param {import("../data/changes.js").Changes} changes */
+  constructor(map, changes) {
+    super();
+    this.map = map;
+    this.changes = changes;
+  }
+
+  /** Take the anchors that the site has now. @param {readonly Anchor[]} anchors */
+  setAnchors(anchors) {
+    this.anchors = anchors;
+    const known = anchors.find(({ id }) => id === this.draft?.id);
+    if (!this.#isDirty && !this.isNew && this.draft) {
+      if (!known) this.draft = null;
+      else if (JSON.stringify(known) !== JSON.stringify(this.draft)) this.#edit(known);
+    }
+    this.#changed();
+  }
+
+  open() {
+    this.isOpen = true;
+    this.#changed();
+  }
+
+  close() {
+    if (this.#timer) this.save();
+    this.isOpen = false;
+    this.#discard();
+    this.#changed();
+  }
+
+  /** @param {string} id */
+  select(id) {
+    const anchor = this.anchors.find((known) => known.id === id);
+    if (!anchor || (this.draft?.id === id && !this.isNew)) return;
+    if (this.#timer) this.save();
+    this.#discard();
+    this.#edit(anchor);
+    this.#changed();
+  }
+
+  /** Begin a new anchor at the centre of the map. @param {string} [id] */
+  add(id = "") {
+    this.#discard();
+    this.isNew = this.isOpen = true;
+    this.draft = { id, x: toCentimetre(this.map.view.x), y: toCentimetre(this.map.view.y), z: 0 };
+    this.#changed();
+  }
+
+  /** Change the draft. @param {Partial<Anchor>} values */
+  change(values) {
+    if (!this.draft) return;
+    this.draft = { ...this.draft, ...values };
+    this.#isDirty = true;
+    this.#changed();
+  }
+
+  async save() {
+    this.#stopTimer();
+    const { draft, isNew } = this;
+    if (!draft || (!isNew && !this.#isDirty)) return;
+    const seen = await this.#seen;
+    const take = () => this.#takeNewer(draft.id);
+    const done = isNew
+      ? await this.changes.create(`Anchor ${draft.id} added.`, pathOf(draft.id), draft)
+      : seen !== null && (await this.changes.edit(`Anchor ${draft.id} moved.`, pathOf(draft.id), draft, seen, take));
+    if (!done || this.draft !== draft) return;
+    this.anchors = [...this.anchors.filter(({ id }) => id !== draft.id), draft];
+    this.#edit(draft);
+    this.#changed();
+  }
+
+  async remove() {
+    const { draft } = this;
+    if (!draft) return;
+    const restore = { path: pathOf(draft.id), value: draft, conditions: { "if-none-match": "*" } };
+    const known = this.anchors.find(({ id }) => id === draft.id) ?? draft;
+    if (!(await this.changes.remove(`Anchor ${draft.id} deleted.`, restore.path, { ...restore, value: known }))) return;
+    this.anchors = this.anchors.filter(({ id }) => id !== draft.id);
+    this.cancel();
+  }
+
+  /** Discard what is not saved. Return whether there was anything. */
+  cancel() {
+    if (!this.draft) return false;
+    this.#discard();
+    this.#changed();
+    return true;
+  }
+
+  /** @param {import("./gestures.js").Spot} at */
+  press({ x, y, px, py }) {
+    if (!this.isOpen) return false;
+    const { view } = this.map;
+    const near = this.map.anchors.find((anchor) => Math.hypot(view.screenX(anchor.x) - px, view.screenY(anchor.y) - py) < REACH_PX);
+    if (near) {
+      if (near.id !== this.draft?.id) this.select(near.id);
+      this.#grab = { px, py, dx: near.x - x, dy: near.y - y, moves: false };
+      return true;
+    }
+    if (!this.isNew) return false;
+    this.#grab = { px, py, dx: 0, dy: 0, moves: true };
+    this.drag({ x, y, px, py });
+    return true;
+  }
+
+  /** @param {import("./gestures.js").Spot} at */
+  drag({ x, y, px, py }) {
+    const grab = this.#grab;
+    grab.moves ||= Math.hypot(px - grab.px, py - grab.py) >= DRAG_PX;
+    if (grab.moves) this.change({ x: toCentimetre(x + grab.dx), y: toCentimetre(y + grab.dy) });
+  }
+
+  drop() {
+    if (!this.isNew) this.save();
+  }
+
+  /** @param {KeyboardEvent} event */
+  key(event) {
+    const direction = ARROWS[/** @type {keyof typeof ARROWS} */ (event.key)];
+    if (!this.draft || !this.isOpen) return false;
+    if (event.key === "Enter") this.save();
+    if (!direction) return event.key === "Enter";
+    const step = event.shiftKey ? LARGE_STEP_M : STEP_M;
+    this.change({ x: toCentimetre(this.draft.x + step * direction[0]), y: toCentimetre(this.draft.y + step * direction[1]) });
+    this.#stopTimer();
+    if (!this.isNew) this.#timer = setTimeout(() => this.save(), PAUSE_MS);
+    return true;
+  }
+
+  /** @param {Anchor} anchor @param {Promise<Seen | null>} [seen] as read from the service */
+  #edit(anchor, seen = this.changes.read(pathOf(anchor.id)).catch(() => null)) {
+    this.draft = anchor;
+    this.isNew = this.#isDirty = false;
+    this.#seen = seen;
+  }
+
+  /** @param {string} id */
+  async #takeNewer(id) {
+    this.#discard();
+    try {
+      const seen = await this.changes.read(pathOf(id));
+      this.anchors = [...this.anchors.filter((known) => known.id !== id), seen.value];
+      this.#edit(seen.value, Promise.resolve(seen));
+    } catch {
+      this.anchors = this.anchors.filter((known) => known.id !== id);
+    }
+    this.#changed();
+  }
+
+  #stopTimer() {
+    clearTimeout(this.#timer);
+    this.#timer = 0;
+  }
+
+  #discard() {
+    this.#stopTimer();
+    this.draft = null;
+    this.isNew = this.#isDirty = false;
+  }
+
+  #changed() {
+    const { draft } = this;
+    const shown = draft ? [...this.anchors.filter(({ id }) => id !== draft.id), draft] : this.anchors;
+    this.map.setAnchors(shown);
+    this.map.redraw();
+    this.dispatchEvent(new Event("change"));
+  }
+}

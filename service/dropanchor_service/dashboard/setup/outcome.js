@@ -1,0 +1,45 @@
+/** Say what became of a change, and offer to undo it or to settle a conflict. */
+
+const SHOWN_MS = 12_000;
+
+export class Outcome {
+  #timer = 0;
+
+  /** @param {HTMLElement} box @param {import("../data/changes.js").Changes} changes */
+  constructor(box, changes) {
+    this.box = box;
+    this.changes = changes;
+    changes.addEventListener("done", (event) => this.#done(detailOf(event)));
+    changes.addEventListener("failed", (event) => this.#show(detailOf(event), []));
+    changes.addEventListener("conflict", (event) => this.#conflict(detailOf(event)));
+  }
+
+  /** @param {string} what */
+  #done(what) {
+    this.#show(what, this.changes.canUndo ? [["Undo", () => this.changes.undo()]] : []);
+    this.#timer = setTimeout(() => (this.box.hidden = true), SHOWN_MS);
+  }
+
+  /** @param {import("../data/changes.js").Conflict} conflict */
+  #conflict({ what, keep, take }) {
+    this.#show(`Somebody else changed the same meanwhile. Not done: ${what}`, [["Take the newer one", take], ["Keep mine", keep]]);
+  }
+
+  /** @param {string} text @param {[string, () => void][]} choices */
+  #show(text, choices) {
+    clearTimeout(this.#timer);
+    const message = Object.assign(document.createElement("span"), { textContent: text });
+    this.box.replaceChildren(message, ...[...choices, /** @type {[string, () => void]} */ (["Close", () => {}])].map(([label, act]) => {
+      const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: label });
+      button.addEventListener("click", () => {
+        this.box.hidden = true;
+        act();
+      });
+      return button;
+    }));
+    this.box.hidden = false;
+  }
+}
+
+/** @param {Event} event */
+const detailOf = (event) => /** @type {CustomEvent} */ (event).detail;

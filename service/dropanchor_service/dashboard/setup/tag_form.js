@@ -1,0 +1,46 @@
+/** Fill the form of a tag's settings, and read it. */
+
+const DEGREES = 180 / Math.PI;
+
+/** Colours that differ for people with any colour vision, and that show on both themes. */
+const COLOURS = [
+  ["Blue", "#2f7fd0"], ["Orange", "#d97a0a"], ["Green", "#1b8a6b"], ["Yellow", "#b89b00"], ["Pink", "#c7609a"],
+  ["Red", "#cf4a12"], ["Grey", "#7a8793"],
+];
+
+/** @param {HTMLFormElement} form @param {string} name */
+const field = (form, name) => /** @type {HTMLInputElement} */ (form.elements.namedItem(name));
+
+/** Return the number in a field; null when it is empty. @param {HTMLInputElement} input */
+export const numberOf = (input) => (Number.isNaN(input.valueAsNumber) ? null : input.valueAsNumber);
+
+/** @param {HTMLFormElement} form @param {Record<string, any>} settings @param {Set<string>} groups that other tags have */
+export function fillForm(form, settings, groups) {
+  const colour = /** @type {HTMLSelectElement} */ (form.elements.namedItem("colour"));
+  const known = COLOURS.some(([, value]) => value === settings.colour);
+  const choices = [["None", ""], ...COLOURS, ...(settings.colour && !known ? [[settings.colour, settings.colour]] : [])];
+  colour.replaceChildren(...choices.map(([text, value]) => new Option(text, value)));
+  const angle = settings.mount_angle_rad;
+  /** @type {Record<string, string>} */
+  const texts = {
+    name: settings.name, group: settings.group, colour: settings.colour ?? "", motion: settings.motion,
+    mount: angle === null ? "" : String(Math.round(angle * DEGREES * 10) / 10), height: String(settings.height_m),
+  };
+  for (const [name, text] of Object.entries(texts)) field(form, name).value = field(form, name).dataset.shown = text;
+  form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
+}
+
+/** Return the settings that a person has changed. @param {HTMLFormElement} form */
+export function patchOf(form) {
+  const isChanged = (/** @type {string} */ name) => field(form, name).value !== field(form, name).dataset.shown;
+  const angle = numberOf(field(form, "mount"));
+  const values = [
+    ["name", "name", field(form, "name").value.trim()],
+    ["group", "group", field(form, "group").value.trim()],
+    ["colour", "colour", field(form, "colour").value || null],
+    ["motion", "motion", field(form, "motion").value],
+    ["mount", "mount_angle_rad", angle === null ? null : angle / DEGREES],
+    ["height", "height_m", numberOf(field(form, "height")) ?? 0],
+  ];
+  return Object.fromEntries(values.filter(([name]) => isChanged(String(name))).map(([, key, value]) => [key, value]));
+}

@@ -1,0 +1,163 @@
+"""The settings of a tag on the page: name, colour, group, motion, angle, height, start; and its deletion."""
+
+import math
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator, expect
+
+from dropanchor_schemas.site import TagSettings
+from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.security.api_keys import SOURCE, ApiKeys
+from dropanchor_service.security.identity import Authenticator, Scope
+from service.dashboard.place import Place, live_api_bench
+from support.browser import WatchedPage, open_page, watched_page
+from support.http_server import running_server
+from support.zenoh_router import wait_until
+
+pytestmark = pytest.mark.browser
+
+
+def open_settings(page: WatchedPage, tag: str) -> Locator:
+    """Open the settings of a tag, and return their form once it is filled."""
+    page.page.locator(f"tr[data-tag='{tag}']").click()
+    with page.page.expect_response(lambda response: f"/{tag}/settings" in response.url):
+        page.page.locator("#detail summary").click()
+    form = page.page.get_by_role("form", name="Settings of the tag")
+    expect(form.get_by_label("Height")).not_to_have_value("")
+    return form
+
+
+def test_a_name_a_colour_and_a_group_show_on_the_list_and_the_map_of_every_page(
+    chromium: Browser, place: Place
+) -> None:
+    place.move("cart", "van", x=[1.0, 3.0], y=1.0, heading=math.nan)
+    with (
+        watched_page(chromium, place.url, reduced_motion="reduce") as page,
+        watched_page(chromium, place.url, reduced_motion="reduce") as other,
+    ):
+        form = open_settings(page, "cart")
+        form.get_by_label("Name").fill("Forklift 1")
+        form.get_by_label("Group").fill("forklifts")
+        form.get_by_label("Colour").select_option(label="Orange")
+        form.get_by_role("button", name="Save settings").click()
+        expect(page.page.locator("#outcome")).to_contain_text("Settings of cart changed.")
+        given = place.bench.answers.site.tag_settings("cart")
+        assert given == TagSettings(name="Forklift 1", colour="#d97a0a", group="forklifts")
+        expect(other.page.locator("tr[data-tag='cart'] .name")).to_have_text("Forklift 1", timeout=2000)
+        other.wait_for_map(2)
+        x, y = next(tag["pixel"] for tag in other.tags().values() if tag["tag"] == "cart")
+        other.wait_for("dropanchor.drawing().still")
+        assert other.pixel(x, y - 8.5)[:3] == pytest.approx((0xD9, 0x7A, 0x0A), abs=40)
+        other.page.get_by_label("Group to show").select_option("forklifts")
+        expect(other.page.locator("#count")).to_have_text("1 of 2 tags")
+        other.wait_for("dropanchor.drawing().visible === 1")
+        other.page.get_by_role("button", name="Show all", exact=True).click()
+        other.page.get_by_label("Filter tags by name").fill("fork")
+        expect(other.page.locator("#count")).to_have_text("1 of 2 tags")
+        assert page.errors == other.errors == []
+
+
+def test_motion_mounting_angle_and_height_are_saved_and_undone(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=1.0, y=1.0)
+    with watched_page(chromium, place.url) as page:
+        form = open_settings(page, "cart")
+        form.get_by_label("Moved by").select_option("carried")
+        form.get_by_label("Mounting angle").fill("90")
+        form.get_by_label("Height").fill("1.2")
+        form.get_by_role("button", name="Save settings").click()
+        outcome = page.page.locator("#outcome")
+        expect(outcome).to_contain_text("Settings of cart changed.")
+        given = place.bench.answers.site.tag_settings("cart")
+        assert given == TagSettings(motion="carried", mount_angle_rad=math.pi / 2, height_m=1.2)
+        outcome.get_by_role("button", name="Undo").click()
+        expect(outcome).to_contain_text("Undone")
+        assert place.bench.answers.site.tag_settings("cart") == TagSettings()
+        expect(form.get_by_label("Height")).to_have_value("0")
+
+
+def test_settings_that_another_page_changed_meanwhile_are_merged_only_when_asked(
+    chromium: Browser, place: Place
+) -> None:
+    place.move("cart", x=1.0, y=1.0)
+    with watched_page(chromium, place.url) as page:
+        form = open_settings(page, "cart")
+        form.get_by_label("Name").fill("Mine")
+        place.bench.answers.site.set_tag("cart", TagSettings(name="Theirs", height_m=2.0))
+        form.get_by_role("button", name="Save settings").click()
+        outcome = page.page.locator("#outcome")
+        outcome.get_by_role("button", name="Keep mine").click()
+        expect(outcome).to_contain_text("Settings of cart changed.")
+        assert place.bench.answers.site.tag_settings("cart") == TagSettings(name="Mine", height_m=2.0)
+
+
+def test_the_tag_is_here_sets_its_start_by_a_drag_or_by_numbers(chromium: Browser, place: Place) -> None:
+    place.move("cart", x=1.0, y=1.0, heading=0.0)
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        page.wait_for_map(1)
+        open_settings(page, "cart")
+        page.page.get_by_role("button", name="The tag is here…").click()
+        form = page.page.get_by_role("form", name="Where the tag is")
+        expect(form.get_by_label("Heading")).to_have_value("90")
+        page.wait_for("dropanchor.drawing().still")
+        box = page.page.locator("#map").bounding_box()
+        assert box is not None
+        x, y = (
+            corner + pixel for corner, pixel in zip((box["x"], box["y"]), page.tags()["cart"]["pixel"], strict=True)
+        )
+        page.page.mouse.move(x + 40, y)
+        page.page.mouse.down()
+        page.page.mouse.move(x + 40, y + 60)
+        page.page.mouse.up()
+        expect(form.get_by_label("Heading")).to_have_value("180")
+        form.get_by_role("button", name="Set start").click()
+        expect(page.page.locator("#outcome")).to_contain_text("Start of cart set.")
+        start = place.bench.answers.site.tag_settings("cart").start
+        assert start is not None
+        assert (start.y, start.heading_rad) == (pytest.approx(1.0, abs=0.03), pytest.approx(-math.pi / 2, abs=0.02))
+        assert start.x > 1.2
+        expect(form).to_be_hidden()
+        page.page.get_by_role("button", name="The tag is here…").click()
+        form.get_by_label("x").fill("2")
+        form.get_by_label("Heading").fill("")
+        form.get_by_label("Heading").press("Enter")
+        wait_until(lambda: place.bench.answers.site.tag_settings("cart").start != start)
+        typed = place.bench.answers.site.tag_settings("cart").start
+        assert typed is not None
+        assert (typed.x, typed.heading_rad) == (2.0, None)
+        assert page.errors == []
+
+
+def test_a_deleted_tag_leaves_every_page(chromium: Browser, place: Place) -> None:
+    place.move("cart", "van", x=[1.0, 3.0], y=1.0)
+    with watched_page(chromium, place.url) as page, watched_page(chromium, place.url) as other:
+        other.page.locator("tr[data-tag='cart']").wait_for()
+        open_settings(page, "cart").get_by_role("button", name="Delete tag…").click()
+        page.page.get_by_role("dialog").get_by_role("button", name="Delete").click()
+        for one in (page, other):
+            expect(one.page.locator("tr[data-tag='cart']:not([hidden])")).to_have_count(0)
+            expect(one.page.locator("#count")).to_have_text("1 tag")
+        assert page.errors == other.errors == []
+
+
+@pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, False, False), (Scope.WRITE, True, False)])
+def test_a_key_sees_only_the_buttons_that_it_may_use(
+    chromium: Browser, tmp_path: Path, scope: Scope, edits: bool, deletes: bool
+) -> None:
+    bench = live_api_bench()
+    keys = ApiKeys(tmp_path)
+    secret = keys.add("person", scope)
+    app = bench.app(DASHBOARD, authenticator=Authenticator({SOURCE: keys}))
+    with running_server(app, bench.stopping) as port, open_page(chromium, f"http://127.0.0.1:{port}/") as page:
+        Place(bench, "").move("cart", x=1.0, y=2.0)
+        page.page.locator("#key").fill(secret)
+        with page.page.expect_response(lambda response: response.url.endswith("/access")):
+            page.page.get_by_role("button", name="Open").click()
+        page.page.locator("tr[data-tag='cart']").click()
+        summary = page.page.locator("#detail summary")
+        if edits:
+            summary.click()
+        expect(summary).to_be_visible(visible=edits)
+        expect(page.page.get_by_role("button", name="Set up anchors")).to_be_visible(visible=edits)
+        expect(page.page.get_by_role("button", name="Save settings")).to_be_visible(visible=edits)
+        expect(page.page.get_by_role("button", name="Delete tag…")).to_be_visible(visible=deletes)
