@@ -97,7 +97,7 @@ class Service:
             self._publishers,
         )
         self._zone_events = ZoneEvents(
-            settings, self.site.site.id, self.tags, self.latest, self._health, self.clock.now_ns, self.metrics
+            settings, self.site, self.tags, self.latest, self._health, self.clock.now_ns, self.metrics
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append

@@ -19,7 +19,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.settings.events import WebhookSettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import HealthTable, LatestPoses, TagTable
+from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, TagTable
 from dropanchor_service.webhooks.queue import Patience
 from dropanchor_service.webhooks.registry import addressees, open_webhooks
 from dropanchor_service.webhooks.sender import Sender
@@ -33,7 +33,7 @@ class ZoneEvents:
     def __init__(
         self,
         settings: Settings,
-        site: str,
+        site: SiteStore,
         tags: TagTable,
         latest: LatestPoses,
         health: HealthTable,
@@ -46,7 +46,7 @@ class ZoneEvents:
         try:
             items, webhooks = ZoneItems.opened(folder), open_webhooks(folder)
             self._database = Database(folder)
-            self.store = EventStore(self._database, site, partial(addressees, webhooks))
+            self.store = EventStore(self._database, site.site.id, partial(addressees, webhooks))
             states = self.store.states()
         except (OSError, ValidationError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
@@ -54,7 +54,7 @@ class ZoneEvents:
         patience = Patience(settings.webhooks.retry_s, round(settings.webhooks.give_up_hours * 3600e9))
         self._webhooks = WebhookThread(webhooks, deliveries, sender, patience, now_ns)
         self._events = EventThread(
-            Watcher(Fleet(tags, latest, health, now_ns), items, states),
+            Watcher(Fleet(site, tags, latest, health, now_ns), items, states),
             self.store,
             Retention(round(settings.events.keep_days * 86_400e9), int(settings.events.most_mib * 2**20)),
             now_ns,

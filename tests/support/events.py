@@ -45,7 +45,7 @@ class EventBench:
         """Start the service's part again, from what is stored."""
         self.store = EventStore(self.database, "yard", self._addressees)
         answers = self.poses.answers
-        fleet = Fleet(answers.tags, answers.latest, self.health, lambda: self.poses.now_ns)
+        fleet = Fleet(answers.site, answers.tags, answers.latest, self.health, lambda: self.poses.now_ns)
         self.watcher = Watcher(fleet, self.items, self.store.states())
         self.thread = EventThread(self.watcher, self.store, KEEP, lambda: self.poses.now_ns, 0.1)
 

@@ -57,10 +57,11 @@ def _registry(folder: Path) -> CollectorRegistry:
     """Return a registry with everything that a service with a data folder registers."""
     metrics, tags, latest = Metrics(), TagTable(), LatestPoses()
     settings = Settings(data_dir=folder)
-    Persistence(settings, tags, SiteStore(settings.site, {}), lambda: 0, metrics)
+    site = SiteStore(settings.site, {})
+    Persistence(settings, tags, site, lambda: 0, metrics)
     metrics.register(FleetGauges(tags, PendingTags(0), latest, lambda: 0, lambda: 0))
     metrics.register(HealthGauges(tags, HealthTable(), lambda: 0, NoClockOffsets()))
-    ZoneEvents(Settings(), "default", tags, latest, HealthTable(), lambda: 0, metrics)
+    ZoneEvents(Settings(), site, tags, latest, HealthTable(), lambda: 0, metrics)
     return metrics.registry
 
 

@@ -1,7 +1,7 @@
 """The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
 
 import logging
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -66,6 +66,7 @@ class SiteStore:
             self._document = SiteDocument.model_validate_json(self._path.read_bytes())
         self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
         self._index_anchors()
+        self._groups = _groups_of(self._document.tags)
         self.version = 1
 
     @property
@@ -189,6 +190,11 @@ class SiteStore:
     def _deleted_without(self, tag: str) -> dict[str, int]:
         return {name: t_ns for name, t_ns in self._document.deleted_ns.items() if name != tag}
 
+    @property
+    def groups(self) -> Mapping[str, Sequence[str]]:
+        """The tags whose own settings name a group, by group."""
+        return self._groups
+
     def are_in(self, tags: Sequence[str], groups: Collection[str]) -> list[bool]:
         """Return whether the group of each tag is one of these."""
         by_name, otherwise = self.tags, self.default_settings
@@ -220,6 +226,7 @@ class SiteStore:
 
     def _apply(self, document: SiteDocument) -> None:
         self._document = document
+        self._groups = _groups_of(document.tags)
         self._index_anchors()
         self.version += 1
 
@@ -227,6 +234,14 @@ class SiteStore:
         for anchor in self.site.anchors:
             index = self._anchors.get(anchor.number, (len(self._anchors),))[0]
             self._anchors[anchor.number] = (index, anchor)
+
+
+def _groups_of(tags: Mapping[str, TagSettings]) -> Mapping[str, Sequence[str]]:
+    by_group: dict[str, list[str]] = {}
+    for name, settings in tags.items():
+        if settings.group:
+            by_group.setdefault(settings.group, []).append(name)
+    return by_group
 
 
 def _require(allows: Allows, current: BaseModel | None) -> None:

@@ -60,7 +60,8 @@ def test_a_dragged_anchor_moves_in_every_open_page_and_undo_moves_it_back(chromi
         outcome = page.page.locator("#outcome")
         expect(outcome).to_contain_text("Anchor 17 moved.")
         moved = anchors_of(place)["17"]
-        assert (moved.x > 0.2, moved.y > 0.1, moved.x) == (True, True, pytest.approx(2 * moved.y, abs=0.05))
+        assert moved.y > 0.1
+        assert moved.x == pytest.approx(2 * moved.y, abs=0.05)
         other.wait_for(f"dropanchor.anchors()[0]?.x === {moved.x}", timeout_s=2)
         outcome.get_by_role("button", name="Undo").click()
         expect(outcome).to_contain_text("Undone: Anchor 17 moved.")
@@ -114,7 +115,7 @@ def test_an_anchor_is_added_where_the_map_is_clicked_and_deleted_after_a_questio
         form.get_by_role("button", name="Add", exact=True).click()
         expect(page.page.locator("#outcome")).to_contain_text("Anchor gate/2 added.")
         added = anchors_of(place)["gate/2"]
-        assert (added.z, added.x) == (2.5, pytest.approx(2 * added.y, abs=0.05))
+        assert [added.x, added.z] == pytest.approx([2 * added.y, 2.5], abs=0.05)
         form.get_by_role("button", name="Delete…").click()
         dialog = page.page.get_by_role("dialog")
         dialog.get_by_role("button", name="Cancel").click()

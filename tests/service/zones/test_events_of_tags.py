@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TagGroup, TooCloseRule
 from dropanchor_service.estimation.columns import Frame, State, StateReason
 from support.events import EventBench, S, circle
@@ -109,6 +110,17 @@ def test_a_zone_concerns_its_tags_and_groups_only() -> None:
     bench.put(circle(tags=["a"], groups=["carts", "missing"]))
     assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter a", "zone.enter b"]
     bench.items.groups.put("carts", TagGroup(id="carts", tags=["b", "c"]))
+    assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter c"]
+
+
+def test_a_zone_concerns_the_tags_whose_settings_name_its_group() -> None:
+    bench = EventBench()
+    site = bench.poses.answers.site
+    site.set_tag("b", TagSettings(group="carts"))
+    bench.items.groups.put("carts", TagGroup(id="carts", tags=["a"]))
+    bench.put(circle(groups=["carts"]))
+    assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter a", "zone.enter b"]
+    site.set_tag("c", TagSettings(group="carts"))
     assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter c"]
 
 

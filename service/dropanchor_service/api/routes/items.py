@@ -1,6 +1,5 @@
 """What the routes of edited items share: ETags, and problems for items that are unknown, changed or too many."""
 
-import hashlib
 from collections.abc import Callable
 from typing import Annotated, TypeVar
 
@@ -10,6 +9,7 @@ from starlette.responses import Response
 
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.etags import etag_of, matches
 from dropanchor_service.api.routes.parameters import id_of, json_response, saving
 from dropanchor_service.store.items import FullError, NamedItems
 
@@ -45,10 +45,6 @@ RuleId = Annotated[str, Depends(path_id("rule", "apart"))]
 WebhookId = Annotated[str, Depends(path_id("webhook", "mes"))]
 
 
-def etag_of(item: BaseModel) -> str:
-    return f'"{hashlib.sha256(item.model_dump_json().encode()).hexdigest()[:16]}"'
-
-
 def item_response(item: BaseModel, answer: BaseModel | None = None) -> Response:
     """Return the item, or the answer that stands for it, with the ETag of the item."""
     response = json_response((answer or item).model_dump(mode="json"))
@@ -71,7 +67,7 @@ def put(items: NamedItems[Item], name: str, body_id: str, item: Item, if_match: 
     present = items.all.get(name)
     with saving():
         try:
-            done = _matches(present, if_match) and items.put(name, item, present if if_match else None)
+            done = matches(if_match, present) and items.put(name, item, present if if_match else None)
         except FullError as error:
             raise ProblemError(Kind.ITEMS_FULL, f"There are {len(items.all)} already. Delete one first.") from error
     if not done:
@@ -83,18 +79,12 @@ def delete(items: NamedItems[Item], name: str, if_match: str | None, unknown: Ki
     present = found(items, name, unknown)
     with saving():
         try:
-            done = _matches(present, if_match) and items.remove(name, present if if_match else None)
+            done = matches(if_match, present) and items.remove(name, present if if_match else None)
         except KeyError as error:
             raise ProblemError(unknown, f"There is none with the id {name!r}.") from error
     if not done:
         raise _changed()
     return Response(status_code=204)
-
-
-def _matches(present: BaseModel | None, if_match: str | None) -> bool:
-    if if_match is None:
-        return True
-    return present is not None and if_match in ("*", etag_of(present))
 
 
 def _changed() -> ProblemError:
