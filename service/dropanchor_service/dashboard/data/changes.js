@@ -57,15 +57,17 @@ export class Changes extends EventTarget {
   /**
    * Change some values of a resource, unless another page has changed it: then ask what to do.
    * @param {string} what @param {string} path @param {object} patch @param {Seen} seen
-   * @param {() => void} take called when the user takes the newer resource
+   * @param {() => void} reread reads the resource again, after a conflict
    * @returns {Promise<boolean>} whether the change was made
    */
-  async edit(what, path, patch, seen, take) {
-    const keep = async () => this.edit(what, path, patch, await this.read(path), take);
+  async edit(what, path, patch, seen, reread) {
+    const keep = async () => {
+      if (await this.edit(what, path, patch, await this.read(path), reread)) reread();
+    };
     return this.#attempt(what, async () => {
       const etag = await sendChange(api(path), "PUT", { ...seen.value, ...patch }, { "if-match": seen.etag });
       return { path, body: seen.value, conditions: { "if-match": etag } };
-    }, { keep, take });
+    }, { keep, take: reread });
   }
 
   /**

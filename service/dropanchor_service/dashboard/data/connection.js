@@ -7,6 +7,9 @@ import { eventsOf } from "./events.js";
 const HZ = 10;
 const HZ_OF_LARGE_FLEET = 4;
 const LARGE_FLEET = 2000;
+/** Least time between two requests for changed settings. */
+const REFRESH_MS = 300;
+const REFRESH_MS_PER_TAG = 5;
 const RETRY_MS = [500, 1000, 2000, 3000];
 const STARTING_MS = 1000;
 const PROBE_MS = 3000;
@@ -39,6 +42,9 @@ export class Connection extends EventTarget {
   #attempt = 0;
   #max_hz = HZ;
   #timer = 0;
+  #isOutdated = false;
+  #refreshTimer = 0;
+  #refresh_ms = REFRESH_MS;
 
   start() {
     this.#open();
@@ -54,6 +60,7 @@ export class Connection extends EventTarget {
 
   /** @param {number} tags */
   slowDownFor(tags) {
+    this.#refresh_ms = REFRESH_MS + REFRESH_MS_PER_TAG * tags;
     const max_hz = tags > LARGE_FLEET ? HZ_OF_LARGE_FLEET : HZ;
     if (max_hz === this.#max_hz) return;
     this.#max_hz = max_hz;
@@ -110,8 +117,17 @@ export class Connection extends EventTarget {
     this.#timer = setTimeout(() => this.#open(), RETRY_MS[Math.min(this.#attempt++, RETRY_MS.length - 1)]);
   }
 
-  /** Request the site now, since it or the settings of a tag have changed. */
+  /** Request the site, since it or the settings of a tag have changed: now, but a burst of changes only now and then. */
   refresh() {
+    this.#isOutdated = true;
+    if (this.#refreshTimer === 0) this.#refreshWhileOutdated();
+  }
+
+  #refreshWhileOutdated() {
+    this.#refreshTimer = 0;
+    if (!this.#isOutdated) return;
+    this.#isOutdated = false;
+    this.#refreshTimer = setTimeout(() => this.#refreshWhileOutdated(), this.#refresh_ms);
     this.dispatchEvent(new Event("settings"));
     this.#requestSite();
   }
