@@ -72,6 +72,19 @@ class ZoneList(BaseModel):
     zones: list[Zone]
 
 
+class ZoneOccupancy(BaseModel):
+    """How many tags are in a zone."""
+
+    zone: Id
+    tags: int = Field(ge=1, description="Tags that have entered and not left, with the certainty of an event.")
+
+
+class ZoneOccupancyList(BaseModel):
+    """The zones that are not empty."""
+
+    zones: list[ZoneOccupancy]
+
+
 class TagGroup(_Edited):
     """Tags with a common name. A tag may be in several groups."""
 

@@ -40,6 +40,7 @@ from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.api.routes.track_file import track_file_router
 from dropanchor_service.api.routes.tracks import tracks_router
 from dropanchor_service.api.routes.webhooks import webhooks_router
+from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
 from dropanchor_service.api.routes.zones import zones_router
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.recording.recorder import Recorder
@@ -100,6 +101,7 @@ def create_app(
         ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
         recordings_router(recorder),
         zones_router(events.items),
+        zone_occupancy_router(events),
         events_router(events.store, stopping),
         webhooks_router(events),
         health_router(ready, impaired),

@@ -98,6 +98,11 @@ class EventStore:
         rows = self.database.rows("SELECT source, item, tag, other, flags, since_ns FROM states")
         return {StateKey(*row[:4]): StateValue(*row[4:]) for row in rows}
 
+    def occupancy(self) -> list[tuple[str, int]]:
+        """Return each zone that is not empty, and how many tags are inside."""
+        rows = self.database.rows("SELECT item, count(*) FROM states WHERE source = 'zone' GROUP BY item")
+        return [(zone, tags) for zone, tags in rows]
+
     def forget(self, source: str, items: Sequence[str]) -> None:
         """Delete the states of zones or rules that no longer exist."""
         with self.database.transaction() as connection:

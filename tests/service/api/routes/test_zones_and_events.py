@@ -16,7 +16,7 @@ from dropanchor_service.api import create_app
 from dropanchor_service.api.http.access import required_scope
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.event_parts import EventParts
-from dropanchor_service.events.drafts import Draft
+from dropanchor_service.events.drafts import Draft, StateKey, StateValue
 from dropanchor_service.security.identity import Scope
 from dropanchor_service.webhooks.registry import FILE_NAME, open_webhooks
 from dropanchor_service.webhooks.sender import Sender
@@ -144,6 +144,20 @@ def test_a_stream_begins_after_the_last_id_and_goes_on_with_new_events() -> None
 
 def webhook(**changes: Any) -> dict[str, Any]:
     return {"id": "mes", "url": "http://127.0.0.1:9/", "secret": SECRET} | changes
+
+
+def test_the_tags_in_each_known_zone_are_counted_from_entry_to_exit() -> None:
+    parts = EventParts.in_memory("yard")
+    app = app_of(parts)
+    ask(app, "PUT", "/api/v1/zones/dock", json=ZONE)
+    inside, outside = StateValue(1, 5), None
+    states = {StateKey("zone", zone, tag): inside for zone in ("dock", "deleted") for tag in ("a", "b")}
+    parts.store.commit([], {**states, StateKey("rule", "dock", "c"): inside})
+    assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": [{"zone": "dock", "tags": 2}]}
+    parts.store.commit([], {StateKey("zone", "dock", "a"): outside})
+    assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": [{"zone": "dock", "tags": 1}]}
+    parts.store.commit([], {StateKey("zone", "dock", "b"): outside})
+    assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": []}
 
 
 def with_loopback(folder: Path | None = None) -> EventParts:
