@@ -17,6 +17,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.recording.recorder import Recorder
@@ -64,6 +65,7 @@ class ApiBench:
         rate_limiter: RateLimiter | None = None,
         endpoints: tuple[str, ...] = (),
         cors_origins: tuple[str, ...] = (),
+        events: EventParts | None = None,
     ) -> FastAPI:
         return create_app(
             self.answers,
@@ -79,6 +81,7 @@ class ApiBench:
             rate_limiter=rate_limiter,
             endpoints=endpoints,
             cors_origins=cors_origins,
+            events=events,
         )
 
 

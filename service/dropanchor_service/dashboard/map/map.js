@@ -30,6 +30,8 @@ export class LiveMap extends EventTarget {
   pressed = (/** @type {number} */ _px, /** @type {number} */ _py) => false;
   /** Draw over everything else. @type {((ctx: CanvasRenderingContext2D, view: View, palette: import("./palette.js").Palette) => void)[]} */
   overlays = [];
+  /** Drawn on the grid, below everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
+  grounds = [];
   /** Keep all tags in view until the user moves the map. */
   autoFit = true;
   /** For tests and the console: figures of the last drawing. */
@@ -213,6 +215,7 @@ export class LiveMap extends EventTarget {
     this.#ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
     drawGrid(this.#ctx, view, palette);
+    for (const draw of this.grounds) draw(scene);
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
     if (centre) drawRings(this.#ctx, view, palette, centre);
     this.#drawTags(scene, isShown);

@@ -18,6 +18,7 @@ import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
 import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
+import { Zones } from "../zones/zones.js";
 
 const PANELS_MS = 250;
 
@@ -39,8 +40,9 @@ const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
 const measure = new Measure(map, byId("measure"), byId("measured"));
-map.pressed = (px, py) => measure.press(px, py);
+map.pressed = (px, py) => measure.press(px, py) || zones.press(px, py);
 const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
+const zones = new Zones(map, connection, (tag) => fleet.row(tag) >= 0 && select(tag));
 
 /** @param {string | null} tag */
 function select(tag) {
@@ -156,6 +158,8 @@ Object.defineProperty(window, "dropanchor", {
       const trail = map.trails.of(tag);
       return Array.from({ length: trail?.length ?? 0 }, (_, i) => /** @type {any} */ (trail).x[/** @type {any} */ (trail).at(i)]);
     },
+    events: () => zones.log.current,
+    zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
     drawing: () => ({ ...map.stats, still: map.still }),
     anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),
     tags: () => fleet.names.map((tag, row) => ({

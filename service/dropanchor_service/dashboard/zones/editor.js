@@ -1,0 +1,136 @@
+/** Draw a new zone, or edit one. Nothing changes for others until it is saved. */
+
+import { ChangedMeanwhileError } from "../data/access.js";
+import { placeIn, withCorner } from "./shape_edit.js";
+
+/** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
+
+const COLOUR = "#2f6fde";
+
+/** Return an id made of the name that no zone has yet. @param {string} name @param {readonly Zone[]} zones */
+export function newId(name, zones) {
+  const base = name.trim().toLowerCase().replace(/[^a-z0-9._-]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 56) || "zone";
+  const taken = new Set(zones.map(({ id }) => id));
+  for (let number = 1; ; number++) {
+    const id = number === 1 ? base : `${base}-${number}`;
+    if (!taken.has(id)) return id;
+  }
+}
+
+/** Event: "change". */
+export class ZoneEditor extends EventTarget {
+  /** What is being edited. Its id is empty while it is new. @type {Zone | null} */
+  zone = null;
+  /** Whether clicks on the map add corners. */
+  drawing = false;
+  /** Why the last attempt to save failed. */
+  problem = "";
+  /** Where on the map that is. @type {[number, number] | null} */
+  problemAt = null;
+  /** Whether somebody else has changed the zone. */
+  conflict = false;
+  #etag = /** @type {string | null} */ (null);
+
+  /** @param {import("./zone_store.js").ZoneStore} store */
+  constructor(store) {
+    super();
+    this.store = store;
+  }
+
+  get isNew() {
+    return this.#etag === null;
+  }
+
+  /** @param {Shape} shape */
+  begin(shape) {
+    this.#etag = null;
+    this.drawing = true;
+    this.zone = {
+      id: "", name: "", colour: COLOUR, shape, enter: true, exit: true, dwell_s: null, speed_mps: null, delay_s: 1, tags: [], groups: [],
+    };
+    this.#say("");
+  }
+
+  /** Edit a zone as it is now. @param {string} id */
+  async open(id) {
+    try {
+      const { zone, etag } = await this.store.read(id);
+      this.zone = zone;
+      this.#etag = etag;
+      this.drawing = false;
+      this.#say("");
+    } catch (error) {
+      this.#say(messageOf(error));
+    }
+  }
+
+  /** @param {Partial<Zone>} values */
+  change(values) {
+    if (!this.zone) return;
+    this.zone = { ...this.zone, ...values };
+    this.problemAt = null;
+    this.#changed();
+  }
+
+  stopDrawing() {
+    this.drawing = false;
+    this.#changed();
+  }
+
+  close() {
+    this.zone = null;
+    this.drawing = false;
+    this.#say("");
+  }
+
+  /** Take a click on the map. Return whether it was for the zone. @param {number} x @param {number} y */
+  click(x, y) {
+    if (!this.zone || !this.drawing) return false;
+    const { shape } = this.zone;
+    this.change({ shape: shape.type === "circle" ? { ...shape, x, y } : withCorner(shape, x, y) });
+    return true;
+  }
+
+  /** Save what is being edited. Return the id, or null when the service refuses it. */
+  async save() {
+    if (!this.zone) return null;
+    const id = this.zone.id || newId(this.zone.name, this.store.zones);
+    const done = await this.#attempt(() => this.store.save({ .../** @type {Zone} */ (this.zone), id }, this.#etag));
+    return done ? id : null;
+  }
+
+  async remove() {
+    const { id } = /** @type {Zone} */ (this.zone);
+    return this.#attempt(() => this.store.remove(id, this.#etag ?? ""));
+  }
+
+  /** @param {() => Promise<void>} send */
+  async #attempt(send) {
+    try {
+      await send();
+      this.close();
+      return true;
+    } catch (error) {
+      this.#say(messageOf(error), error instanceof ChangedMeanwhileError);
+      return false;
+    }
+  }
+
+  /** @param {string} problem @param {boolean} [conflict] */
+  #say(problem, conflict = false) {
+    this.problem = conflict ? "Somebody else has changed this zone meanwhile. Nothing was saved." : problem;
+    this.problemAt = placeIn(problem);
+    this.conflict = conflict;
+    this.#changed();
+  }
+
+  #changed() {
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** Return the sentence of an error without the name of the field. @param {unknown} error */
+function messageOf(error) {
+  const text = (error instanceof Error ? error.message : String(error)).replace(/^body\.shape: /, "");
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

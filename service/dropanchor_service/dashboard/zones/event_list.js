@@ -1,0 +1,65 @@
+/** The list of the latest events, newest first. A click selects the tag and the zone. */
+
+import { clock, probability, sentence } from "./words.js";
+
+/** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
+
+export class EventList {
+  /** @type {Map<string, HTMLElement>} */
+  #lines = new Map();
+
+  /** @param {HTMLDetailsElement} box @param {import("./event_log.js").EventLog} log @param {(event: ServiceEvent) => void} pick */
+  constructor(box, log, pick) {
+    this.log = log;
+    this.pick = pick;
+    this.list = /** @type {HTMLElement} */ (box.querySelector("ol"));
+    this.newest = /** @type {HTMLElement} */ (box.querySelector('[data-part="newest"]'));
+    this.note = /** @type {HTMLElement} */ (box.querySelector('[data-part="note"]'));
+    this.box = box;
+  }
+
+  update() {
+    const { events, current } = this.log;
+    const newest = events[0];
+    write(this.newest, !current ? "out of date" : newest ? `${clock(newest)} ${sentence(newest)}` : "none yet");
+    this.box.classList.toggle("outdated", !current);
+    write(this.note, current ? (newest ? "" : "Nothing has happened yet. Zones and rules make events.") : "No connection to the service: newer events are missing here.");
+    this.note.hidden = this.note.textContent === "";
+    this.#show(events);
+  }
+
+  /** Add and remove lines, so that the line with the focus keeps it. @param {ServiceEvent[]} events newest first */
+  #show(events) {
+    const wanted = new Set(events.map(({ sequence }) => sequence));
+    for (const [sequence, line] of this.#lines) {
+      if (wanted.has(sequence)) continue;
+      line.remove();
+      this.#lines.delete(sequence);
+    }
+    for (const event of [...events].reverse()) {
+      if (!this.#lines.has(event.sequence)) this.list.prepend(this.#line(event));
+    }
+  }
+
+  /** @param {ServiceEvent} event */
+  #line(event) {
+    const line = document.createElement("li");
+    const button = element("button", "");
+    const time = /** @type {HTMLTimeElement} */ (element("time", clock(event)));
+    time.dateTime = event.time;
+    button.setAttribute("type", "button");
+    button.append(element("span", sentence(event)), " ", time, " ", element("small", probability(event)));
+    button.addEventListener("click", () => this.pick(event));
+    line.append(button);
+    this.#lines.set(event.sequence, line);
+    return line;
+  }
+}
+
+/** @param {string} name @param {string} text */
+const element = (name, text) => Object.assign(document.createElement(name), { textContent: text });
+
+/** @param {HTMLElement} target @param {string} text */
+function write(target, text) {
+  if (target.textContent !== text) target.textContent = text;
+}

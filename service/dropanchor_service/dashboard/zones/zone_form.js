@@ -1,0 +1,111 @@
+/** The form of the zone that is being edited. */
+
+import { counted } from "../data/format.js";
+
+/** @typedef {import("./zone_store.js").Zone} Zone */
+
+export class ZoneForm {
+  #shown = "";
+
+  /** @param {HTMLFormElement} form @param {import("./editor.js").ZoneEditor} editor @param {() => void} addCorner */
+  constructor(form, editor, addCorner) {
+    this.form = form;
+    this.editor = editor;
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      editor.save();
+    });
+    form.addEventListener("reset", () => editor.close());
+    form.addEventListener("input", () => editor.change(this.#values()));
+    this.#part("corner").addEventListener("click", addCorner);
+    this.#part("newer").addEventListener("click", () => editor.zone && editor.open(editor.zone.id));
+    this.#part("delete").addEventListener("click", () => this.#ask(true));
+    this.#part("keep").addEventListener("click", () => this.#ask(false));
+    this.#part("delete-now").addEventListener("click", () => editor.remove());
+    editor.addEventListener("change", () => this.update());
+  }
+
+  update() {
+    const { zone, problem, conflict, isNew } = this.editor;
+    this.form.hidden = zone === null;
+    const isNews = problem !== "" && problem !== this.#part("problem").textContent;
+    put(this.#part("problem"), problem);
+    if (isNews) this.#part("problem").scrollIntoView({ block: "nearest" });
+    this.#part("newer").hidden = !conflict;
+    const key = zone === null ? "" : `${isNew} ${zone.id}`;
+    if (key !== this.#shown) this.#part("question").hidden = true;
+    if (zone) this.#show(zone);
+    if (zone && key !== this.#shown) this.#field("name").focus();
+    this.#shown = key;
+  }
+
+  /** @param {string} name @returns {HTMLElement} */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.form.querySelector(`[data-part="${name}"]`));
+  }
+
+  /** @param {string} name */
+  #field(name) {
+    return /** @type {HTMLInputElement} */ (this.form.elements.namedItem(name));
+  }
+
+  /** @param {Zone} zone */
+  #show(zone) {
+    const { shape } = zone;
+    const isCircle = shape.type === "circle";
+    put(this.#part("title"), this.editor.isNew ? `New ${shape.type}` : `Zone ${zone.name || zone.id}`);
+    put(this.#part("how"), isCircle ? circleHelp(this.editor.drawing) : polygonHelp(shape.points.length, this.editor.drawing));
+    this.#part("radius").hidden = !isCircle;
+    this.#part("corner").hidden = isCircle;
+    this.#part("delete").hidden = this.editor.isNew || !this.editor.store.mayDelete;
+    for (const name of /** @type {const} */ (["enter", "exit"])) this.#field(name).checked = zone[name];
+    for (const name of /** @type {const} */ (["tags", "groups"])) this.#fill(name, zone[name].join(", "));
+    for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "speed_mps", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));
+    this.#field("radius_m").disabled = !isCircle;
+    this.#fill("radius_m", isCircle ? String(shape.radius_m) : "");
+  }
+
+  /** Write a value, but not over what is being typed. @param {string} name @param {string} value */
+  #fill(name, value) {
+    const field = this.#field(name);
+    if (field !== document.activeElement && field.value !== value) field.value = value;
+  }
+
+  /** @returns {Partial<Zone>} */
+  #values() {
+    const number = (/** @type {string} */ name) => (this.#field(name).value === "" ? null : this.#field(name).valueAsNumber);
+    const list = (/** @type {string} */ name) => this.#field(name).value.split(/[\s,]+/).filter((id) => id !== "");
+    const shape = /** @type {Zone} */ (this.editor.zone).shape;
+    const radius_m = number("radius_m");
+    return {
+      name: this.#field("name").value, colour: this.#field("colour").value,
+      enter: this.#field("enter").checked, exit: this.#field("exit").checked,
+      dwell_s: number("dwell_s"), speed_mps: number("speed_mps"), delay_s: number("delay_s") ?? 1,
+      tags: list("tags"), groups: list("groups"),
+      shape: shape.type === "circle" && radius_m !== null ? { ...shape, radius_m } : shape,
+    };
+  }
+
+  /** @param {boolean} asking */
+  #ask(asking) {
+    this.#part("question").hidden = !asking;
+    this.#part(asking ? "delete-now" : "delete").focus();
+  }
+}
+
+/** @param {number} corners @param {boolean} drawing */
+function polygonHelp(corners, drawing) {
+  const keys = "Arrow keys move a corner, Delete removes it.";
+  if (!drawing) return `Drag the corners, or a small dot to add one. ${keys}`;
+  const close = corners < 3 ? "" : " Click the first corner to finish.";
+  return `${counted(corners, "corner")}. Click the map to add one.${close} ${keys}`;
+}
+
+/** @param {boolean} drawing */
+const circleHelp = (drawing) => `${drawing ? "Click the map to place the circle. " : ""}Drag its centre and its edge, or move them with arrow keys.`;
+
+/** @param {HTMLElement} target @param {string} text */
+function put(target, text) {
+  if (target.textContent !== text) target.textContent = text;
+  target.hidden = text === "";
+}

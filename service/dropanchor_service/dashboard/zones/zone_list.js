@@ -1,0 +1,66 @@
+/** The list of zones: how many tags are in each, and a button that edits it. */
+
+import { counted } from "../data/format.js";
+
+/** @typedef {import("./zone_store.js").Zone} Zone */
+
+export class ZoneList {
+  #shown = "";
+
+  /** @param {HTMLElement} box @param {import("./zone_store.js").ZoneStore} store
+   * @param {{select: (id: string) => void, edit: (id: string) => void}} act */
+  constructor(box, store, act) {
+    this.store = store;
+    this.act = act;
+    this.list = /** @type {HTMLElement} */ (box.querySelector("ul"));
+    this.count = /** @type {HTMLElement} */ (box.querySelector('[data-part="count"]'));
+    this.stuck = /** @type {HTMLElement} */ (box.querySelector('[data-part="stuck"]'));
+    this.adding = /** @type {HTMLElement} */ (box.querySelector('[data-part="new"]'));
+  }
+
+  /** @param {boolean} current whether the counts are @param {string | null} selected id of a zone @param {boolean} editing */
+  update(current, selected, editing) {
+    const { zones, inside, stuck, mayWrite } = this.store;
+    write(this.count, zones.length === 0 ? "none yet" : zones.length.toLocaleString("en"));
+    write(this.stuck, stuck === 0 ? "" : `${counted(stuck, "event")} could not be delivered by webhooks.`);
+    this.stuck.hidden = stuck === 0;
+    this.adding.hidden = !mayWrite || editing;
+    const shown = JSON.stringify([zones.map(({ id, name, colour }) => [id, name, colour]), mayWrite]);
+    if (shown !== this.#shown) this.list.replaceChildren(...zones.map((zone) => this.#line(zone)));
+    this.#shown = shown;
+    zones.forEach(({ id }, i) => {
+      const [choose, tags] = this.list.children[i].children;
+      choose.setAttribute("aria-pressed", String(id === selected));
+      const text = !current ? "out of date" : inside.has(id) ? `${counted(inside.get(id) ?? 0, "tag")} inside` : "empty";
+      write(/** @type {HTMLElement} */ (tags), text);
+    });
+  }
+
+  /** @param {Zone} zone */
+  #line({ id, name, colour }) {
+    const line = document.createElement("li");
+    const swatch = document.createElement("i");
+    swatch.style.backgroundColor = colour;
+    const choose = this.#button("choose", name || id, () => this.act.select(id));
+    choose.prepend(swatch);
+    line.append(choose, document.createElement("span"));
+    if (this.store.mayWrite) {
+      const edit = this.#button("text", "Edit", () => this.act.edit(id));
+      edit.setAttribute("aria-label", `Edit ${name || id}`);
+      line.append(edit);
+    }
+    return line;
+  }
+
+  /** @param {string} className @param {string} textContent @param {() => void} act */
+  #button(className, textContent, act) {
+    const button = Object.assign(document.createElement("button"), { type: "button", className, textContent });
+    button.addEventListener("click", act);
+    return button;
+  }
+}
+
+/** @param {HTMLElement} target @param {string} text */
+function write(target, text) {
+  if (target.textContent !== text) target.textContent = text;
+}

@@ -1,0 +1,149 @@
+/** Connect zones and events: what the service sends, the map, the two lists and the editor. */
+
+import { boundsAround } from "../map/view.js";
+import { drawShape, drawZones } from "./draw_zones.js";
+import { ZoneEditor } from "./editor.js";
+import { EventList } from "./event_list.js";
+import { EventLog } from "./event_log.js";
+import { Handles } from "./handles.js";
+import { withCorner } from "./shape_edit.js";
+import { ZoneForm } from "./zone_form.js";
+import { ZoneList } from "./zone_list.js";
+import { ZoneStore } from "./zone_store.js";
+
+const PADDING_PX = 64;
+const MIN_SIDE_M = 2;
+/** Size of a new circle, and distance of corners that the keyboard adds from the centre of the map. */
+const NEW_PX = 80;
+/** Between two requests for the number of tags inside, however many events there are. */
+const REFRESH_MS = 500;
+
+/** @template {HTMLElement} T @param {string} id @returns {T} */
+const byId = (id) => /** @type {T} */ (document.getElementById(id));
+
+export class Zones {
+  store = new ZoneStore();
+  log = new EventLog();
+  editor = new ZoneEditor(this.store);
+  /** Id of a zone. @type {string | null} */
+  selected = null;
+  #timer = 0;
+
+  /** @param {import("../map/map.js").LiveMap} map @param {import("../data/connection.js").Connection} connection
+   * @param {(tag: string) => void} selectTag */
+  constructor(map, connection, selectTag) {
+    this.map = map;
+    this.connection = connection;
+    this.selectTag = selectTag;
+    const box = byId("zone-list");
+    this.handles = new Handles(byId("handles"), map, this.editor);
+    this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.#pick(event));
+    this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.#edit(id) });
+    new ZoneForm(/** @type {HTMLFormElement} */ (byId("zone-form")), this.editor, () => this.#addCorner());
+    byId("new-polygon").addEventListener("click", () => this.#begin({ type: "polygon", points: [] }));
+    byId("new-circle").addEventListener("click", () => this.#begin(this.#newCircle()));
+    map.grounds.push((scene) => this.#draw(scene));
+    this.store.addEventListener("change", () => this.#update());
+    this.editor.addEventListener("change", () => this.#update());
+    this.log.addEventListener("change", () => this.#happened());
+    connection.addEventListener("status", () => this.#connected(connection.status === "live"));
+  }
+
+  /** Take a click on the map while a zone is drawn. Return whether it was for that. @param {number} px @param {number} py */
+  press(px, py) {
+    return this.editor.click(this.map.view.worldX(px), this.map.view.worldY(py));
+  }
+
+  /** Select a zone and bring it into view. @param {string | null} id */
+  select(id) {
+    const { map } = this;
+    const zone = this.store.zones.find((known) => known.id === id);
+    this.selected = zone?.id ?? null;
+    if (zone) {
+      map.takeOver();
+      Object.assign(map.view, map.view.fitted(boundsOf(zone.shape), Math.min(PADDING_PX, map.view.width / 6, map.view.height / 6)));
+    }
+    this.#update();
+  }
+
+  /** @param {boolean} live */
+  #connected(live) {
+    for (const part of [this.store, this.log]) {
+      if (live) part.start();
+      else part.stop();
+    }
+    this.#update();
+  }
+
+  /** @param {import("./words.js").ServiceEvent} event */
+  #pick({ subject, data }) {
+    if (data.zone !== null) this.select(data.zone);
+    this.selectTag(subject);
+  }
+
+  #happened() {
+    this.events.update();
+    if (this.#timer || !this.log.current) return;
+    this.#timer = setTimeout(() => {
+      this.#timer = 0;
+      this.store.refresh();
+    }, REFRESH_MS);
+  }
+
+  /** @param {string} id */
+  #edit(id) {
+    this.select(id);
+    this.editor.open(id);
+  }
+
+  /** Begin a new zone, and keep the map where it is meanwhile. @param {import("./zone_store.js").Shape} shape */
+  #begin(shape) {
+    this.map.takeOver();
+    this.editor.begin(shape);
+  }
+
+  /** @returns {import("./zone_store.js").Shape} */
+  #newCircle() {
+    const { x, y, scale } = this.map.view;
+    return { type: "circle", x: round(x), y: round(y), radius_m: Math.max(0.1, round(NEW_PX / scale)) };
+  }
+
+  /** Add a corner without a pointer: around the centre of the map, where the next arrow keys move it. */
+  #addCorner() {
+    const { zone } = this.editor;
+    if (zone?.shape.type !== "polygon") return;
+    const { x, y, scale } = this.map.view;
+    const turn = (zone.shape.points.length * Math.PI) / 2 + Math.PI / 4;
+    this.editor.change({ shape: withCorner(zone.shape, x + (NEW_PX / scale) * Math.cos(turn), y + (NEW_PX / scale) * Math.sin(turn)) });
+    this.handles.focusLast();
+  }
+
+  #update() {
+    this.list.update(this.connection.status === "live", this.selected, this.editor.zone !== null);
+    this.map.redraw();
+  }
+
+  /** @param {import("../map/scene.js").Scene} scene */
+  #draw(scene) {
+    const { zone } = this.editor;
+    const others = this.store.zones.filter(({ id }) => id !== zone?.id);
+    drawZones(scene, others, this.store.inside, this.selected);
+    if (zone) {
+      scene.ctx.save();
+      drawShape(scene, zone.shape, { colour: zone.colour, dash: [], width: 2.5 });
+      scene.ctx.restore();
+    }
+    this.handles.place();
+  }
+}
+
+/** @param {number} metres */
+const round = (metres) => Math.round(metres * 100) / 100;
+
+/** @param {import("./zone_store.js").Shape} shape */
+function boundsOf(shape) {
+  const points = shape.type === "polygon" ? shape.points : /** @type {[number, number][]} */ ([
+    [shape.x - shape.radius_m, shape.y - shape.radius_m], [shape.x + shape.radius_m, shape.y + shape.radius_m],
+  ]);
+  return /** @type {import("../map/view.js").Bounds} */ (boundsAround(points, MIN_SIDE_M));
+}

@@ -1,0 +1,204 @@
+"""Zones are drawn, edited and deleted on the map, with pointer and keyboard."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator, expect
+
+from dropanchor_schemas.zones import Circle, Polygon
+from dropanchor_service.security.api_keys import SOURCE, ApiKeys
+from dropanchor_service.security.identity import Authenticator, Scope
+from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
+from support.browser import WatchedPage, open_page, watched_page
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture
+def yard() -> Iterator[ZonePlace]:
+    place = zone_place()
+    place.put(square("yard", 1.0, 1.0, name="Yard"), disc("dock", -3.0, 0.0, 1.5, name="Dock"))
+    place.go("cart-3", -4.0, -4.0)
+    with served(place):
+        yield place
+
+
+def open_list(page: WatchedPage) -> Locator:
+    page.wait_for("dropanchor.events() && 'yard' in dropanchor.zones()")
+    page.wait_for_map(1)
+    page.page.locator("#zone-list summary").click()
+    return page.page.get_by_role("form", name="Zone", exact=True)
+
+
+def points_of(place: ZonePlace, zone: str) -> list[list[float]]:
+    shape = place.zones[zone].shape
+    assert isinstance(shape, Polygon)
+    return shape.points
+
+
+def drag(page: WatchedPage, handle: Locator, dx: int, dy: int) -> None:
+    box = handle.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + dx / 2, y + dy / 2)
+    page.page.mouse.move(x + dx, y + dy)
+    page.page.mouse.up()
+
+
+def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="New polygon").click()
+        canvas = page.page.locator("#map")
+        for x, y in ((200, 300), (320, 300), (320, 400), (200, 400)):
+            canvas.click(position={"x": x, "y": y})
+        page.page.get_by_role("button", name="Corner 1 of 4").click()
+        expect(page.page.get_by_role("button", name="New corner after")).to_have_count(4)
+        form.get_by_label("Name").fill("Gate 7")
+        form.get_by_label("Too long after").fill("300")
+        form.get_by_label("Event on leaving").uncheck()
+        form.get_by_label("Tags").fill("cart-3, cart-4")
+        form.get_by_label("Delay").fill("0")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form).to_be_hidden()
+        made = yard.zones["gate-7"]
+        assert (made.name, made.dwell_s, made.enter, made.exit) == ("Gate 7", 300.0, True, False)
+        assert made.tags == ["cart-3", "cart-4"]
+        (x0, y0), (x1, _), (_, y2), _ = points_of(yard, "gate-7")
+        assert (x1 - x0) / (y0 - y2) == pytest.approx(1.2, rel=0.02)
+        yard.go("cart-3", (x0 + x1) / 2, (y0 + y2) / 2)
+        expect(page.page.locator("#events summary")).to_contain_text("cart-3 entered Gate 7")
+        assert page.errors == []
+
+
+def test_corners_are_dragged_added_and_removed(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="Edit Yard").click()
+        expect(form.get_by_label("Name")).to_be_focused()
+        drag(page, page.page.get_by_role("button", name="Corner 1 of 4"), -40, 20)
+        drag(page, page.page.get_by_role("button", name="New corner after 4"), -30, 0)
+        page.page.get_by_role("button", name="Corner 3 of 5").press("Delete")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form).to_be_hidden()
+        first, _, third, fourth = points_of(yard, "yard")
+        assert first[0] < 0.9
+        assert first[1] < 0.9
+        assert third == [1.0, 5.0]
+        assert fourth[0] < 0.9
+        assert yard.zones["yard"].name == "Yard"
+        assert page.errors == []
+
+
+def test_a_zone_is_made_with_the_keyboard_alone(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="New polygon").press("Enter")
+        expect(form.get_by_label("Name")).to_be_focused()
+        page.page.keyboard.type("Keys")
+        for _ in range(3):
+            form.get_by_role("button", name="Add corner").press("Enter")
+        corner = page.page.get_by_role("button", name="Corner 3 of 3")
+        expect(corner).to_be_focused()
+        before = corner.get_attribute("aria-label")
+        page.page.keyboard.press("Shift+ArrowLeft")
+        page.page.keyboard.press("ArrowUp")
+        expect(corner).not_to_have_attribute("aria-label", before or "")
+        form.get_by_label("Name").press("Enter")
+        expect(form).to_be_hidden()
+        assert len(points_of(yard, "keys")) == 3
+        assert page.errors == []
+
+
+def test_a_circle_is_placed_sized_and_edited(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="New circle").click()
+        page.page.locator("#map").click(position={"x": 300, "y": 500})
+        drag(page, page.page.get_by_role("button", name="Radius"), 30, 0)
+        form.get_by_label("Name").fill("Pit")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form).to_be_hidden()
+        drawn = yard.zones["pit"].shape
+        assert isinstance(drawn, Circle)
+        page.page.get_by_role("button", name="Edit Pit").click()
+        form.get_by_label("Radius").fill("2.5")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form).to_be_hidden()
+        assert yard.zones["pit"].shape == drawn.model_copy(update={"radius_m": 2.5})
+        assert page.errors == []
+
+
+def test_a_polygon_that_crosses_itself_is_refused_in_words_at_its_place(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="New polygon").click()
+        for x, y in ((200, 300), (320, 400), (320, 300), (200, 400)):
+            page.page.locator("#map").click(position={"x": x, "y": y})
+        form.get_by_role("button", name="Save zone").click()
+        expect(form.get_by_role("alert")).to_contain_text("The edges cross or touch each other near")
+        box = page.page.locator("#handles .mark").bounding_box()
+        canvas = page.page.locator("#map").bounding_box()
+        assert box is not None
+        assert canvas is not None
+        assert box["x"] + 12 - canvas["x"] == pytest.approx(260, abs=4)
+        assert box["y"] + 12 - canvas["y"] == pytest.approx(350, abs=4)
+        assert set(yard.zones) == {"yard", "dock"}
+
+
+def test_a_change_of_somebody_else_is_not_overwritten(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="Edit Yard").click()
+        expect(form.get_by_label("Name")).to_be_focused()
+        yard.put(square("yard", 2.0, 2.0, name="Theirs"))
+        form.get_by_label("Name").fill("Mine")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form.get_by_role("alert")).to_contain_text("Somebody else has changed this zone")
+        assert yard.zones["yard"].name == "Theirs"
+        form.get_by_role("button", name="Load the newer one").click()
+        expect(form.get_by_label("Name")).to_have_value("Theirs")
+        form.get_by_label("Name").fill("Ours")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form).to_be_hidden()
+        assert (yard.zones["yard"].name, points_of(yard, "yard")[0]) == ("Ours", [2.0, 2.0])
+
+
+def test_a_zone_is_deleted_only_after_a_confirmation(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="Edit Yard").click()
+        form.get_by_role("button", name="Delete…").click()
+        expect(form.get_by_role("button", name="Delete zone")).to_be_focused()
+        form.get_by_role("button", name="Keep it").click()
+        assert "yard" in yard.zones
+        form.get_by_role("button", name="Delete…").click()
+        form.get_by_role("button", name="Delete zone").click()
+        expect(form).to_be_hidden()
+        assert set(yard.zones) == {"dock"}
+        expect(page.page.locator("#zone-list li")).to_have_count(1)
+        assert page.errors == []
+
+
+@pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, 0, 0), (Scope.WRITE, 2, 0), (Scope.ADMIN, 2, 1)])
+def test_a_key_sees_only_the_buttons_that_it_may_use(
+    chromium: Browser, tmp_path: Path, scope: Scope, edits: int, deletes: int
+) -> None:
+    place, keys = zone_place(), ApiKeys(tmp_path)
+    place.put(square("yard", 1.0, 1.0, name="Yard"), disc("dock", -3.0, 0.0, 1.5, name="Dock"))
+    secret = keys.add("somebody", scope)
+    with served(place, Authenticator({SOURCE: keys})), open_page(chromium, place.url) as page:
+        page.page.locator("#key").fill(secret)
+        page.page.get_by_role("button", name="Open").click()
+        page.wait_for("dropanchor.events() && 'yard' in dropanchor.zones()")
+        page.page.locator("#zone-list summary").click()
+        expect(page.page.locator("#zone-list li")).to_have_count(2)
+        assert page.page.get_by_role("button", name="Edit").count() == edits
+        assert page.page.get_by_role("button", name="New polygon").count() == (edits > 0)
+        if edits:
+            page.page.get_by_role("button", name="Edit Yard").click()
+            page.page.get_by_role("button", name="Save zone").wait_for()
+            assert page.page.get_by_role("button", name="Delete…").count() == deletes

@@ -1,0 +1,116 @@
+"""The page shows zones and events, live."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from threading import Event
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from dropanchor_schemas.webhooks import Webhook
+from dropanchor_service.api.routes import event_examples as examples
+from dropanchor_service.events.database import Database
+from dropanchor_service.events.deliveries import Deliveries
+from dropanchor_service.events.drafts import webhook_test
+from dropanchor_service.events.store import EventStore
+from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
+from support.browser import WatchedPage, watched_page
+
+pytestmark = pytest.mark.browser
+
+COLOUR = "#d02090"
+STROKE = """([r, g, b]) => {
+    const map = document.getElementById("map");
+    const { data } = map.getContext("2d").getImageData(0, 0, map.width, map.height);
+    let count = 0;
+    for (let i = 0; i < data.length; i += 4) if (data[i] === r && data[i + 1] === g && data[i + 2] === b) count++;
+    return count;
+}"""
+
+
+@pytest.fixture
+def yard() -> Iterator[ZonePlace]:
+    place = zone_place()
+    place.put(square("yard", 1.0, 1.0, name="Yard", colour=COLOUR), disc("dock", -3.0, 0.0, 1.5, name="Dock"))
+    place.go("cart-3", -10.0, -10.0)
+    with served(place):
+        yield place
+
+
+def strokes(page: WatchedPage) -> int:
+    """Return how many pixels of the map have exactly the colour of the yard."""
+    page.wait_for("dropanchor.drawing().still")
+    count: int = page.page.evaluate(STROKE, [0xD0, 0x20, 0x90])
+    return count
+
+
+def test_a_zone_is_dashed_until_a_tag_enters_and_its_list_counts_the_tags(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        page.wait_for("dropanchor.events() && dropanchor.zones().yard === 0")
+        page.page.locator("#zone-list summary").click()
+        line = page.page.locator("#zone-list li", has_text="Yard")
+        expect(line).to_contain_text("empty")
+        line.get_by_role("button", name="Yard", exact=True).click()
+        dashed = strokes(page)
+        assert dashed > 100
+        yard.go("cart-3", 3.0, 3.0)
+        page.wait_for("dropanchor.zones().yard === 1")
+        expect(line).to_contain_text("1 tag inside")
+        assert strokes(page) > 1.3 * dashed
+        yard.put(square("yard", 1.0, 1.0, name="Court", colour="#112233"))
+        expect(page.page.locator("#zone-list li", has_text="Court")).to_be_visible()
+        page.wait_for(f"({STROKE})([0xd0, 0x20, 0x90]) === 0")
+
+
+def test_events_come_live_and_newest_first_and_a_click_selects_tag_and_zone(chromium: Browser, yard: ZonePlace) -> None:
+    yard.go("cart-3", 3.0, 3.0)
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        page.wait_for("dropanchor.events()")
+        events = page.page.locator("#events")
+        expect(events.locator("summary")).to_contain_text("cart-3 entered Yard")
+        events.locator("summary").click()
+        expect(events.get_by_role("listitem")).to_have_count(1)
+        yard.go("cart-3", -3.0, 0.0)
+        expect(events.get_by_role("listitem")).to_have_count(3)
+        texts = events.get_by_role("listitem").all_inner_texts()
+        assert {text.split("\n")[0] for text in texts[:2]} == {"cart-3 left Yard", "cart-3 entered Dock"}
+        assert "P 1.00" in texts[2] or "P 0.9" in texts[2]
+        events.get_by_role("button", name="cart-3 left Yard").click()
+        expect(page.page.locator("#detail")).to_contain_text("cart-3")
+        events.get_by_role("button", name="cart-3 left Yard").press("Tab")
+        page.page.locator("#zone-list summary").click()
+        expect(page.page.get_by_role("button", name="Yard", exact=True)).to_have_attribute("aria-pressed", "true")
+        assert page.errors == []
+
+
+def test_nothing_is_counted_while_the_connection_is_lost_and_missed_events_come_with_it(chromium: Browser) -> None:
+    place = zone_place()
+    place.put(square("yard", 1.0, 1.0, name="Yard", colour=COLOUR))
+    place.go("cart-3", 3.0, 3.0)
+    with ExitStack() as pages:
+        with served(place) as port:
+            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
+            page.wait_for("dropanchor.events() && dropanchor.zones().yard === 1")
+            page.page.locator("#zone-list summary").click()
+        page.page.locator("#lost").wait_for(state="visible")
+        expect(page.page.locator("#zone-list li")).to_contain_text("out of date")
+        expect(page.page.locator("#events summary")).to_contain_text("out of date")
+        page.wait_for(f"({STROKE})([0xd0, 0x20, 0x90]) === 0")
+        place.go("cart-3", -10.0, -10.0)
+        place.bench.stopping = Event()
+        with served(place, port=port):
+            expect(page.page.locator("#events summary")).to_contain_text("cart-3 left Yard", timeout=40_000)
+            expect(page.page.locator("#zone-list li")).to_contain_text("empty")
+
+
+def test_a_line_says_how_many_events_webhooks_could_not_deliver(chromium: Browser) -> None:
+    store = EventStore(Database(None), "yard", lambda _: ["mes"])
+    store.commit([webhook_test("mes"), webhook_test("mes")], {})
+    place = zone_place()
+    place.parts = replace(place.parts, store=store, deliveries=Deliveries(store.database))
+    place.parts.deliveries.bury("mes", [1, 2], "the receiver answered 404 Not Found")
+    place.parts.webhooks.put("mes", Webhook(id="mes", url="https://mes.example.com", secret=examples.SECRET))
+    with served(place), watched_page(chromium, place.url) as page:
+        page.page.locator("#zone-list summary").click()
+        expect(page.page.get_by_text("2 events could not be delivered by webhooks.")).to_be_visible()
