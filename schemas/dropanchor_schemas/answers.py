@@ -19,6 +19,16 @@ class RemoteSettingsStatus(_Answer):
     acknowledged: RemoteSettings | None = Field(description="null: the program has acknowledged no settings.")
 
 
+class MotionOffset(_Answer):
+    """The same offset, from the turns and stops that the motion and the ranges of a moving tag both show.
+
+    Delays of messages do not change it.
+    """
+
+    offset_s: float = Field(description="Negative: the clock of the motion is behind. Found from the last 100 s.")
+    uncertainty_s: float = Field(description="With 95 % probability, the offset lies within this much of it.")
+
+
 class ClockOffset(_Answer):
     """How far the clock of a tag's motion is ahead of that of its ranges."""
 
@@ -27,6 +37,9 @@ class ClockOffset(_Answer):
         "network that delays all messages of one side by this much looks the same."
     )
     uncertainty_s: float = Field(description="The offset lies within this much of it.")
+    from_motion: MotionOffset | None = Field(
+        description="A second estimate; null while the tag does not move, or its motion does not tell."
+    )
 
 
 class TagStatus(_Answer):

@@ -26,8 +26,8 @@ def care_of(
     """Return a `Care` for everything that a person should do for the tag."""
     record = health.of(tag.row)
     hints = {} if record is None else _of_values(record, health.majority_firmware)
-    if clock_offset is not None and clock_offset.is_too_large:
-        hints["clock_offset"] = _clock_hint(clock_offset.offset_s)
+    if clock_offset is not None and (clock_hint := _clock_hint(clock_offset)):
+        hints["clock_offset"] = clock_hint
     last_ns = max(tag.last_heard_ns or 0, 0 if record is None or tag.last_heard_ns else record.received_ns)
     if last_ns and _age_s(last_ns, now_ns) > NO_CONTACT_S:
         hints["no_contact"] = _no_contact(tag.online, _age_s(last_ns, now_ns))
@@ -48,12 +48,25 @@ def _of_values(record: HealthRecord, majority: str | None) -> dict[str, str]:
     return hints
 
 
-def _clock_hint(offset_s: float) -> str:
-    where, late = ("ahead of", "the ranges always come") if offset_s > 0 else ("behind", "the motion always comes")
-    return (
-        f"The clock of its motion is {abs(offset_s):.1f} s {where} that of its ranges, or {late} so late: let both "
-        "devices set their time automatically, and check the network."
-    )
+def _clock_hint(offset: ClockOffset) -> str | None:
+    """Return what to do about the clocks, None if there is nothing to do."""
+    where = f"The clock of its motion is {_where(offset.offset_s)} that of its ranges"
+    if offset.from_motion is not None and offset.disagrees:
+        delay_s = offset.offset_s - offset.from_motion.offset_s
+        late = "the ranges" if delay_s > 0 else "the motion"
+        return (
+            f"{where} by the times of the messages, but {_where(offset.from_motion.offset_s)} by its motion: the "
+            f"messages with {late} probably come {abs(delay_s):.1f} s late. Check their network, and let both devices "
+            "set their time automatically."
+        )
+    if not offset.is_too_large:
+        return None
+    side = "the ranges always come" if offset.offset_s > 0 else "the motion always comes"
+    return f"{where}, or {side} so late: let both devices set their time automatically, and check the network."
+
+
+def _where(offset_s: float) -> str:
+    return f"{abs(offset_s):.1f} s {'ahead of' if offset_s > 0 else 'behind'}"
 
 
 def _no_contact(online: bool, age_s: float) -> str:

@@ -5,14 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.clock_offsets import offsets_of
 from dropanchor_service.ingest.kernels import sequences
 from dropanchor_service.ingest.kernels.clocks import TAG_TIME, time_offsets
 from dropanchor_service.ingest.kernels.sequences import PER_TAG, PUBLISHER, WINDOW
 from dropanchor_service.ingest.kernels.values import newest_times
+from dropanchor_service.ingest.motion_offsets.watch import MotionOffsets
 from dropanchor_service.store.clock_offsets import LEAST_DELAYS_S, ClockOffset
 from dropanchor_service.store.records import enlarged
+
+WATCH_NS = 5_000_000_000  # time between two searches for tags with two publishers
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class Publishers:
     def __init__(self) -> None:
         self._columns = np.zeros(0, PUBLISHER)
         self._times = np.zeros(0, TAG_TIME)
+        self._motion_offsets = MotionOffsets()
+        self._watched_ns = 0
 
     @property
     def columns(self) -> Array:
@@ -127,6 +132,13 @@ class Publishers:
         )
         return offsets if offsets.any() else np.zeros(0, np.int64), jumps
 
+    def compare_clocks(self, samples: SampleBatch, now_ns: int) -> None:
+        """Use the samples of tags whose motion and ranges come from two publishers to compare their clocks."""
+        if abs(now_ns - self._watched_ns) >= WATCH_NS:
+            self._watched_ns = now_ns
+            self._motion_offsets.watch(offsets_of(self._columns.reshape(-1, PER_TAG), now_ns)[0].tolist())
+        self._motion_offsets.add(samples)
+
     def clock_offset(self, row: int, now_ns: int) -> ClockOffset | None:
         """Return how far the clock of a tag's motion is ahead of that of its ranges, None if that is not known."""
         return self._clock_offsets(row, row + 1, now_ns).get(row)
@@ -139,7 +151,10 @@ class Publishers:
         of_rows = self._columns[first * PER_TAG : end * PER_TAG].reshape(-1, PER_TAG)
         rows, offset_ns, spread_ns = offsets_of(of_rows, now_ns)
         found = zip((first + rows).tolist(), (offset_ns * 1e-9).tolist(), (spread_ns * 1e-9).tolist(), strict=True)
-        return {row: ClockOffset(offset_s, LEAST_DELAYS_S + spread_s) for row, offset_s, spread_s in found}
+        return {
+            row: ClockOffset(offset_s, LEAST_DELAYS_S + spread_s, self._motion_offsets.offset(row))
+            for row, offset_s, spread_s in found
+        }
 
     def to_utc(self, outcomes: Array) -> None:
         """Convert the times of POSE or INNOVATION from the estimators' time to UTC, in place."""

@@ -136,6 +136,7 @@ class Ingest:
                 self._metrics.samples.labels(kind.name).inc(len(column))
         if not any(map(len, samples.columns())):
             return
+        self._notify(self._publishers.compare_clocks, samples, now_ns)
         started = time.perf_counter()
         for poses in self._engine.process(samples, now_ns):
             self._store(poses)

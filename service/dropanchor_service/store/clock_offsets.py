@@ -1,21 +1,45 @@
 """How far the clock of a tag's motion is ahead of that of its ranges, where two programs or devices send them."""
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 LEAST_DELAYS_S = 0.1  # by which the least delays of the messages of two publishers may differ
 TOO_LARGE_S = 0.2  # a person walks 0.3 m in this time
 
 
-class ClockOffset(NamedTuple):
-    """offset_s: motion minus ranges. uncertainty_s: the offset lies within this much of it."""
+class MotionOffset(NamedTuple):
+    """An estimate from what motion and ranges say while the tag moves. uncertainty_s: 95 %."""
 
     offset_s: float
     uncertainty_s: float
+
+
+class ClockOffset(NamedTuple):
+    """offset_s: motion minus ranges, from message times. uncertainty_s: the offset lies within this much of it.
+
+    from_motion: None while the motion does not tell.
+    """
+
+    offset_s: float
+    uncertainty_s: float
+    from_motion: MotionOffset | None = None
 
     @property
     def is_too_large(self) -> bool:
         """Whether the offset harms the track for certain."""
         return abs(self.offset_s) - self.uncertainty_s > TOO_LARGE_S
+
+    def answer(self) -> dict[str, Any]:
+        """Return the `ClockOffset` of the contract."""
+        motion = self.from_motion
+        return self._asdict() | {"from_motion": None if motion is None else motion._asdict()}
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether message times and motion contradict each other, so that a network delays one side."""
+        motion = self.from_motion
+        if motion is None:
+            return False
+        return abs(self.offset_s - motion.offset_s) > self.uncertainty_s + motion.uncertainty_s
 
 
 class ClockOffsets(Protocol):

@@ -7,7 +7,7 @@ import pytest
 
 from dropanchor_service.answers.care import NO_CONTACT_S, SPOOL_RISES, care_of
 from dropanchor_service.store import HealthTable, Tag, TagTable
-from dropanchor_service.store.clock_offsets import ClockOffset
+from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 
 S = 1_000_000_000
 NOW_NS = 1_800_000_000 * S
@@ -65,6 +65,17 @@ def test_clocks_that_are_far_apart_need_care(offset_s: float, said: str) -> None
     [care] = care_of(tag, fleet.health, NOW_NS, ClockOffset(offset_s, 0.1))
     assert care["reason"] == "clock_offset"
     assert said in care["hint"]
+
+
+@pytest.mark.parametrize(("by_messages_s", "by_motion_s", "late"), [(0.8, 0.0, "ranges"), (0.0, 0.8, "motion")])
+def test_a_contradiction_of_message_times_and_motion_needs_care_and_names_the_side_that_is_late(
+    by_messages_s: float, by_motion_s: float, late: str
+) -> None:
+    fleet = Fleet()
+    offset = ClockOffset(by_messages_s, 0.1, MotionOffset(by_motion_s, 0.25))
+    [care] = care_of(fleet.tag("a"), fleet.health, NOW_NS, offset)
+    assert care["reason"] == "clock_offset"
+    assert f"the messages with the {late} probably come 0.8 s late" in care["hint"]
 
 
 def test_a_spool_needs_care_when_it_grows_from_report_to_report() -> None:

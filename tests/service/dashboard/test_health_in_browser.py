@@ -5,7 +5,7 @@ import time
 import pytest
 from playwright.sync_api import Browser, expect
 
-from dropanchor_service.store.clock_offsets import ClockOffset, NoClockOffsets
+from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset, NoClockOffsets
 from service.dashboard.place import Place
 from support.browser import watched_page
 
@@ -42,7 +42,7 @@ class Offsets(NoClockOffsets):
     """One offset, of the first tag."""
 
     def clock_offsets(self, _now_ns: int) -> dict[int, ClockOffset]:
-        return {0: ClockOffset(0.8, 0.12)}
+        return {0: ClockOffset(0.8, 0.12, MotionOffset(-0.1, 0.25))}
 
 
 def test_the_panel_shows_how_far_the_clocks_of_a_tag_are_apart_and_what_to_do(chromium: Browser, place: Place) -> None:
@@ -53,3 +53,4 @@ def test_the_panel_shows_how_far_the_clocks_of_a_tag_are_apart_and_what_to_do(ch
         health = watched.page.locator("[data-part='health']")
         expect(health).to_contain_text("0.80 s ahead of the ranges ± 0.12 s", timeout=10_000)
         expect(watched.page.locator("[data-part='care']")).to_contain_text("0.8 s ahead of that of its ranges")
+        expect(health).to_contain_text("0.10 s behind the ranges ± 0.25 s")

@@ -188,7 +188,7 @@ def _statuses(
             "hint": answers.hint_of(tag),
             "unknown_anchor": answers.unknown_anchor_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),
-            "clock_offset": None if offset is None else offset._asdict(),
+            "clock_offset": None if offset is None else offset.answer(),
             "needs_care": care_of(tag, answers.health, now_ns, offset),
             "remote_settings": remote_answer(answers, tag),
             "settings": configured[tag.name].model_dump() if tag.name in configured else default,

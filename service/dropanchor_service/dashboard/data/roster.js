@@ -6,6 +6,8 @@ const REQUEST_MS = 3000;
 /** The response grows with the fleet, so the page requests it less often for a large fleet. */
 const REQUEST_MS_PER_TAG = 5;
 
+/** @typedef {{offset_s: number, uncertainty_s: number}} Offset */
+
 /**
  * @typedef {object} TagStatus as in the contract, as far as the page needs it
  * @property {string} tag
@@ -15,7 +17,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
  * @property {string | null} unknown_anchor an anchor that the tag ranges to although the site does not have it
  * @property {Health | null} health what the tag reports about itself
- * @property {{offset_s: number, uncertainty_s: number} | null} clock_offset of motion, ahead of the ranges
+ * @property {(Offset & {from_motion: Offset | null}) | null} clock_offset of motion, ahead of the ranges
  * @property {{reason: string, hint: string}[]} needs_care what a person should do for the tag
  * @property {{height_m: number, name: string, group: string, colour: string | null}} settings
  */

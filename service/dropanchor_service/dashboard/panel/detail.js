@@ -119,6 +119,8 @@ export class Detail {
     const box = this.#part("health");
     const texts = status?.health ? healthTexts(status.health) : [];
     if (status?.clock_offset) texts.push(["Motion clock", clockText(status.clock_offset)]);
+    const fromMotion = status?.clock_offset?.from_motion;
+    if (fromMotion) texts.push(["By its motion", clockText(fromMotion)]);
     box.hidden = texts.length === 0;
     if (box.dataset.shown === JSON.stringify(texts)) return;
     box.dataset.shown = JSON.stringify(texts);
