@@ -285,8 +285,7 @@ class TagClient(SampleMethods):
             _log.error("tag %s: could not send a message: %s", self.tag, error)
 
     def _payload(self, frame: Frame) -> bytes:
-        frame.sequence = self._sent.messages % 2**32
-        frame.boot_id = self.boot_id
+        frame.sequence, frame.boot_id = self._sent.messages % 2**32, self.boot_id
         frame.boot_clock = self._boot_clock
         frame.replay = self._replay
         return encode_packed(frame) if self._packed else encode_json(frame)

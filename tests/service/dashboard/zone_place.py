@@ -55,7 +55,7 @@ def zone_place() -> ZonePlace:
     """Return a place that nobody serves yet."""
     bench = live_api_bench()
     parts = EventParts.in_memory("yard")
-    fleet = Fleet(bench.answers.tags, bench.answers.latest, HealthTable(), time.time_ns)
+    fleet = Fleet(bench.answers.site, bench.answers.tags, bench.answers.latest, HealthTable(), time.time_ns)
     watch = EventThread(Watcher(fleet, parts.items, {}), parts.store, KEEP, time.time_ns, 0.1)
     return ZonePlace(bench, "", parts, watch)
 
