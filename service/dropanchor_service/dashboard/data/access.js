@@ -49,23 +49,6 @@ export async function sendChange(url, method, body, conditions) {
   throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
 }
 
-/** Somebody changed the resource since this page has read it. */
-export class ChangedMeanwhileError extends Error {}
-
-/**
- * Send a change. Return the ETag of the new resource, empty after a deletion. Throws ChangedMeanwhileError when the
- * conditions are not met, and Error with the sentence of the service when it refuses the change.
- * @param {URL} url @param {"PUT" | "DELETE"} method @param {object | null} body
- * @param {Record<string, string>} conditions headers
- */
-export async function sendChange(url, method, body, conditions) {
-  const headers = { ...authorization(), ...conditions, "content-type": "application/json" };
-  const response = await fetch(url, { method, headers, body: body && JSON.stringify(body), cache: "no-store" });
-  if (response.ok) return response.headers.get("etag") ?? "";
-  const { detail } = await response.json();
-  throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
-}
-
 /** @returns {Record<string, string>} */
 function authorization() {
   const key = sessionStorage.getItem(STORAGE_KEY);
