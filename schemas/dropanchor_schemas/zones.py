@@ -1,10 +1,10 @@
-"""Models of zones, groups of tags, and the rules that make events."""
+"""Models of zones, and of the rules that make events."""
 
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.site import Id, Number, StrictBool
+from dropanchor_schemas.site import Id, Label, Number, StrictBool
 
 MAX_POINTS = 200
 MAX_COORDINATE_M = 100_000.0
@@ -42,7 +42,9 @@ class Concerned(_Edited):
     """The tags that a zone or a rule concerns. If both lists are empty, it concerns all tags."""
 
     tags: Ids = Field(default=[], description="Ids of tags.")
-    groups: Annotated[list[Id], Field(max_length=1000)] = Field(default=[], description="Ids of groups of tags.")
+    groups: Annotated[list[Annotated[Label, Field(min_length=1)]], Field(max_length=1000)] = Field(
+        default=[], description="Groups, as the settings of their tags name them."
+    )
 
 
 class Zone(Concerned):
@@ -83,20 +85,6 @@ class ZoneOccupancyList(BaseModel):
     """The zones that are not empty."""
 
     zones: list[ZoneOccupancy]
-
-
-class TagGroup(_Edited):
-    """Tags with a common name. A tag may be in several groups."""
-
-    id: Id = Field(description="Id of the group, as in its path.")
-    name: str = Field(default="", max_length=100, description="Name for people.")
-    tags: Ids = Field(default=[], description="Ids of its tags. They need not exist yet.")
-
-
-class TagGroupList(BaseModel):
-    """The groups of tags."""
-
-    groups: list[TagGroup]
 
 
 class _Rule(Concerned):

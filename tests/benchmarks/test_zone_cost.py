@@ -10,6 +10,7 @@ from dropanchor_schemas.zones import Polygon, Zone
 from dropanchor_service.engines.warm_up import warm_up_zones
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Array, State
 from dropanchor_service.store import LatestPoses
+from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.modes import placed
 from dropanchor_service.zones.zone_watch import ZoneWatch
 
@@ -51,7 +52,7 @@ def test_the_cost_of_zones_is_measured() -> None:
     warm_up_zones()
     rng = np.random.default_rng(1)
     watch, latest = ZoneWatch(), LatestPoses()
-    watch.set_zones(zones(rng), {})
+    watch.set_zones(zones(rng), Groups())
     watch.add_tags([f"tag-{row}" for row in range(TAGS)])
     poses, hypotheses = fleet(rng)
     places, velocity = rng.uniform(0, SITE_M, (TAGS, 2)), rng.normal(0, 1, (TAGS, 2))

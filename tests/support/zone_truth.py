@@ -11,6 +11,7 @@ from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.evaluation.simulated import PriorKnowledge, batches, configure, merged, samples_of
 from dropanchor_service.store import LatestPoses
+from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.judge import ENTER
 from dropanchor_service.zones.modes import placed
 from dropanchor_service.zones.zone_watch import ZoneWatch
@@ -87,7 +88,7 @@ def compare(runs: list[Simulation], known: PriorKnowledge, into: Comparison) -> 
     truth = [[shapely.contains_xy(shape, run.truth.x, run.truth.y) for shape in shapes] for run in runs]
     number = {zone.id: index for index, zone in enumerate(watched)}
     watch, latest, version = ZoneWatch(), LatestPoses(), 0
-    watch.set_zones(watched, {})
+    watch.set_zones(watched, Groups())
     watch.add_tags([str(row) for row in range(len(runs))])
     delayed, plain = Dots(len(runs), shapes, DELAY_NS), Dots(len(runs), shapes, 0)
 

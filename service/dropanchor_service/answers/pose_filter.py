@@ -45,5 +45,5 @@ class PoseFilter:
             matching[rows] = [text in name.casefold() for name in names]
         if self.groups:
             rows = np.flatnonzero(matching)
-            matching[rows] = site.are_in(tags.names(poses["row"][rows].tolist()), self.groups)
+            matching[rows] = site.groups.are_in(tags.names(poses["row"][rows].tolist()), self.groups)
         return matching

@@ -40,6 +40,7 @@ from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
 from dropanchor_service.runtime.kernel_cache import VARIABLE
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.modes import placed
 from dropanchor_service.zones.pair_watch import PairWatch
 from dropanchor_service.zones.zone_watch import ZoneWatch
@@ -209,10 +210,10 @@ def warm_up_zones(progress: CompilationProgress | None = None) -> None:
     with _compiling("the zones", progress or CompilationProgress()):
         found = placed(poses, np.zeros(2), LatestPoses())
         zones = ZoneWatch()
-        zones.set_zones([Zone(id="a", shape=Circle(type="circle", x=0.0, y=0.0, radius_m=9.0))], {})
+        zones.set_zones([Zone(id="a", shape=Circle(type="circle", x=0.0, y=0.0, radius_m=9.0))], Groups())
         zones.add_tags(names)
         list(zones.judge(found))
         rule = TooCloseRule(id="a", type="too_close", distance_m=9.0, delay_s=0.0)
-        pairs = PairWatch(rule, {})
+        pairs = PairWatch(rule, Groups())
         for _ in range(2):
             list(pairs.judge(found, names, 1))

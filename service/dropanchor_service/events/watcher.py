@@ -11,7 +11,6 @@ from dropanchor_service.answers.columns import aged_poses
 from dropanchor_service.events.describe import pair_event, tag_event, zone_event
 from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue
 from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, TagTable
-from dropanchor_service.zones.concerned import with_members
 from dropanchor_service.zones.items import ZoneItems
 from dropanchor_service.zones.judge import INSIDE
 from dropanchor_service.zones.modes import placed
@@ -85,12 +84,11 @@ class Watcher:
             self._states[key] = value
 
     def _follow_edits(self) -> None:
-        members = self._fleet.site.groups
-        versions = (*self._items.versions, members)
+        groups = self._fleet.site.groups
+        versions = (*self._items.versions, groups)
         if versions == self._versions:
             return
         zones, rules = self._items.zones.all, self._items.rules.all
-        groups = with_members(self._items.groups.all, members)
         for key in [key for key in self._states if key.item not in (zones if key.source == "zone" else rules)]:
             self._set(key, None)
         self._zones.set_zones(list(zones.values()), groups)

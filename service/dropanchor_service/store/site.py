@@ -1,7 +1,7 @@
 """The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
 
 import logging
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict
 from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.store.groups import Groups, groups_of
 
 FILE_NAME = "site.json"
 
@@ -66,7 +67,7 @@ class SiteStore:
             self._document = SiteDocument.model_validate_json(self._path.read_bytes())
         self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
         self._index_anchors()
-        self._groups = _groups_of(self._document.tags)
+        self._groups = groups_of(self._document.tags, self.default_settings)
         self.version = 1
 
     @property
@@ -191,14 +192,9 @@ class SiteStore:
         return {name: t_ns for name, t_ns in self._document.deleted_ns.items() if name != tag}
 
     @property
-    def groups(self) -> Mapping[str, Sequence[str]]:
-        """The tags whose own settings name a group, by group."""
+    def groups(self) -> Groups:
+        """The groups of the tags. The value never changes."""
         return self._groups
-
-    def are_in(self, tags: Sequence[str], groups: Collection[str]) -> list[bool]:
-        """Return whether the group of each tag is one of these."""
-        by_name, otherwise = self.tags, self.default_settings
-        return [by_name.get(tag, otherwise).group in groups for tag in tags]
 
     def remote_settings(self, tag: str) -> RemoteSettings:
         """Return what the program of the tag should apply."""
@@ -226,7 +222,7 @@ class SiteStore:
 
     def _apply(self, document: SiteDocument) -> None:
         self._document = document
-        self._groups = _groups_of(document.tags)
+        self._groups = groups_of(document.tags, self.default_settings)
         self._index_anchors()
         self.version += 1
 
@@ -234,14 +230,6 @@ class SiteStore:
         for anchor in self.site.anchors:
             index = self._anchors.get(anchor.number, (len(self._anchors),))[0]
             self._anchors[anchor.number] = (index, anchor)
-
-
-def _groups_of(tags: Mapping[str, TagSettings]) -> Mapping[str, Sequence[str]]:
-    by_group: dict[str, list[str]] = {}
-    for name, settings in tags.items():
-        if settings.group:
-            by_group.setdefault(settings.group, []).append(name)
-    return by_group
 
 
 def _require(allows: Allows, current: BaseModel | None) -> None:

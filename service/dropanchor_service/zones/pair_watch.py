@@ -1,14 +1,15 @@
 """Find tags that are too close to each other."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from dropanchor_schemas.zones import TagGroup, TooCloseRule
+from dropanchor_schemas.zones import TooCloseRule
 from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.concerned import concerned
 from dropanchor_service.zones.judge import ENTER_P, EXIT_P, NEAR
 from dropanchor_service.zones.modes import PlacedPoses
@@ -68,7 +69,7 @@ def close_pairs(places: Any, stds: Any, weights: Any, covs: Any, distance: float
 class PairWatch:
     """The pairs of one rule. One thread owns it. Tags without one surely known place take no part."""
 
-    def __init__(self, rule: TooCloseRule, groups: Mapping[str, TagGroup]) -> None:
+    def __init__(self, rule: TooCloseRule, groups: Groups) -> None:
         self.rule = rule
         self._groups = groups
         self._around = disc(rule.distance_m)

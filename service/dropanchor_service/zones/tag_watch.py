@@ -1,12 +1,13 @@
 """Follow a condition of single tags, such as a low battery, by row."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TagGroup
+from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule
 from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.store.groups import Groups
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.zones.concerned import concerned
 
@@ -35,7 +36,7 @@ class TagWatch:
     Delays count from what this process has seen, so that a restart makes no event.
     """
 
-    def __init__(self, rule: TagRule, groups: Mapping[str, TagGroup]) -> None:
+    def __init__(self, rule: TagRule, groups: Groups) -> None:
         self.rule = rule
         self._groups = groups
         self._on = np.zeros(0, bool)

@@ -1,12 +1,13 @@
 """Follow which tags are in which zones."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.zones import TagGroup, Zone
+from dropanchor_schemas.zones import Zone
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.groups import Groups
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.zones.concerned import concerned
 from dropanchor_service.zones.judge import CHANGE, PER_PAIR, STAY, Memory, Poses, empty_stays, judge
@@ -37,13 +38,13 @@ class ZoneWatch:
         self.zones: tuple[Zone, ...] = ()
         self._table = table_of(())
         self._names: list[str] = []
-        self._groups: Mapping[str, TagGroup] = {}
+        self._groups = Groups()
         self._stays = empty_stays(0, 0)
         self._touched = np.zeros((0, 0), bool)
         self._concerned = np.ones((0, 0), bool)
         self._judged_ns = np.zeros(0, np.int64)
 
-    def set_zones(self, zones: Sequence[Zone], groups: Mapping[str, TagGroup]) -> None:
+    def set_zones(self, zones: Sequence[Zone], groups: Groups) -> None:
         """Replace the zones. Tags stay inside those that keep their id, until a pose shows that they are not."""
         before = {zone.id: column for column, zone in enumerate(self.zones)}
         stays, touched = (

@@ -61,12 +61,14 @@ def test_a_polygon_is_drawn_with_clicks_and_watched_at_once(chromium: Browser, y
         form.get_by_label("Too long after").fill("300")
         form.get_by_label("Event on leaving").uncheck()
         form.get_by_label("Tags").fill("cart-3, cart-4")
+        form.get_by_label("Groups").fill("Carts of hall 2, forklifts")
         form.get_by_label("Delay").fill("0")
         form.get_by_role("button", name="Save zone").click()
         expect(form).to_be_hidden()
         made = yard.zones["gate-7"]
         assert (made.name, made.dwell_s, made.enter, made.exit) == ("Gate 7", 300.0, True, False)
         assert made.tags == ["cart-3", "cart-4"]
+        assert made.groups == ["Carts of hall 2", "forklifts"]
         (x0, y0), (x1, _), (_, y2), _ = points_of(yard, "gate-7")
         assert (x1 - x0) / (y0 - y2) == pytest.approx(1.2, rel=0.02)
         yard.go("cart-3", (x0 + x1) / 2, (y0 + y2) / 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dropanchor_schemas.site import TagSettings
-from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TagGroup, TooCloseRule
+from dropanchor_schemas.zones import AmbiguousRule, BatteryLowRule, LostRule, TooCloseRule
 from dropanchor_service.estimation.columns import Frame, State, StateReason
 from support.events import EventBench, S, circle
 
@@ -106,21 +106,11 @@ def test_dwell_comes_once_per_stay_and_speed_once_until_the_tag_is_slow() -> Non
 
 def test_a_zone_concerns_its_tags_and_groups_only() -> None:
     bench = EventBench()
-    bench.items.groups.put("carts", TagGroup(id="carts", tags=["b"]))
-    bench.put(circle(tags=["a"], groups=["carts", "missing"]))
-    assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter a", "zone.enter b"]
-    bench.items.groups.put("carts", TagGroup(id="carts", tags=["b", "c"]))
-    assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter c"]
-
-
-def test_a_zone_concerns_the_tags_whose_settings_name_its_group() -> None:
-    bench = EventBench()
     site = bench.poses.answers.site
-    site.set_tag("b", TagSettings(group="carts"))
-    bench.items.groups.put("carts", TagGroup(id="carts", tags=["a"]))
-    bench.put(circle(groups=["carts"]))
+    site.set_tag("b", TagSettings(group="carts of hall 2"))
+    bench.put(circle(tags=["a"], groups=["carts of hall 2", "missing"]))
     assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter a", "zone.enter b"]
-    site.set_tag("c", TagSettings(group="carts"))
+    site.set_tag("c", TagSettings(group="carts of hall 2"))
     assert bench.stay(2.0, "a", "b", "c", x=0.0) == ["zone.enter c"]
 
 

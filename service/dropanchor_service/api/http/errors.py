@@ -30,7 +30,6 @@ class Kind(Enum):
     NO_POSE_THEN = (404, "The tag has no pose at that time")
     UNKNOWN_ANCHOR = (404, "The anchor is unknown")
     UNKNOWN_ZONE = (404, "The zone is unknown")
-    UNKNOWN_GROUP = (404, "The group of tags is unknown")
     UNKNOWN_RULE = (404, "The rule is unknown")
     UNKNOWN_WEBHOOK = (404, "The webhook is unknown")
     METHOD_NOT_ALLOWED = (405, "The resource does not allow this method")

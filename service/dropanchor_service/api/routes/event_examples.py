@@ -16,7 +16,6 @@ ZONE: dict[str, Any] = {
     "delay_s": 1.0,
 }
 OCCUPANCY: dict[str, Any] = {"zones": [{"zone": "dock", "tags": 3}]}
-GROUP: dict[str, Any] = {"id": "forklifts", "name": "Forklifts", "tags": ["tag-1", "tag-2"]}
 RULE: dict[str, Any] = {
     "tags": [],
     "groups": ["forklifts"],

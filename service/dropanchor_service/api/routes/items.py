@@ -40,7 +40,6 @@ def path_id(what: str, example: str) -> Callable[..., str]:
 
 
 ZoneId = Annotated[str, Depends(path_id("zone", "dock"))]
-GroupId = Annotated[str, Depends(path_id("group", "forklifts"))]
 RuleId = Annotated[str, Depends(path_id("rule", "apart"))]
 WebhookId = Annotated[str, Depends(path_id("webhook", "mes"))]
 

@@ -1,16 +1,15 @@
-"""The routes for zones, groups of tags, and rules without a zone."""
+"""The routes for zones, and for rules without a zone."""
 
 from typing import Annotated
 
 from fastapi import APIRouter, Body
 from starlette.responses import Response
 
-from dropanchor_schemas.zones import EventRule, EventRuleList, TagGroup, TagGroupList, Zone, ZoneList
+from dropanchor_schemas.zones import EventRule, EventRuleList, Zone, ZoneList
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.items import (
     CHANGE_KINDS,
-    GroupId,
     IfMatch,
     RuleId,
     ZoneId,
@@ -29,7 +28,6 @@ _READ = (Kind.INVALID_REQUEST,)
 def zones_router(items: ZoneItems) -> APIRouter:
     router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
     _add_zone_routes(router, items)
-    _add_group_routes(router, items)
     _add_rule_routes(router, items)
     return router
 
@@ -85,54 +83,6 @@ def _add_zone_routes(router: APIRouter, items: ZoneItems) -> None:
     )
     def delete_zone(zone: ZoneId, if_match: IfMatch = None) -> Response:
         return delete(zones, zone, if_match, Kind.UNKNOWN_ZONE)
-
-
-def _add_group_routes(router: APIRouter, items: ZoneItems) -> None:
-    groups = items.groups
-
-    @router.get(
-        "/tag-groups",
-        operation_id="list_tag_groups",
-        summary="List the groups of tags",
-        response_model=TagGroupList,
-        responses=example_response({"groups": [examples.GROUP]}) | problems(*_READ),
-    )
-    async def list_tag_groups() -> Response:
-        return json_response({"groups": [group.model_dump() for group in groups.all.values()]})
-
-    @router.get(
-        "/tag-groups/{group}",
-        operation_id="get_tag_group",
-        summary="Get a group of tags",
-        response_model=TagGroup,
-        responses=example_response(examples.GROUP) | problems(Kind.UNKNOWN_GROUP, *_READ),
-    )
-    async def get_tag_group(group: GroupId) -> Response:
-        return item_response(found(groups, group, Kind.UNKNOWN_GROUP))
-
-    @router.put(
-        "/tag-groups/{group}",
-        operation_id="put_tag_group",
-        summary="Create or replace a group of tags",
-        response_model=TagGroup,
-        responses=example_response(examples.GROUP) | problems(*CHANGE_KINDS, *_READ),
-    )
-    def put_tag_group(
-        group: GroupId, body: Annotated[TagGroup, Body(examples=[examples.GROUP])], if_match: IfMatch = None
-    ) -> Response:
-        put(groups, group, body.id, body, if_match)
-        return item_response(body)
-
-    @router.delete(
-        "/tag-groups/{group}",
-        operation_id="delete_tag_group",
-        summary="Delete a group of tags",
-        description="Zones and rules that name it concern none of its tags from then on.",
-        status_code=204,
-        responses=problems(Kind.UNKNOWN_GROUP, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_READ),
-    )
-    def delete_tag_group(group: GroupId, if_match: IfMatch = None) -> Response:
-        return delete(groups, group, if_match, Kind.UNKNOWN_GROUP)
 
 
 def _add_rule_routes(router: APIRouter, items: ZoneItems) -> None:

@@ -74,14 +74,15 @@ export class ZoneForm {
   /** @returns {Partial<Zone>} */
   #values() {
     const number = (/** @type {string} */ name) => (this.#field(name).value === "" ? null : this.#field(name).valueAsNumber);
-    const list = (/** @type {string} */ name) => this.#field(name).value.split(/[\s,]+/).filter((id) => id !== "");
+    const list = (/** @type {string} */ name, /** @type {RegExp} */ separator) =>
+      this.#field(name).value.trim().split(separator).filter((part) => part !== "");
     const shape = /** @type {Zone} */ (this.editor.zone).shape;
     const radius_m = number("radius_m");
     return {
       name: this.#field("name").value, colour: this.#field("colour").value,
       enter: this.#field("enter").checked, exit: this.#field("exit").checked,
       dwell_s: number("dwell_s"), speed_mps: number("speed_mps"), delay_s: number("delay_s") ?? 1,
-      tags: list("tags"), groups: list("groups"),
+      tags: list("tags", /[\s,]+/), groups: list("groups", /\s*,\s*/),
       shape: shape.type === "circle" && radius_m !== null ? { ...shape, radius_m } : shape,
     };
   }

@@ -1,4 +1,4 @@
-"""Zones, groups, rules, events and webhooks over REST."""
+"""Zones, rules, events and webhooks over REST."""
 
 import ipaddress
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.http_server import running_server
 from support.receiver import Receiver, running_receiver
 
-ZONE, GROUP, RULE, SECRET = examples.ZONE, examples.GROUP, examples.RULE, examples.SECRET
+ZONE, RULE, SECRET = examples.ZONE, examples.RULE, examples.SECRET
 
 
 def app_of(parts: EventParts, bench: ApiBench | None = None) -> FastAPI:
@@ -49,11 +49,11 @@ def happen(parts: EventParts, *tags: str, zone: str = "dock", **data: Any) -> No
 
 @pytest.mark.parametrize(
     ("path", "item", "unknown"),
-    [("zones/dock", ZONE, "zone"), ("tag-groups/forklifts", GROUP, "group"), ("event-rules/apart", RULE, "rule")],
+    [("zones/dock", ZONE, "zone"), ("event-rules/apart", RULE, "rule")],
 )
 def test_an_item_is_made_read_changed_and_deleted_with_etags(path: str, item: dict[str, Any], unknown: str) -> None:
     app = app_of(EventParts.in_memory("yard"))
-    collection, key = path.split("/")[0], {"zone": "zones", "group": "groups", "rule": "rules"}[unknown]
+    collection, key = path.split("/")[0], {"zone": "zones", "rule": "rules"}[unknown]
 
     def put(name: str, **headers: str) -> Any:
         return ask(app, "PUT", f"/api/v1/{path}", json=item | {"name": name}, headers=headers)
@@ -75,11 +75,10 @@ def test_an_item_is_made_read_changed_and_deleted_with_etags(path: str, item: di
 
 def test_what_was_saved_is_there_after_a_restart(tmp_path: Path) -> None:
     app = app_of(replace(EventParts.in_memory("yard"), items=ZoneItems.opened(tmp_path)))
-    for path, item in (("zones/dock", ZONE), ("tag-groups/forklifts", GROUP), ("event-rules/apart", RULE)):
+    for path, item in (("zones/dock", ZONE), ("event-rules/apart", RULE)):
         assert ask(app, "PUT", f"/api/v1/{path}", json=item).status_code == 200
     app = app_of(replace(EventParts.in_memory("yard"), items=ZoneItems.opened(tmp_path)))
     assert ask(app, "GET", "/api/v1/zones/dock").json() == ZONE
-    assert ask(app, "GET", "/api/v1/tag-groups/forklifts").json() == GROUP
     assert ask(app, "GET", "/api/v1/event-rules/apart").json() == RULE
 
 
@@ -94,6 +93,7 @@ def test_what_was_saved_is_there_after_a_restart(tmp_path: Path) -> None:
         ({"shape": {"type": "circle", "x": 0, "y": 0, "radius_m": 0}}, "invalid-request", "0.1"),
         ({"shape": {"type": "star"}}, "invalid-request", "polygon"),
         ({"colour": "red"}, "invalid-request", "colour"),
+        ({"groups": [""]}, "invalid-request", "groups"),
         ({"dwell_s": -1}, "invalid-request", "dwell_s"),
         ({"surprise": 1}, "invalid-request", "unknown"),
     ],
