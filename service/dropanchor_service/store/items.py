@@ -5,11 +5,12 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Generic, TypeVar
 
-from pydantic import TypeAdapter
+from pydantic import BaseModel, TypeAdapter
 
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.store.preconditions import Precondition, always, require
 
-Item = TypeVar("Item")
+Item = TypeVar("Item", bound=BaseModel)
 
 _UP_TO_UMASK = 0o666
 PRIVATE = 0o600
@@ -45,34 +46,26 @@ class NamedItems(Generic[Item]):
         """The items by id, in the order in which they were made. The mapping never changes."""
         return self._items
 
-    def put(self, name: str, item: Item, expected: Item | None = None) -> bool:
-        """Add or replace an item and save. Raises FullError, or OSError; then nothing has changed.
+    def put(self, name: str, item: Item, allows: Precondition = always) -> None:
+        """Add or replace an item and save.
 
-        Return False, and change nothing, unless `expected` is None or the present item.
+        Raises FullError, OSError, and ChangedMeanwhileError when `allows` refuses; then nothing has changed.
         """
         with self._lock:
-            if expected is not None and self._items.get(name) != expected:
-                return False
+            require(allows, self._items.get(name))
             if name not in self._items and len(self._items) >= self._limit:
                 raise FullError
             self._replace(self._items | {name: item})
-            return True
 
-    def remove(self, name: str, expected: Item | None = None) -> bool:
-        """Remove an item and save. Raises KeyError when there is none, or OSError.
+    def remove(self, name: str, allows: Precondition = always) -> None:
+        """Remove an item and save.
 
-        Return False, and change nothing, unless `expected` is None or the present item.
+        Raises KeyError when there is none, OSError, and ChangedMeanwhileError when `allows` refuses; then nothing has
+        changed.
         """
         with self._lock:
-            if expected is not None and self._items[name] != expected:
-                return False
-            self._replace({key: item for key, item in self._items.items() if key != self._present(name)})
-            return True
-
-    def _present(self, name: str) -> str:
-        if name not in self._items:
-            raise KeyError(name)
-        return name
+            require(allows, self._items[name])
+            self._replace({key: item for key, item in self._items.items() if key != name})
 
     def _replace(self, items: dict[str, Item]) -> None:
         """Save first, then apply: a restart never loses an acknowledged change."""

@@ -1,7 +1,7 @@
 """The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -11,21 +11,11 @@ from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.store.groups import Groups, groups_of
+from dropanchor_service.store.preconditions import Precondition, always, require
 
 FILE_NAME = "site.json"
 
 _log = logging.getLogger(__name__)
-
-Allows = Callable[[BaseModel | None], bool]
-"""Returns whether a change may replace what there is now; None: there is nothing yet."""
-
-
-class ChangedMeanwhileError(Exception):
-    """Somebody has changed a resource since the client read it."""
-
-
-def _always(_current: BaseModel | None) -> bool:
-    return True
 
 
 class SiteDocument(BaseModel):
@@ -137,16 +127,16 @@ class SiteStore:
         """Return the anchor with this id, or None."""
         return next((known for known in self.site.anchors if known.number == anchor_number(anchor)), None)
 
-    def set_anchor(self, anchor: Anchor, allows: Allows = _always) -> None:
+    def set_anchor(self, anchor: Anchor, allows: Precondition = always) -> None:
         """Add the anchor, or replace the one with its number, and save the site.
 
         Raises OSError, and ChangedMeanwhileError when `allows` refuses.
         """
         with self._lock:
-            _require(allows, self.anchor(anchor.id))
+            require(allows, self.anchor(anchor.id))
             self._replace(self._document.model_copy(update={"site": _with_anchor(self.site, anchor)}))
 
-    def remove_anchor(self, anchor: str, allows: Allows = _always) -> None:
+    def remove_anchor(self, anchor: str, allows: Precondition = always) -> None:
         """Remove the anchor with this id and save the site.
 
         Raises KeyError when there is none, OSError, and ChangedMeanwhileError when `allows` refuses.
@@ -155,29 +145,29 @@ class SiteStore:
             known = self.anchor(anchor)
             if known is None:
                 raise KeyError(anchor)
-            _require(allows, known)
+            require(allows, known)
             left = [other for other in self.site.anchors if other != known]
             site = self.site.model_copy(update={"anchors": left})
             self._replace(self._document.model_copy(update={"site": site}))
 
-    def set_tag(self, tag: str, settings: TagSettings, allows: Allows = _always) -> None:
+    def set_tag(self, tag: str, settings: TagSettings, allows: Precondition = always) -> None:
         """Replace the settings of the tag and save them. What is not given becomes the default.
 
         Raises OSError, and ChangedMeanwhileError when `allows` refuses.
         """
         with self._lock:
-            _require(allows, self.tag_settings(tag))
+            require(allows, self.tag_settings(tag))
             complete = settings.over(self.default_settings)
             update = {"tags": self.tags | {tag: complete}, "deleted_ns": self._deleted_without(tag)}
             self._replace(self._document.model_copy(update=update))
 
-    def remove_tag(self, tag: str, now_ns: int, allows: Allows = _always) -> None:
+    def remove_tag(self, tag: str, now_ns: int, allows: Precondition = always) -> None:
         """Remove everything that is set for the tag, note when it was deleted, and save that.
 
         Raises OSError, and ChangedMeanwhileError when `allows` refuses.
         """
         with self._lock:
-            _require(allows, self.tag_settings(tag))
+            require(allows, self.tag_settings(tag))
             tags, remote = dict(self.tags), dict(self._document.remote)
             tags.pop(tag, None)
             remote.pop(tag, None)
@@ -230,11 +220,6 @@ class SiteStore:
         for anchor in self.site.anchors:
             index = self._anchors.get(anchor.number, (len(self._anchors),))[0]
             self._anchors[anchor.number] = (index, anchor)
-
-
-def _require(allows: Allows, current: BaseModel | None) -> None:
-    if not allows(current):
-        raise ChangedMeanwhileError
 
 
 def _with_anchor(site: Site, anchor: Anchor) -> Site:

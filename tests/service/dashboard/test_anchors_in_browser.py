@@ -88,7 +88,7 @@ def test_a_drag_over_a_change_of_another_page_asks_whose_is_kept(chromium: Brows
         select(page, open_setup(page), "17")
         outcome = page.page.locator("#outcome")
         drag(page, "17", 60, 0, lambda: place.bench.answers.site.set_anchor(newer))
-        expect(outcome).to_contain_text("Somebody else changed the same meanwhile")
+        expect(outcome).to_contain_text("Somebody else changed this meanwhile")
         assert anchors_of(place)["17"] == newer
         with page.page.expect_response(lambda response: "/anchors/17" in response.url):
             outcome.get_by_role("button", name="Take the newer one").click()

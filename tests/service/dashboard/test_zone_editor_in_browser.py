@@ -159,14 +159,30 @@ def test_a_change_of_somebody_else_is_not_overwritten(chromium: Browser, yard: Z
         yard.put(square("yard", 2.0, 2.0, name="Theirs"))
         form.get_by_label("Name").fill("Mine")
         form.get_by_role("button", name="Save zone").click()
-        expect(form.get_by_role("alert")).to_contain_text("Somebody else has changed this zone")
+        expect(form.get_by_role("alert")).to_contain_text("Somebody else changed this meanwhile")
         assert yard.zones["yard"].name == "Theirs"
-        form.get_by_role("button", name="Load the newer one").click()
+        form.get_by_role("button", name="Take the newer one").click()
         expect(form.get_by_label("Name")).to_have_value("Theirs")
         form.get_by_label("Name").fill("Ours")
         form.get_by_role("button", name="Save zone").click()
         expect(form).to_be_hidden()
         assert (yard.zones["yard"].name, points_of(yard, "yard")[0]) == ("Ours", [2.0, 2.0])
+
+
+def test_a_new_zone_never_replaces_one_that_somebody_else_has_just_made(chromium: Browser, yard: ZonePlace) -> None:
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        form = open_list(page)
+        page.page.get_by_role("button", name="New circle").click()
+        page.page.locator("#map").click(position={"x": 300, "y": 300})
+        form.get_by_label("Name").fill("Gate")
+        page.page.route("**/zones", lambda route: route.abort())  # the page cannot know the other zone
+        yard.put(disc("gate", 5.0, 5.0, 1.0, name="Theirs"))
+        form.get_by_role("button", name="Save zone").click()
+        expect(form.get_by_role("alert")).to_contain_text("Somebody else changed this meanwhile")
+        page.page.unroute("**/zones")
+        form.get_by_role("button", name="Save zone").click()
+        expect(form).to_be_hidden()
+        assert (yard.zones["gate"].name, yard.zones["gate-2"].name) == ("Theirs", "Gate")
 
 
 def test_a_zone_is_deleted_only_after_a_confirmation(chromium: Browser, yard: ZonePlace) -> None:

@@ -1,14 +1,12 @@
 """Conditional requests (RFC 9110): an ETag for each resource, and the preconditions of a change."""
 
 import hashlib
-from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import Depends, Header
 from pydantic import BaseModel
 
-Precondition = Callable[[BaseModel | None], bool]
-"""Returns whether a change may replace the current resource; None: there is no resource yet."""
+from dropanchor_service.store.preconditions import Precondition
 
 
 def etag_of(model: BaseModel) -> str:

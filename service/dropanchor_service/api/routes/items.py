@@ -3,19 +3,18 @@
 from collections.abc import Callable
 from typing import Annotated, TypeVar
 
-from fastapi import Depends, Header, Path
+from fastapi import Depends, Path
 from pydantic import BaseModel
 from starlette.responses import Response
 
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_service.api.http.errors import Kind, ProblemError
-from dropanchor_service.api.http.etags import etag_of, matches
+from dropanchor_service.api.http.etags import etag_of
 from dropanchor_service.api.routes.parameters import id_of, json_response, saving
 from dropanchor_service.store.items import FullError, NamedItems
+from dropanchor_service.store.preconditions import Precondition
 
 Item = TypeVar("Item", bound=BaseModel)
-
-IfMatch = Annotated[str | None, Header(description="Change nothing unless it is the `ETag` of the present one.")]
 
 CHANGE_KINDS = (Kind.ID_DIFFERS, Kind.ITEMS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
 
@@ -39,8 +38,6 @@ def path_id(what: str, example: str) -> Callable[..., str]:
     return read
 
 
-ZoneId = Annotated[str, Depends(path_id("zone", "dock"))]
-RuleId = Annotated[str, Depends(path_id("rule", "apart"))]
 WebhookId = Annotated[str, Depends(path_id("webhook", "mes"))]
 
 
@@ -55,36 +52,30 @@ def found(items: NamedItems[Item], name: str, unknown: Kind) -> Item:
     """Return the item. Raises ProblemError when there is none."""
     item = items.all.get(name)
     if item is None:
-        raise ProblemError(unknown, f"There is none with the id {name!r}.")
+        raise _unknown(name, unknown)
     return item
 
 
-def put(items: NamedItems[Item], name: str, body_id: str, item: Item, if_match: str | None) -> None:
+def put(items: NamedItems[Item], name: str, body_id: str, item: Item, allows: Precondition) -> None:
     """Save the item. Raises ProblemError."""
     if body_id != name:
         raise ProblemError(Kind.ID_DIFFERS, f"The id is {name!r} in the path and {body_id!r} in the body.")
-    present = items.all.get(name)
     with saving():
         try:
-            done = matches(if_match, present) and items.put(name, item, present if if_match else None)
+            items.put(name, item, allows)
         except FullError as error:
             raise ProblemError(Kind.ITEMS_FULL, f"There are {len(items.all)} already. Delete one first.") from error
-    if not done:
-        raise _changed()
 
 
-def delete(items: NamedItems[Item], name: str, if_match: str | None, unknown: Kind) -> Response:
+def delete(items: NamedItems[Item], name: str, allows: Precondition, unknown: Kind) -> Response:
     """Delete the item. Raises ProblemError."""
-    present = found(items, name, unknown)
     with saving():
         try:
-            done = matches(if_match, present) and items.remove(name, present if if_match else None)
+            items.remove(name, allows)
         except KeyError as error:
-            raise ProblemError(unknown, f"There is none with the id {name!r}.") from error
-    if not done:
-        raise _changed()
+            raise _unknown(name, unknown) from error
     return Response(status_code=204)
 
 
-def _changed() -> ProblemError:
-    return ProblemError(Kind.CHANGED_MEANWHILE, "Somebody changed it: get it and try again.")
+def _unknown(name: str, kind: Kind) -> ProblemError:
+    return ProblemError(kind, f"There is none with the id {name!r}.")

@@ -18,7 +18,7 @@ from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.answers.times import ns_of_iso
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.etags import etag_of
-from dropanchor_service.store.site import ChangedMeanwhileError
+from dropanchor_service.store.preconditions import ChangedMeanwhileError
 
 
 def json_response(answer: Any, media_type: str = "application/json", status: int = 200) -> Response:
@@ -189,7 +189,7 @@ class LastInnovations(BaseModel):
 
 @contextmanager
 def saving() -> Iterator[None]:
-    """Turn a failed write of the site into a problem. The site does not change when it cannot be written."""
+    """Turn a change that is refused or cannot be written into a problem. Then nothing has changed."""
     try:
         yield
     except ChangedMeanwhileError as error:

@@ -13,7 +13,7 @@ from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.care import care_of, health_answer
 from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
-from dropanchor_service.api.http.etags import Conditions, Precondition
+from dropanchor_service.api.http.etags import Conditions
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
@@ -25,6 +25,7 @@ from dropanchor_service.api.routes.parameters import (
     saving,
 )
 from dropanchor_service.store.clock_offsets import ClockOffset
+from dropanchor_service.store.preconditions import Precondition
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
 
 _REASON_NAMES = [reason.value for reason in REASONS]

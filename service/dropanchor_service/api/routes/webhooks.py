@@ -15,10 +15,11 @@ from dropanchor_schemas.webhooks import (
     WebhookTest,
 )
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.etags import Conditions
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
-from dropanchor_service.api.routes.items import CHANGE_KINDS, IfMatch, WebhookId, delete, found, item_response, put
+from dropanchor_service.api.routes.items import CHANGE_KINDS, WebhookId, delete, found, item_response, put
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.events.drafts import webhook_test
 from dropanchor_service.events.store import cloud_event
@@ -70,10 +71,10 @@ def _add_routes(router: APIRouter, parts: EventParts) -> None:
         responses=example_response(examples.WEBHOOK_STATUS) | problems(Kind.WEBHOOK_REFUSED, *CHANGE_KINDS, *_READ),
     )
     def put_webhook(
-        webhook: WebhookId, body: Annotated[Webhook, Body(examples=[examples.WEBHOOK])], if_match: IfMatch = None
+        webhook: WebhookId, body: Annotated[Webhook, Body(examples=[examples.WEBHOOK])], allows: Conditions
     ) -> Response:
         usable = _usable(parts, body)
-        put(webhooks, webhook, body.id, usable, if_match)
+        put(webhooks, webhook, body.id, usable, allows)
         return _response(parts, usable)
 
     @router.delete(
@@ -83,8 +84,8 @@ def _add_routes(router: APIRouter, parts: EventParts) -> None:
         status_code=204,
         responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
     )
-    def delete_webhook(webhook: WebhookId, if_match: IfMatch = None) -> Response:
-        response = delete(webhooks, webhook, if_match, Kind.UNKNOWN_WEBHOOK)
+    def delete_webhook(webhook: WebhookId, allows: Conditions) -> Response:
+        response = delete(webhooks, webhook, allows, Kind.UNKNOWN_WEBHOOK)
         with reading():
             parts.deliveries.drop(webhook)
         return response

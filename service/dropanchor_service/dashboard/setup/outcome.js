@@ -1,5 +1,7 @@
 /** Say what became of a change, and offer to undo it or to settle a conflict. */
 
+import { CHANGED_MEANWHILE_SENTENCE } from "../data/access.js";
+
 const SHOWN_MS = 12_000;
 
 export class Outcome {
@@ -22,7 +24,7 @@ export class Outcome {
 
   /** @param {import("../data/changes.js").Conflict} conflict */
   #conflict({ what, keep, take }) {
-    this.#show(`Somebody else changed the same meanwhile. Not done: ${what}`, [["Take the newer one", take], ["Keep mine", keep]]);
+    this.#show(`${CHANGED_MEANWHILE_SENTENCE} Not done: ${what}`, [["Take the newer one", take], ["Keep mine", keep]]);
   }
 
   /** @param {string} text @param {[string, () => void][]} choices */

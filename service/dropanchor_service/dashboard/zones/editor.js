@@ -1,6 +1,6 @@
 /** Draw a new zone, or edit one. Nothing changes for others until it is saved. */
 
-import { ChangedMeanwhileError } from "../data/access.js";
+import { CHANGED_MEANWHILE_SENTENCE, ChangedMeanwhileError } from "../data/access.js";
 import { placeIn, withCorner } from "./shape_edit.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
@@ -94,9 +94,27 @@ export class ZoneEditor extends EventTarget {
   /** Save what is being edited. Return the id, or null when the service refuses it. */
   async save() {
     if (!this.zone) return null;
-    const id = this.zone.id || newId(this.zone.name, this.store.zones);
-    const done = await this.#attempt(() => this.store.save({ .../** @type {Zone} */ (this.zone), id }, this.#etag));
+    let id = this.zone.id;
+    const done = await this.#attempt(async () => {
+      const zone = /** @type {Zone} */ (this.zone);
+      if (this.#etag === null) id = await this.#create(zone);
+      else await this.store.save(zone, this.#etag);
+    });
     return done ? id : null;
+  }
+
+  /** Save a new zone with an id that is free. Return the id. @param {Zone} zone @returns {Promise<string>} */
+  async #create(zone) {
+    const id = newId(zone.name, this.store.zones);
+    try {
+      await this.store.save({ ...zone, id }, null);
+      return id;
+    } catch (error) {
+      if (!(error instanceof ChangedMeanwhileError)) throw error;
+      await this.store.refresh(); // somebody else has made a zone with this id
+      if (newId(zone.name, this.store.zones) === id) throw error;
+      return this.#create(zone);
+    }
   }
 
   async remove() {
@@ -118,7 +136,7 @@ export class ZoneEditor extends EventTarget {
 
   /** @param {string} problem @param {boolean} [conflict] */
   #say(problem, conflict = false) {
-    this.problem = conflict ? "Somebody else has changed this zone meanwhile. Nothing was saved." : problem;
+    this.problem = conflict ? `${CHANGED_MEANWHILE_SENTENCE} Nothing was saved.` : problem;
     this.problemAt = placeIn(problem);
     this.conflict = conflict;
     this.#changed();

@@ -31,7 +31,7 @@ export class ZoneForm {
     const isNews = problem !== "" && problem !== this.#part("problem").textContent;
     put(this.#part("problem"), problem);
     if (isNews) this.#part("problem").scrollIntoView({ block: "nearest" });
-    this.#part("newer").hidden = !conflict;
+    this.#part("newer").hidden = !conflict || isNew;
     const key = zone === null ? "" : `${isNew} ${zone.id}`;
     if (key !== this.#shown) this.#part("question").hidden = true;
     if (zone) this.#show(zone);

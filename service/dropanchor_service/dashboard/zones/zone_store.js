@@ -80,7 +80,7 @@ export class ZoneStore extends EventTarget {
 
   /** Save a zone. Throws as sendChange does. @param {Zone} zone @param {string | null} etag of the present one; null: it is new */
   async save(zone, etag) {
-    await sendChange(pathOf(zone.id), "PUT", zone, etag === null ? {} : { "if-match": etag });
+    await sendChange(pathOf(zone.id), "PUT", zone, etag === null ? { "if-none-match": "*" } : { "if-match": etag });
     await this.refresh();
   }
 

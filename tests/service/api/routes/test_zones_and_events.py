@@ -64,12 +64,14 @@ def test_an_item_is_made_read_changed_and_deleted_with_etags(path: str, item: di
     assert made.json() == item | {"name": "one"}
     etag = made.headers["etag"]
     assert ask(app, "GET", f"/api/v1/{path}").headers["etag"] == etag
+    assert kind_of(put("two", **{"if-none-match": "*"})) == "changed-meanwhile"
     assert put("two", **{"if-match": etag}).status_code == 200
     assert kind_of(put("three", **{"if-match": etag})) == "changed-meanwhile"
     assert ask(app, "GET", f"/api/v1/{collection}").json() == {key: [item | {"name": "two"}]}
     assert kind_of(ask(app, "DELETE", f"/api/v1/{path}", headers={"if-match": etag})) == "changed-meanwhile"
     assert ask(app, "DELETE", f"/api/v1/{path}").status_code == 204
     assert kind_of(ask(app, "DELETE", f"/api/v1/{path}")) == f"unknown-{unknown}"
+    assert put("again", **{"if-none-match": "*"}).status_code == 200
     assert kind_of(ask(app, "PUT", f"/api/v1/{path}-2", json=item)) == "id-differs"
 
 
@@ -173,6 +175,11 @@ def test_a_webhook_never_returns_its_secret_and_keeps_it(tmp_path: Path) -> None
     changed = ask(app, "PUT", "/api/v1/webhooks/mes", json=webhook(secret=None, tags=["a"]))
     answers = [made, changed, *(ask(app, "GET", f"/api/v1/webhooks{path}") for path in ("", "/mes"))]
     assert all(response.status_code == 200 and SECRET not in response.text for response in answers)
+    again = ask(
+        app, "PUT", "/api/v1/webhooks/mes", json=webhook(url="http://127.0.0.1:8/"), headers={"if-none-match": "*"}
+    )
+    assert kind_of(again) == "changed-meanwhile"
+    assert parts.webhooks.all["mes"].url == "http://127.0.0.1:9/"
     assert parts.webhooks.all["mes"].secret == SECRET
     assert open_webhooks(tmp_path).all["mes"].secret == SECRET
     assert (tmp_path / FILE_NAME).stat().st_mode & 0o077 == 0
