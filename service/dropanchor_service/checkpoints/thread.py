@@ -8,6 +8,7 @@ from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.worker import Worker
 
 OLD_S = 5.0  # an older newest checkpoint is a problem
 REST = 3  # pause, relative to the duration of the last write, so that a slow disk is not always busy
@@ -16,10 +17,11 @@ _TURN_S = 1.0  # wait for a turn of the ingest thread
 _log = logging.getLogger(__name__)
 
 
-class CheckpointThread:
+class CheckpointThread(Worker):
     """Writes checkpoints on a thread of its own. The ingest thread calls `between_turns`."""
 
     def __init__(self, state: ServiceState, folder: CheckpointFolder, metrics: Metrics, period_s: float) -> None:
+        super().__init__("checkpoints", _TURN_S)
         self._log = RareLog(_log)
         self._state = state
         self._folder = folder
@@ -27,13 +29,11 @@ class CheckpointThread:
         self._period_s = period_s
         self._requested = threading.Event()
         self._taken = threading.Event()
-        self._stop = threading.Event()
         self._snapshot: Snapshot | None = None
         self._messages = -1  # in the newest checkpoint
         self._current_s = time.monotonic()  # when the newest checkpoint, or the loaded one, was last up to date
         self._error: str | None = None
         self._took_s = 0.0
-        self._thread = threading.Thread(target=self._run, name="checkpoints", daemon=True)
         metrics.checkpoint_age.set_function(lambda: self.age_s)
 
     def load(self) -> None:
@@ -49,22 +49,17 @@ class CheckpointThread:
 
     def start(self) -> None:
         self._current_s = time.monotonic()
-        self._thread.start()
+        super().start()
 
     def stop(self) -> None:
         """Stop, and write the last checkpoint. Call it after the ingest thread has stopped."""
-        self._stop.set()
-        self._thread.join(_TURN_S)
-        if self._thread.is_alive():
+        super().stop()
+        if self.is_alive:
             self._state.keep_buffers_apart()
         self._snapshot = None
         self._requested.set()
         self.between_turns()
         self._write()
-
-    @property
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
 
     @property
     def age_s(self) -> float:

@@ -2,21 +2,20 @@
 
 import logging
 import sqlite3
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.events.watcher import Watcher
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.worker import Worker
 
 MAX_UNSAVED = 50_000  # events that wait for the disk; then nothing is judged until they are stored
 RETRY_S = 1.0
 PRUNE_S = 60.0
 MAX_PRUNE_S = 0.5
+STOP_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -27,35 +26,24 @@ class Retention:
     max_bytes: int
 
 
-class EventThread:
+class EventThread(Worker):
     """Watches while this context is open. An event is shown to nobody before it is stored."""
 
     def __init__(
         self, watcher: Watcher, store: EventStore, retention: Retention, now_ns: Callable[[], int], period_s: float
     ) -> None:
+        super().__init__("events", STOP_S)
         self._log = RareLog(logging.getLogger(__name__))
         self._watcher = watcher
         self._store = store
         self._retention = retention
         self._now_ns = now_ns
         self._period_s = period_s
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="events", daemon=True)
         self._prune_due_s = 0.0
         self.problem: str | None = None
         self.stored = 0
         self.busy_s = 0.0
         """Time that the thread has worked."""
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stop.set()
-        self._thread.join(5.0)
 
     def _run(self) -> None:
         while not self._stop.wait(self._period_s if self.problem is None else RETRY_S):

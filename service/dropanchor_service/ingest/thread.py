@@ -1,7 +1,6 @@
 """Run the ingest on a thread of its own, which survives errors and reports when it is stuck."""
 
 import logging
-import threading
 import time
 from collections.abc import Callable
 
@@ -9,6 +8,7 @@ from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.worker import Worker
 
 IDLE_S = 0.25
 PENDING_S = 0.02  # longest wait while messages are pending, which may become due
@@ -19,7 +19,7 @@ MIN_MESSAGES, MAX_MESSAGES = 100, 2000  # limits of such a turn
 MIN_MEASURED = 50  # messages of a turn whose duration predicts that of the next one
 
 
-class IngestThread:
+class IngestThread(Worker):
     """Takes a turn every `period_s` while messages arrive.
 
     between_turns: called after each turn, on the same thread.
@@ -33,27 +33,15 @@ class IngestThread:
         period_s: float,
         between_turns: Callable[[], None] = lambda: None,
     ) -> None:
+        super().__init__("ingest")
         self._log = RareLog(logging.getLogger(__name__))
         self._ingest = ingest
         self._buffer = buffer
         self._metrics = metrics
         self._period_s = period_s
         self._between_turns = between_turns
-        self._stop = threading.Event()
         self._turned_s = time.monotonic()
         self._limit = MIN_MESSAGES
-        self._thread = threading.Thread(target=self._run, name="ingest", daemon=True)
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def stop(self, timeout_s: float = 1.0) -> None:
-        self._stop.set()
-        self._thread.join(timeout_s)
-
-    @property
-    def is_alive(self) -> bool:
-        return self._thread.is_alive()
 
     @property
     def problem(self) -> str | None:

@@ -3,14 +3,12 @@
 import asyncio
 import logging
 import sqlite3
-import threading
 from collections.abc import Callable
-from types import TracebackType
-from typing import Self
 
 from dropanchor_schemas.webhooks import Webhook
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.worker import Worker
 from dropanchor_service.store.items import NamedItems
 from dropanchor_service.webhooks.queue import Counts, Patience, Queue
 from dropanchor_service.webhooks.sender import Sender
@@ -19,7 +17,7 @@ IDLE_S = 0.1
 STOP_S = 2.0
 
 
-class WebhookThread:
+class WebhookThread(Worker):
     """Delivers while this context is open. A slow receiver delays no other."""
 
     def __init__(
@@ -30,6 +28,7 @@ class WebhookThread:
         patience: Patience,
         now_ns: Callable[[], int],
     ) -> None:
+        super().__init__("webhooks", STOP_S)
         self._log = RareLog(logging.getLogger(__name__))
         self._webhooks = webhooks
         self._deliveries = deliveries
@@ -39,26 +38,17 @@ class WebhookThread:
         self._urls: dict[str, str] = {}  # a connection is checked for the host of one URL, so each URL gets its own
         self._queues: dict[str, Queue] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._run()), name="webhooks", daemon=True)
         self.counts = Counts()
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stop.set()
-        self._thread.join(STOP_S)
 
     def problem_of(self, webhook: str) -> str | None:
         """Return why the last attempt failed, None if it did not."""
         queue = self._queues.get(webhook)
         return None if queue is None else queue.problem
 
-    async def _run(self) -> None:
+    def _run(self) -> None:
+        asyncio.run(self._deliver_all())
+
+    async def _deliver_all(self) -> None:
         while not self._stop.is_set():
             urls = {name: webhook.url for name, webhook in self._webhooks.all.items()}
             for name in [name for name, url in self._urls.items() if urls.get(name) != url]:

@@ -1,42 +1,29 @@
 """Publish from a thread of its own."""
 
 import logging
-import threading
-from abc import ABC, abstractmethod
-from types import TracebackType
-from typing import Self
+from abc import abstractmethod
 
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.worker import Worker
 
 
-class PeriodicPublisher(ABC):
+class PeriodicPublisher(Worker):
     """Calls `publish` every `period_s` while it is open. An error is counted and logged, and the calls go on.
 
     The ingest thread must not publish, because a put may take longer than it can wait.
     """
 
     def __init__(self, name: str, period_s: float, metrics: Metrics) -> None:
+        super().__init__(name)
         self._log = RareLog(logging.getLogger(__name__))
         self._name = name
         self._period_s = period_s
         self._metrics = metrics
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     @abstractmethod
     def publish(self) -> None:
         """Put what has changed since the last call."""
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stop.set()
-        self._thread.join(1.0)
 
     def _run(self) -> None:
         while not self._stop.wait(self._period_s):
