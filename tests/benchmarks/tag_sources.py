@@ -1,17 +1,15 @@
 """The commands of `dropanchor-tag` at the full rates of their sources, each in a process of its own."""
 
 import json
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from subprocess import Popen
-from threading import Event, Thread
 
 from support.commands import start_python
 from support.module_strings import EXAMPLES
 from support.mosquitto import mosquitto
+from support.repeated import repeated
 from support.serial_module import plugged_in
 
 IMU_HZ, RANGES_HZ = 100, 10
@@ -102,24 +100,14 @@ def publish(_folder: Path, endpoint: str) -> Iterator[Process]:
 @contextmanager
 def _samples(take: Callable[[dict[str, object]], object]) -> Iterator[None]:
     """Make IMU samples and ranges at their rates, in real time, until the block ends."""
-    stop = Event()
 
-    def run() -> None:
-        began_s = time.monotonic()
-        for i in count():
-            if stop.wait(max(0.0, began_s + i / IMU_HZ - time.monotonic())):
-                return
-            take({"acc": [0.0, 0.0, 9.81 + 0.001 * (i % 7)], "gyro": [0.0, 0.0, 0.1]})
-            if i % (IMU_HZ // RANGES_HZ) == 0:
-                take({"anchor": 7, "range_m": 12.25})
+    def take_samples(index: int) -> None:
+        take({"acc": [0.0, 0.0, 9.81 + 0.001 * (index % 7)], "gyro": [0.0, 0.0, 0.1]})
+        if index % (IMU_HZ // RANGES_HZ) == 0:
+            take({"anchor": 7, "range_m": 12.25})
 
-    thread = Thread(target=run)
-    thread.start()
-    try:
+    with repeated(take_samples, 1.0 / IMU_HZ):
         yield
-    finally:
-        stop.set()
-        thread.join()
 
 
 @contextmanager

@@ -5,13 +5,13 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Event, Thread
 
 import pytest
 from playwright.sync_api import Browser
 
 from dropanchor_tag_client import TagClient
 from support.browser import WatchedPage, running_chromium, watched_page
+from support.repeated import repeated
 from support.service import running_service
 from support.zenoh_router import free_endpoint, free_port
 
@@ -37,24 +37,16 @@ def chromium() -> Iterator[Browser]:
 @contextmanager
 def driving_tag(name: str, endpoint: str) -> Iterator[None]:
     """Run a tag with a platform heading and ten ranges a second until the block ends."""
-    stop = Event()
-    with TagClient(name, connect=endpoint, connect_timeout_s=20) as client:
-        thread = Thread(target=_drive, args=(client, stop))
-        thread.start()
-        try:
-            yield
-        finally:
-            stop.set()
-            thread.join()
-
-
-def _drive(client: TagClient, stop: Event) -> None:
     begun_s = time.monotonic()
-    while not stop.wait(0.1):
+
+    def publish(_: int) -> None:
         turned = (time.monotonic() - begun_s) * SPEED_MPS / RADIUS_M
         x, y = CENTRE_M[0] + RADIUS_M * math.cos(turned), CENTRE_M[1] + RADIUS_M * math.sin(turned)
         client.publish_heading(math.remainder(turned + math.pi / 2, math.tau), std_rad=0.03)
         client.publish_range("7", math.hypot(x, y), std_m=0.1)
+
+    with TagClient(name, connect=endpoint, connect_timeout_s=20) as client, repeated(publish, 0.1):
+        yield
 
 
 def wait_until_moved(page: WatchedPage, tag: str, pixels: float) -> None:

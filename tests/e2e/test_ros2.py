@@ -9,11 +9,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import hypot, pi
-from threading import Event, Thread
+from threading import Thread
 
 import pytest
 
 from dropanchor_service.cli import main
+from support.repeated import repeated
 from support.ros2 import IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, Robot, imu_cdr, range_cdr, read_pose
 from support.service import Running, command, environment, running_service, settings_file
 from support.vibration import shaken_acc, shaken_gyro
@@ -57,37 +58,38 @@ def running_bridge(service: Running, ros_router: str, *arguments: str) -> Iterat
             reader.join()
 
 
-def drive(robot: Robot, stop: Event) -> None:
-    """Go north past the anchor from (10, -20). The y axis of the IMU points forward, and some messages are unusable."""
+@contextmanager
+def driving(robot: Robot) -> Iterator[None]:
+    """Go north past the anchor from (10, -20) until the block ends.
+
+    The y axis of the IMU points forward, and some messages are unusable.
+    """
     began_s = time.monotonic()
-    count = 0
-    while not stop.wait(0.02):
+
+    def publish(index: int) -> None:
         now_ns = time.time_ns()
         forward, left, up = shaken_acc()
         gyro_forward, gyro_left, gyro_up = shaken_gyro()
         robot.publish("imu/data", IMU, imu_cdr(now_ns, (-left, forward, up), (-gyro_left, gyro_forward, gyro_up)))
-        if count % 5 == 0:
+        if index % 5 == 0:
             distance_m = hypot(10.0, -20.0 + SPEED_MPS * (time.monotonic() - began_s))
             robot.publish("uwb/range", RANGE, range_cdr(now_ns, distance_m))
             robot.publish("uwb/range", RANGE, range_cdr(now_ns, float("inf")))
-        count += 1
+
+    with repeated(publish, 0.02):
+        yield
 
 
 def test_a_robot_is_a_tag_and_gets_its_pose_with_covariance_odometry_and_tf(service: Running, ros_router: str) -> None:
     with connected_session(ros_router) as session, running_bridge(service, ros_router, *OPTIONS) as said:
-        robot, stop = Robot(session, DOMAIN), Event()
+        robot = Robot(session, DOMAIN)
         keys = [
             robot.subscribe("cart/dropanchor/pose", POSE),
             robot.subscribe("cart/dropanchor/odometry", ODOMETRY),
             robot.subscribe("tf", TF),
         ]
-        driving = Thread(target=drive, args=(robot, stop))
-        driving.start()
-        try:
+        with driving(robot):
             wait_until(lambda: all(len(robot.received[key]) >= 10 for key in keys), 90.0)
-        finally:
-            stop.set()
-            driving.join()
         pose, odometry, tf = (robot.received[key] for key in keys)
 
         reader = CdrReader(pose[-1][0])

@@ -2,16 +2,16 @@
 program publishes one for the same tag."""
 
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from math import hypot
 from pathlib import Path
-from threading import Event, Thread
 
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from support.commands import start_python
 from support.module_strings import EXAMPLES
+from support.repeated import repeated
 from support.serial_module import Answer, plugged_in
 from support.service import running_service, settings_file
 from support.vibration import shaken_acc, shaken_gyro
@@ -20,17 +20,22 @@ from support.zenoh_router import wait_until
 SPEED_MPS = 1.0
 
 
-def publish_imu(endpoint: str, stop: Event) -> None:
-    """Publish IMU samples of a tag that moves north for each module without an IMU, until `stop` is set."""
+@contextmanager
+def imu_of_others(endpoint: str) -> Iterator[None]:
+    """Publish IMU samples of a tag that moves north for each module without an IMU, until the block ends."""
     with ExitStack() as stack:
         clients = [
             stack.enter_context(TagClient(tag, connect=endpoint))
             for tag, example in EXAMPLES.items()
             if not example.has_imu
         ]
-        while not stop.wait(0.02):
+
+        def publish(_: int) -> None:
             for client in clients:
                 client.publish_imu(shaken_acc(), shaken_gyro(), (20.0, 0.0, -40.0))
+
+        with repeated(publish, 0.02):
+            yield
 
 
 def distance(began_s: float) -> float:
@@ -57,12 +62,7 @@ def test_each_module_is_a_dot_that_moves_along_its_ranges(tmp_path: Path) -> Non
             process = start_python("-m", "dropanchor_tag_client", "serial", str(module.path), *arguments)
             stack.callback(process.communicate, timeout=30)
             stack.callback(process.terminate)
-
-        stop = Event()
-        imu = Thread(target=publish_imu, args=(service.zenoh, stop))
-        imu.start()
-        stack.callback(imu.join)
-        stack.callback(stop.set)
+        stack.enter_context(imu_of_others(service.zenoh))
 
         def poses() -> dict[str, tuple[float, float]]:
             return {

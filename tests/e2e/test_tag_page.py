@@ -5,13 +5,13 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Event, Thread
 
 import pytest
 
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, RangeSample, encode_json
 from dropanchor_service.cli import main
 from support.browser import running_chromium
+from support.repeated import repeated
 from support.service import Running, running_service, settings_file
 from support.tag_page import tag_page
 from support.zenoh_router import free_port
@@ -29,25 +29,16 @@ def range_m(seconds: float) -> float:
 @contextmanager
 def ranges_from_elsewhere(service: Running, key: str) -> Iterator[None]:
     """Post ten ranges a second to anchor 7, as a gateway does, until the block ends."""
-    stop = Event()
     headers = {"authorization": f"Bearer {key}", "content-type": ENCODING_JSON}
     begun_s = time.monotonic()
 
-    def post() -> None:
-        sequence = 0
-        while not stop.wait(0.1):
-            sample = RangeSample(time.time_ns(), 7, range_m(time.monotonic() - begun_s), 0.1)
-            content = encode_json(Frame(ranges=[sample], sequence=sequence, boot_id=7))
-            service.ask("POST", "/api/v1/ingest/samples", content=content, headers=headers)
-            sequence += 1
+    def post(index: int) -> None:
+        sample = RangeSample(time.time_ns(), 7, range_m(time.monotonic() - begun_s), 0.1)
+        content = encode_json(Frame(ranges=[sample], sequence=index, boot_id=7))
+        service.ask("POST", "/api/v1/ingest/samples", content=content, headers=headers)
 
-    thread = Thread(target=post)
-    thread.start()
-    try:
+    with repeated(post, 0.1):
         yield
-    finally:
-        stop.set()
-        thread.join()
 
 
 def test_a_phone_that_opens_the_link_of_its_key_has_a_pose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

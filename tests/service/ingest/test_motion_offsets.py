@@ -1,5 +1,7 @@
 """The offset between the clocks of motion and ranges shows from turns and stops, or not at all."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,7 @@ from support.manual_clock import ManualClock
 
 S = 1_000_000_000
 T = 1_760_000_000 * S
+EVERY_S = 0.5  # samples arrive
 SENSORS = preset("real", imu_hz=50.0)
 
 
@@ -26,21 +29,28 @@ def yard(seed: int) -> Simulation:
     return simulation("yard", seed, seed % 4, SENSORS, 120.0)
 
 
-def answers(
-    motion: Simulation, ahead_s: float, ranges: Simulation | None = None, every_s: float = 0.5
-) -> list[MotionOffset]:
-    """Return all answers for the motion of one run, by a clock that is ahead, and the ranges of the same or another."""
+def batches(
+    motion: Simulation, ahead_s: float, ranges: Simulation | None = None, row: int = 0
+) -> Iterator[SampleBatch]:
+    """Yield the motion of one run, by a clock that is ahead, with the ranges of the same or another."""
     measured = (ranges or motion).ranges
     imu, distances = np.zeros(len(motion.imu.t_s), IMU), np.zeros(len(measured.t_s), RANGE)
+    imu["row"] = distances["row"] = row
     imu["t_ns"] = T + np.round((motion.imu.t_s + ahead_s) * S).astype(np.int64)
     imu["acc"], imu["gyro"] = motion.imu.acc, motion.imu.gyro
     distances["t_ns"], distances["range"] = T + np.round(measured.t_s * S).astype(np.int64), measured.range_m
+    for begin in np.arange(0.0, motion.imu.t_s[-1], EVERY_S):
+        of_imu, of_ranges = ((t >= begin) & (t < begin + EVERY_S) for t in (motion.imu.t_s, measured.t_s))
+        yield SampleBatch(imu[of_imu], distances[of_ranges])
+
+
+def answers(motion: Simulation, ahead_s: float, ranges: Simulation | None = None) -> list[MotionOffset]:
+    """Return all answers for the motion of one run, by a clock that is ahead, and the ranges of the same or another."""
     offsets = MotionOffsets()
     found: list[MotionOffset] = []
     offsets.watch([0])
-    for begin in np.arange(0.0, motion.imu.t_s[-1], every_s):
-        of_imu, of_ranges = ((t >= begin) & (t < begin + every_s) for t in (motion.imu.t_s, measured.t_s))
-        offsets.add(SampleBatch(imu[of_imu], distances[of_ranges]))
+    for batch in batches(motion, ahead_s, ranges):
+        offsets.add(batch)
         answer = offsets.offset(0)
         if answer is not None and answer not in found[-1:]:
             found.append(answer)
@@ -111,17 +121,15 @@ def test_another_anchor_is_used_when_the_first_one_has_been_silent() -> None:
 
 
 def test_the_number_of_watched_tags_is_bounded_and_other_rows_are_ignored() -> None:
-    offsets, rows = MotionOffsets(), np.arange(3 * MAX_TAGS)
-    offsets.watch(rows.tolist())
-    imu, ranges = np.zeros(len(rows), IMU), np.zeros(len(rows), RANGE)
-    imu["row"] = ranges["row"] = rows
-    imu["t_ns"] = ranges["t_ns"] = T
-    offsets.add(SampleBatch(imu, ranges))
-    assert sum(offsets.offset(row) is None for row in rows.tolist()) == len(rows)
-    assert offsets.watched == MAX_TAGS
+    offsets, run = MotionOffsets(), yard(7001)
+    offsets.watch(range(MAX_TAGS + 1))
+    for row in (MAX_TAGS - 1, MAX_TAGS, 3 * MAX_TAGS):
+        for batch in batches(run, 0.5, row=row):
+            offsets.add(batch)
+    assert offsets.offset(MAX_TAGS - 1) is not None
+    assert offsets.offset(MAX_TAGS) is offsets.offset(3 * MAX_TAGS) is None
     offsets.watch([])
-    offsets.add(SampleBatch(imu, ranges))
-    assert offsets.watched == 0
+    assert offsets.offset(MAX_TAGS - 1) is None
 
 
 def messages(run: Simulation, delay_s: float) -> list[tuple[float, Frame]]:

@@ -6,12 +6,11 @@ import random
 
 import pytest
 
-from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, decode_packed
-from dropanchor_service.phones.intake import PhoneIntake
-from dropanchor_service.phones.phyphox import parse
+from dropanchor_service.phones.phyphox import Message, parse
 from dropanchor_service.phones.phyphox_session import PhyphoxSession
 from dropanchor_service.phones.readings import PhoneError
 from dropanchor_service.phones.session import MAX_WAITING, WAIT_S
+from support.phone import Phone
 from support.phyphox import Value, event, message, recording
 from support.sensor_logger import G, Vector
 
@@ -20,30 +19,8 @@ START_NS = 1_800_000_000_125_000_000
 START = [event("START", 0.0, START_S)]
 
 
-class Phone:
-    """An intake, and what it put out for one tag."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-        self.frames: list[Frame] = []
-        self.counted: list[bytes] = []
-        self.intake = PhoneIntake(self._receive, lambda *_: None, parse, lambda _: PhyphoxSession(), lambda: self.now_s)
-
-    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
-        assert tag == "anna"
-        if encoding == ENCODING_JSON:
-            self.counted.append(payload)
-            return
-        frame = decode_packed(payload)
-        assert isinstance(frame, Frame)
-        self.frames.append(frame)
-
-    def post(self, body: bytes) -> int:
-        return self.intake.post("anna", body).samples
-
-    @property
-    def samples(self) -> list[ImuSample]:
-        return [sample for frame in self.frames for sample in frame.imu]
+def make_phone() -> Phone[Message]:
+    return Phone(parse, lambda _: PhyphoxSession())
 
 
 def turning(t: float) -> Vector:
@@ -65,7 +42,7 @@ def at_rest(*times: float) -> dict[str, list[tuple[float, Vector]]]:
 
 
 def test_ten_minutes_at_100_hz_out_of_order_and_repeated_lose_no_reading_and_use_none_twice() -> None:
-    phone, chance = Phone(), random.Random(5)
+    phone, chance = make_phone(), random.Random(5)
     messages = list(recording(600, SENSORS, START_S))
     places = [(index + chance.uniform(0.0, 5.0), body) for index, body in enumerate(messages)]
     places += [(index + chance.uniform(0.0, 9.0), body) for index, body in list(enumerate(messages))[::7]]
@@ -84,7 +61,7 @@ def test_ten_minutes_at_100_hz_out_of_order_and_repeated_lose_no_reading_and_use
 
 
 def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
-    phone = Phone()
+    phone = make_phone()
     [body] = recording(0.2, SENSORS, START_S)
     assert phone.post(body) > 0
     before = len(phone.samples)
@@ -93,7 +70,7 @@ def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
 
 
 def test_messages_that_overlap_give_every_reading_once() -> None:
-    phone = Phone()
+    phone = make_phone()
     times = [round(0.01 * index, 3) for index in range(1, 61)]
     for begin in (0, 10, 20, 30):
         phone.post(message(START, START_S, at_rest(*times[begin : begin + 30])))
@@ -101,7 +78,7 @@ def test_messages_that_overlap_give_every_reading_once() -> None:
 
 
 def test_a_message_that_never_comes_is_given_up_after_a_while_and_used_when_it_comes_after_all() -> None:
-    phone = Phone()
+    phone = make_phone()
     first, second, third = recording(0.6, SENSORS, START_S)
     phone.post(first)
     assert phone.intake.post("anna", third).waiting == 1
@@ -116,7 +93,7 @@ def test_a_message_that_never_comes_is_given_up_after_a_while_and_used_when_it_c
 
 
 def test_no_more_messages_wait_than_are_allowed() -> None:
-    phone = Phone()
+    phone = make_phone()
     bodies = list(recording(0.2 * (MAX_WAITING + 2), SENSORS, START_S))
     waiting = [phone.intake.post("anna", body).waiting for body in bodies[1:]]
     assert max(waiting) == MAX_WAITING
@@ -124,12 +101,12 @@ def test_no_more_messages_wait_than_are_allowed() -> None:
 
 
 def test_a_service_that_hears_an_experiment_from_its_middle_on_does_not_wait_for_its_beginning() -> None:
-    phone = Phone()
+    phone = make_phone()
     assert phone.post(list(recording(4, SENSORS, START_S))[10]) >= 19
 
 
 def test_a_pause_moves_the_times_after_it_and_a_cleared_experiment_is_a_new_one() -> None:
-    phone = Phone()
+    phone = make_phone()
     phone.post(message(START, START_S + 1, at_rest(0.98, 0.99)))
     resumed = [*START, event("PAUSE", 1.0, START_S + 1.0), event("START", 1.0, START_S + 61.0)]
     assert phone.intake.post("anna", message(resumed, START_S + 62, {})).waiting == 0
@@ -144,13 +121,13 @@ def test_a_pause_moves_the_times_after_it_and_a_cleared_experiment_is_a_new_one(
 
 
 def test_a_phone_without_a_magnetometer_sends_samples_without_a_field() -> None:
-    phone = Phone()
+    phone = make_phone()
     assert phone.post(message(START, START_S, at_rest(0.05, 0.06))) == 2
     assert {sample.mag for sample in phone.samples} == {None}
 
 
 def test_readings_that_make_no_sense_are_counted_and_harm_no_others() -> None:
-    phone = Phone()
+    phone = make_phone()
     readings = at_rest(0.05, 0.06, 0.07)
     damaged = json.loads(message(START, START_S, readings))
     damaged["gyroscope_x"][1] = None  # what the app sends for a value that is not finite
@@ -178,14 +155,14 @@ def test_readings_that_make_no_sense_are_counted_and_harm_no_others() -> None:
     ],
 )
 def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, sentence: str) -> None:
-    phone = Phone()
+    phone = make_phone()
     with pytest.raises(PhoneError, match=sentence):
         phone.post(body)
     assert phone.counted == [body]
 
 
 def test_an_experiment_that_has_not_begun_or_pauses_sends_nothing_and_is_welcome() -> None:
-    phone = Phone()
+    phone = make_phone()
     for body in (message([], START_S, {}), message(START, START_S, at_rest())):
         assert phone.post(body) == 0
     assert not phone.counted

@@ -6,42 +6,17 @@ import random
 
 import pytest
 
-from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, decode_packed
-from dropanchor_service.phones.intake import BATTERY_S, SESSIONS_PER_TAG, PhoneIntake
-from dropanchor_service.phones.pairing import Signs
+from dropanchor_schemas.wire import ENCODING_JSON
+from dropanchor_service.phones.intake import BATTERY_S, SESSIONS_PER_TAG
 from dropanchor_service.phones.readings import PhoneError
-from dropanchor_service.phones.sensor_logger import parse
+from dropanchor_service.phones.sensor_logger import Message, parse
 from dropanchor_service.phones.session import MAX_WAITING, WAIT_S, Session
+from support.phone import Phone
 from support.sensor_logger import T_NS, G, Value, Vector, message, reading, recording
 
 
-class Phones:
-    """An intake, and what it put out for one tag."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-        self.frames: list[Frame] = []
-        self.counted: list[bytes] = []
-        self.health: list[tuple[str, bytes, str]] = []
-        self.intake = PhoneIntake(
-            self._receive, lambda *report: self.health.append(report), parse, Session, lambda: self.now_s
-        )
-
-    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
-        assert tag == "anna"
-        if encoding == ENCODING_JSON:
-            self.counted.append(payload)
-            return
-        frame = decode_packed(payload)
-        assert isinstance(frame, Frame)
-        self.frames.append(frame)
-
-    def post(self, body: bytes) -> int:
-        return self.intake.post("anna", body, Signs.AUTO).samples
-
-    @property
-    def samples(self) -> list[ImuSample]:
-        return [sample for frame in self.frames for sample in frame.imu]
+def make_phone() -> Phone[Message]:
+    return Phone(parse, Session)
 
 
 def turning(t_ns: int) -> Vector:
@@ -70,99 +45,99 @@ def out_of_order(messages: list[bytes], seed: int) -> list[bytes]:
 
 @pytest.mark.parametrize("sensors", [ANDROID, IOS], ids=["android", "ios"])
 def test_ten_minutes_at_100_hz_out_of_order_lose_no_reading_and_use_none_twice(sensors: dict[str, Value]) -> None:
-    phones = Phones()
+    phone = make_phone()
     taken = 0
     for body in out_of_order(list(recording(600, sensors, batch_ns=200_000_000)), seed=3):
-        taken += phones.post(body)
-        phones.now_s += 0.175  # 3,429 messages in 600 s
-    times = [sample.t_ns for sample in phones.samples]
+        taken += phone.post(body)
+        phone.now_s += 0.175  # 3,429 messages in 600 s
+    times = [sample.t_ns for sample in phone.samples]
     every = [T_NS + index * 10_000_000 for index in range(60_000)]
     assert times == every[:-1]  # the last one has no acceleration after it
     assert taken == len(times)
-    for sample in phones.samples[::997]:
+    for sample in phone.samples[::997]:
         assert sample.acc == pytest.approx((0.0, 0.0, G), rel=1e-6)
         assert sample.gyro[2] == pytest.approx(turning(sample.t_ns)[2], abs=1e-6)
-    assert [frame.sequence for frame in phones.frames] == list(range(len(phones.frames)))
-    assert len({frame.boot_id for frame in phones.frames}) == 1
+    assert [frame.sequence for frame in phone.frames] == list(range(len(phone.frames)))
+    assert len({frame.boot_id for frame in phone.frames}) == 1
 
 
 def test_a_message_that_comes_twice_is_told_and_used_once() -> None:
-    phones = Phones()
+    phone = make_phone()
     [body] = recording(1, ANDROID)
-    assert phones.post(body) == 99
-    assert phones.intake.post("anna", body, Signs.AUTO).duplicate
-    assert len(phones.samples) == 99
+    assert phone.post(body) == 99
+    assert phone.intake.post("anna", body).duplicate
+    assert len(phone.samples) == 99
 
 
 def test_a_message_that_never_comes_is_given_up_after_a_while_without_another_one() -> None:
-    phones = Phones()
+    phone = make_phone()
     first, _, third = recording(3, ANDROID)
-    phones.post(first)
-    assert phones.intake.post("anna", third, Signs.AUTO).waiting == 1
-    phones.intake.release_overdue()
-    assert len(phones.samples) == 99
-    phones.now_s += WAIT_S
-    phones.intake.release_overdue()
-    assert len(phones.samples) > 190
+    phone.post(first)
+    assert phone.intake.post("anna", third).waiting == 1
+    phone.intake.release_overdue()
+    assert len(phone.samples) == 99
+    phone.now_s += WAIT_S
+    phone.intake.release_overdue()
+    assert len(phone.samples) > 190
 
 
 def test_a_message_that_comes_after_it_was_given_up_is_used_all_the_same_and_with_the_signs_of_the_others() -> None:
-    phones = Phones()
+    phone = make_phone()
     upright: dict[str, Value] = IOS | {
         "gravity": lambda t_ns: (0.0, 0.0, -G) if t_ns < T_NS + 9 * 10**8 else (0.0, G, 0.0)
     }
     first, second, third = recording(3, upright)
-    phones.post(first)
-    phones.post(third)
-    phones.now_s += WAIT_S
-    phones.intake.release_overdue()
-    assert phones.post(second) > 90
-    times = [sample.t_ns for sample in phones.samples]
+    phone.post(first)
+    phone.post(third)
+    phone.now_s += WAIT_S
+    phone.intake.release_overdue()
+    assert phone.post(second) > 90
+    times = [sample.t_ns for sample in phone.samples]
     assert len(times) == len(set(times))
 
 
 def test_no_more_messages_wait_than_are_allowed() -> None:
-    phones = Phones()
+    phone = make_phone()
     bodies = list(recording(MAX_WAITING + 2, ANDROID))
-    waiting = [phones.intake.post("anna", body, Signs.AUTO).waiting for body in bodies[1:]]
+    waiting = [phone.intake.post("anna", body).waiting for body in bodies[1:]]
     assert max(waiting) == MAX_WAITING
     assert waiting[-1] == 0
 
 
 def test_a_service_that_hears_a_recording_from_its_middle_on_does_not_wait_for_its_beginning() -> None:
-    phones = Phones()
+    phone = make_phone()
     bodies = list(recording(60, ANDROID))
-    assert phones.post(bodies[57]) == 99
+    assert phone.post(bodies[57]) == 99
 
 
 def test_a_new_recording_ends_the_wait_of_the_oldest_of_its_tag() -> None:
-    phones = Phones()
-    phones.post(message(1, [reading("gyroscope", T_NS, (0, 0, 0)), reading("totalacceleration", T_NS, (0, 0, G))]))
-    assert not phones.samples
+    phone = make_phone()
+    phone.post(message(1, [reading("gyroscope", T_NS, (0, 0, 0)), reading("totalacceleration", T_NS, (0, 0, G))]))
+    assert not phone.samples
     for number in range(SESSIONS_PER_TAG):
-        phones.post(message(0, [reading("light", T_NS, (0, 0, 0))], session=f"later-{number}"))
-    assert len(phones.samples) == 1
+        phone.post(message(0, [reading("light", T_NS, (0, 0, 0))], session=f"later-{number}"))
+    assert len(phone.samples) == 1
 
 
 def test_a_large_message_fills_several_payloads() -> None:
-    phones = Phones()
+    phone = make_phone()
     [body] = recording(10, {"gyroscope": turning, "totalacceleration": lambda _: (0, 0, G)}, 400, T_NS, 10_000_000_000)
-    assert phones.post(body) == 3998
-    assert [len(frame.imu) for frame in phones.frames] == [1000, 1000, 1000, 998]
+    assert phone.post(body) == 3998
+    assert [len(frame.imu) for frame in phone.frames] == [1000, 1000, 1000, 998]
 
 
 def test_a_test_of_the_connection_is_welcome() -> None:
     for body in (b"{}", b'{"payload": []}'):
-        assert Phones().post(body) == 0
+        assert make_phone().post(body) == 0
 
 
 def test_times_as_text_and_values_beside_them_are_understood() -> None:
-    phones = Phones()
+    phone = make_phone()
     readings = [
         {"name": name, "time": str(T_NS), "x": 0.0, "y": 0.0, "z": z}
         for name, z in (("Gyroscope", 0.0), ("TotalAcceleration", G))
     ]
-    assert phones.post(message(0, readings)) == 1
+    assert phone.post(message(0, readings)) == 1
 
 
 @pytest.mark.parametrize(
@@ -182,10 +157,10 @@ def test_times_as_text_and_values_beside_them_are_understood() -> None:
     ],
 )
 def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, sentence: str) -> None:
-    phones = Phones()
+    phone = make_phone()
     with pytest.raises(PhoneError, match=sentence):
-        phones.post(body)
-    assert phones.counted == [body]
+        phone.post(body)
+    assert phone.counted == [body]
 
 
 @pytest.mark.parametrize(
@@ -205,27 +180,27 @@ def test_what_is_no_message_is_refused_with_a_sentence_and_counted(body: bytes, 
     ],
 )
 def test_a_damaged_reading_is_counted_and_harms_no_other(damage: dict[str, object]) -> None:
-    phones = Phones()
+    phone = make_phone()
     good = [reading("gyroscope", T_NS, (0, 0, 0)), reading("totalacceleration", T_NS, (0, 0, G))]
     bad = [reading("gyroscope", T_NS + 1, (0, 0, 0)) | damage, 17, {"name": ["gyroscope"]}]
-    posted = phones.intake.post("anna", message(0, [*bad, *good]), Signs.AUTO)
+    posted = phone.intake.post("anna", message(0, [*bad, *good]))
     assert (posted.samples, posted.damaged) == (1, 1)
 
 
 def test_the_charge_of_the_battery_is_reported_when_it_changes_and_now_and_then() -> None:
-    phones = Phones()
+    phone = make_phone()
 
     def post(number: int, *levels: object) -> None:
         batteries = [{"name": "battery", "time": T_NS, "values": {"batteryLevel": level}} for level in levels]
         t_ns = T_NS + number * 10_000_000
         motion = [reading("gyroscope", t_ns, (0, 0, 0)), reading("totalacceleration", t_ns, (0, 0, G))]
-        phones.post(message(number, [*batteries, *motion]))
+        phone.post(message(number, [*batteries, *motion]))
 
     for number, levels in enumerate([(0.9, 0.8), (0.8,), (0.79,), (), (-1,), ("full",), (True,)]):
         post(number, *levels)
     post(2, 0.5)  # a repeated message tells nothing
-    phones.now_s = BATTERY_S
+    phone.now_s = BATTERY_S
     post(7, 0.79)
-    reports = [json.loads(payload)["battery_fraction"] for _, payload, _ in phones.health]
+    reports = [json.loads(payload)["battery_fraction"] for _, payload, _ in phone.health]
     assert reports == [0.8, 0.79, 0.79]
-    assert {(tag, encoding) for tag, _, encoding in phones.health} == {("anna", ENCODING_JSON)}
+    assert {(tag, encoding) for tag, _, encoding in phone.health} == {("anna", ENCODING_JSON)}

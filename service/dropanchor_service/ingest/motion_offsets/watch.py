@@ -56,11 +56,6 @@ class MotionOffsets:
         self._tags: dict[int, WatchedTag] = {}
         self._is_watched = np.zeros(1, np.bool_)  # of each row; the last one stands for all higher rows
 
-    @property
-    def watched(self) -> int:
-        """Number of tags that are watched."""
-        return len(self._tags)
-
     def watch(self, rows: Iterable[int]) -> None:
         """Watch these rows and forget the others."""
         self._tags = {row: self._tags.get(row) or WatchedTag() for row in islice(rows, MAX_TAGS)}
