@@ -43,14 +43,19 @@ class Admission:
         return self._confirm(name, message) if found is Reason.TAG_UNPROVEN else found
 
     def admit(self, name: str) -> Tag | Reason:
-        """Return the tag with this name, registering it if it needs no confirmation, or why it gets no row."""
+        """Return the tag with this name, registering it if it needs no confirmation, or why it gets no row.
+
+        A deleted tag needs what an unknown tag needs, except room: it still has its row.
+        """
         tag = self._tags.find(name)
-        if tag is not None:
+        if tag is not None and not self._tags.is_deleted(tag.row):
             return tag
         if name in self._site.tags:
             return self._tags.register(name)
         if self._refusal is not None:
             return self._refusal
+        if tag is not None:
+            return self._tags.register(name)
         if len(self._tags) >= self._max_tags:
             return Reason.TAGS_FULL
         if len(self._unconfirmed) >= self._max_unconfirmed:

@@ -108,6 +108,10 @@ class MessageBuffer:
         """Register a key: its messages belong to `row` from now on."""
         self._rows[key] = row
 
+    def forget(self, key: str) -> None:
+        """Treat the messages of a key as those of an unregistered tag from now on."""
+        self._rows.pop(key, None)
+
     def row_of(self, key: str) -> int | None:
         """Return the row of a key, None for one that is not registered."""
         return self._rows.get(key)

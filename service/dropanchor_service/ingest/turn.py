@@ -54,6 +54,7 @@ class Ingest:
         self._admission = admission
         self._site = site
         self._registered_tags = 0  # rows whose keys are registered with the buffer
+        self._forgotten: frozenset[int] = frozenset()  # rows of deleted tags, whose keys are no longer registered
         self._engine = engine
         self._publishers = publishers
         self._tags = tags
@@ -83,7 +84,9 @@ class Ingest:
         kept = list(self._register_new_tags())
         fresh, unregistered = self._buffer.drain(limit, self._clock.now_ns())
         self._count_shed()
-        messages = [*kept, *fresh, *self._admitted(unregistered)]
+        self._forget_deleted_tags()
+        of_known, of_deleted = self._split(fresh)
+        messages = [*kept, *of_known, *self._admitted([*of_deleted, *unregistered])]
         if messages:
             self._notify(self._observers.messages, messages)
             self._metrics.messages.inc(len(messages))
@@ -98,10 +101,28 @@ class Ingest:
         From then on, their messages wait neither among those of unregistered tags nor for their estimator.
         """
         for tag in self._tags.all()[self._registered_tags :] if len(self._tags) > self._registered_tags else ():
-            self._buffer.admit(samples_key(self._site.site.id, tag.name), tag.row)
+            self._buffer.admit(self._key_of(tag.row), tag.row)
             self._engine.prepare(tag.row)
             self._registered_tags = tag.row + 1
             yield from self._kept(tag)
+
+    def _forget_deleted_tags(self) -> None:
+        """Let the messages of deleted tags wait among those of unregistered ones."""
+        deleted = self._tags.deleted
+        for row in deleted - self._forgotten:
+            self._buffer.forget(self._key_of(row))
+        self._forgotten = deleted
+
+    def _split(self, fresh: list[Message]) -> tuple[list[Message], list[UnregisteredMessage]]:
+        """Split off the messages of deleted tags, which have to be admitted like those of unknown tags."""
+        if not self._forgotten:
+            return fresh, []
+        of_known = [message for message in fresh if message[0] not in self._forgotten]
+        of_deleted = [(self._key_of(message[0]), *message[1:]) for message in fresh if message[0] in self._forgotten]
+        return of_known, of_deleted
+
+    def _key_of(self, row: int) -> str:
+        return samples_key(self._site.site.id, self._tags.at(row).name)
 
     def _admitted(self, unregistered: Sequence[UnregisteredMessage]) -> Iterator[Message]:
         for message in unregistered:
@@ -157,6 +178,8 @@ class Ingest:
         for outcomes in (batch.poses, batch.innovations):
             self._publishers.to_utc(outcomes)
         self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
+        for row in self._tags.deleted.intersection(batch.poses["row"].tolist()):
+            self._latest.forget(row)  # the samples were pending when the tag was deleted
         self._metrics.poses.inc(len(batch.poses))
         for reason, rows in batch.rejected.items():
             self._rejections.count_rejected(Reason(reason), rows)

@@ -77,7 +77,7 @@ class TagTable:
         self._counts = np.zeros(16, _COUNTS)
         self.presence = Presence()
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past, by row
-        self._deleted: set[int] = set()
+        self._deleted: frozenset[int] = frozenset()
         self.unknown_anchors = UnknownAnchors()
         self.arrivals = Arrivals()
 
@@ -101,22 +101,27 @@ class TagTable:
         deleted = self._deleted
         return [tag for tag in self._by_row if tag.row not in deleted]
 
+    @property
+    def deleted(self) -> frozenset[int]:
+        """The rows of the tags that were deleted and not registered again."""
+        return self._deleted
+
     def is_deleted(self, row: int) -> bool:
-        """Return whether the tag of this row was deleted and has sent nothing since."""
+        """Return whether the tag of this row was deleted and not registered again."""
         return row in self._deleted
 
     def delete(self, row: int) -> None:
-        """Clear the counters of a row, and take its tag off the list until it sends again or is registered."""
+        """Clear the counters of a row, and take its tag off the list until it is registered again."""
         with self._lock:
             self._counts[row] = 0
-            self._deleted.add(row)
+            self._deleted |= {row}
 
     def names(self, rows: Sequence[int]) -> list[str]:
         by_row = self._by_row
         return [by_row[row].name for row in rows]
 
     def register(self, name: str) -> Tag:
-        """Return the tag of this name; add it when it is new."""
+        """Return the tag of this name; add it when it is new, and list it again when it was deleted."""
         with self._lock:
             tag = self._by_name.get(name)
             if tag is None:
@@ -125,7 +130,7 @@ class TagTable:
                 self.presence.add_row(name, tag.row)
                 self._by_row.append(tag)
                 self._by_name[name] = tag
-            self._deleted.discard(tag.row)
+            self._deleted -= {tag.row}
             return tag
 
     def set_replay_lag(self, rows: Array, lag_ns: Array) -> None:
@@ -153,8 +158,6 @@ class TagTable:
 
     def count_messages(self, rows: Array, now_ns: int) -> None:
         """Count one message for each entry of `rows`, and note the time. A row may appear several times."""
-        if self._deleted:
-            self._deleted.difference_update(rows.tolist())
         first = self._counts["first_heard_ns"]
         first[rows[first[rows] == 0]] = now_ns
         self._counts["last_heard_ns"][rows] = now_ns

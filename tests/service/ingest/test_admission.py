@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
+import pytest
+
 from dropanchor_schemas import TagSettings
 from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from service.ingest.messages import S, T, ranges
 from support.ingest import IngestBench
+from support.manual_clock import ManualClock
 
 
 def take_turns(bench: IngestBench) -> None:
@@ -114,6 +117,42 @@ def test_a_quarantined_tag_is_pending_until_its_settings_are_put() -> None:
     bench.send("unlisted", ranges(4.0))
     assert fused(bench) == [1.0, 4.0]
     assert len(bench.pending_tags) == 0
+
+
+@pytest.mark.parametrize(
+    ("unknown_tags", "reason", "pending"), [("quarantine", "tag_quarantined", 1), ("refuse", "tag_unknown", 0)]
+)
+def test_a_deleted_tag_that_still_sends_needs_to_be_admitted_again(
+    unknown_tags: str, reason: str, pending: int
+) -> None:
+    bench = IngestBench(unknown_tags=unknown_tags, tags={"a": {}})
+    bench.send("a", ranges(1.0))
+    [tag] = bench.tags.all()
+    bench.put("a", ranges(2.0))  # in the buffer while the tag is deleted
+    bench.site.remove_tag("a", T)
+    bench.tags.delete(tag.row)
+    bench.latest.forget(tag.row)
+    bench.ingest.turn()
+    bench.send("a", ranges(3.0))
+    assert (fused(bench), bench.tags.listed(), bench.x_of(["a"])) == ([1.0], [], [None])
+    assert bench.rejected() == {reason: 2}
+    assert len(bench.pending_tags) == pending
+    bench.site.set_tag("a", TagSettings())
+    bench.send("a", ranges(4.0))
+    assert (fused(bench), bench.tags.listed(), bench.x_of(["a"])) == ([1.0, 4.0], [tag], [4.0])
+    assert len(bench.pending_tags) == 0
+
+
+def test_samples_that_were_pending_when_their_tag_was_deleted_make_no_pose() -> None:
+    clock = ManualClock(T)
+    bench = IngestBench(unknown_tags="quarantine", tags={"a": {}}, clock=clock)
+    bench.send("a", ranges(1.0, sequence=1, boot_id=1), ranges(3.0, sequence=3, boot_id=1))
+    bench.tags.delete(0)
+    bench.latest.forget(0)
+    clock.t_ns += S
+    bench.ingest.turn()
+    assert fused(bench) == [1.0, 3.0]
+    assert bench.x_of(["a"]) == [None]
 
 
 def test_messages_kept_for_a_tag_are_used_when_rest_registers_it() -> None:

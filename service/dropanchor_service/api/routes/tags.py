@@ -115,8 +115,8 @@ def _add_delete_route(router: APIRouter, answers: Answers) -> None:
         "/tags/{tag}",
         operation_id="delete_tag",
         summary="Delete a tag: its settings, its counters and its pose",
-        description="Its stored tracks stay. A tag that still sends is back with its next message, with the settings "
-        "in `tag_defaults`.",
+        description="Its stored tracks stay. A tag that still sends is unknown from then on. With "
+        '`unknown_tags = "accept"`, it is back with its next message, with the settings in `tag_defaults`.',
         status_code=204,
         responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )

@@ -127,7 +127,7 @@ export class TagPanel {
 
   async #delete() {
     const tag = this.#tag;
-    const question = `Delete ${tag} with its settings? Its stored tracks stay. A tag that still sends comes back with the default settings.`;
+    const question = `Delete ${tag} with its settings? Its stored tracks stay. If it still sends, it is a new tag with the default settings.`;
     if (!(await confirmed(this.dialog, question, "Delete"))) return;
     const path = `tags/${encodeURIComponent(tag)}`;
     const { value } = await this.changes.read(`${path}/settings`);
