@@ -63,6 +63,26 @@ def test_a_zone_is_dashed_until_a_tag_enters_and_its_list_counts_the_tags(chromi
         page.wait_for(f"({STROKE})([0xd0, 0x20, 0x90]) === 0")
 
 
+def test_the_lists_of_the_present_are_hidden_while_the_page_shows_the_past(chromium: Browser, yard: ZonePlace) -> None:
+    yard.go("cart-3", 3.0, 3.0)
+    with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
+        page.wait_for("dropanchor.events() && dropanchor.zones().yard === 1")
+        lists = [page.page.locator("#events"), page.page.locator("#zone-list")]
+        lists[1].locator("summary").click()
+        sentence = page.page.get_by_text("The lists of zones and events are hidden")
+        expect(sentence).to_be_hidden()
+        page.page.locator("#history").click()
+        expect(sentence).to_be_visible()
+        for hidden in lists:
+            expect(hidden).to_be_hidden()
+        page.page.locator("#history").click()
+        expect(sentence).to_be_hidden()
+        expect(lists[1]).to_contain_text("1 tag inside")
+        lists[1].get_by_role("button", name="Edit Yard").click()
+        page.page.locator("#history").click()
+        expect(page.page.get_by_role("form", name="Zone", exact=True)).to_be_visible()
+
+
 def test_events_come_live_and_newest_first_and_a_click_selects_tag_and_zone(chromium: Browser, yard: ZonePlace) -> None:
     yard.go("cart-3", 3.0, 3.0)
     with watched_page(chromium, yard.url, reduced_motion="reduce") as page:
