@@ -5,6 +5,7 @@ import { drawEvidence } from "./draw_evidence.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
 import { drawColours, drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
+import { drawTrack } from "./draw_track.js";
 import { follow } from "../data/motion.js";
 import { readPalette, withoutStates } from "./palette.js";
 import { nearest, rowsInView } from "./scene.js";
@@ -24,14 +25,14 @@ export class LiveMap extends EventTarget {
   /** @type {readonly import("./draw_site.js").Anchor[]} */
   anchors = [];
   hovered = -1;
-  /** Drawn below the trails. @type {((scene: import("./scene.js").Scene) => void)[]} */
+  /** Draw on the grid, below everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
   underlays = [];
+  /** Draw over everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
+  overlays = [];
+  /** Return the track of the selected tag. @type {(tag: string | null) => import("../data/tracks.js").Track | null | undefined} */
+  trackOf = () => null;
   /** Return whether a click was meant for something else than the tags. */
   pressed = (/** @type {number} */ _px, /** @type {number} */ _py) => false;
-  /** Draw over everything else. @type {((ctx: CanvasRenderingContext2D, view: View, palette: import("./palette.js").Palette) => void)[]} */
-  overlays = [];
-  /** Drawn on the grid, below everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
-  grounds = [];
   /** Keep all tags in view until the user moves the map. */
   autoFit = true;
   /** For tests and the console: figures of the last drawing. */
@@ -215,11 +216,11 @@ export class LiveMap extends EventTarget {
     this.#ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
     drawGrid(this.#ctx, view, palette);
-    for (const draw of this.grounds) draw(scene);
+    for (const draw of this.underlays) draw(scene);
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
     if (centre) drawRings(this.#ctx, view, palette, centre);
     this.#drawTags(scene, isShown);
-    for (const drawOver of this.overlays) drawOver(this.#ctx, view, palette);
+    for (const draw of this.overlays) draw(scene);
     drawScaleBar(this.#ctx, view, palette);
   }
 
@@ -231,7 +232,8 @@ export class LiveMap extends EventTarget {
     if (density) drawDensity(scene);
     else drawEllipses(scene);
     drawEvidence(scene, this.evidence.of(this.choice.selected));
-    for (const draw of this.underlays) draw(scene);
+    const track = this.trackOf(this.choice.selected);
+    if (track) drawTrack(scene, track);
     drawTrails(scene);
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, isShown);

@@ -36,7 +36,7 @@ export class Measure {
     this.button = button;
     this.answer = answer;
     button.addEventListener("click", () => this.turn(!this.active));
-    map.underlays.push((scene) => this.#draw(scene));
+    map.overlays.push((scene) => this.#draw(scene));
     map.canvas.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && this.press(map.view.width / 2, map.view.height / 2)) event.preventDefault();
     });

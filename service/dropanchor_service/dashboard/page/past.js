@@ -9,7 +9,6 @@ import { RecentTrack } from "../data/recent.js";
 import { Replay, tracksUrl } from "../data/replay.js";
 import { Track, frameAt } from "../data/tracks.js";
 import { TRAIL_S } from "../data/trails.js";
-import { drawTrack } from "../map/draw_track.js";
 
 const TICK_MS = 100;
 /** With reduced motion the dots move once a second. */
@@ -44,7 +43,7 @@ export class Past {
     this.page = page;
     this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
-    page.map.underlays.push((scene) => this.#drawTrack(scene));
+    page.map.trackOf = (tag) => this.#trackOf(tag);
     page.byId("history").addEventListener("click", () => (this.active ? this.leave() : this.enter()));
     this.bar.addEventListener("leave", () => this.leave());
     this.replay.addEventListener("time", () => this.#show());
@@ -132,12 +131,10 @@ export class Past {
     setTimeout(() => this.#tick(now_ms), calm ? CALM_TICK_MS : TICK_MS);
   }
 
-  /** @param {import("../map/scene.js").Scene} scene */
-  #drawTrack(scene) {
-    const tag = this.page.choice.selected;
+  /** Return the track of the period that is shown, or the recent one. @param {string | null} tag */
+  #trackOf(tag) {
     const period = this.replay.figures.get(tag ?? "");
-    const track = this.active ? period && new Track(period) : this.#recent.of(tag);
-    if (track) drawTrack(scene, track);
+    return this.active ? period && new Track(period) : this.#recent.of(tag);
   }
 
   #readAddress() {

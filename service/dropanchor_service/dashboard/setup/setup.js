@@ -30,7 +30,7 @@ export class Setup {
     this.addAnchor = new AddAnchor(byId("detail"), roster, choice, changes, (id) => panel.add(id));
     this.groups = new GroupFilter(/** @type {HTMLSelectElement} */ (byId("group")), fleet, choice);
     new Outcome(byId("outcome"), changes);
-    map.overlays.push((ctx, view, palette) => {
+    map.overlays.push(({ ctx, view, palette }) => {
       if (this.anchors.draft) drawEditedAnchor(ctx, view, palette, this.anchors.draft);
       if (start.draft) drawStart(ctx, view, palette, start.draft);
     });

@@ -42,7 +42,7 @@ export class Zones {
     new ZoneForm(/** @type {HTMLFormElement} */ (byId("zone-form")), this.editor, () => this.#addCorner());
     byId("new-polygon").addEventListener("click", () => this.#begin({ type: "polygon", points: [] }));
     byId("new-circle").addEventListener("click", () => this.#begin(this.#newCircle()));
-    map.grounds.push((scene) => this.#draw(scene));
+    map.underlays.push((scene) => this.#draw(scene));
     this.store.addEventListener("change", () => this.#update());
     this.editor.addEventListener("change", () => this.#update());
     this.log.addEventListener("change", () => this.#happened());
