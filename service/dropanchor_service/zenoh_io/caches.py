@@ -87,8 +87,8 @@ class ZenohCaches:
     def ask_if_silent(self, name: str) -> None:
         """Ask the caches of a tag that came online and sends nothing, for what it sent while it was away.
 
-        Zenoh itself fetches what is missing before a live message. It should also do so after a heartbeat of the
-        publisher, but it ignores heartbeats on keys with a verbatim chunk such as `@v1`.
+        Zenoh itself fetches what is missing before a live message. After a heartbeat of the publisher it does so
+        too, but not on keys with a verbatim chunk such as `@v1`; `test_heartbeats` shows both.
         """
         heard_ns = self._last_heard_ns(name)
         if heard_ns:
