@@ -15,6 +15,9 @@ from dropanchor_schemas.site import Anchor, RemoteSettings
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, HEADER, MAX_PAYLOAD_BYTES
 
+Channels = dict[str, tuple[str, list[str], str, dict[str, Any]]]
+"""The key, the messages, the description and the Zenoh details of each channel."""
+
 _MODELS: tuple[type[BaseModel], ...] = (
     SamplesMessage,
     TagHealthMessage,
@@ -35,6 +38,7 @@ _ESCAPING = "1 to 64 printable characters. All characters except A-Z a-z 0-9 . _
 
 def document() -> dict[str, Any]:
     """Return the AsyncAPI 3.0 document, ready for JSON."""
+    channels = _channels_of_tags() | _channels_of_service()
     return {
         "asyncapi": "3.0.0",
         "info": {
@@ -53,14 +57,14 @@ def document() -> dict[str, Any]:
                 "variables": {"router": {"default": "127.0.0.1"}},
             }
         },
-        "channels": {name: _channel(*channel) for name, channel in _channels().items()},
+        "channels": {name: _channel(*channel) for name, channel in channels.items()},
         "operations": _operations(),
         "components": {"messages": _messages(), "schemas": _schemas()},
     }
 
 
-def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
-    """Return the key, the messages, the description and the Zenoh details of each channel."""
+def _channels_of_tags() -> Channels:
+    """Return what tags send."""
     return {
         "samples": (
             _readable(keys.samples_key("{site}", "{tag}")),
@@ -80,6 +84,12 @@ def _channels() -> dict[str, tuple[str, list[str], str, dict[str, Any]]]:
             "What a tag says about itself: battery, temperature, firmware. Optional.",
             {"kind": "put", "put": "about once a minute"},
         ),
+    }
+
+
+def _channels_of_service() -> Channels:
+    """Return what the service sends and answers."""
+    return {
         "settings": (
             _readable(keys.settings_key("{site}", "{tag}")),
             ["settings"],

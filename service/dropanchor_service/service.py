@@ -102,6 +102,9 @@ class Service:
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
+        self._register_gauges()
+
+    def _register_gauges(self) -> None:
         self.metrics.register(HealthGauges(self.tags, self._health, self.clock.now_ns, self._publishers))
         self.metrics.register(
             FleetGauges(self.tags, self._pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)

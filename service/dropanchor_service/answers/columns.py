@@ -8,6 +8,7 @@ import numpy as np
 from dropanchor_schemas.pose import Frame as FrameName
 from dropanchor_schemas.pose import StateReason as ReasonName
 from dropanchor_schemas.pose import TrackingState
+from dropanchor_schemas.site import Site
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.hints import hints_of, past_hints
 from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, age_poses, ellipses
@@ -58,22 +59,17 @@ def columns_of(
     """
     age_s = (now_ns - poses["t_ns"]) * 1e-9 if historical else tags.age_s(poses, now_ns)
     aged = poses if historical else aged_poses(poses, age_s)
-    of_tags = tags.names(aged["row"].tolist()) if names is None else list(names)
+    if names is None:
+        of_tags, online = tags.names(aged["row"].tolist()), tags.presence.are_online(aged["row"])
+    else:
+        of_tags, online = list(names), np.array([tags.presence.is_online(name) for name in names])
     ellipse = ellipse_95(aged["cov"])
     hint_texts, hint = past_hints(aged) if historical else hints_of(aged, site, tags, now_ns)
-    origin = site.site.georeference
-    in_site = aged["frame"] == Frame.SITE
-    lat, lon = (
-        (None, None)
-        if origin is None
-        else lat_lon(origin, np.where(in_site, aged["x"], np.nan), np.where(in_site, aged["y"], np.nan))
-    )
+    lat, lon = _lat_lon_of(aged, site.site)
     return PoseColumns(
         poses=aged,
         tags=of_tags,
-        online=tags.presence.are_online(aged["row"])
-        if names is None
-        else np.array([tags.presence.is_online(name) for name in names]),
+        online=online,
         hint_texts=hint_texts,
         hint=hint,
         anchor_ids=[anchor.id for anchor in site.anchors_by_index()],
@@ -84,6 +80,14 @@ def columns_of(
         lat=lat,
         lon=lon,
     )
+
+
+def _lat_lon_of(poses: Array, site: Site) -> tuple[Array | None, Array | None]:
+    """Return latitude and longitude, NaN for poses in a frame of their own; None without a georeference."""
+    if site.georeference is None:
+        return None, None
+    x, y = np.where(poses["frame"] == Frame.SITE, (poses["x"], poses["y"]), np.nan)
+    return lat_lon(site.georeference, x, y)
 
 
 def aged_poses(poses: Array, age_s: Array) -> Array:

@@ -58,7 +58,12 @@ class EventQuery(EventFilter):
 
 def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
     router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
+    _add_list_route(router, store)
+    _add_stream_route(router, store, stopping)
+    return router
 
+
+def _add_list_route(router: APIRouter, store: EventStore) -> None:
     @router.get(
         "/events",
         operation_id="list_events",
@@ -79,6 +84,8 @@ def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
         following = f"{found[-1].sequence:020}" if leads_on else None
         return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
 
+
+def _add_stream_route(router: APIRouter, store: EventStore, stopping: ThreadEvent) -> None:
     @router.get(
         "/events/stream",
         operation_id="stream_events",
@@ -97,8 +104,6 @@ def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
             query = query.model_copy(update={"after": last_event_id})
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
-
-    return router
 
 
 async def _refuse_repeated(request: Request) -> None:

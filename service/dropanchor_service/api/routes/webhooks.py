@@ -33,14 +33,13 @@ _ONE = (Kind.UNKNOWN_WEBHOOK, *_READ)
 
 def webhooks_router(parts: EventParts) -> APIRouter:
     router = APIRouter(tags=["webhooks"], dependencies=[NO_QUERY])
-    _add_routes(router, parts)
+    _add_read_routes(router, parts)
+    _add_change_routes(router, parts)
     _add_delivery_routes(router, parts)
     return router
 
 
-def _add_routes(router: APIRouter, parts: EventParts) -> None:
-    webhooks = parts.webhooks
-
+def _add_read_routes(router: APIRouter, parts: EventParts) -> None:
     @router.get(
         "/webhooks",
         operation_id="list_webhooks",
@@ -49,7 +48,7 @@ def _add_routes(router: APIRouter, parts: EventParts) -> None:
         responses=example_response({"webhooks": [examples.WEBHOOK_STATUS]}) | problems(*_READ),
     )
     def list_webhooks() -> Response:
-        statuses = [_status(parts, webhook) for webhook in webhooks.all.values()]
+        statuses = [_status(parts, webhook) for webhook in parts.webhooks.all.values()]
         return json_response({"webhooks": [status.model_dump(mode="json") for status in statuses]})
 
     @router.get(
@@ -60,8 +59,10 @@ def _add_routes(router: APIRouter, parts: EventParts) -> None:
         responses=example_response(examples.WEBHOOK_STATUS) | problems(*_ONE),
     )
     def get_webhook(webhook: WebhookId) -> Response:
-        return _response(parts, found(webhooks, webhook, Kind.UNKNOWN_WEBHOOK))
+        return _response(parts, found(parts.webhooks, webhook, Kind.UNKNOWN_WEBHOOK))
 
+
+def _add_change_routes(router: APIRouter, parts: EventParts) -> None:
     @router.put(
         "/webhooks/{webhook}",
         operation_id="put_webhook",
@@ -74,7 +75,7 @@ def _add_routes(router: APIRouter, parts: EventParts) -> None:
         webhook: WebhookId, body: Annotated[Webhook, Body(examples=[examples.WEBHOOK])], allows: Conditions
     ) -> Response:
         usable = _usable(parts, body)
-        put(webhooks, webhook, body.id, usable, allows)
+        put(parts.webhooks, webhook, body.id, usable, allows)
         return _response(parts, usable)
 
     @router.delete(
@@ -85,7 +86,7 @@ def _add_routes(router: APIRouter, parts: EventParts) -> None:
         responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
     )
     def delete_webhook(webhook: WebhookId, allows: Conditions) -> Response:
-        response = delete(webhooks, webhook, allows, Kind.UNKNOWN_WEBHOOK)
+        response = delete(parts.webhooks, webhook, allows, Kind.UNKNOWN_WEBHOOK)
         with reading():
             parts.deliveries.drop(webhook)
         return response
