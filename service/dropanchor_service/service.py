@@ -270,11 +270,11 @@ class Service:
 
     def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
         """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
-        self.tags.presence.hear(tag)
+        self.tags.presence.note_http_message(tag)
         self._on_live(samples_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
 
     def _receive_health(self, tag: str, payload: bytes, encoding: str) -> None:
-        self.tags.presence.hear(tag)
+        self.tags.presence.note_http_message(tag)
         self._ingest.health.put(health_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:

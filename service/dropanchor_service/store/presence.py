@@ -24,7 +24,7 @@ class Presence:
         self._tokens: set[str] = set()
         self._connections: Counter[str] = Counter()
         self._rows: dict[str, int] = {}
-        self._until_s = np.zeros(16)  # by row: when the tag goes offline unless something is heard
+        self._until_s = np.zeros(16)  # by row: when the tag goes offline unless another message arrives
 
     def add_row(self, name: str, row: int) -> None:
         """Note that a name has got its row."""
@@ -49,7 +49,7 @@ class Presence:
         finally:
             self._count_connection(name, -1)
 
-    def hear(self, name: str) -> None:
+    def note_http_message(self, name: str) -> None:
         """Note a message over HTTP. It counts only for a name with a row: made-up names must take no memory."""
         with self._lock:
             row = self._rows.get(name)
@@ -59,7 +59,7 @@ class Presence:
     def is_online(self, name: str) -> bool:
         """Return whether a name is online."""
         row = self._rows.get(name)
-        return self._is_held(name) if row is None else bool(self._until_s[row] > self._clock())
+        return self._is_connected(name) if row is None else bool(self._until_s[row] > self._clock())
 
     def are_online(self, rows: Array) -> Array:
         """Return whether the tag of each row is online."""
@@ -83,10 +83,10 @@ class Presence:
             self._connections += Counter()  # drops what is zero
             self._update(name)
 
-    def _is_held(self, name: str) -> bool:
+    def _is_connected(self, name: str) -> bool:
         return name in self._tokens or name in self._connections
 
     def _update(self, name: str) -> None:
         row = self._rows.get(name)
         if row is not None:
-            self._until_s[row] = math.inf if self._is_held(name) else 0.0
+            self._until_s[row] = math.inf if self._is_connected(name) else 0.0

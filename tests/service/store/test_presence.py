@@ -15,14 +15,14 @@ class Clock:
 def test_messages_over_http_make_a_tag_online_for_a_while() -> None:
     clock = Clock()
     presence = Presence(clock)
-    presence.hear("a")
+    presence.note_http_message("a")
     assert not presence.is_online("a")  # a name that has no row
     presence.add_row("a", 0)
     assert not presence.is_online("a")
-    presence.hear("a")
+    presence.note_http_message("a")
     clock.now_s += HTTP_S - 1
     assert presence.is_online("a")
-    presence.hear("a")
+    presence.note_http_message("a")
     clock.now_s += HTTP_S
     assert not presence.is_online("a")
     assert presence.count() == 0
@@ -33,7 +33,7 @@ def test_an_open_websocket_makes_its_tag_online_until_the_last_one_is_closed() -
     presence.add_row("a", 0)
     with presence.connected("a"), presence.connected("later"):
         with presence.connected("a"):
-            presence.hear("a")
+            presence.note_http_message("a")
         assert presence.is_online("a")
         assert presence.is_online("later")
         presence.add_row("later", 1)
