@@ -2,7 +2,7 @@
 
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -71,9 +71,11 @@ def watched_page(
     scheme: Scheme = "light",
     size: tuple[int, int] = (1280, 800),
     reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
+    locale: str = "en-GB",
+    prepare: Callable[[Page], object] = lambda _: None,
 ) -> Iterator[WatchedPage]:
-    """Open the page, wait until its stream is live, and close it at the end. size: CSS pixels."""
-    with open_page(browser, url, scheme, size, reduced_motion) as watched:
+    """Open the page, wait until its stream is live, and close it at the end. Arguments as for `open_page`."""
+    with open_page(browser, url, scheme, size, reduced_motion, locale, prepare) as watched:
         watched.wait_for("window.dropanchor?.status() === 'live'")
         yield watched
 
@@ -85,13 +87,19 @@ def open_page(
     scheme: Scheme = "light",
     size: tuple[int, int] = (1280, 800),
     reduced_motion: Literal["reduce", "no-preference"] = "no-preference",
+    locale: str = "en-GB",
+    prepare: Callable[[Page], object] = lambda _: None,
 ) -> Iterator[WatchedPage]:
-    """Open the page, and close it at the end. size: CSS pixels."""
+    """Open the page, and close it at the end. size: CSS pixels. prepare: is called before the page loads."""
     context = browser.new_context(
-        viewport={"width": size[0], "height": size[1]}, color_scheme=scheme, reduced_motion=reduced_motion
+        viewport={"width": size[0], "height": size[1]},
+        color_scheme=scheme,
+        reduced_motion=reduced_motion,
+        locale=locale,
     )
     watched = WatchedPage(context.new_page())
     page = watched.page
+    prepare(page)
     page.on("request", lambda request: watched.origins.add("/".join(request.url.split("/", 3)[:3])))
     page.on("pageerror", lambda error: watched.errors.append(str(error)))
     page.on("console", lambda line: watched.errors.append(line.text) if line.type in ("error", "warning") else None)

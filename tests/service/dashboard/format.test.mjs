@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
-  age, compass, coordinate, counted, distance, fixed, metres, percent, sigma, turnRate, words,
+  age, compass, coordinate, distance, fixed, metres, percent, sigma, tagCount, turnRate, words,
 } from "../../../service/dropanchor_service/dashboard/data/format.js";
 
 /** @param {(value: any) => string} format @param {[any, string][]} cases */
@@ -48,7 +48,7 @@ test("ring distances have no needless digits", () => {
 });
 
 test("a count of one has a singular noun", () => {
-  assert.equal(counted(1, "tag"), "1 tag");
-  assert.equal(counted(12000, "tag"), "12,000 tags");
+  assert.equal(tagCount(1), "1 tag");
+  assert.equal(tagCount(12000), "12,000 tags");
   assert.equal(words("several_modes"), "several modes");
 });

@@ -1,7 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { hashWith, momentIn } from "../../../service/dropanchor_service/dashboard/page/address.js";
+import { hashWith } from "../../../service/dropanchor_service/dashboard/data/address.js";
+import { momentIn, momentValues } from "../../../service/dropanchor_service/dashboard/page/address.js";
 import { Track, frameAt, poseAt } from "../../../service/dropanchor_service/dashboard/data/tracks.js";
 import { drawTrack } from "../../../service/dropanchor_service/dashboard/map/draw_track.js";
 import { trailOf } from "../../../service/dropanchor_service/dashboard/data/past_trails.js";
@@ -69,9 +70,9 @@ test("stored points come before the live ones of a trail", () => {
 
 test("a link leads to the same moment, and other values in the address stay", () => {
   const moment = { from_ms: 1e12, to_ms: 1e12 + 3_600_000, time_ms: 1e12 + 1500, speed: 5, tag: "Süd & 1" };
-  const hash = hashWith("#zoom=3", moment);
+  const hash = hashWith("#zoom=3", momentValues(moment));
   assert.deepEqual(momentIn(hash), moment);
-  assert.equal(hashWith(hash, null), "#zoom=3");
+  assert.equal(hashWith(hash, momentValues(null)), "#zoom=3");
   for (const bad of ["", "#from=x&to=y", "#from=2026-01-02T00:00Z&to=2026-01-01T00:00Z"]) assert.equal(momentIn(bad), null);
 });
 

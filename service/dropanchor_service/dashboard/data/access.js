@@ -35,8 +35,6 @@ export async function request(url, options) {
 /** Somebody changed the resource since this page has read it. */
 export class ChangedMeanwhileError extends Error {}
 
-export const CHANGED_MEANWHILE_SENTENCE = "Somebody else changed this meanwhile.";
-
 /**
  * Send a change. Return the ETag of the new resource, empty after a deletion. Throws ChangedMeanwhileError when the
  * conditions are not met, and Error with the sentence of the service when it refuses the change.

@@ -2,6 +2,8 @@
 
 import { ChangedMeanwhileError, request, sendChange } from "./access.js";
 import { api, getJson } from "./connection.js";
+import { t } from "../i18n/language.js";
+import { refusal } from "../i18n/said.js";
 
 /** @typedef {{value: any, etag: string}} Seen a resource as this page has read it */
 /** @typedef {{what: string, path: string, body: object | null, conditions: Record<string, string>}} Undo */
@@ -87,10 +89,10 @@ export class Changes extends EventTarget {
     const { what, path, body, conditions } = /** @type {Undo} */ (this.#undo.pop());
     try {
       await sendChange(api(path), body === null ? "DELETE" : "PUT", body, conditions);
-      this.#tell("done", `Undone: ${what}`);
+      this.#tell("done", t("outcome.undone", { what }));
     } catch (error) {
       const changed = error instanceof ChangedMeanwhileError;
-      this.#tell("failed", changed ? `Not undone, because somebody changed it since: ${what}` : sentence(error));
+      this.#tell("failed", changed ? t("outcome.not_undone", { what }) : sentence(error));
     }
   }
 
@@ -114,4 +116,4 @@ export class Changes extends EventTarget {
 }
 
 /** @param {unknown} error */
-const sentence = (error) => (error instanceof Error ? error.message : String(error));
+const sentence = (error) => refusal(error instanceof Error ? error.message : String(error));

@@ -1,5 +1,7 @@
 /** Format numbers for people. An unknown value (NaN, null) becomes an en dash. */
 
+import { count, decimal, has, t } from "../i18n/language.js";
+
 export const UNKNOWN = "–";
 const MINUS = "−";
 
@@ -13,8 +15,8 @@ const known = (value) => typeof value === "number" && Number.isFinite(value);
  */
 export function fixed(value, decimals) {
   if (!known(value)) return UNKNOWN;
-  const text = Math.abs(value).toFixed(decimals);
-  return value < 0 && Number(text) !== 0 ? MINUS + text : text;
+  const isNegative = value < 0 && Number(value.toFixed(decimals)) !== 0;
+  return (isNegative ? MINUS : "") + decimal(Math.abs(value), decimals);
 }
 
 /** Format a coordinate for a narrow column, with fewer decimals the larger it is. @param {number | null | undefined} value */
@@ -22,8 +24,8 @@ export function coordinate(value) {
   return known(value) ? fixed(value, Math.abs(value) < 100 ? 2 : Math.abs(value) < 1000 ? 1 : 0) : UNKNOWN;
 }
 
-/** @param {number | null | undefined} value */
-export const metres = (value) => (known(value) ? `${fixed(value, 2)} m` : UNKNOWN);
+/** @param {number | null | undefined} value @param {number} [decimals] */
+export const metres = (value, decimals = 2) => (known(value) ? `${fixed(value, decimals)} m` : UNKNOWN);
 
 /** Format a standard deviation in metres, with fewer decimals the larger it is. @param {number | null | undefined} value */
 export function sigma(value) {
@@ -31,7 +33,7 @@ export function sigma(value) {
   return fixed(value, value < 10 ? 2 : value < 100 ? 1 : 0);
 }
 
-const POINTS = ["N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW"];
+const POINTS = t("compass.points").split(" ");
 
 /** Format a heading as on a compass: degrees clockwise from north and the nearest of 16 points, such as `337° NNW`.
  * @param {number | null | undefined} rad counter-clockwise from east, as in the interfaces */
@@ -45,20 +47,21 @@ export function compass(rad) {
 export function turnRate(radps) {
   if (!known(radps)) return UNKNOWN;
   const turned = Math.round((radps * 180) / Math.PI);
-  return `${Math.abs(turned)} °/s${turned === 0 ? "" : turned > 0 ? " left" : " right"}`;
+  const rate = `${Math.abs(turned)} °/s`;
+  return turned === 0 ? rate : t(turned > 0 ? "turn.left" : "turn.right", { rate });
 }
 
 /** @param {number | null | undefined} share 0 to 1 */
 export function percent(share) {
   if (!known(share)) return UNKNOWN;
-  if (share > 0.99 && share < 1) return `${(Math.floor(share * 1000) / 10).toFixed(1)} %`;
+  if (share > 0.99 && share < 1) return `${decimal(Math.floor(share * 1000) / 10, 1)} %`;
   return `${Math.round(share * 100)} %`;
 }
 
 /** @param {number | null | undefined} seconds */
 export function age(seconds) {
   if (!known(seconds)) return UNKNOWN;
-  if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
+  if (seconds < 9.95) return `${decimal(Math.max(0, seconds), 1)} s`;
   if (seconds < 99.5) return `${Math.round(seconds)} s`;
   if (seconds < 5970) return `${Math.round(seconds / 60)} min`;
   if (seconds < 48 * 3600) return `${Math.round(seconds / 3600)} h`;
@@ -67,13 +70,39 @@ export function age(seconds) {
 
 /** Format the distance of a ring or scale bar, such as 0.5 m, 20 m or 2 km. @param {number} value_m */
 export function distance(value_m) {
-  if (value_m >= 1000) return `${Number((value_m / 1000).toPrecision(6))} km`;
-  if (value_m < 0.1) return `${Number((value_m * 100).toPrecision(6))} cm`;
-  return `${Number(value_m.toPrecision(6))} m`;
+  if (value_m >= 1000) return `${short(value_m / 1000)} km`;
+  if (value_m < 0.1) return `${short(value_m * 100)} cm`;
+  return `${short(value_m)} m`;
 }
 
-/** @param {number} count @param {string} noun */
-export const counted = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+/** Write a number without needless digits. @param {number} value */
+const short = (value) => decimal(Number(value.toPrecision(6)), 0, 6);
 
-/** Format a machine-readable name for people: `several_modes` → "several modes". @param {string} word */
-export const words = (word) => word.replaceAll("_", " ");
+/** Format a speed. @param {number | null | undefined} value_mps @param {number} [decimals] */
+export const speed = (value_mps, decimals = 2) => `${fixed(value_mps, decimals)} m/s`;
+
+/** Format a place on the map. @param {number} x m @param {number} y m @param {number} decimals */
+export const place = (x, y, decimals) => t("place", { x: fixed(x, decimals), y: fixed(y, decimals), unit: "m" });
+
+/** Format a place in space. @param {number} x m @param {number} y m @param {number} z m */
+export const place3 = (x, y, z) => t("place3", { x: fixed(x, 2), y: fixed(y, 2), z: fixed(z, 2), unit: "m" });
+
+/** Format a standard deviation with its unit. @param {number} value_m */
+export const sigmaText = (value_m) => `± ${sigma(value_m)} m`;
+
+/** Format the semi-axes of an ellipse. @param {number} major_m @param {number} minor_m */
+export const ellipse = (major_m, minor_m) => `${fixed(major_m, 2)} × ${fixed(minor_m, 2)} m`;
+
+/** Format a coordinate with its unit. @param {number} value_m @param {number} decimals */
+export const coordinateText = (value_m, decimals) => `${fixed(value_m, decimals)} m`;
+
+/** Format a number of tags. @param {number} n */
+export const tagCount = (n) => t("count.tags", { n });
+
+/** Format a time of the past. @param {number | null | undefined} seconds */
+export const ago = (seconds) => t("ago", { age: age(seconds) });
+
+export { count };
+
+/** Return a machine-readable name in words: `several_modes` → "several modes". @param {string} word */
+export const words = (word) => (has(`word.${word}`) ? t(`word.${word}`) : word.replaceAll("_", " "));

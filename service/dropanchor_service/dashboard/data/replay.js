@@ -2,6 +2,7 @@
 
 import { api, getJson } from "./connection.js";
 import { Track } from "./tracks.js";
+import { t } from "../i18n/language.js";
 
 export const SPEEDS = [0.5, 1, 2, 5, 10, 20, 50];
 const PIECE_POINTS = 60_000;
@@ -144,7 +145,7 @@ export class Replay extends EventTarget {
       return tracks;
     } catch {
       if (signal.aborted) return null;
-      this.problem = "The history cannot be read at the moment. Choose a time to try again, or a shorter period.";
+      this.problem = t("past.unreadable");
       this.playing = false;
       this.dispatchEvent(new Event("state"));
       return null;

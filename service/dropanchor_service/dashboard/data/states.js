@@ -1,5 +1,7 @@
 /** The tracking states in the order of the contract, tracking without north, and how far a pose in each can be trusted. */
 
+import { t } from "../i18n/language.js";
+
 /**
  * @typedef {object} StateStyle
  * @property {string} name as in the contract
@@ -10,21 +12,26 @@
  * @property {boolean} trusted whether the pose is as good as the service can make it
  */
 
+/** @param {string} name */
+function wordsOf(name) {
+  return { name, label: t(`state.${name}`), meaning: t(`state.${name}.meaning`) };
+}
+
 /** @type {readonly StateStyle[]} */
 export const STATES = Object.freeze([
-  { name: "initialising", label: "Initialising", meaning: "Waiting for the first ranges and a heading.", shape: "dotted", placed: false, trusted: false },
-  { name: "ambiguous", label: "Ambiguous", meaning: "More than one position fits the measurements.", shape: "ring", placed: false, trusted: false },
-  { name: "tracking", label: "Tracking", meaning: "The pose and its ellipse can be trusted.", shape: "disc", placed: true, trusted: true },
-  { name: "coasting", label: "Coasting", meaning: "No ranges at the moment: predicted from motion alone.", shape: "diamond", placed: true, trusted: false },
-  { name: "degraded", label: "Degraded", meaning: "Tracked, but with poor data: the position is rough.", shape: "square", placed: true, trusted: false },
-  { name: "lost", label: "Lost", meaning: "The position is no longer known.", shape: "cross", placed: false, trusted: false },
-  { name: "turned", label: "North unknown", meaning: "Tracked, but turned about the anchor by an unknown angle: the dot is not where the tag is.", shape: "triangle", placed: false, trusted: false },
+  { ...wordsOf("initialising"), shape: "dotted", placed: false, trusted: false },
+  { ...wordsOf("ambiguous"), shape: "ring", placed: false, trusted: false },
+  { ...wordsOf("tracking"), shape: "disc", placed: true, trusted: true },
+  { ...wordsOf("coasting"), shape: "diamond", placed: true, trusted: false },
+  { ...wordsOf("degraded"), shape: "square", placed: true, trusted: false },
+  { ...wordsOf("lost"), shape: "cross", placed: false, trusted: false },
+  { ...wordsOf("turned"), shape: "triangle", placed: false, trusted: false },
 ]);
 
 /** The style of every tag while no newer pose can arrive, since its state may have changed.
  * @type {Readonly<StateStyle>} */
 export const OUT_OF_DATE = Object.freeze({
-  name: "outdated", label: "Out of date", meaning: "No connection to the service: this is the last pose that arrived.",
+  ...wordsOf("outdated"),
   shape: "dotted", placed: false, trusted: false,
 });
 

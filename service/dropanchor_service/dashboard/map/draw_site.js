@@ -3,6 +3,7 @@
 import { distancesTo } from "./geometry.js";
 import { distance } from "../data/format.js";
 import { multiples, roundStep } from "./view.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("./view.js").View} View @typedef {import("./palette.js").Palette} Palette */
 /** @typedef {{id: string, x: number, y: number, z: number}} Anchor */
@@ -102,7 +103,7 @@ export function drawAnchors(ctx, view, palette, anchors) {
     ctx.strokeStyle = palette.map;
     ctx.stroke();
     traceAnchorSign(ctx, x, y);
-    haloText(ctx, palette, `Anchor ${anchor.id}`, x, y + 15, palette["ink-2"]);
+    haloText(ctx, palette, t("map.anchor", { id: anchor.id }), x, y + 15, palette["ink-2"]);
   }
 }
 

@@ -1,6 +1,6 @@
 /** Draw the dots, heading ticks and names of the tags. */
 
-import { age } from "../data/format.js";
+import { ago } from "../data/format.js";
 import { SCALE_BAR_PX, haloText } from "./draw_site.js";
 import { shortened } from "../data/names.js";
 import { FADE, alike } from "./scene.js";
@@ -119,7 +119,7 @@ function drawLabel({ ctx, view, palette, fleet, now_ms }, row, important, taken)
  * @param {number} row @param {number} now_ms @returns {{name: string, note: string}} */
 function labelOf(fleet, row, now_ms) {
   const name = fleet.labels[row];
-  if (fleet.staleness(row, now_ms)) return { name, note: ` · ${age(fleet.age(row, now_ms))} ago` };
+  if (fleet.staleness(row, now_ms)) return { name, note: ` · ${ago(fleet.age(row, now_ms))}` };
   return { name, note: fleet.state[row] === AMBIGUOUS ? " ?" : "" };
 }
 

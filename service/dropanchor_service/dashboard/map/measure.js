@@ -2,6 +2,7 @@
 
 import { compass, metres } from "../data/format.js";
 import { haloText } from "./draw_site.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {[number, number]} Point m */
 /** @typedef {import("./map.js").LiveMap} LiveMap */
@@ -18,10 +19,10 @@ export function legsOf(points) {
 export function sentence(points, rotation_rad) {
   const legs = legsOf(points);
   const last = legs.at(-1);
-  if (!last) return "Click two or more points, or press Enter for the middle of the map.";
-  const leg = `${metres(last.length_m)}, ${compass(last.angle_rad + rotation_rad)}`;
+  if (!last) return t("measure.how");
+  const leg = t("measure.leg", { length: metres(last.length_m), bearing: compass(last.angle_rad + rotation_rad) });
   const total_m = legs.reduce((sum, { length_m }) => sum + length_m, 0);
-  return legs.length === 1 ? leg : `${leg} · ${metres(total_m)} in all`;
+  return legs.length === 1 ? leg : t("measure.total", { leg, total: metres(total_m) });
 }
 
 export class Measure {

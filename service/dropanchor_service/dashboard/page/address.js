@@ -11,18 +11,10 @@ export function momentIn(hash) {
   return { from_ms, to_ms, time_ms, speed: Number(values.get("speed") ?? 1), tag: values.get("tag") };
 }
 
-/** Return the hash with this moment, or without one. Other values in it stay. @param {string} hash @param {Moment | null} moment */
-export function hashWith(hash, moment) {
-  const values = new URLSearchParams(hash.replace(/^#/, ""));
-  for (const name of ["from", "to", "at", "speed", "tag"]) values.delete(name);
-  if (moment) {
-    const iso = (/** @type {number} */ time_ms) => new Date(time_ms).toISOString();
-    values.set("from", iso(moment.from_ms));
-    values.set("to", iso(moment.to_ms));
-    values.set("at", iso(moment.time_ms));
-    values.set("speed", String(moment.speed));
-    if (moment.tag !== null) values.set("tag", moment.tag);
-  }
-  const text = values.toString().replaceAll("%3A", ":");
-  return text === "" ? "" : `#${text}`;
+/** Return the values of a moment in the address; null removes each. @param {Moment | null} moment @returns {Record<string, string | null>} */
+export function momentValues(moment) {
+  if (!moment) return { from: null, to: null, at: null, speed: null, tag: null };
+  const iso = (/** @type {number} */ time_ms) => new Date(time_ms).toISOString();
+  const { from_ms, to_ms, time_ms, speed, tag } = moment;
+  return { from: iso(from_ms), to: iso(to_ms), at: iso(time_ms), speed: String(speed), tag };
 }

@@ -7,7 +7,9 @@ import { Connection } from "../data/connection.js";
 import { Detail } from "../panel/detail.js";
 import { Evidence } from "../data/evidence.js";
 import { Fleet } from "../data/fleet.js";
-import { fixed } from "../data/format.js";
+import { coordinateText, place } from "../data/format.js";
+import { t } from "../i18n/language.js";
+import { translate } from "../i18n/document.js";
 import { listen } from "../map/gestures.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
@@ -16,11 +18,14 @@ import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
+import { installDialog, installLanguages } from "./display.js";
 import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
 import { Zones } from "../zones/zones.js";
 
 const PANELS_MS = 250;
+
+translate(document);
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 const byId = (id) => /** @type {T} */ (document.getElementById(id));
@@ -65,8 +70,9 @@ evidence.addEventListener("change", () => {
 function announce(tag) {
   const row = fleet.row(tag);
   const { x, y } = fleet.number;
-  const place = `x ${fixed(x[row], 1)} m, y ${fixed(y[row], 1)} m`;
-  byId("spoken").textContent = `${fleet.labels[row]} selected: ${fleet.style(row).label}, ${place}`;
+  byId("spoken").textContent = t("tag.announced", {
+    tag: fleet.labels[row], state: fleet.style(row).label, x: coordinateText(x[row], 1), y: coordinateText(y[row], 1),
+  });
 }
 
 /** @param {(frame: import("../data/fleet.js").Frame, now_ms: number) => void} update @returns {(event: Event) => void} */
@@ -131,7 +137,7 @@ byId("zoom-out").addEventListener("click", () => map.zoom(1 / 1.6));
 byId("fit").addEventListener("click", () => map.fitAll());
 map.addEventListener("view", () => byId("fit").setAttribute("aria-pressed", String(map.autoFit)));
 map.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
-  byId("cursor").textContent = `${fixed(map.view.worldX(offsetX), 2)}, ${fixed(map.view.worldY(offsetY), 2)} m`;
+  byId("cursor").textContent = place(map.view.worldX(offsetX), map.view.worldY(offsetY), 2);
 });
 document.addEventListener("keydown", (event) => {
   if (event.key === "Escape" && measure.active) measure.turn(false);
@@ -143,6 +149,8 @@ document.addEventListener("keydown", (event) => {
 
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
+installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
+installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();

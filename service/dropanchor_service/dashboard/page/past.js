@@ -1,6 +1,7 @@
 /** Switch the page between the present and the past. In the past the fleet is fed from stored tracks instead of the stream. */
 
-import { hashWith, momentIn } from "./address.js";
+import { momentIn, momentValues } from "./address.js";
+import { writeAddress } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
 import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
@@ -9,6 +10,7 @@ import { RecentTrack } from "../data/recent.js";
 import { Replay, tracksUrl } from "../data/replay.js";
 import { Track, frameAt } from "../data/tracks.js";
 import { TRAIL_S } from "../data/trails.js";
+import { t } from "../i18n/language.js";
 
 const TICK_MS = 100;
 /** With reduced motion the dots move once a second. */
@@ -76,7 +78,7 @@ export class Past {
 
   enter() {
     this.#become(true);
-    if (!this.#hasHistory) this.bar.explain("This service keeps no history. Start it with --data-dir FOLDER.");
+    if (!this.#hasHistory) this.bar.explain(t("past.no_history"));
     const now_ms = Date.now();
     this.bar.suggest(now_ms);
     if (this.#hasHistory) this.replay.open(now_ms - 3_600_000, now_ms);
@@ -102,7 +104,7 @@ export class Past {
     document.body.dataset.time = active ? "past" : "present";
     if (active) fleet.replace({ t_ns: 0, tags: [] }, 0);
     else fleet.current = false;
-    byId("spoken").textContent = active ? "The page shows the past." : "The page shows the present again.";
+    byId("spoken").textContent = t(active ? "past.shows" : "past.shows_present");
     byId("past-figures").hidden = true;
     this.page.updatePanels();
   }
@@ -141,7 +143,7 @@ export class Past {
     const moment = momentIn(location.hash);
     if (!moment || (this.active && this.#isShown(moment))) return;
     this.#become(true);
-    if (!this.#hasHistory) return this.bar.explain("This service keeps no history. Start it with --data-dir FOLDER.");
+    if (!this.#hasHistory) return this.bar.explain(t("past.no_history"));
     this.replay.speed = moment.speed;
     this.page.choice.select(moment.tag);
     this.replay.open(moment.from_ms, moment.to_ms, moment.time_ms);
@@ -160,8 +162,7 @@ export class Past {
     const isChosen = this.active && to_ms > from_ms;
     if (!isChosen && this.active) return;
     const moment = isChosen ? { from_ms, to_ms, time_ms, speed, tag: this.page.choice.selected } : null;
-    const hash = isChosen || momentIn(location.hash) ? hashWith(location.hash, moment) : location.hash;
-    if (hash !== location.hash) history.replaceState(null, "", hash || location.pathname + location.search);
+    if (isChosen || momentIn(location.hash)) writeAddress(momentValues(moment));
   }
 
   /** @param {KeyboardEvent} event */

@@ -1,5 +1,7 @@
 /** Light or dark colours: those of the system until the user chooses others. */
 
+import { t } from "../i18n/language.js";
+
 const KEY = "dropanchor-theme";
 
 /** @param {HTMLButtonElement} button @param {() => void} changed */
@@ -8,9 +10,8 @@ export function installTheme(button, changed) {
   const apply = () => {
     const theme = localStorage.getItem(KEY) ?? (system.matches ? "dark" : "light");
     document.documentElement.dataset.theme = theme;
-    const other = theme === "dark" ? "light" : "dark";
-    button.setAttribute("aria-label", `Switch to ${other} colours`);
-    button.title = `Switch to ${other} colours`;
+    button.title = t(theme === "dark" ? "theme.light" : "theme.dark");
+    button.setAttribute("aria-label", button.title);
     changed();
   };
   button.addEventListener("click", () => {

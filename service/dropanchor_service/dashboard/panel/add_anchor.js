@@ -1,5 +1,7 @@
 /** Offer to add an anchor that the selected tag hears and the site lacks. */
 
+import { t } from "../i18n/language.js";
+
 export class AddAnchor {
   /** @param {HTMLElement} panel @param {import("../data/roster.js").Roster} roster
    * @param {import("../page/choice.js").Choice} choice @param {import("../data/changes.js").Changes} changes
@@ -18,7 +20,7 @@ export class AddAnchor {
     this.offer.hidden = missing === null || !this.changes.mayWrite;
     if (missing !== null && this.offer.dataset.anchor !== missing) {
       this.offer.dataset.anchor = missing;
-      this.offer.textContent = `Add anchor ${missing}`;
+      this.offer.textContent = t("tag.add_anchor", { id: missing });
     }
   }
 }

@@ -3,6 +3,7 @@
 import { countStates } from "../page/choice.js";
 import { BEST_FIRST, OUT_OF_DATE, STATES } from "../data/states.js";
 import { symbol } from "../map/symbols.js";
+import { count as countText, t } from "../i18n/language.js";
 
 export class StateChips {
   /** @type {{button: HTMLButtonElement, count: HTMLElement}[]} */
@@ -37,7 +38,7 @@ export class StateChips {
     const button = document.createElement("button");
     const { count } = chip(button, state);
     button.type = "button";
-    button.title = `${state.meaning} Click to hide or show these tags.`;
+    button.title = t("state.toggle", { meaning: state.meaning });
     button.addEventListener("click", () => this.choice.toggleState(number));
     return { button, count };
   }
@@ -56,6 +57,6 @@ function chip(element, state) {
 
 /** @param {HTMLElement} element @param {number} count */
 function write(element, count) {
-  const text = count.toLocaleString("en");
+  const text = countText(count);
   if (element.textContent !== text) element.textContent = text;
 }

@@ -2,7 +2,9 @@
 
 import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
-import { UNKNOWN, age, compass, fixed, metres, percent, sigma, turnRate, words } from "../data/format.js";
+import { UNKNOWN, age, compass, count, ellipse, metres, percent, place, sigmaText, speed, turnRate, words } from "../data/format.js";
+import { t } from "../i18n/language.js";
+import { said } from "../i18n/said.js";
 import { AMBIGUOUS } from "../data/states.js";
 import { clockText, healthTexts } from "./care.js";
 import { Plots } from "./plots.js";
@@ -34,8 +36,8 @@ export class Detail {
   /** @param {number} rad */
   set rotation_rad(rad) {
     this.#rotation_rad = rad;
-    put(this.#part("n-x"), rad === 0 ? "x (east)" : "x");
-    put(this.#part("n-y"), rad === 0 ? "y (north)" : "y");
+    put(this.#part("n-x"), t(rad === 0 ? "figure.x_east" : "table.x"));
+    put(this.#part("n-y"), t(rad === 0 ? "figure.y_north" : "table.y"));
   }
 
   update() {
@@ -59,8 +61,8 @@ export class Detail {
     if (row < 0) return;
     this.plots.update(this.#explanation);
     const status = this.#explanation ?? this.roster.of(this.fleet.names[row]);
-    countsInto(this.#part("samples"), "Used", status?.samples);
-    countsInto(this.#part("rejected"), "Not used", status?.rejected);
+    countsInto(this.#part("samples"), t("tag.used"), status?.samples);
+    countsInto(this.#part("rejected"), t("tag.rejected"), status?.rejected);
   }
 
   /** @param {string} name */
@@ -82,7 +84,7 @@ export class Detail {
     put(this.#part("meaning"), state.meaning);
     put(this.#part("reason"), reason ? words(reason) : "");
     const hint = (current ? value.hint[row] || this.roster.of(name)?.hint : null) ?? "";
-    put(this.#part("hint"), hint);
+    put(this.#part("hint"), said(hint));
     this.#part("hint").hidden = hint === "";
     this.follow.setAttribute("aria-pressed", String(this.choice.follow));
     this.#part("json").setAttribute("href", api(`tags/${encodeURIComponent(name)}/pose`).href);
@@ -97,17 +99,17 @@ export class Detail {
     const texts = {
       x: metres(number("x")),
       y: metres(number("y")),
-      sigma: `± ${sigma(number("sigma_pos_m"))} m`,
-      ellipse: `${fixed(number("semi_major_m"), 2)} × ${fixed(number("semi_minor_m"), 2)} m`,
+      sigma: sigmaText(number("sigma_pos_m")),
+      ellipse: ellipse(number("semi_major_m"), number("semi_minor_m")),
       heading: compass(number("heading_rad") + this.#rotation_rad),
-      speed: `${fixed(number("speed_mps"), 2)} m/s`,
+      speed: speed(number("speed_mps")),
       turn: turnRate(number("yaw_rate_radps")),
       range: metres(number("range_m")),
       anchor: anchor ?? UNKNOWN,
       mode: percent(number("p_mode")),
-      sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : `± ${sigma(number("sigma_obs_m"))} m`,
+      sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : sigmaText(number("sigma_obs_m")),
       age: age(this.fleet.age(row, performance.now())),
-      online: !this.fleet.current || this.fleet.past ? UNKNOWN : this.fleet.online[row] ? "Online" : "Offline",
+      online: !this.fleet.current || this.fleet.past ? UNKNOWN : t(this.fleet.online[row] ? "figure.online" : "figure.offline"),
     };
     for (const [name, value] of Object.entries(texts)) put(this.#part(`v-${name}`), value);
   }
@@ -115,12 +117,12 @@ export class Detail {
   /** @param {string} tag */
   #health(tag) {
     const status = this.roster.of(tag);
-    fillList(this.#part("care"), (status?.needs_care ?? []).map(({ hint }) => hint));
+    fillList(this.#part("care"), (status?.needs_care ?? []).map(({ hint }) => said(hint)));
     const box = this.#part("health");
     const texts = status?.health ? healthTexts(status.health) : [];
-    if (status?.clock_offset) texts.push(["Motion clock", clockText(status.clock_offset)]);
+    if (status?.clock_offset) texts.push([t("health.motion_clock"), clockText(status.clock_offset)]);
     const fromMotion = status?.clock_offset?.from_motion;
-    if (fromMotion) texts.push(["By its motion", clockText(fromMotion)]);
+    if (fromMotion) texts.push([t("health.by_motion"), clockText(fromMotion)]);
     box.hidden = texts.length === 0;
     if (box.dataset.shown === JSON.stringify(texts)) return;
     box.dataset.shown = JSON.stringify(texts);
@@ -148,19 +150,19 @@ function hypothesisLine(ghost) {
   const bar = document.createElement("meter");
   bar.max = 1;
   bar.value = ghost.weight;
-  bar.setAttribute("aria-label", "probability");
-  const place = document.createElement("span");
-  place.textContent = `${fixed(ghost.x, 1)}, ${fixed(ghost.y, 1)} m`;
+  bar.setAttribute("aria-label", t("tag.hypothesis"));
+  const where = document.createElement("span");
+  where.textContent = place(ghost.x, ghost.y, 1);
   const weight = document.createElement("span");
   weight.textContent = percent(ghost.weight);
-  line.append(place, bar, weight);
+  line.append(where, bar, weight);
   return line;
 }
 
 /** @param {HTMLElement} list @param {string} title @param {Record<string, number> | undefined} byName */
 function countsInto(list, title, byName) {
   const counts = Object.entries(byName ?? {}).sort((a, b) => b[1] - a[1]);
-  fillList(list, counts.length === 0 ? [] : [title, ...counts.map(([name, count]) => `${words(name)} ${count.toLocaleString("en")}`)]);
+  fillList(list, counts.length === 0 ? [] : [title, ...counts.map(([name, number]) => `${words(name)} ${count(number)}`)]);
 }
 
 /** @param {HTMLElement} list @param {string[]} texts */

@@ -3,6 +3,8 @@
 import { hasKey, storeKey } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
 import { age } from "../data/format.js";
+import { t } from "../i18n/language.js";
+import { said } from "../i18n/said.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
@@ -22,14 +24,13 @@ export class Notices {
   update() {
     const { status, lostAt, progress } = this.connection;
     const isPast = this.fleet.past;
-    const label = { connecting: "Connecting", starting: "Starting", live: "Live", lost: "Disconnected", locked: "Locked" }[status];
     byId("status").dataset.status = isPast ? "past" : status;
-    write(byId("status-text"), isPast ? "Past" : label);
+    write(byId("status-text"), t(isPast ? "status.past" : `status.${status}`));
     byId("lost").hidden = status !== "lost" || isPast;
-    document.title = isPast ? "Past · Dropanchor" : status === "lost" ? "Connection lost · Dropanchor" : "Dropanchor";
-    write(byId("lost-age"), age((performance.now() - lostAt) / 1000));
+    document.title = isPast ? t("page.past_title") : status === "lost" ? t("page.lost_title") : "Dropanchor";
+    write(byId("lost-text"), t("lost.text", { age: age((performance.now() - lostAt) / 1000) }));
     byId("starting").hidden = status !== "starting";
-    write(byId("progress"), progress);
+    write(byId("progress"), said(progress));
     byId("locked").hidden = status !== "locked";
     byId("refused").hidden = !hasKey();
     const isEmpty = !isPast && status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
@@ -69,11 +70,11 @@ function installCopy(button) {
     const source = byId(/** @type {HTMLElement} */ (button).dataset.copies ?? "");
     try {
       await navigator.clipboard.writeText(source.textContent ?? "");
-      button.textContent = "Copied";
+      button.textContent = t("copy.copied");
     } catch {
       getSelection()?.selectAllChildren(source);
-      button.textContent = "Press Ctrl-C";
+      button.textContent = t("copy.press");
     }
-    setTimeout(() => (button.textContent = "Copy"), 1600);
+    setTimeout(() => (button.textContent = t("copy.copy")), 1600);
   });
 }

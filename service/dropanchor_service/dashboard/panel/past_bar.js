@@ -1,6 +1,7 @@
 /** The controls of the past: which period, when in it, how fast, and a clear note that this is not the present. */
 
 import { SPEEDS } from "../data/replay.js";
+import { decimal, t, timeText } from "../i18n/language.js";
 
 const HOUR_MS = 3_600_000;
 
@@ -14,7 +15,7 @@ export class PastBar extends EventTarget {
     this.replay = replay;
     this.slider = /** @type {HTMLInputElement} */ (this.#part("slider"));
     this.speed = /** @type {HTMLSelectElement} */ (this.#part("speed"));
-    this.speed.append(...SPEEDS.map((speed) => new Option(`× ${speed}`, String(speed), speed === 1)));
+    this.speed.append(...SPEEDS.map((speed) => new Option(`× ${decimal(speed, 0, 1)}`, String(speed), speed === 1)));
     bar.addEventListener("submit", (event) => this.#choose(event));
     this.#part("play").addEventListener("click", () => replay.play(!replay.playing));
     this.#part("leave").addEventListener("click", () => this.dispatchEvent(new Event("leave")));
@@ -43,13 +44,13 @@ export class PastBar extends EventTarget {
     put(this.#part("time"), localTime(replay.time_ms));
     this.#part("time").setAttribute("datetime", new Date(replay.time_ms).toISOString());
     const play = this.#part("play");
-    play.setAttribute("aria-label", replay.playing ? "Pause" : "Play");
-    play.title = `${replay.playing ? "Pause" : "Play"} (space)`;
+    play.setAttribute("aria-label", t(replay.playing ? "past.pause" : "past.play"));
+    play.title = t(replay.playing ? "past.pause_key" : "past.play_key");
     play.dataset.playing = String(replay.playing);
     this.speed.value = String(replay.speed);
     this.bar.setAttribute("aria-busy", String(replay.loading));
     const nothing = !replay.loading && replay.problem === "" && replay.isLoaded && replay.figures.size === 0;
-    this.explain(nothing ? "No poses are stored in this period." : replay.problem);
+    this.explain(nothing ? t("past.nothing") : replay.problem);
   }
 
   #showPeriod() {
@@ -65,7 +66,7 @@ export class PastBar extends EventTarget {
     const [from_ms, to_ms] = ["from", "to"].map((name) => new Date(this.#input(name).value).getTime());
     const isRight = to_ms > from_ms && to_ms - from_ms <= 31 * 24 * HOUR_MS;
     if (isRight) this.replay.open(from_ms, to_ms);
-    else this.explain("The end must come after the start, by at most 31 days.");
+    else this.explain(t("past.order"));
   }
 
   /** @param {string} name @param {number} time_ms */
@@ -86,7 +87,7 @@ export class PastBar extends EventTarget {
 }
 
 /** Return a time as people here write it, with its zone. @param {number} time_ms */
-export const localTime = (time_ms) => new Date(time_ms).toLocaleString("en-GB", {
+export const localTime = (time_ms) => timeText(time_ms, {
   weekday: "short", day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit", second: "2-digit", timeZoneName: "short",
 });
 

@@ -2,7 +2,8 @@
 
 import { request } from "../data/access.js";
 import { api } from "../data/connection.js";
-import { UNKNOWN, age, distance, fixed } from "../data/format.js";
+import { UNKNOWN, age, count, distance, speed } from "../data/format.js";
+import { t } from "../i18n/language.js";
 import { nanoseconds } from "../data/replay.js";
 
 export class PastFigures {
@@ -32,9 +33,9 @@ export class PastFigures {
     const texts = {
       distance: distance(Number(track.distance_m.toPrecision(4))),
       tracked: age(track.tracked_s),
-      mean: `${fixed(track.mean_speed_mps, 2)} m/s`,
-      max: `${fixed(track.max_speed_mps, 2)} m/s`,
-      poses: track.poses.toLocaleString("en"),
+      mean: speed(track.mean_speed_mps),
+      max: speed(track.max_speed_mps),
+      poses: count(track.poses),
     };
     for (const [name, text] of Object.entries(texts)) this.#part(name).textContent = text || UNKNOWN;
   }
@@ -46,15 +47,15 @@ export class PastFigures {
     url.search = new URLSearchParams({
       format, from: nanoseconds(this.replay.from_ms), to: nanoseconds(this.replay.to_ms),
     }).toString();
-    this.#part("answer").textContent = "Preparing the file …";
+    this.#part("answer").textContent = t("figures.preparing");
     try {
       const content = await (await request(url, {})).blob();
       const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(content), download: `${tag}.${format}` });
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
-      this.#part("answer").textContent = `Saved ${tag}.${format}.`;
+      this.#part("answer").textContent = t("figures.saved", { file: `${tag}.${format}` });
     } catch {
-      this.#part("answer").textContent = "The file could not be loaded. Try again.";
+      this.#part("answer").textContent = t("figures.failed");
     }
   }
 

@@ -1,7 +1,8 @@
 /** Plots of the last measurements beside the expected ones. */
 
 import { minimumSpeeds } from "../data/evidence.js";
-import { UNKNOWN, fixed, metres } from "../data/format.js";
+import { UNKNOWN, fixed, metres, percent, speed as speedText } from "../data/format.js";
+import { t } from "../i18n/language.js";
 import { Plot } from "./plot.js";
 
 /** @typedef {import("../data/evidence.js").Explanation} Explanation @typedef {import("../data/evidence.js").Innovation} Innovation
@@ -33,7 +34,7 @@ export class Plots {
     this.#ranges(ranges, span, before);
     this.#innovations(innovations, span, before);
     this.#speeds(explanation, ranges, span, before);
-    this.#put("span", `The last ${fixed(span, 0)} s`);
+    this.#put("span", t("plots.span", { span: `${fixed(span, 0)} s` }));
   }
 
   /** @param {Innovation[]} ranges @param {number} span @param {(t_ns: number) => number} before */
@@ -44,8 +45,8 @@ export class Plots {
     for (const anchor of anchors) this.#expected(ranges.filter((one) => one.anchor === anchor), before, anchors.length > 1);
     this.#mark(this.range, measured);
     const last = ranges.at(-1);
-    this.#put("range", last ? `${metres(last.measured)}, expected ${metres(last.predicted)}` : UNKNOWN);
-    this.range.label = `Ranges: ${ranges.length}, of which ${refused(ranges)} refused`;
+    this.#put("range", last ? t("plots.range", { measured: metres(last.measured), expected: metres(last.predicted) }) : UNKNOWN);
+    this.range.label = t("plots.ranges_label", { all: ranges.length, refused: refused(ranges) });
   }
 
   /** Draw the expected ranges to one anchor with their 95 % band. @param {Innovation[]} ranges
@@ -71,9 +72,9 @@ export class Plots {
     this.innovation.line("zero", edge(0));
     this.#mark(this.innovation, points);
     const within = points.filter(({ value }) => Math.abs(value) <= BAND_SIGMAS).length;
-    const share = points.length ? `${Math.round((100 * within) / points.length)} %` : UNKNOWN;
-    this.#put("innovation", `${share} in the band, ${refused(innovations)} of ${innovations.length} refused`);
-    this.innovation.label = `Normalised innovations: ${share} within 1.96 standard deviations`;
+    const share = points.length ? percent(within / points.length) : UNKNOWN;
+    this.#put("innovation", t("plots.innovations", { share, refused: refused(innovations), all: innovations.length }));
+    this.innovation.label = t("plots.innovations_label", { share });
   }
 
   /** @param {Explanation} explanation @param {Innovation[]} ranges @param {number} span
@@ -89,9 +90,10 @@ export class Plots {
     this.speed.band("least", minimum, minimum.map(({ t }) => ({ t, value: 0 })));
     this.speed.line("estimate", speeds);
     const rate = speed.range_rate_mps;
-    const rateText = rate === null ? "" : `, its range changes by ${fixed(rate, 2)} m/s`;
-    this.#put("speed", `${fixed(pose.speed_mps, 2)} m/s${rateText}`);
-    this.speed.label = `Speed ${fixed(pose.speed_mps, 2)} m/s${rateText}`;
+    const now = speedText(pose.speed_mps);
+    const text = rate === null ? now : t("plots.speed", { speed: now, rate: speedText(rate) });
+    this.#put("speed", text);
+    this.speed.label = t("plots.speed_label", { speed: text });
   }
 
   /** Mark used measurements with dots and refused ones with crosses. @param {Plot} plot

@@ -1,6 +1,7 @@
 /** The table of all tags. Only visible rows exist in the document, so that ten thousand tags stay fast. */
 
-import { UNKNOWN, age, coordinate, counted, fixed, sigma } from "../data/format.js";
+import { UNKNOWN, age, coordinate, count, fixed, sigma, tagCount } from "../data/format.js";
+import { t } from "../i18n/language.js";
 import { Order } from "../data/order.js";
 import { NameColumn } from "../data/names.js";
 import { symbol } from "../map/symbols.js";
@@ -45,8 +46,8 @@ export class TagTable {
   update() {
     const wanted = (/** @type {number} */ row) => this.choice.shows(this.fleet, row);
     this.#rows = this.#order.rows(this.fleet, wanted, this.#sort, performance.now());
-    const all = counted(this.fleet.size, "tag");
-    this.count.textContent = this.choice.isFiltered ? `${this.#rows.length.toLocaleString("en")} of ${all}` : all;
+    const all = tagCount(this.fleet.size);
+    this.count.textContent = this.choice.isFiltered ? t("count.of", { shown: count(this.#rows.length), all }) : all;
     this.#paint();
   }
 
@@ -117,7 +118,7 @@ export class TagTable {
     attribute(line.use, "href", `#s-${state.name}`);
     const texts = [
       this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
-      age(seconds), !fleet.current ? UNKNOWN : fleet.online[row] ? "online" : "offline",
+      age(seconds), !fleet.current ? UNKNOWN : t(fleet.online[row] ? "figure.online" : "figure.offline"),
     ];
     texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));
     const full = label === name ? name : `${label} (${name})`;

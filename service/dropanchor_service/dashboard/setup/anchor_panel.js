@@ -1,6 +1,7 @@
 /** The panel of the anchors: a list, and a form for the one that is being edited. */
 
-import { fixed } from "../data/format.js";
+import { place3 } from "../data/format.js";
+import { t } from "../i18n/language.js";
 import { nameKey } from "../data/order.js";
 import { confirmed } from "./confirm.js";
 
@@ -63,7 +64,7 @@ export class AnchorPanel {
     this.#fillList();
     this.form.hidden = draft === null;
     this.#part("delete").hidden = editor.isNew || !changes.mayDelete;
-    this.#part("save").textContent = editor.isNew ? "Add" : "Save";
+    this.#part("save").textContent = t(editor.isNew ? "anchors.add_new" : "save");
     this.#field("id").readOnly = !editor.isNew;
     if (!draft) return;
     if (this.#field("id").value !== draft.id) this.#field("id").value = draft.id;
@@ -73,7 +74,7 @@ export class AnchorPanel {
   #fillList() {
     const { draft, isNew } = this.editor;
     const anchors = [...this.editor.anchors].sort((a, b) => (nameKey(a.id) < nameKey(b.id) ? -1 : 1));
-    const texts = anchors.map(({ id, x, y, z }) => `${id}: ${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(z, 2)} m`);
+    const texts = anchors.map(({ id, x, y, z }) => t("anchors.line", { id, place: place3(x, y, z) }));
     const shown = JSON.stringify([texts, draft?.id, isNew]);
     if (this.list.dataset.shown === shown) return;
     this.list.dataset.shown = shown;
@@ -96,7 +97,7 @@ export class AnchorPanel {
   }
 
   async #delete() {
-    const question = `Delete anchor ${this.editor.draft?.id}? Its ranges are no longer used.`;
-    if (await confirmed(this.dialog, question, "Delete")) await this.editor.remove();
+    const question = t("anchors.delete_question", { id: this.editor.draft?.id });
+    if (await confirmed(this.dialog, question, t("delete"))) await this.editor.remove();
   }
 }

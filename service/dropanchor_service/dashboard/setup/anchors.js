@@ -1,6 +1,7 @@
 /** Place, move, add and delete anchors. A draft is on the map only until it is saved or cancelled. */
 
 import { toCentimetre } from "./gestures.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("../map/draw_site.js").Anchor} Anchor */
 /** @typedef {import("../data/changes.js").Seen} Seen */
@@ -96,8 +97,8 @@ export class AnchorEditor extends EventTarget {
     const seen = await this.#seen;
     const take = () => this.#takeNewer(draft.id);
     const done = isNew
-      ? await this.changes.create(`Anchor ${draft.id} added.`, pathOf(draft.id), draft)
-      : seen !== null && (await this.changes.edit(`Anchor ${draft.id} moved.`, pathOf(draft.id), draft, seen, take));
+      ? await this.changes.create(t("anchors.added", { id: draft.id }), pathOf(draft.id), draft)
+      : seen !== null && (await this.changes.edit(t("anchors.moved", { id: draft.id }), pathOf(draft.id), draft, seen, take));
     if (!done || this.draft !== draft) return;
     this.anchors = [...this.anchors.filter(({ id }) => id !== draft.id), draft];
     this.#edit(draft);
@@ -109,7 +110,7 @@ export class AnchorEditor extends EventTarget {
     if (!draft) return;
     const restore = { path: pathOf(draft.id), value: draft, conditions: { "if-none-match": "*" } };
     const known = this.anchors.find(({ id }) => id === draft.id) ?? draft;
-    if (!(await this.changes.remove(`Anchor ${draft.id} deleted.`, restore.path, { ...restore, value: known }))) return;
+    if (!(await this.changes.remove(t("anchors.deleted", { id: draft.id }), restore.path, { ...restore, value: known }))) return;
     this.anchors = this.anchors.filter(({ id }) => id !== draft.id);
     this.cancel();
   }

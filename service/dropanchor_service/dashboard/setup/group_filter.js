@@ -1,5 +1,7 @@
 /** A list of the groups, of which one can be shown alone. */
 
+import { t } from "../i18n/language.js";
+
 export class GroupFilter {
   /** @param {HTMLSelectElement} select @param {import("../data/fleet.js").Fleet} fleet @param {import("../page/choice.js").Choice} choice */
   constructor(select, fleet, choice) {
@@ -16,7 +18,7 @@ export class GroupFilter {
     if (this.choice.group !== "" && !groups.includes(this.choice.group)) this.choice.group = "";
     if (this.select.dataset.shown !== shown) {
       this.select.dataset.shown = shown;
-      this.select.replaceChildren(new Option("All groups", ""), ...groups.map((group) => new Option(group)));
+      this.select.replaceChildren(new Option(t("tags.all_groups"), ""), ...groups.map((group) => new Option(group)));
     }
     this.select.value = this.choice.group;
     this.select.hidden = groups.length === 0;

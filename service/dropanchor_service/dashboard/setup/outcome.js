@@ -1,6 +1,6 @@
 /** Say what became of a change, and offer to undo it or to settle a conflict. */
 
-import { CHANGED_MEANWHILE_SENTENCE } from "../data/access.js";
+import { t } from "../i18n/language.js";
 
 const SHOWN_MS = 12_000;
 
@@ -18,20 +18,20 @@ export class Outcome {
 
   /** @param {string} what */
   #done(what) {
-    this.#show(what, this.changes.canUndo ? [["Undo", () => this.changes.undo()]] : []);
+    this.#show(what, this.changes.canUndo ? [[t("outcome.undo"), () => this.changes.undo()]] : []);
     this.#timer = setTimeout(() => (this.box.hidden = true), SHOWN_MS);
   }
 
   /** @param {import("../data/changes.js").Conflict} conflict */
   #conflict({ what, keep, take }) {
-    this.#show(`${CHANGED_MEANWHILE_SENTENCE} Not done: ${what}`, [["Take the newer one", take], ["Keep mine", keep]]);
+    this.#show(t("outcome.conflict", { what }), [[t("outcome.take"), take], [t("outcome.keep"), keep]]);
   }
 
   /** @param {string} text @param {[string, () => void][]} choices */
   #show(text, choices) {
     clearTimeout(this.#timer);
     const message = Object.assign(document.createElement("span"), { textContent: text });
-    this.box.replaceChildren(message, ...[...choices, /** @type {[string, () => void]} */ (["Close", () => {}])].map(([label, act]) => {
+    this.box.replaceChildren(message, ...[...choices, /** @type {[string, () => void]} */ ([t("close"), () => {}])].map(([label, act]) => {
       const button = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: label });
       button.addEventListener("click", () => {
         this.box.hidden = true;

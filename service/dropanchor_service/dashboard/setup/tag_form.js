@@ -1,11 +1,13 @@
 /** Fill the form of a tag's settings, and read it. */
 
+import { t } from "../i18n/language.js";
+
 const DEGREES = 180 / Math.PI;
 
 /** Colours that differ for people with any colour vision, and that show on both themes. */
 const COLOURS = [
-  ["Blue", "#2f7fd0"], ["Orange", "#d97a0a"], ["Green", "#1b8a6b"], ["Yellow", "#b89b00"], ["Pink", "#c7609a"],
-  ["Red", "#cf4a12"], ["Grey", "#7a8793"],
+  ["blue", "#2f7fd0"], ["orange", "#d97a0a"], ["green", "#1b8a6b"], ["yellow", "#b89b00"], ["pink", "#c7609a"],
+  ["red", "#cf4a12"], ["grey", "#7a8793"],
 ];
 
 /** @param {HTMLFormElement} form @param {string} name */
@@ -18,7 +20,7 @@ export const numberOf = (input) => (Number.isNaN(input.valueAsNumber) ? null : i
 export function fillForm(form, settings, groups) {
   const colour = /** @type {HTMLSelectElement} */ (form.elements.namedItem("colour"));
   const known = COLOURS.some(([, value]) => value === settings.colour);
-  const choices = [["None", ""], ...COLOURS, ...(settings.colour && !known ? [[settings.colour, settings.colour]] : [])];
+  const choices = [[t("colour.none"), ""], ...COLOURS.map(([name, value]) => [t(`colour.${name}`), value]), ...(settings.colour && !known ? [[settings.colour, settings.colour]] : [])];
   colour.replaceChildren(...choices.map(([text, value]) => new Option(text, value)));
   const angle = settings.mount_angle_rad;
   /** @type {Record<string, string>} */

@@ -2,6 +2,7 @@
 
 import { confirmed } from "./confirm.js";
 import { numberOf, patchOf, fillForm } from "./tag_form.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("../data/changes.js").Seen} Seen */
 
@@ -76,7 +77,7 @@ export class TagPanel {
   async #save(event) {
     event.preventDefault();
     if (!this.#seen) return;
-    await this.#edit(`Settings of ${this.#tag} changed.`, patchOf(this.form));
+    await this.#edit(t("setup.saved", { tag: this.#tag }), patchOf(this.form));
   }
 
   /** @param {string} what @param {object} patch */
@@ -122,17 +123,17 @@ export class TagPanel {
     event.preventDefault();
     const { draft } = this.start;
     if (!draft) return;
-    if (await this.#edit(`Start of ${this.#tag} set.`, { start: { ...draft, std_m: STD_M } })) this.start.cancel();
+    if (await this.#edit(t("setup.start_set", { tag: this.#tag }), { start: { ...draft, std_m: STD_M } })) this.start.cancel();
   }
 
   async #delete() {
     const tag = this.#tag;
-    const question = `Delete ${tag} with its settings? Its stored tracks stay. If it still sends, it is a new tag with the default settings.`;
-    if (!(await confirmed(this.dialog, question, "Delete"))) return;
+    const question = t("setup.delete_question", { tag });
+    if (!(await confirmed(this.dialog, question, t("delete")))) return;
     const path = `tags/${encodeURIComponent(tag)}`;
     const { value } = await this.changes.read(`${path}/settings`);
     this.choice.select(null);
-    const done = await this.changes.remove(`Tag ${tag} deleted.`, path, { path: `${path}/settings`, value, conditions: {} });
+    const done = await this.changes.remove(t("setup.deleted", { tag }), path, { path: `${path}/settings`, value, conditions: {} });
     if (!done) this.choice.select(tag);
   }
 }

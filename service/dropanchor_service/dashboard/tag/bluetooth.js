@@ -2,6 +2,7 @@
 
 import { DISTANCES, LOCATION_DATA, LOCATION_DATA_MODE, POSITION, SERVICE, rangesOf } from "./location_data.js";
 import { anchorNumber } from "./packed.js";
+import { t } from "../i18n/language.js";
 
 /** Modules announce the service as data only, which no filter of a browser sees; their name is DW and four digits. */
 const NAME_PREFIX = "DW";
@@ -49,7 +50,7 @@ export class Bluetooth {
       const filters = [{ services: [SERVICE] }, { namePrefix: NAME_PREFIX }];
       this.#device = await bluetooth.requestDevice({ filters, optionalServices: [SERVICE] });
     } catch (error) {
-      this.problem = `No module was chosen: ${/** @type {Error} */ (error).message}`;
+      this.problem = t("phone.not_chosen", { message: /** @type {Error} */ (error).message });
       return;
     }
     await this.#stay(this.#device);
@@ -61,10 +62,10 @@ export class Bluetooth {
       try {
         await this.#listen(device);
         attempt = 0;
-        this.problem = "The module is out of reach. Trying again until it is back.";
+        this.problem = t("phone.out_of_reach");
       } catch (error) {
         const { name, message } = /** @type {Error} */ (error);
-        this.problem = `The module cannot be read: ${message}`;
+        this.problem = t("phone.unreadable", { message });
         if (FINAL.has(name)) return;
       }
       await new Promise((resolve) => setTimeout(resolve, RETRY_MS[Math.min(attempt, RETRY_MS.length - 1)]));
@@ -102,7 +103,7 @@ export class Bluetooth {
   }
 
   #complain() {
-    this.problem = "The module reports no ranges. Is it set up as a tag, and is an anchor on?";
+    this.problem = t("phone.reports_nothing");
   }
 }
 

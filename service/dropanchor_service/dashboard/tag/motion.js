@@ -9,6 +9,8 @@
  * at rest with the screen up. Apple's browsers report its negative.
  */
 
+import { t } from "../i18n/language.js";
+
 const RAD_PER_DEG = Math.PI / 180;
 const NONE_MS = 3000;
 const RATE_MS = 2000;
@@ -94,19 +96,19 @@ export class Motion {
   }
 
   #complain() {
-    this.problem = "This device reports no motion: it needs an accelerometer and a gyroscope, and the browser must allow them.";
+    this.problem = t("phone.no_motion");
   }
 }
 
 /** Ask for the permission where there is one to ask for. Return a sentence when there are no sensors to listen to. */
 async function refusal() {
-  if (!isSecureContext) return "Browsers give motion to pages over HTTPS only: open this page with https://.";
-  if (!("DeviceMotionEvent" in window)) return "This browser has no motion sensors.";
+  if (!isSecureContext) return t("phone.https_motion");
+  if (!("DeviceMotionEvent" in window)) return t("phone.no_sensors");
   const asking = /** @type {{ requestPermission?: () => Promise<string> }} */ (/** @type {unknown} */ (DeviceMotionEvent));
   try {
-    if ((await asking.requestPermission?.()) === "denied") return "Motion was not allowed. Close the tab, open the link again and allow it.";
+    if ((await asking.requestPermission?.()) === "denied") return t("phone.motion_denied");
   } catch {
-    return "The browser did not ask for motion. Tap Start again.";
+    return t("phone.motion_not_asked");
   }
   return "";
 }

@@ -1,7 +1,11 @@
 /** The page of a tag: a form for the key, one button, and what happens to the samples. */
 
 import { OUT_OF_DATE, STATES } from "../data/states.js";
-import { fixed, UNKNOWN } from "../data/format.js";
+import { count, fixed, UNKNOWN } from "../data/format.js";
+import { translate } from "../i18n/document.js";
+import { t } from "../i18n/language.js";
+import { said } from "../i18n/said.js";
+import { installLanguages } from "../page/display.js";
 import { installTheme } from "../page/theme.js";
 import { hasBluetooth } from "./bluetooth.js";
 import { remember, remembered, takeFromAddress } from "./link.js";
@@ -10,13 +14,6 @@ import { hasSerial } from "./serial.js";
 import { ThisTag } from "./tag.js";
 
 const SHOW_MS = 250;
-const STATUS = {
-  closed: "Not connected",
-  connecting: "Connecting",
-  open: "Connected",
-  broken: "No connection",
-  refused: "Refused",
-};
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 const byId = (id) => /** @type {T} */ (document.getElementById(id));
@@ -29,15 +26,12 @@ function write(id, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** @param {number} count */
-const counted = (count) => count.toLocaleString("en");
-
 /** @param {ThisTag} tag */
 function offset(tag) {
   const best = tag.clock.best;
   if (best === null) return UNKNOWN;
-  const sentence = `${fixed(best.offset_us / 1000, 0)} ms ± ${fixed(best.half_us / 1000, 0)}`;
-  return tag.clock.correction_us ? `${sentence}, corrected` : sentence;
+  const values = { offset: fixed(best.offset_us / 1000, 0), half: fixed(best.half_us / 1000, 0) };
+  return t(tag.clock.correction_us ? "phone.offset_corrected" : "phone.offset_value", values);
 }
 
 /** The tracking state of the last answer; undefined before the first pose. @param {ThisTag} tag */
@@ -49,12 +43,13 @@ function stateOf({ uplink }) {
 /** The sentences that the person should read now, the most urgent first. @param {ThisTag} tag */
 function* problems(tag) {
   const { uplink, motion, queue } = tag;
-  if (uplink.status === "refused") yield uplink.problem;
-  if (uplink.status === "broken") yield `${uplink.problem} The samples wait on this device and are sent later.`.trim();
-  if (uplink.status === "open" && uplink.problem) yield uplink.problem;
+  const problem = said(uplink.problem);
+  if (uplink.status === "refused") yield problem;
+  if (uplink.status === "broken") yield t("phone.later", { problem }).trim();
+  if (uplink.status === "open" && problem) yield problem;
   if (motion.problem) yield motion.problem;
-  if (queue.lost) yield "The queue on this device is full: its oldest samples were dropped.";
-  if (tag.running && !tag.awake) yield "The screen may go off, and then the sensors stop: keep it on.";
+  if (queue.lost) yield t("phone.queue_full");
+  if (tag.running && !tag.awake) yield t("phone.screen_off");
 }
 
 /** @param {ThisTag} tag */
@@ -62,18 +57,18 @@ function show(tag) {
   const { uplink, motion, queue } = tag;
   const state = stateOf(tag);
   byId("status").dataset.status = { open: "live", broken: "lost", refused: "lost" }[String(uplink.status)] ?? "connecting";
-  write("status-text", STATUS[uplink.status]);
-  write("toggle", tag.running ? "Stop" : "Start");
+  write("status-text", t(`phone.${uplink.status}`));
+  write("toggle", t(tag.running ? "phone.stop" : "phone.start"));
   byId("toggle").classList.toggle("on", tag.running);
   write("rate", tag.running ? fixed(motion.rate_hz, 0) : UNKNOWN);
-  write("screen", motion.screen || UNKNOWN);
-  write("sent", counted(uplink.sent));
-  write("waiting", counted(queue.samples));
-  write("lost", counted(queue.lost));
+  write("screen", motion.screen ? t(`phone.${motion.screen}`) : UNKNOWN);
+  write("sent", count(uplink.sent));
+  write("waiting", count(queue.samples));
+  write("lost", count(queue.lost));
   write("offset", offset(tag));
   byId("pose").dataset.state = state?.name ?? "initialising";
-  write("state", state?.label ?? (uplink.answer === null ? UNKNOWN : "No position yet"));
-  write("hint", (uplink.status === "open" && uplink.answer?.hint) || state?.meaning || "Motion alone gives no position: this tag needs ranges too.");
+  write("state", state?.label ?? (uplink.answer === null ? UNKNOWN : t("phone.no_position")));
+  write("hint", (uplink.status === "open" && said(uplink.answer?.hint ?? "")) || state?.meaning || t("phone.motion_alone"));
   const [first, ...others] = problems(tag);
   byId("problem").hidden = first === undefined;
   write("problem", [first, ...others].join(" "));
@@ -87,15 +82,15 @@ function showModule({ serial, bluetooth }) {
   const [ranges, damaged] = [serial.ranges + bluetooth.ranges, serial.damaged + bluetooth.damaged];
   byId("usb").hidden = connected || !hasSerial();
   byId("bluetooth").hidden = connected || !hasBluetooth();
-  write("ranges", connected || ranges || damaged ? `${counted(ranges)} ranges${damaged ? `, ${counted(damaged)} damaged` : ""}` : "");
+  write("ranges", connected || ranges || damaged ? t(damaged ? "phone.ranges_damaged" : "phone.ranges", { ranges, damaged }) : "");
   write("module-problem", [serial.problem, bluetooth.problem].filter(Boolean).join(" "));
 }
 
 /** Why no module can be connected here; null where one can. */
 function moduleRefusal() {
-  if (!isSecureContext) return "Browsers reach modules from pages over HTTPS only: open this page with https://.";
+  if (!isSecureContext) return t("phone.https_module");
   if (hasSerial() || hasBluetooth()) return null;
-  return "This browser reaches no UWB module: Firefox and Safari have neither Web Bluetooth nor Web Serial. Use Chrome or Edge.";
+  return t("phone.no_module");
 }
 
 /** @param {string} name @param {string} key */
@@ -120,7 +115,7 @@ async function showPhyphox(name, key) {
     code.hidden = false;
     write("phyphox-problem", "");
   } catch (error) {
-    write("phyphox-problem", `The code cannot be shown: ${/** @type {Error} */ (error).message}`);
+    write("phyphox-problem", t("phone.no_code", { message: /** @type {Error} */ (error).message }));
   }
 }
 
@@ -145,6 +140,8 @@ byId("change").addEventListener("click", async () => {
 });
 addEventListener("hashchange", () => location.reload());
 
+translate(document);
+installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 installTheme(byId("theme"), () => undefined);
 takeFromAddress();
 const known = remembered();

@@ -2,6 +2,7 @@
 
 import { Dwm1001 } from "./dwm1001.js";
 import { anchorNumber } from "./packed.js";
+import { t } from "../i18n/language.js";
 
 const BAUD = 115_200;
 /** Written, one by one, while the module says nothing: `lec` would stop a module that prints already. */
@@ -46,10 +47,10 @@ export class Serial {
       await port.open({ baudRate: BAUD });
       this.connected = true;
       await this.#read(port);
-      this.problem = "The module was unplugged. Connect it again.";
+      this.problem = t("phone.unplugged");
     } catch (error) {
       const { name, message } = /** @type {Error} */ (error);
-      this.problem = name === "NotFoundError" ? "No port was chosen." : `The module cannot be read: ${message}`;
+      this.problem = name === "NotFoundError" ? t("phone.no_port") : t("phone.unreadable", { message });
     }
     this.connected = false;
     clearTimeout(this.#timer);
@@ -86,7 +87,7 @@ export class Serial {
     this.#timer = setTimeout(async () => {
       const word = words.shift();
       if (word === undefined) {
-        this.problem = "The module prints no ranges. Is it a DWM1001, set up as a tag, and is an anchor on?";
+        this.problem = t("phone.prints_nothing");
         return;
       }
       const writer = port.writable.getWriter();

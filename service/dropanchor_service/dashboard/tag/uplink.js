@@ -1,6 +1,7 @@
 /** The connection that takes the messages of the queue to the service. It reconnects by itself. */
 
 import { stamp } from "./packed.js";
+import { t } from "../i18n/language.js";
 
 const PROTOCOL = "dropanchor.samples";
 const KEY_PROTOCOL = "dropanchor.key.";
@@ -58,7 +59,7 @@ export class Uplink {
     try {
       this.#socket = new WebSocket(this.url, protocols);
     } catch {
-      this.#refuse("This is not a key: it has characters that no key has.");
+      this.#refuse(t("phone.bad_key"));
       return;
     }
     const socket = this.#socket;
@@ -111,7 +112,7 @@ export class Uplink {
     this.clock.note(/** @type {number} */ (this.#sent_us.shift()), t_ns / 1000);
     const { samples } = this.queue.answered();
     if (rejected === null) this.sent += samples;
-    else this.problem = `The service did not understand a message: ${detail}.`;
+    else this.problem = t("phone.not_understood", { detail });
   }
 
   /** @param {number} code @param {string} reason */

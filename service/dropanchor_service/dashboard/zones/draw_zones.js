@@ -1,7 +1,8 @@
 /** Draw zones: dashed while nobody is inside, grey while that is not known, such as in the past. */
 
 import { haloText } from "../map/draw_site.js";
-import { counted } from "../data/format.js";
+import { tagCount } from "../data/format.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
 /** @typedef {import("../map/view.js").View} View */
@@ -71,6 +72,7 @@ function labelZone({ ctx, view, palette }, zone, tags) {
   ctx.font = `600 12px ${palette.font}`;
   ctx.textAlign = "center";
   ctx.textBaseline = "bottom";
-  const count = tags > 0 ? ` · ${counted(tags, "tag")}` : "";
-  haloText(ctx, palette, `${zone.name || zone.id}${count}`, view.screenX(x), view.screenY(y) - 5, palette["ink-2"]);
+  const name = zone.name || zone.id;
+  const text = tags > 0 ? t("zones.on_map", { zone: name, tags: tagCount(tags) }) : name;
+  haloText(ctx, palette, text, view.screenX(x), view.screenY(y) - 5, palette["ink-2"]);
 }

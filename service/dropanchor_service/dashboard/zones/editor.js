@@ -1,7 +1,9 @@
 /** Draw a new zone, or edit one. Nothing changes for others until it is saved. */
 
-import { CHANGED_MEANWHILE_SENTENCE, ChangedMeanwhileError } from "../data/access.js";
+import { ChangedMeanwhileError } from "../data/access.js";
 import { placeIn, withCorner } from "./shape_edit.js";
+import { t } from "../i18n/language.js";
+import { refusal } from "../i18n/said.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
 
@@ -136,7 +138,7 @@ export class ZoneEditor extends EventTarget {
 
   /** @param {string} problem @param {boolean} [conflict] */
   #say(problem, conflict = false) {
-    this.problem = conflict ? `${CHANGED_MEANWHILE_SENTENCE} Nothing was saved.` : problem;
+    this.problem = conflict ? t("zone.conflict") : capitalised(refusal(problem));
     this.problemAt = placeIn(problem);
     this.conflict = conflict;
     this.#changed();
@@ -148,7 +150,7 @@ export class ZoneEditor extends EventTarget {
 }
 
 /** Return the sentence of an error without the name of the field. @param {unknown} error */
-function messageOf(error) {
-  const text = (error instanceof Error ? error.message : String(error)).replace(/^body\.shape: /, "");
-  return text.charAt(0).toUpperCase() + text.slice(1);
-}
+const messageOf = (error) => (error instanceof Error ? error.message : String(error)).replace(/^body\.shape: /, "");
+
+/** @param {string} text */
+const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);

@@ -1,6 +1,7 @@
 /** The list of the latest events, newest first. A click selects the tag and the zone. */
 
 import { clock, probability, sentence } from "./words.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("./words.js").ServiceEvent} ServiceEvent */
 
@@ -21,9 +22,9 @@ export class EventList {
   update() {
     const { events, current } = this.log;
     const newest = events[0];
-    write(this.newest, !current ? "out of date" : newest ? `${clock(newest)} ${sentence(newest)}` : "none yet");
+    write(this.newest, !current ? t("events.outdated") : newest ? t("events.newest", { time: clock(newest), event: sentence(newest) }) : t("events.none"));
     this.box.classList.toggle("outdated", !current);
-    write(this.note, current ? (newest ? "" : "Nothing has happened yet. Zones and rules make events.") : "No connection to the service: newer events are missing here.");
+    write(this.note, current ? (newest ? "" : t("events.nothing")) : t("events.missing"));
     this.note.hidden = this.note.textContent === "";
     this.#show(events);
   }

@@ -1,6 +1,7 @@
 /** The handles of the edited zone: buttons over the map that pointers drag, arrow keys move and Delete removes. */
 
-import { fixed } from "../data/format.js";
+import { coordinateText } from "../data/format.js";
+import { t } from "../i18n/language.js";
 import { handlesOf, movedTo, withoutCorner } from "./shape_edit.js";
 
 /** @typedef {import("./shape_edit.js").Handle} Handle */
@@ -8,7 +9,6 @@ import { handlesOf, movedTo, withoutCorner } from "./shape_edit.js";
 const STEP_M = 0.1;
 const LARGE_STEP_M = 1;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const NAMES = { corner: "Corner", edge: "New corner after", centre: "Centre", radius: "Radius" };
 
 export class Handles {
   /** @type {HTMLButtonElement[]} */
@@ -60,9 +60,8 @@ export class Handles {
 
   /** @param {HTMLButtonElement} button @param {Handle} handle @param {number} corners */
   #label(button, { kind, index, x, y }, corners) {
-    const number = kind === "corner" ? ` ${index + 1} of ${corners}` : kind === "edge" ? ` ${index + 1}` : "";
     button.className = kind;
-    button.setAttribute("aria-label", `${NAMES[kind]}${number}: x ${fixed(x, 1)} m, y ${fixed(y, 1)} m`);
+    button.setAttribute("aria-label", t(`handle.${kind}`, { number: index + 1, corners, x: coordinateText(x, 1), y: coordinateText(y, 1) }));
   }
 
   #add() {

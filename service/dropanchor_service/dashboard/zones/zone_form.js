@@ -1,6 +1,6 @@
 /** The form of the zone that is being edited. */
 
-import { counted } from "../data/format.js";
+import { t } from "../i18n/language.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -53,7 +53,7 @@ export class ZoneForm {
   #show(zone) {
     const { shape } = zone;
     const isCircle = shape.type === "circle";
-    put(this.#part("title"), this.editor.isNew ? `New ${shape.type}` : `Zone ${zone.name || zone.id}`);
+    put(this.#part("title"), this.editor.isNew ? t(`zone.new_${shape.type}`) : t("zone.title", { zone: zone.name || zone.id }));
     put(this.#part("how"), isCircle ? circleHelp(this.editor.drawing) : polygonHelp(shape.points.length, this.editor.drawing));
     this.#part("radius").hidden = !isCircle;
     this.#part("corner").hidden = isCircle;
@@ -96,14 +96,12 @@ export class ZoneForm {
 
 /** @param {number} corners @param {boolean} drawing */
 function polygonHelp(corners, drawing) {
-  const keys = "Arrow keys move a corner, Delete removes it.";
-  if (!drawing) return `Drag the corners, or a small dot to add one. ${keys}`;
-  const close = corners < 3 ? "" : " Click the first corner to finish.";
-  return `${counted(corners, "corner")}. Click the map to add one.${close} ${keys}`;
+  if (!drawing) return t("zone.edit_polygon");
+  return t(corners < 3 ? "zone.draw_polygon" : "zone.finish_polygon", { corners: t("zone.corners", { n: corners }) });
 }
 
 /** @param {boolean} drawing */
-const circleHelp = (drawing) => `${drawing ? "Click the map to place the circle. " : ""}Drag its centre and its edge, or move them with arrow keys.`;
+const circleHelp = (drawing) => t(drawing ? "zone.draw_circle" : "zone.edit_circle");
 
 /** @param {HTMLElement} target @param {string} text */
 function put(target, text) {

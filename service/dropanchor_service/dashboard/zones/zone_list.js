@@ -1,6 +1,6 @@
 /** The list of zones: how many tags are in each, and a button that edits it. */
 
-import { counted } from "../data/format.js";
+import { count, t } from "../i18n/language.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -21,8 +21,8 @@ export class ZoneList {
   /** @param {boolean} current whether the counts are @param {string | null} selected id of a zone @param {boolean} editing */
   update(current, selected, editing) {
     const { zones, inside, stuck, mayWrite } = this.store;
-    write(this.count, zones.length === 0 ? "none yet" : zones.length.toLocaleString("en"));
-    write(this.stuck, stuck === 0 ? "" : `${counted(stuck, "event")} could not be delivered by webhooks.`);
+    write(this.count, zones.length === 0 ? t("zones.none") : count(zones.length));
+    write(this.stuck, stuck === 0 ? "" : t("zones.stuck", { n: stuck }));
     this.stuck.hidden = stuck === 0;
     this.adding.hidden = !mayWrite || editing;
     const shown = JSON.stringify([zones.map(({ id, name, colour }) => [id, name, colour]), mayWrite]);
@@ -31,7 +31,7 @@ export class ZoneList {
     zones.forEach(({ id }, i) => {
       const [choose, tags] = this.list.children[i].children;
       choose.setAttribute("aria-pressed", String(id === selected));
-      const text = !current ? "out of date" : inside.has(id) ? `${counted(inside.get(id) ?? 0, "tag")} inside` : "empty";
+      const text = !current ? t("zones.outdated") : inside.has(id) ? t("zones.inside", { n: inside.get(id) }) : t("zones.empty");
       write(/** @type {HTMLElement} */ (tags), text);
     });
   }
@@ -45,8 +45,8 @@ export class ZoneList {
     choose.prepend(swatch);
     line.append(choose, document.createElement("span"));
     if (this.store.mayWrite) {
-      const edit = this.#button("text", "Edit", () => this.act.edit(id));
-      edit.setAttribute("aria-label", `Edit ${name || id}`);
+      const edit = this.#button("text", t("zones.edit"), () => this.act.edit(id));
+      edit.setAttribute("aria-label", t("zones.edit_one", { zone: name || id }));
       line.append(edit);
     }
     return line;

@@ -1,0 +1,35 @@
+/** Put the messages of the language into a document. Its elements name the messages in `data-i18n…` attributes. */
+
+import { SYMBOLS } from "../data/units.js";
+import { language, t } from "./language.js";
+
+const ATTRIBUTES = { i18nLabel: "aria-label", i18nTitle: "title", i18nPlaceholder: "placeholder", i18nAlt: "alt" };
+const NAMES = Object.keys(ATTRIBUTES).map((name) => `[data-${name.replace("i18n", "i18n-").toLowerCase()}]`);
+
+/** Translate everything in the document. @param {Document} page */
+export function translate(page) {
+  page.documentElement.lang = language;
+  for (const element of page.querySelectorAll("[data-unit]")) {
+    element.textContent = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (/** @type {HTMLElement} */ (element).dataset.unit)];
+  }
+  for (const element of page.querySelectorAll("[data-i18n]")) fill(element, t(/** @type {HTMLElement} */ (element).dataset.i18n ?? ""));
+  for (const element of page.querySelectorAll(NAMES.join())) {
+    for (const [name, attribute] of Object.entries(ATTRIBUTES)) {
+      const key = /** @type {HTMLElement} */ (element).dataset[name];
+      if (key !== undefined) element.setAttribute(attribute, t(key));
+    }
+  }
+}
+
+/** Write a message around the children of an element: `{0}` is the first of them. Children that the message does not
+ * name follow it. @param {Element} element @param {string} message */
+function fill(element, message) {
+  const children = [...element.children];
+  /** @type {(string | Element)[]} */
+  const parts = message.split(/(\{\d+\})/).filter((part) => part !== "").map((part) => {
+    const number = /^\{(\d+)\}$/.exec(part)?.[1];
+    return number === undefined ? part : children[Number(number)];
+  });
+  for (const child of children) if (!parts.includes(child)) parts.push(" ", child);
+  element.replaceChildren(...parts);
+}

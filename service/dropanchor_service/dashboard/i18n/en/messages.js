@@ -1,0 +1,10 @@
+/** All messages in English. */
+
+import page from "./page.js";
+import tags from "./tags.js";
+import setup from "./setup.js";
+import zones from "./zones.js";
+import phone from "./phone.js";
+import service from "./service.js";
+
+export default { ...page, ...tags, ...setup, ...zones, ...phone, ...service };

@@ -1,0 +1,25 @@
+/** The dialog in which a person chooses the language. A choice is remembered, stands in the address and loads the page anew. */
+
+import { writeAddress } from "../data/address.js";
+import { remember } from "../data/display.js";
+import { LANGUAGES, language } from "../i18n/language.js";
+
+/** Offer the languages in a list. @param {HTMLSelectElement} list */
+export function installLanguages(list) {
+  list.replaceChildren(...Object.entries(LANGUAGES).map(([code, name]) => new Option(name, code, false, code === language)));
+  for (const option of list.options) option.lang = option.value;
+  list.addEventListener("change", () => choose("lang", list.value));
+}
+
+/** @param {string} name @param {string} value */
+function choose(name, value) {
+  remember({ [name]: value });
+  writeAddress({ [name]: value });
+  location.reload();
+}
+
+/** Open a dialog with a button, and close it with the button inside it. @param {HTMLElement} button @param {HTMLDialogElement} dialog */
+export function installDialog(button, dialog) {
+  button.addEventListener("click", () => dialog.showModal());
+  dialog.querySelector('[data-part="close"]')?.addEventListener("click", () => dialog.close());
+}
