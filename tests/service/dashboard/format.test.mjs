@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
-  age, compass, coordinate, distance, fixed, metres, percent, sigma, tagCount, turnRate, words,
+  age, compass, coordinate, distance, fixed, length, percent, sigma, tagCount, turnRate, words,
 } from "../../../service/dropanchor_service/dashboard/data/format.js";
 
 /** @param {(value: any) => string} format @param {[any, string][]} cases */
@@ -11,7 +11,7 @@ function gives(format, cases) {
 }
 
 test("every unknown value is a dash", () => {
-  for (const format of [age, compass, coordinate, metres, percent, sigma, turnRate]) {
+  for (const format of [age, compass, coordinate, length, percent, sigma, turnRate]) {
     gives(format, [[NaN, "–"], [null, "–"], [undefined, "–"], [Infinity, "–"]]);
   }
 });

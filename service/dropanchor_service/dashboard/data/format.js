@@ -1,6 +1,7 @@
 /** Format numbers for people. An unknown value (NaN, null) becomes an en dash. */
 
 import { count, decimal, has, t } from "../i18n/language.js";
+import { units } from "./units.js";
 
 export const UNKNOWN = "–";
 const MINUS = "−";
@@ -19,17 +20,21 @@ export function fixed(value, decimals) {
   return (isNegative ? MINUS : "") + decimal(Math.abs(value), decimals);
 }
 
-/** Format a coordinate for a narrow column, with fewer decimals the larger it is. @param {number | null | undefined} value */
-export function coordinate(value) {
-  return known(value) ? fixed(value, Math.abs(value) < 100 ? 2 : Math.abs(value) < 1000 ? 1 : 0) : UNKNOWN;
+/** Return a length in the unit of the page. @param {number | null | undefined} value_m */
+const inUnit = (value_m) => (known(value_m) ? value_m * units.length.factor : NaN);
+
+/** Format a coordinate for a narrow column, with fewer decimals the larger it is. @param {number | null | undefined} value_m */
+export function coordinate(value_m) {
+  const value = inUnit(value_m);
+  return fixed(value, Math.abs(value) < 100 ? 2 : Math.abs(value) < 1000 ? 1 : 0);
 }
 
-/** @param {number | null | undefined} value @param {number} [decimals] */
-export const metres = (value, decimals = 2) => (known(value) ? `${fixed(value, decimals)} m` : UNKNOWN);
+/** Format a length with its unit. @param {number | null | undefined} value_m @param {number} [decimals] */
+export const length = (value_m, decimals = 2) => (known(value_m) ? `${fixed(inUnit(value_m), decimals)} ${units.length.symbol}` : UNKNOWN);
 
-/** Format a standard deviation in metres, with fewer decimals the larger it is. @param {number | null | undefined} value */
-export function sigma(value) {
-  if (!known(value)) return UNKNOWN;
+/** Format a standard deviation, with fewer decimals the larger it is. @param {number | null | undefined} value_m */
+export function sigma(value_m) {
+  const value = inUnit(value_m);
   return fixed(value, value < 10 ? 2 : value < 100 ? 1 : 0);
 }
 
@@ -68,33 +73,34 @@ export function age(seconds) {
   return `${Math.round(seconds / 86400)} d`;
 }
 
-/** Format the distance of a ring or scale bar, such as 0.5 m, 20 m or 2 km. @param {number} value_m */
-export function distance(value_m) {
+/** Format the distance of a ring or scale bar, such as 0.5 m, 20 m or 2 km. @param {number} value_m @param {number} [digits] at most */
+export function distance(value_m, digits = 6) {
+  const short = (/** @type {number} */ value) => decimal(Number(value.toPrecision(digits)), 0, 6);
+  if (units.length.symbol !== "m") return `${short(inUnit(value_m))} ${units.length.symbol}`;
   if (value_m >= 1000) return `${short(value_m / 1000)} km`;
   if (value_m < 0.1) return `${short(value_m * 100)} cm`;
   return `${short(value_m)} m`;
 }
 
-/** Write a number without needless digits. @param {number} value */
-const short = (value) => decimal(Number(value.toPrecision(6)), 0, 6);
-
 /** Format a speed. @param {number | null | undefined} value_mps @param {number} [decimals] */
-export const speed = (value_mps, decimals = 2) => `${fixed(value_mps, decimals)} m/s`;
+export const speed = (value_mps, decimals = 2) => `${speedNumber(value_mps, decimals)} ${units.velocity.symbol}`;
+
+/** Format a speed without its unit. @param {number | null | undefined} value_mps @param {number} decimals */
+export const speedNumber = (value_mps, decimals) => fixed(known(value_mps) ? value_mps * units.velocity.factor : NaN, decimals);
 
 /** Format a place on the map. @param {number} x m @param {number} y m @param {number} decimals */
-export const place = (x, y, decimals) => t("place", { x: fixed(x, decimals), y: fixed(y, decimals), unit: "m" });
+export const place = (x, y, decimals) => t("place", { x: fixed(inUnit(x), decimals), y: fixed(inUnit(y), decimals), unit: units.length.symbol });
 
 /** Format a place in space. @param {number} x m @param {number} y m @param {number} z m */
-export const place3 = (x, y, z) => t("place3", { x: fixed(x, 2), y: fixed(y, 2), z: fixed(z, 2), unit: "m" });
+export const place3 = (x, y, z) => t("place3", {
+  x: fixed(inUnit(x), 2), y: fixed(inUnit(y), 2), z: fixed(inUnit(z), 2), unit: units.length.symbol,
+});
 
 /** Format a standard deviation with its unit. @param {number} value_m */
-export const sigmaText = (value_m) => `± ${sigma(value_m)} m`;
+export const sigmaText = (value_m) => `± ${sigma(value_m)} ${units.length.symbol}`;
 
 /** Format the semi-axes of an ellipse. @param {number} major_m @param {number} minor_m */
-export const ellipse = (major_m, minor_m) => `${fixed(major_m, 2)} × ${fixed(minor_m, 2)} m`;
-
-/** Format a coordinate with its unit. @param {number} value_m @param {number} decimals */
-export const coordinateText = (value_m, decimals) => `${fixed(value_m, decimals)} m`;
+export const ellipse = (major_m, minor_m) => `${fixed(inUnit(major_m), 2)} × ${length(minor_m)}`;
 
 /** Format a number of tags. @param {number} n */
 export const tagCount = (n) => t("count.tags", { n });

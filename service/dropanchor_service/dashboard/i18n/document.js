@@ -1,6 +1,6 @@
 /** Put the messages of the language into a document. Its elements name the messages in `data-i18n…` attributes. */
 
-import { SYMBOLS } from "../data/units.js";
+import { installUnits } from "../data/units.js";
 import { language, t } from "./language.js";
 
 const ATTRIBUTES = { i18nLabel: "aria-label", i18nTitle: "title", i18nPlaceholder: "placeholder", i18nAlt: "alt" };
@@ -9,9 +9,7 @@ const NAMES = Object.keys(ATTRIBUTES).map((name) => `[data-${name.replace("i18n"
 /** Translate everything in the document. @param {Document} page */
 export function translate(page) {
   page.documentElement.lang = language;
-  for (const element of page.querySelectorAll("[data-unit]")) {
-    element.textContent = SYMBOLS[/** @type {keyof typeof SYMBOLS} */ (/** @type {HTMLElement} */ (element).dataset.unit)];
-  }
+  installUnits(page);
   for (const element of page.querySelectorAll("[data-i18n]")) fill(element, t(/** @type {HTMLElement} */ (element).dataset.i18n ?? ""));
   for (const element of page.querySelectorAll(NAMES.join())) {
     for (const [name, attribute] of Object.entries(ATTRIBUTES)) {

@@ -2,7 +2,7 @@
 
 import { headingSigma, recentRanges } from "../data/evidence.js";
 import { horizontal } from "./geometry.js";
-import { metres } from "../data/format.js";
+import { length } from "../data/format.js";
 import { haloText, traceRing } from "./draw_site.js";
 import { hasGhosts } from "./draw_tags.js";
 
@@ -40,7 +40,7 @@ function drawRecentRange({ ctx, view, palette, fleet, roster, anchors, selected 
   ctx.font = `11px ${palette.font}`;
   ctx.textAlign = "center";
   ctx.textBaseline = "bottom";
-  haloText(ctx, palette, metres(range), view.screenX(anchor.x), view.screenY(anchor.y + radius) - 3, colour);
+  haloText(ctx, palette, length(range), view.screenX(anchor.x), view.screenY(anchor.y + radius) - 3, colour);
 }
 
 /** Draw a wedge of one standard deviation to either side of the heading. @param {Scene} scene @param {number} sigma rad */

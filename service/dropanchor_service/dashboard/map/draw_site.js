@@ -2,7 +2,7 @@
 
 import { distancesTo } from "./geometry.js";
 import { distance } from "../data/format.js";
-import { multiples, roundStep } from "./view.js";
+import { multiples, roundLength } from "./view.js";
 import { t } from "../i18n/language.js";
 
 /** @typedef {import("./view.js").View} View @typedef {import("./palette.js").Palette} Palette */
@@ -15,7 +15,7 @@ export const SCALE_BAR_PX = 40;
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette */
 export function drawGrid(ctx, view, palette) {
-  const step = roundStep(GRID_PX / view.scale);
+  const step = roundLength(GRID_PX / view.scale);
   ctx.lineWidth = 1;
   traceGrid(ctx, view, step);
   ctx.strokeStyle = palette.grid;
@@ -43,7 +43,7 @@ function traceGrid(ctx, view, step) {
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette @param {Anchor} anchor */
 export function drawRings(ctx, view, palette, anchor) {
-  const step = roundStep(RING_PX / view.scale);
+  const step = roundLength(RING_PX / view.scale);
   const [near, far] = distancesTo(anchor.x, anchor.y, view.bounds());
   const radii = multiples(Math.max(step, near), far, step);
   ctx.beginPath();
@@ -125,7 +125,7 @@ function traceAnchorSign(ctx, x, y) {
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette */
 export function drawScaleBar(ctx, view, palette) {
-  const length = roundStep(64 / view.scale);
+  const length = roundLength(64 / view.scale);
   const [x, y, width] = [16, view.height - 18, length * view.scale];
   ctx.beginPath();
   ctx.moveTo(x + 0.5, y - 5);

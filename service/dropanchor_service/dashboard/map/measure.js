@@ -1,6 +1,6 @@
 /** Measure distances and bearings between points that a person clicks on the map. */
 
-import { compass, metres } from "../data/format.js";
+import { compass, length } from "../data/format.js";
 import { haloText } from "./draw_site.js";
 import { t } from "../i18n/language.js";
 
@@ -20,9 +20,9 @@ export function sentence(points, rotation_rad) {
   const legs = legsOf(points);
   const last = legs.at(-1);
   if (!last) return t("measure.how");
-  const leg = t("measure.leg", { length: metres(last.length_m), bearing: compass(last.angle_rad + rotation_rad) });
+  const leg = t("measure.leg", { length: length(last.length_m), bearing: compass(last.angle_rad + rotation_rad) });
   const total_m = legs.reduce((sum, { length_m }) => sum + length_m, 0);
-  return legs.length === 1 ? leg : t("measure.total", { leg, total: metres(total_m) });
+  return legs.length === 1 ? leg : t("measure.total", { leg, total: length(total_m) });
 }
 
 export class Measure {
@@ -82,7 +82,7 @@ export class Measure {
     ctx.textBaseline = "bottom";
     legsOf(this.#points).forEach(({ length_m }, i) => {
       const [from, to] = [places[i], places[i + 1]];
-      haloText(ctx, palette, metres(length_m), (from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 4, palette.ink);
+      haloText(ctx, palette, length(length_m), (from[0] + to[0]) / 2, (from[1] + to[1]) / 2 - 4, palette.ink);
     });
   }
 }

@@ -1,5 +1,7 @@
 /** The visible part of the plane. World: metres, x east, y north. Screen: CSS pixels, y down. */
 
+import { units } from "../data/units.js";
+
 /** @typedef {{left: number, bottom: number, right: number, top: number}} Bounds metres */
 
 export const MIN_SCALE = 0.005;
@@ -112,6 +114,9 @@ export function roundStep(min) {
   }
   return 10 * power;
 }
+
+/** Return the smallest length of 1, 2, 5 × 10ⁿ units of the page that is at least `min`. @param {number} min m */
+export const roundLength = (min) => roundStep(min * units.length.factor) / units.length.factor;
 
 /** Return the multiples of `step` within [low, high]. @param {number} low @param {number} high @param {number} step */
 export function multiples(low, high, step) {

@@ -1,7 +1,8 @@
-/** The dialog in which a person chooses the language. A choice is remembered, stands in the address and loads the page anew. */
+/** The dialog in which a person chooses the language and the units. A choice is remembered, stands in the address and loads the page anew. */
 
 import { writeAddress } from "../data/address.js";
 import { remember } from "../data/display.js";
+import { UNITS, unitNames } from "../data/units.js";
 import { LANGUAGES, language } from "../i18n/language.js";
 
 /** Offer the languages in a list. @param {HTMLSelectElement} list */
@@ -9,6 +10,12 @@ export function installLanguages(list) {
   list.replaceChildren(...Object.entries(LANGUAGES).map(([code, name]) => new Option(name, code, false, code === language)));
   for (const option of list.options) option.lang = option.value;
   list.addEventListener("change", () => choose("lang", list.value));
+}
+
+/** Offer the units of a kind in a list. @param {HTMLSelectElement} list @param {import("../data/units.js").Kind} kind */
+export function installUnitChoice(list, kind) {
+  list.replaceChildren(...Object.entries(UNITS[kind]).map(([name, { symbol }]) => new Option(symbol, name, false, name === unitNames[kind])));
+  list.addEventListener("change", () => choose(kind, list.value));
 }
 
 /** @param {string} name @param {string} value */

@@ -7,7 +7,7 @@ import { Connection } from "../data/connection.js";
 import { Detail } from "../panel/detail.js";
 import { Evidence } from "../data/evidence.js";
 import { Fleet } from "../data/fleet.js";
-import { coordinateText, place } from "../data/format.js";
+import { length, place } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { translate } from "../i18n/document.js";
 import { listen } from "../map/gestures.js";
@@ -18,7 +18,7 @@ import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
-import { installDialog, installLanguages } from "./display.js";
+import { installDialog, installLanguages, installUnitChoice } from "./display.js";
 import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
 import { Zones } from "../zones/zones.js";
@@ -71,7 +71,7 @@ function announce(tag) {
   const row = fleet.row(tag);
   const { x, y } = fleet.number;
   byId("spoken").textContent = t("tag.announced", {
-    tag: fleet.labels[row], state: fleet.style(row).label, x: coordinateText(x[row], 1), y: coordinateText(y[row], 1),
+    tag: fleet.labels[row], state: fleet.style(row).label, x: length(x[row], 1), y: length(y[row], 1),
   });
 }
 
@@ -151,6 +151,7 @@ listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
+for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);
 setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();

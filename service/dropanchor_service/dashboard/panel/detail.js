@@ -2,7 +2,7 @@
 
 import { hasKey } from "../data/access.js";
 import { api } from "../data/connection.js";
-import { UNKNOWN, age, compass, count, ellipse, metres, percent, place, sigmaText, speed, turnRate, words } from "../data/format.js";
+import { UNKNOWN, age, compass, count, ellipse, length, percent, place, sigmaText, speed, turnRate, words } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { said } from "../i18n/said.js";
 import { AMBIGUOUS } from "../data/states.js";
@@ -97,14 +97,14 @@ export class Detail {
     const anchor = this.fleet.value.anchor[row];
     /** @type {Record<string, string>} */
     const texts = {
-      x: metres(number("x")),
-      y: metres(number("y")),
+      x: length(number("x")),
+      y: length(number("y")),
       sigma: sigmaText(number("sigma_pos_m")),
       ellipse: ellipse(number("semi_major_m"), number("semi_minor_m")),
       heading: compass(number("heading_rad") + this.#rotation_rad),
       speed: speed(number("speed_mps")),
       turn: turnRate(number("yaw_rate_radps")),
-      range: metres(number("range_m")),
+      range: length(number("range_m")),
       anchor: anchor ?? UNKNOWN,
       mode: percent(number("p_mode")),
       sight: Number.isNaN(number("sigma_obs_m")) ? UNKNOWN : sigmaText(number("sigma_obs_m")),

@@ -5,6 +5,7 @@ import { api } from "../data/connection.js";
 import { UNKNOWN, age, count, distance, speed } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { nanoseconds } from "../data/replay.js";
+import { isSi } from "../data/units.js";
 
 export class PastFigures {
   /** @param {HTMLElement} box @param {import("../data/replay.js").Replay} replay @param {import("../page/choice.js").Choice} choice */
@@ -15,6 +16,7 @@ export class PastFigures {
     for (const button of box.querySelectorAll("button")) {
       button.addEventListener("click", () => this.#save(button.dataset.format ?? "csv"));
     }
+    this.#part("si").hidden = isSi;
     choice.addEventListener("change", () => this.update());
     replay.addEventListener("period", () => this.update());
   }
@@ -31,7 +33,7 @@ export class PastFigures {
     this.#part("answer").textContent = "";
     if (!track) return;
     const texts = {
-      distance: distance(Number(track.distance_m.toPrecision(4))),
+      distance: distance(track.distance_m, 4),
       tracked: age(track.tracked_s),
       mean: speed(track.mean_speed_mps),
       max: speed(track.max_speed_mps),

@@ -1,9 +1,10 @@
 /** Plots of the last measurements beside the expected ones. */
 
 import { minimumSpeeds } from "../data/evidence.js";
-import { UNKNOWN, fixed, metres, percent, speed as speedText } from "../data/format.js";
+import { UNKNOWN, fixed, length, percent, speed as speedText } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { Plot } from "./plot.js";
+import { units } from "../data/units.js";
 
 /** @typedef {import("../data/evidence.js").Explanation} Explanation @typedef {import("../data/evidence.js").Innovation} Innovation
  * @typedef {import("./plot.js").Point} Point */
@@ -39,13 +40,14 @@ export class Plots {
 
   /** @param {Innovation[]} ranges @param {number} span @param {(t_ns: number) => number} before */
   #ranges(ranges, span, before) {
-    const measured = ranges.map(({ t_ns, measured: value, fused }) => ({ t: before(t_ns), value, fused }));
-    this.range.begin(span, ranges.flatMap((one) => [one.measured, one.predicted]), 1);
+    const { factor } = units.length;
+    const measured = ranges.map(({ t_ns, measured: value, fused }) => ({ t: before(t_ns), value: value * factor, fused }));
+    this.range.begin(span, ranges.flatMap((one) => [one.measured * factor, one.predicted * factor]), 1);
     const anchors = [...new Set(ranges.map(({ anchor }) => anchor))];
     for (const anchor of anchors) this.#expected(ranges.filter((one) => one.anchor === anchor), before, anchors.length > 1);
     this.#mark(this.range, measured);
     const last = ranges.at(-1);
-    this.#put("range", last ? t("plots.range", { measured: metres(last.measured), expected: metres(last.predicted) }) : UNKNOWN);
+    this.#put("range", last ? t("plots.range", { measured: length(last.measured), expected: length(last.predicted) }) : UNKNOWN);
     this.range.label = t("plots.ranges_label", { all: ranges.length, refused: refused(ranges) });
   }
 
@@ -53,7 +55,7 @@ export class Plots {
    * @param {(t_ns: number) => number} before @param {boolean} named */
   #expected(ranges, before, named) {
     const line = (/** @type {number} */ sigmas) => ranges.map(({ t_ns, predicted, variance }) => (
-      { t: before(t_ns), value: predicted + sigmas * Math.sqrt(variance) }
+      { t: before(t_ns), value: units.length.factor * (predicted + sigmas * Math.sqrt(variance)) }
     ));
     this.range.band("band", line(BAND_SIGMAS), line(-BAND_SIGMAS));
     this.range.line("expected", line(0));
@@ -80,12 +82,13 @@ export class Plots {
   /** @param {Explanation} explanation @param {Innovation[]} ranges @param {number} span
    * @param {(t_ns: number) => number} before */
   #speeds({ pose, speed, speed_track: track }, ranges, span, before) {
+    const { factor } = units.velocity;
     const speeds = track.t_ns
-      .map((t_ns, i) => ({ t: before(t_ns), value: track.speed_mps[i] ?? NaN }))
+      .map((t_ns, i) => ({ t: before(t_ns), value: factor * (track.speed_mps[i] ?? NaN) }))
       .filter(({ t, value }) => t >= -span && t <= 0 && !Number.isNaN(value));
     const anchor = ranges.at(-1)?.anchor;
     const used = ranges.filter((one) => one.fused && one.anchor === anchor);
-    const minimum = minimumSpeeds(used).map(({ t_ns, value }) => ({ t: before(t_ns), value }));
+    const minimum = minimumSpeeds(used).map(({ t_ns, value }) => ({ t: before(t_ns), value: factor * value }));
     this.speed.begin(span, [0, ...[...speeds, ...minimum].map(({ value }) => value)], 1);
     this.speed.band("least", minimum, minimum.map(({ t }) => ({ t, value: 0 })));
     this.speed.line("estimate", speeds);

@@ -1,6 +1,6 @@
 /** The table of all tags. Only visible rows exist in the document, so that ten thousand tags stay fast. */
 
-import { UNKNOWN, age, coordinate, count, fixed, sigma, tagCount } from "../data/format.js";
+import { UNKNOWN, age, coordinate, count, sigma, speedNumber, tagCount } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { Order } from "../data/order.js";
 import { NameColumn } from "../data/names.js";
@@ -117,7 +117,7 @@ export class TagTable {
     attribute(line.element, "aria-selected", String(name === this.choice.selected));
     attribute(line.use, "href", `#s-${state.name}`);
     const texts = [
-      this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), fixed(speed_mps[row], 2),
+      this.#names.of(label), state.label, coordinate(x[row]), coordinate(y[row]), sigma(sigma_pos_m[row]), speedNumber(speed_mps[row], 2),
       age(seconds), !fleet.current ? UNKNOWN : t(fleet.online[row] ? "figure.online" : "figure.offline"),
     ];
     texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));

@@ -3,6 +3,7 @@
 import { place3 } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { nameKey } from "../data/order.js";
+import { readMeasure, writeMeasure } from "../data/units.js";
 import { confirmed } from "./confirm.js";
 
 const FIELDS = /** @type {const} */ (["x", "y", "z"]);
@@ -68,7 +69,7 @@ export class AnchorPanel {
     this.#field("id").readOnly = !editor.isNew;
     if (!draft) return;
     if (this.#field("id").value !== draft.id) this.#field("id").value = draft.id;
-    for (const name of FIELDS) if (this.#field(name).valueAsNumber !== draft[name]) this.#field(name).value = String(draft[name]);
+    for (const name of FIELDS) writeMeasure(this.#field(name), draft[name]);
   }
 
   #fillList() {
@@ -91,8 +92,8 @@ export class AnchorPanel {
   }
 
   #typed() {
-    const values = Object.fromEntries(FIELDS.map((name) => [name, this.#field(name).valueAsNumber]));
-    if (FIELDS.some((name) => Number.isNaN(values[name]))) return; // the form says what is missing when it is sent
+    const values = Object.fromEntries(FIELDS.map((name) => [name, readMeasure(this.#field(name))]));
+    if (FIELDS.some((name) => values[name] === null)) return; // the form says what is missing when it is sent
     this.editor.change({ id: this.#field("id").value, ...values });
   }
 

@@ -1,5 +1,6 @@
 /** Fill the form of a tag's settings, and read it. */
 
+import { readMeasure, writeMeasure } from "../data/units.js";
 import { t } from "../i18n/language.js";
 
 const DEGREES = 180 / Math.PI;
@@ -26,9 +27,10 @@ export function fillForm(form, settings, groups) {
   /** @type {Record<string, string>} */
   const texts = {
     name: settings.name, group: settings.group, colour: settings.colour ?? "", motion: settings.motion,
-    mount: angle === null ? "" : String(Math.round(angle * DEGREES * 10) / 10), height: String(settings.height_m),
+    mount: angle === null ? "" : String(Math.round(angle * DEGREES * 10) / 10),
   };
   for (const [name, text] of Object.entries(texts)) field(form, name).value = field(form, name).dataset.shown = text;
+  writeMeasure(field(form, "height"), settings.height_m);
   form.querySelector("datalist")?.replaceChildren(...[...groups].sort().map((group) => new Option(group)));
 }
 
@@ -42,7 +44,7 @@ export function patchOf(form) {
     ["colour", "colour", field(form, "colour").value || null],
     ["motion", "motion", field(form, "motion").value],
     ["mount", "mount_angle_rad", angle === null ? null : angle / DEGREES],
-    ["height", "height_m", numberOf(field(form, "height")) ?? 0],
+    ["height", "height_m", readMeasure(field(form, "height")) ?? 0],
   ];
   return Object.fromEntries(values.filter(([name]) => isChanged(String(name))).map(([, key, value]) => [key, value]));
 }

@@ -1,5 +1,6 @@
 /** The settings of the selected tag: name, colour, group, motion, mounting angle, height, start; and its deletion. */
 
+import { readMeasure, writeMeasure } from "../data/units.js";
 import { confirmed } from "./confirm.js";
 import { numberOf, patchOf, fillForm } from "./tag_form.js";
 import { t } from "../i18n/language.js";
@@ -107,15 +108,14 @@ export class TagPanel {
     this.startForm.hidden = draft === null;
     this.#part("start").hidden = draft !== null;
     if (!draft) return;
-    for (const [name, value] of /** @type {[string, number | null][]} */ ([["x", draft.x], ["y", draft.y], ["heading", degrees]])) {
-      const field = this.#startField(name);
-      if (numberOf(field) !== value) field.value = value === null ? "" : String(value);
-    }
+    for (const name of /** @type {const} */ (["x", "y"])) writeMeasure(this.#startField(name), draft[name]);
+    const heading = this.#startField("heading");
+    if (numberOf(heading) !== degrees) heading.value = degrees === null ? "" : String(degrees);
   }
 
   #typedStart() {
-    const [x, y, degrees] = ["x", "y", "heading"].map((name) => numberOf(this.#startField(name)));
-    if (x !== null && y !== null) this.start.type(x, y, degrees);
+    const [x, y] = ["x", "y"].map((name) => readMeasure(this.#startField(name)));
+    if (x !== null && y !== null) this.start.type(x, y, numberOf(this.#startField("heading")));
   }
 
   /** @param {Event} event */

@@ -1,6 +1,6 @@
 /** The handles of the edited zone: buttons over the map that pointers drag, arrow keys move and Delete removes. */
 
-import { coordinateText } from "../data/format.js";
+import { length } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { handlesOf, movedTo, withoutCorner } from "./shape_edit.js";
 
@@ -61,7 +61,7 @@ export class Handles {
   /** @param {HTMLButtonElement} button @param {Handle} handle @param {number} corners */
   #label(button, { kind, index, x, y }, corners) {
     button.className = kind;
-    button.setAttribute("aria-label", t(`handle.${kind}`, { number: index + 1, corners, x: coordinateText(x, 1), y: coordinateText(y, 1) }));
+    button.setAttribute("aria-label", t(`handle.${kind}`, { number: index + 1, corners, x: length(x, 1), y: length(y, 1) }));
   }
 
   #add() {

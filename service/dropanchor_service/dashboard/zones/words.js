@@ -1,6 +1,6 @@
 /** Events in words, and times for people. */
 
-import { age, fixed, metres, percent, speed } from "../data/format.js";
+import { age, fixed, length, percent, speed } from "../data/format.js";
 import { has, t, timeText } from "../i18n/language.js";
 
 /**
@@ -22,7 +22,7 @@ export function sentence({ type, subject, data }) {
   if (!has(key)) return t("event.other", { tag: subject, type });
   return t(key, {
     tag: subject, place: data.name || data.zone || data.rule || "", other: data.other_tag ?? "",
-    time: age((data.t_ns - data.since_ns) / 1e9), speed: speed(data.speed_mps, 1), distance: metres(data.distance_m, 1),
+    time: age((data.t_ns - data.since_ns) / 1e9), speed: speed(data.speed_mps, 1), distance: length(data.distance_m, 1),
     battery: percent(data.battery_fraction),
   });
 }

@@ -1,6 +1,7 @@
 /** The form of the zone that is being edited. */
 
 import { t } from "../i18n/language.js";
+import { readMeasure, writeMeasure } from "../data/units.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone */
 
@@ -60,9 +61,10 @@ export class ZoneForm {
     this.#part("delete").hidden = this.editor.isNew || !this.editor.store.mayDelete;
     for (const name of /** @type {const} */ (["enter", "exit"])) this.#field(name).checked = zone[name];
     for (const name of /** @type {const} */ (["tags", "groups"])) this.#fill(name, zone[name].join(", "));
-    for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "speed_mps", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));
+    for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));
     this.#field("radius_m").disabled = !isCircle;
-    this.#fill("radius_m", isCircle ? String(shape.radius_m) : "");
+    this.#measure("radius_m", isCircle ? shape.radius_m : null);
+    this.#measure("speed_mps", zone.speed_mps);
   }
 
   /** Write a value, but not over what is being typed. @param {string} name @param {string} value */
@@ -71,17 +73,22 @@ export class ZoneForm {
     if (field !== document.activeElement && field.value !== value) field.value = value;
   }
 
+  /** @param {string} name @param {number | null} value in SI units */
+  #measure(name, value) {
+    if (this.#field(name) !== document.activeElement) writeMeasure(this.#field(name), value);
+  }
+
   /** @returns {Partial<Zone>} */
   #values() {
     const number = (/** @type {string} */ name) => (this.#field(name).value === "" ? null : this.#field(name).valueAsNumber);
     const list = (/** @type {string} */ name, /** @type {RegExp} */ separator) =>
       this.#field(name).value.trim().split(separator).filter((part) => part !== "");
     const shape = /** @type {Zone} */ (this.editor.zone).shape;
-    const radius_m = number("radius_m");
+    const radius_m = readMeasure(this.#field("radius_m"));
     return {
       name: this.#field("name").value, colour: this.#field("colour").value,
       enter: this.#field("enter").checked, exit: this.#field("exit").checked,
-      dwell_s: number("dwell_s"), speed_mps: number("speed_mps"), delay_s: number("delay_s") ?? 1,
+      dwell_s: number("dwell_s"), speed_mps: readMeasure(this.#field("speed_mps")), delay_s: number("delay_s") ?? 1,
       tags: list("tags", /[\s,]+/), groups: list("groups", /\s*,\s*/),
       shape: shape.type === "circle" && radius_m !== null ? { ...shape, radius_m } : shape,
     };

@@ -1,0 +1,64 @@
+"""A person chooses the units of lengths and speeds; what is stored and sent stays SI."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from service.dashboard.zone_place import disc, served, zone_place
+from support.browser import watched_page
+from support.zenoh_router import wait_until
+
+pytestmark = pytest.mark.browser
+
+
+def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
+    chromium: Browser, tmp_path: Path
+) -> None:
+    place = zone_place()
+    place.put(disc("dock", 0.0, 0.0, 3.048, name="Dock", speed_mps=2.5))
+    place.go("cart", 3.048, -6.096)
+    place.move("cart", x=3.048, y=-6.096, speed=2.0, sigma_pos=0.3048)
+    with served(place), watched_page(chromium, place.url, reduced_motion="reduce") as watched:
+        page = watched.page
+        page.get_by_role("button", name="Display").click()
+        page.get_by_label("Lengths").select_option("ft")
+        page.get_by_role("button", name="Display").click()
+        page.get_by_label("Speeds").select_option("mph")
+        row = page.locator("tr[data-tag='cart']")
+        expect(row.locator(".c-x")).to_have_text("10.00")
+        expect(row.locator(".c-y")).to_have_text("−20.00")
+        expect(row.locator(".c-sigma")).to_have_text("1.00")
+        expect(row.locator(".c-speed")).to_have_text("4.47")
+        expect(page.locator("th.c-x")).to_have_text("x ft")
+        row.click()
+        expect(page.locator("[data-part='v-x']")).to_have_text("10.00 ft")
+        expect(page.locator("[data-part='v-speed']")).to_have_text("4.47 mph")
+        assert "length=ft" in page.url
+        page.goto(place.url)
+        expect(row.locator(".c-x")).to_have_text("10.00")
+        page.locator("#zone-list summary").click()
+        page.get_by_role("button", name="Edit Dock").click()
+        radius, fast = page.locator("[name='radius_m']"), page.get_by_label("Too fast above")
+        expect(radius).to_have_value("10")
+        expect(fast).to_have_value("5.592")
+        page.get_by_label("Name").last.fill("Pier")
+        page.get_by_role("button", name="Save zone").click()
+        wait_until(lambda: place.zones["dock"].name == "Pier")
+        assert (place.zones["dock"].shape.radius_m, place.zones["dock"].speed_mps) == (3.048, 2.5)
+        page.get_by_role("button", name="Edit Pier").click()
+        radius.fill("20")
+        page.get_by_role("button", name="Save zone").click()
+        wait_until(lambda: place.zones["dock"].shape.radius_m == pytest.approx(6.096))
+        page.locator("#edit").click()
+        page.locator("#setup [data-part='new']").click()
+        page.locator("#setup [name='id']").fill("north")
+        page.locator("#setup [name='y']").fill("100")
+        page.locator("#setup [name='x']").fill("0")
+        page.locator("#setup [data-part='save']").click()
+        wait_until(lambda: any(a.id == "north" for a in place.bench.answers.site.site.anchors))
+        north = next(a for a in place.bench.answers.site.site.anchors if a.id == "north")
+        assert (north.x, north.y) == (0.0, pytest.approx(30.48))
+        watched.wait_for("dropanchor.drawing().still")
+        page.screenshot(path=tmp_path / "feet.png")
+        assert watched.errors == []
