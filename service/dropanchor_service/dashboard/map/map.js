@@ -9,7 +9,7 @@ import { drawTrack } from "./draw_track.js";
 import { follow } from "../data/motion.js";
 import { readPalette, withoutStates } from "./palette.js";
 import { nearest, rowsInView } from "./scene.js";
-import { View, boundsAround } from "./view.js";
+import { View, boundsAround, limited } from "./view.js";
 
 const SMOOTH_UP_TO = 1000;
 const MIN_FIT_M = 6;
@@ -104,6 +104,12 @@ export class LiveMap extends EventTarget {
     this.#aimAtAll();
     this.dispatchEvent(new Event("view"));
     this.redraw();
+  }
+
+  /** Show a part of the plane. @param {number} x m, of the centre @param {number} y m @param {number} scale pixels per metre */
+  show(x, y, scale) {
+    Object.assign(this.view, { x, y, scale: limited(scale) });
+    this.takeOver();
   }
 
   /** @param {number} factor @param {number} [px] @param {number} [py] */

@@ -8,7 +8,7 @@ export const MIN_SCALE = 0.005;
 export const MAX_SCALE = 4000;
 
 /** @param {number} scale */
-const limited = (scale) => Math.min(MAX_SCALE, Math.max(MIN_SCALE, scale));
+export const limited = (scale) => Math.min(MAX_SCALE, Math.max(MIN_SCALE, scale));
 
 export class View {
   x = 0;

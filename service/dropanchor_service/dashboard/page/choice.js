@@ -77,10 +77,15 @@ export class Choice extends EventTarget {
   }
 
   showAll() {
-    this.#text = "";
-    this.#group = "";
-    this.#onlyCare = false;
-    this.hiddenStates.clear();
+    this.filter({ text: "", group: "", onlyCare: false, hidden: [] });
+  }
+
+  /** Set the whole filter. @param {{text: string, group: string, onlyCare: boolean, hidden: number[]}} filter hidden: states */
+  filter({ text, group, onlyCare, hidden }) {
+    this.#text = text.trim().toLowerCase();
+    this.#group = group;
+    this.#onlyCare = onlyCare;
+    this.hiddenStates = new Set(hidden);
     this.#changed();
   }
 

@@ -1,9 +1,16 @@
 /** The dialog in which a person chooses the language and the units. A choice is remembered, stands in the address and loads the page anew. */
 
 import { writeAddress } from "../data/address.js";
-import { remember } from "../data/display.js";
+import { chosen, remember } from "../data/display.js";
 import { UNITS, unitNames } from "../data/units.js";
 import { LANGUAGES, language } from "../i18n/language.js";
+
+/** Write the choices that this browser remembers into the address, so that a copied link keeps them. */
+export function showChoices() {
+  writeAddress({
+    lang: chosen("lang", [language]), length: chosen("length", [unitNames.length]), velocity: chosen("velocity", [unitNames.velocity]),
+  });
+}
 
 /** Offer the languages in a list. @param {HTMLSelectElement} list */
 export function installLanguages(list) {

@@ -18,9 +18,10 @@ import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
-import { installDialog, installLanguages, installUnitChoice } from "./display.js";
+import { installDialog, installLanguages, installUnitChoice, showChoices } from "./display.js";
 import { installTheme } from "./theme.js";
 import { Trails } from "../data/trails.js";
+import { ViewAddress } from "./view_address.js";
 import { Zones } from "../zones/zones.js";
 
 const PANELS_MS = 250;
@@ -121,6 +122,7 @@ function updatePanels() {
   past.update();
   setup.update();
   notices.update();
+  address.update();
   byId("crowd").hidden = !map.stats.density;
   map.redraw();
 }
@@ -147,9 +149,12 @@ document.addEventListener("keydown", (event) => {
   filter.focus();
 });
 
+showChoices();
+const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")));
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
+byId("options").addEventListener("click", () => (byId("link").textContent = location.href));
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);
 setInterval(updatePanels, PANELS_MS);

@@ -50,7 +50,6 @@ export class Past {
     this.bar.addEventListener("leave", () => this.leave());
     this.replay.addEventListener("time", () => this.#show());
     for (const name of ["period", "state"]) this.replay.addEventListener(name, () => this.#writeAddress());
-    page.choice.addEventListener("change", () => this.#writeAddress());
     this.#recent.addEventListener("change", () => page.map.redraw());
     addEventListener("hashchange", () => this.#readAddress());
     document.addEventListener("keydown", (event) => this.#onKey(event));
@@ -145,7 +144,6 @@ export class Past {
     this.#become(true);
     if (!this.#hasHistory) return this.bar.explain(t("past.no_history"));
     this.replay.speed = moment.speed;
-    this.page.choice.select(moment.tag);
     this.replay.open(moment.from_ms, moment.to_ms, moment.time_ms);
     return undefined;
   }
@@ -161,7 +159,7 @@ export class Past {
     const { from_ms, to_ms, time_ms, speed } = this.replay;
     const isChosen = this.active && to_ms > from_ms;
     if (!isChosen && this.active) return;
-    const moment = isChosen ? { from_ms, to_ms, time_ms, speed, tag: this.page.choice.selected } : null;
+    const moment = isChosen ? { from_ms, to_ms, time_ms, speed } : null;
     if (isChosen || momentIn(location.hash)) writeAddress(momentValues(moment));
   }
 

@@ -12,6 +12,8 @@ export default {
   "display.length": "Längen",
   "display.velocity": "Geschwindigkeiten",
   "display.si": "Dateien und Schnittstellen bleiben bei SI-Einheiten: m und m/s.",
+  "link.title": "Link zu dieser Ansicht",
+  "link.what": "Er zeigt dasselbe Tag, dieselbe Karte, denselben Filter und Zeitpunkt, in derselben Sprache und denselben Einheiten.",
   "place": "{x}; {y} {unit}",
   "place3": "{x}; {y}; {z} {unit}",
   "ago": "vor {age}",

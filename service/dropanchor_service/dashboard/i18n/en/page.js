@@ -12,6 +12,8 @@ export default {
   "display.length": "Lengths",
   "display.velocity": "Speeds",
   "display.si": "Files and interfaces keep SI units: m and m/s.",
+  "link.title": "Link to this view",
+  "link.what": "It shows the same tag, map, filter and time, in the same language and units.",
   "place": "{x}, {y} {unit}",
   "place3": "{x}, {y}, {z} {unit}",
   "ago": "{age} ago",
