@@ -71,7 +71,7 @@ class Service:
         self._credentials = credentials_of(settings)
         refuse_exposure(settings, self._credentials)
         self._certificate = certificate_of(settings.http, self._credentials)
-        self._authenticator = authenticator_of(settings.security)
+        self._authenticator = authenticator_of(settings)
         self._compiling = compiling or nullcontext()
         self._stopping = Event()
         self._opened = ExitStack()

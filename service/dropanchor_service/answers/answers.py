@@ -78,6 +78,11 @@ class Answers:
         range_ns = int(self.tags.arrivals.of(np.array([tag.row]))["range_ns"][0])
         return hint_about(unknown, hears_others=self.now_ns() - range_ns <= FRESH_NS)
 
+    def tags_in_group(self, group: str) -> list[str]:
+        """Return the tags whose settings name this group."""
+        names = [tag.name for tag in self.tags.listed()]
+        return [name for name, is_in in zip(names, self.site.are_in(names, [group]), strict=True) if is_in]
+
     def forget(self, tag: Tag) -> None:
         """Remove a tag from the answers until it sends again."""
         self.tags.delete(tag.row)

@@ -19,6 +19,7 @@ from dropanchor_service.api.http.errors import Kind, add_error_handlers, problem
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.http.shared_view import Members
 from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
@@ -33,6 +34,7 @@ from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.remote_settings import remote_settings_router
+from dropanchor_service.api.routes.shares import shares_router
 from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.stream import stream_router
 from dropanchor_service.api.routes.tags import tags_router
@@ -46,6 +48,7 @@ from dropanchor_service.phones.intake import Receive
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
+from dropanchor_service.security.share_links import share_links_of
 
 PREFIX = "/api/v1"
 MAX_BODY_BYTES = 1_048_576
@@ -82,7 +85,7 @@ def create_app(
     zones, events and webhooks; None keeps them in memory and watches nothing.
     """
     events = events or EventParts.in_memory(answers.site.site.id)
-    app = _app_without_routes(authenticator, rate_limiter, cors_origins)
+    app = _app_without_routes(authenticator, rate_limiter, cors_origins, answers.tags_in_group)
     for router in (
         poses_router(answers),
         tags_router(answers, max_tags),
@@ -104,6 +107,7 @@ def create_app(
         zone_occupancy_router(events),
         events_router(events.store, stopping),
         webhooks_router(events),
+        shares_router(share_links_of(authenticator)),
         health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
@@ -115,7 +119,10 @@ def create_app(
 
 
 def _app_without_routes(
-    authenticator: Authenticator | None, rate_limiter: RateLimiter | None, cors_origins: Sequence[str]
+    authenticator: Authenticator | None,
+    rate_limiter: RateLimiter | None,
+    cors_origins: Sequence[str],
+    members: Members,
 ) -> FastAPI:
     app = FastAPI(
         title="Dropanchor",
@@ -126,7 +133,7 @@ def _app_without_routes(
         redirect_slashes=False,
     )
     app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
-    app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter)
+    app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter, members=members)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
     allow_origins(app, cors_origins)
@@ -178,6 +185,7 @@ _TAGS = [
     {"name": "zones", "description": "Areas of the site, groups of tags, and the rules that make events."},
     {"name": "events", "description": "What has happened, as CloudEvents."},
     {"name": "webhooks", "description": "Events over HTTP to other systems."},
+    {"name": "shares", "description": "Links that show the page, read only, until they expire."},
     {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},

@@ -3,12 +3,13 @@
 import logging
 from datetime import timedelta
 
-from dropanchor_service.security import api_keys, oidc
+from dropanchor_service.security import api_keys, oidc, share_links
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
 from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import Authenticator, IdentityProvider
+from dropanchor_service.security.share_links import ShareLinkError, ShareLinks
 from dropanchor_service.settings.model import HttpSettings, SecuritySettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 
@@ -44,8 +45,21 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
     return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
 
 
-def authenticator_of(settings: SecuritySettings) -> Authenticator | None:
+def authenticator_of(settings: Settings) -> Authenticator | None:
     """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError."""
+    providers = _providers_of(settings.security)
+    folder = settings.data_dir or settings.security.folder
+    if not providers:
+        return None
+    if folder is None:
+        return Authenticator(providers)
+    try:
+        return Authenticator({share_links.SOURCE: ShareLinks(folder), **providers})
+    except (OSError, ShareLinkError) as error:
+        raise SettingsError(f"share links: {error}") from error
+
+
+def _providers_of(settings: SecuritySettings) -> dict[str, IdentityProvider]:
     providers: dict[str, IdentityProvider] = {}
     try:
         if settings.folder is not None:
@@ -54,4 +68,4 @@ def authenticator_of(settings: SecuritySettings) -> Authenticator | None:
         raise SettingsError(f"security.folder: {error}") from error
     if settings.oidc is not None:
         providers[oidc.SOURCE] = oidc.OidcTokens(settings.oidc)
-    return Authenticator(providers) if providers else None
+    return providers

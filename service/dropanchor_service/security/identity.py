@@ -27,11 +27,19 @@ SCOPES = tuple(scope.word for scope in Scope)
 
 
 @dataclass(frozen=True)
+class Limit:
+    """The only tags that a client may read: one tag, or those of a group."""
+
+    tag: str | None
+    group: str | None
+
+
+@dataclass(frozen=True)
 class Identity:
     """An authenticated client.
 
     source: the identity provider. scope: None when the client may do nothing. expires_s: Unix time; None: never.
-    tag: the tag whose samples the client may send; None: no tag.
+    tag: the tag whose samples the client may send; None: no tag. limit: the only tags that it may read; None: all.
     """
 
     source: str
@@ -39,6 +47,7 @@ class Identity:
     scope: Scope | None
     expires_s: float | None = None
     tag: str | None = None
+    limit: Limit | None = None
 
 
 class UnauthenticatedError(Exception):
@@ -66,6 +75,10 @@ class Authenticator:
 
     def __init__(self, providers: Mapping[str, IdentityProvider]) -> None:
         self._providers = dict(providers)
+
+    def provider(self, source: str) -> IdentityProvider | None:
+        """Return the provider of this source, None when there is none."""
+        return self._providers.get(source)
 
     def provider_of(self, secret: str) -> IdentityProvider:
         """Return the provider that recognises the secret. Raises UnauthenticatedError when none does."""

@@ -11,6 +11,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dropanchor_service.api.http.errors import Kind, problem_response
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.http.shared_view import Members, narrowed
+from dropanchor_service.security import share_links
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 from dropanchor_service.security.identity import Scope as AccessScope
 
@@ -20,6 +22,7 @@ KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
 _SITE = "/api/v1/site"
+_SHARES = "/api/v1/shares"
 _WEBHOOKS = "/api/v1/webhooks/"
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
@@ -31,10 +34,18 @@ class Access:
     """ASGI middleware. Without an authenticator every client may do everything, and loopback has no rate limit.
 
     WebSockets pass: a browser can read why it is refused only after their handshake, so their route checks them.
+    members: returns the tags of a group, to which a share link may be limited.
     """
 
-    def __init__(self, app: ASGIApp, authenticator: Authenticator | None, rate_limiter: RateLimiter | None) -> None:
+    def __init__(
+        self,
+        app: ASGIApp,
+        authenticator: Authenticator | None,
+        rate_limiter: RateLimiter | None,
+        members: Members,
+    ) -> None:
         self._app = app
+        self._members = members
         self._authenticator = authenticator
         self._rate_limiter = rate_limiter
 
@@ -44,7 +55,7 @@ class Access:
             return
         request = Request(scope)
         identity, refusal = await self._authenticate(request)
-        refusal = self._rate_limited(request, identity) or refusal or _forbidden(request, identity)
+        refusal = self._rate_limited(request, identity) or refusal or self._forbidden(request, identity)
         if refusal is not None:
             await refusal(scope, receive, send)
         elif identity is None:
@@ -75,6 +86,15 @@ class Access:
         detail = f"Wait {seconds} s before the next request. /api/v1/poses and /api/v1/stream return all tags at once."
         return problem_response(request, Kind.TOO_MANY_REQUESTS, detail, headers={"retry-after": str(seconds)})
 
+    def _forbidden(self, request: Request, identity: Identity | None) -> Response | None:
+        if (
+            identity is not None
+            and identity.limit is not None
+            and not narrowed(request.scope, identity.limit, self._members)
+        ):
+            return problem_response(request, Kind.FORBIDDEN, "This share link shows its tags and nothing else.")
+        return _forbidden(request, identity)
+
     def _while_valid(self, identity: Identity, send: Send) -> Send:
         """Return a `send` that ends a stream when its key is revoked or its token expires."""
         assert self._authenticator is not None
@@ -103,9 +123,11 @@ async def identify(authenticator: Authenticator, secret: str) -> Identity:
 
 def client_of(connection: HTTPConnection, identity: Identity | None) -> str:
     """Return what limits are counted by: the key or token, or without one the network address."""
-    if identity is not None:
-        return f"{identity.source} {identity.name}"
-    return _network("" if connection.client is None else connection.client.host)
+    address = _network("" if connection.client is None else connection.client.host)
+    if identity is None:
+        return address
+    name = f"{identity.source} {identity.name}"
+    return f"{name} at {address}" if identity.source == share_links.SOURCE else name  # many people have one link
 
 
 def bearer_of(connection: HTTPConnection) -> str:
@@ -126,7 +148,9 @@ def _is_protected(path: str) -> bool:
 
 
 def required_scope(method: str, path: str) -> AccessScope:
-    """Return READ for reading, ADMIN for deleting and for changing the site or a webhook, WRITE for other changes."""
+    """Return READ for reading, ADMIN for deleting, the site, webhooks and share links, WRITE for other changes."""
+    if path.startswith(_SHARES):
+        return AccessScope.ADMIN
     if method in ("GET", "HEAD", "OPTIONS"):
         return AccessScope.READ
     is_admin = method == "DELETE" or path == _SITE or path.startswith(_WEBHOOKS)

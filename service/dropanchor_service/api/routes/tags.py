@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Annotated
 
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Query
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import NewcomerList, TagList, TimedTagStatus
@@ -18,6 +18,7 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
     NO_QUERY,
+    TagFilter,
     TagId,
     example_response,
     json_response,
@@ -32,15 +33,17 @@ _REASON_NAMES = [reason.value for reason in REASONS]
 
 
 def tags_router(answers: Answers, max_tags: int) -> APIRouter:
-    router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_list_routes(router, answers)
+    listing, router = APIRouter(tags=["tags"]), APIRouter(tags=["tags"], dependencies=[NO_QUERY])
+    _add_list_route(listing, answers)
+    _add_newcomers_route(router, answers)
     _add_status_route(router, answers)
     _add_settings_routes(router, answers, max_tags)
     _add_delete_route(router, answers)
-    return router
+    listing.include_router(router)
+    return listing
 
 
-def _add_list_routes(router: APIRouter, answers: Answers) -> None:
+def _add_list_route(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/tags",
         operation_id="list_tags",
@@ -48,11 +51,15 @@ def _add_list_routes(router: APIRouter, answers: Answers) -> None:
         response_model=TagList,
         responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
     )
-    def list_tags() -> Response:
+    def list_tags(query: Annotated[TagFilter, Query()]) -> Response:
         now_ns = answers.now_ns()
         offsets = answers.clock_offsets.clock_offsets(now_ns)
-        return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, answers.tags.listed(), offsets, now_ns))})
+        wanted = set(query.tags)
+        tags = [tag for tag in answers.tags.listed() if not wanted or tag.name in wanted]
+        return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, tags, offsets, now_ns))})
 
+
+def _add_newcomers_route(router: APIRouter, answers: Answers) -> None:
     @router.get(
         "/newcomers",
         operation_id="list_newcomers",

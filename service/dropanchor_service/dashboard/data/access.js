@@ -1,4 +1,7 @@
-/** Requests to the service, with a key where it requires one. The key lives in this browser tab until the tab closes. */
+/** Requests to the service, with a key where it requires one. The key lives in this browser tab until the tab closes.
+ * The token of a share link takes its place. */
+
+import { shareToken } from "./shared.js";
 
 const STORAGE_KEY = "dropanchor.key";
 
@@ -11,7 +14,10 @@ const UNAVAILABLE = 503;
 const CHANGED_MEANWHILE = 412;
 const NOT_READY = "urn:dropanchor:problem:not-ready";
 
-export const hasKey = () => sessionStorage.getItem(STORAGE_KEY) !== null;
+export const hasKey = () => keyOf() !== null;
+
+/** @returns {string | null} */
+const keyOf = () => shareToken ?? sessionStorage.getItem(STORAGE_KEY);
 
 /** @param {string} key */
 export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
@@ -42,15 +48,21 @@ export class ChangedMeanwhileError extends Error {}
  * @param {Record<string, string>} conditions headers
  */
 export async function sendChange(url, method, body, conditions) {
+  return (await send(url, method, body, conditions)).headers.get("etag") ?? "";
+}
+
+/** Send a request with a body. Throws as `sendChange` does. @param {URL} url @param {"POST" | "PUT" | "DELETE"} method
+ * @param {object | null} body @param {Record<string, string>} [conditions] headers */
+export async function send(url, method, body, conditions = {}) {
   const headers = { ...authorization(), ...conditions, "content-type": "application/json" };
   const response = await fetch(url, { method, headers, body: body && JSON.stringify(body), cache: "no-store" });
-  if (response.ok) return response.headers.get("etag") ?? "";
+  if (response.ok) return response;
   const { detail } = await response.json();
   throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
 }
 
 /** @returns {Record<string, string>} */
 function authorization() {
-  const key = sessionStorage.getItem(STORAGE_KEY);
+  const key = keyOf();
   return key === null ? {} : { authorization: `Bearer ${key}` };
 }

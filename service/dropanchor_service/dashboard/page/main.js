@@ -17,6 +17,7 @@ import { Notices } from "../panel/notices.js";
 import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
+import { SharePanel } from "./share_panel.js";
 import { TagTable } from "../panel/table.js";
 import { installDialog, installLanguages, installUnitChoice, showChoices } from "./display.js";
 import { installTheme } from "./theme.js";
@@ -142,6 +143,7 @@ map.canvas.addEventListener("pointermove", ({ offsetX, offsetY }) => {
   byId("cursor").textContent = place(map.view.worldX(offsetX), map.view.worldY(offsetY), 2);
 });
 document.addEventListener("keydown", (event) => {
+  if (document.querySelector("dialog[open]")) return;
   if (event.key === "Escape" && measure.active) measure.turn(false);
   else if (event.key === "Escape") select(null);
   if (event.key !== "/" || event.target === filter) return;
@@ -154,7 +156,11 @@ const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (by
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
-byId("options").addEventListener("click", () => (byId("link").textContent = location.href));
+const share = new SharePanel(byId("share"), choice);
+byId("options").addEventListener("click", () => {
+  byId("link").textContent = location.href;
+  share.open();
+});
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);
 setInterval(updatePanels, PANELS_MS);

@@ -5,11 +5,15 @@ import { api, getJson } from "../data/connection.js";
 import { age } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { said } from "../i18n/said.js";
+import { shareToken } from "../data/shared.js";
+import { SharedNotice } from "./shared_notice.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
 
 export class Notices {
+  #shared = new SharedNotice();
+
   /** @param {import("../data/connection.js").Connection} connection @param {import("../data/fleet.js").Fleet} fleet */
   constructor(connection, fleet) {
     this.connection = connection;
@@ -31,7 +35,8 @@ export class Notices {
     write(byId("lost-text"), t("lost.text", { age: age((performance.now() - lostAt) / 1000) }));
     byId("starting").hidden = status !== "starting";
     write(byId("progress"), said(progress));
-    byId("locked").hidden = status !== "locked";
+    byId("locked").hidden = status !== "locked" || shareToken !== null;
+    this.#shared.update(status === "locked");
     byId("refused").hidden = !hasKey();
     const isEmpty = !isPast && status === "live" && this.connection.stats.frames > 0 && this.fleet.size === 0;
     if (isEmpty && byId("empty").hidden) this.#requestCommand();

@@ -6,5 +6,6 @@ import setup from "./setup.js";
 import zones from "./zones.js";
 import phone from "./phone.js";
 import service from "./service.js";
+import share from "./share.js";
 
-export default { ...page, ...tags, ...setup, ...zones, ...phone, ...service };
+export default { ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };

@@ -1,0 +1,73 @@
+"""Models of links that let anybody who has them look at the page until they expire."""
+
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from dropanchor_schemas.site import Id, Label
+
+DAY_S = 86_400
+
+
+def _without_comma(tag: str) -> str:
+    if "," in tag:
+        raise ValueError("a tag whose id has a comma cannot be shared alone: put it into a group")
+    return tag
+
+
+class ShareRequest(BaseModel):
+    """What to share, and for how long."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Label = Field(default="", description="What the link is for, as the list of links shows it.")
+    valid_s: int = Field(default=7 * DAY_S, ge=60, le=366 * DAY_S, description="For how many seconds the link works.")
+    tag: Annotated[Id, AfterValidator(_without_comma)] | None = Field(
+        default=None, description="Show this tag only; null for all."
+    )
+    group: Label | None = Field(
+        default=None, min_length=1, description="Show only tags whose settings name this group; null for all."
+    )
+    view: str = Field(
+        default="",
+        max_length=2000,
+        pattern=r"^[!-~]*$",
+        description="What the page shows at first: the part of its address after the `#`.",
+    )
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> Self:
+        if self.tag is not None and self.group is not None:
+            raise ValueError("give a tag or a group, not both")
+        return self
+
+
+class Share(BaseModel):
+    """A link that was created, without its secret."""
+
+    model_config = ConfigDict(frozen=True)
+
+    id: str
+    name: str
+    made_ns: int = Field(description="UTC, ns.")
+    expires_ns: int = Field(description="UTC, ns: from then on the link does not work.")
+    tag: str | None
+    group: str | None
+
+
+class NewShare(Share):
+    """A new link. Its secret cannot be read again."""
+
+    secret: str = Field(description="Works as a bearer token with the scope `read`, as far as the link reaches.")
+    path: str = Field(description="The path of the page with the secret: the link, after the address of the service.")
+
+
+class ShareList(BaseModel):
+    """The links that are neither revoked nor long expired."""
+
+    model_config = ConfigDict(frozen=True)
+
+    available: bool = Field(
+        description="Whether links can be created. They need access control: without it everybody sees everything."
+    )
+    shares: list[Share]

@@ -1,0 +1,89 @@
+"""The routes of share links."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Path
+from starlette.responses import Response
+
+from dropanchor_schemas.shares import NewShare, Share, ShareList, ShareRequest
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
+from dropanchor_service.security.share_links import MAX_LINKS, ShareLinks, TooManyLinksError
+
+_EXAMPLE: dict[str, Any] = {
+    "id": "3f9a1c5e7b20d846",
+    "name": "Visitors",
+    "made_ns": 1_800_000_000_000_000_000,
+    "expires_ns": 1_800_604_800_000_000_000,
+    "tag": None,
+    "group": "forklifts",
+}
+_SECRET = "dropanchor_share_eyJhbGciOi.eyJqdGkiOi.c2lnbmF0dXJl"
+_DESCRIPTION = """\
+The link shows the page, read only, until it expires or is revoked, and its `secret` works as a bearer token with the
+scope `read`. A link of a tag or a group reads these tags, the site and nothing else. The service signs links with a key
+in its data folder."""
+
+
+def shares_router(links: ShareLinks | None) -> APIRouter:
+    """Return the routes. links: None without access control, with which everybody sees everything anyway."""
+    router = APIRouter(tags=["shares"], dependencies=[NO_QUERY])
+    _add_list_route(router, links)
+    _add_create_route(router, links)
+    _add_revoke_route(router, links)
+    return router
+
+
+def _add_list_route(router: APIRouter, links: ShareLinks | None) -> None:
+    @router.get(
+        "/shares",
+        operation_id="list_shares",
+        summary="List the share links",
+        response_model=ShareList,
+        responses=example_response({"available": True, "shares": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
+    )
+    async def list_shares() -> Response:
+        shares: list[Share] = [] if links is None else sorted(links.all().values(), key=lambda one: one.expires_ns)
+        return json_response({"available": links is not None, "shares": [share.model_dump() for share in shares]})
+
+
+def _add_create_route(router: APIRouter, links: ShareLinks | None) -> None:
+    @router.post(
+        "/shares",
+        operation_id="create_share",
+        summary="Create a share link",
+        description=_DESCRIPTION,
+        status_code=201,
+        response_model=NewShare,
+        responses=example_response(_EXAMPLE | {"secret": _SECRET, "path": f"/#group=forklifts&share={_SECRET}"}, 201)
+        | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED),
+    )
+    def create_share(request: Annotated[ShareRequest, Body(examples=[{"name": "Visitors"}])]) -> Response:
+        if links is None:
+            raise ProblemError(
+                Kind.NO_ACCESS_CONTROL,
+                "Without access control everybody sees everything: send the address of the page. To share less, set "
+                "`security.folder` and `data_dir`.",
+            )
+        try:
+            with saving():
+                share, secret = links.add(request)
+        except TooManyLinksError as error:
+            raise ProblemError(Kind.ITEMS_FULL, f"There are {MAX_LINKS} share links: revoke some.") from error
+        view = f"{request.view}&" if request.view else ""
+        return json_response(share.model_dump() | {"secret": secret, "path": f"/#{view}share={secret}"}, status=201)
+
+
+def _add_revoke_route(router: APIRouter, links: ShareLinks | None) -> None:
+    @router.delete(
+        "/shares/{share}",
+        operation_id="revoke_share",
+        summary="Revoke a share link, which ends its streams",
+        status_code=204,
+        responses=problems(Kind.UNKNOWN_SHARE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
+    )
+    def revoke_share(share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])]) -> None:
+        with saving():
+            is_known = links is not None and links.revoke(share)
+        if not is_known:
+            raise ProblemError(Kind.UNKNOWN_SHARE, "There is no such share link. GET /api/v1/shares lists them.")
