@@ -139,9 +139,9 @@ export class LiveMap extends EventTarget {
     const { clientWidth, clientHeight } = this.canvas;
     this.view.width = Math.max(1, clientWidth);
     this.view.height = Math.max(1, clientHeight);
-    this.view.covered = clientWidth - this.tools.offsetLeft;
-    this.canvas.width = Math.round(clientWidth * devicePixelRatio);
-    this.canvas.height = Math.round(clientHeight * devicePixelRatio);
+    this.view.covered = this.tools.offsetWidth === 0 ? 0 : clientWidth - this.tools.offsetLeft; // none on a wall
+    this.canvas.width = Math.round(clientWidth * this.#pixelRatio);
+    this.canvas.height = Math.round(clientHeight * this.#pixelRatio);
     if (this.autoFit) this.#aimAtAll();
     this.redraw();
   }
@@ -193,6 +193,11 @@ export class LiveMap extends EventTarget {
     this.#goal = this.view.fitted(bounds ?? { left: -5, right: 5, bottom: -5, top: 5 }, this.#padding);
   }
 
+  /** Pixels of the canvas for a pixel of the style sheet, also where that zooms the page. */
+  get #pixelRatio() {
+    return devicePixelRatio * (this.canvas.currentCSSZoom ?? 1);
+  }
+
   get #padding() {
     return Math.min(FIT_PADDING_PX, this.view.width / 6, this.view.height / 6);
   }
@@ -219,7 +224,7 @@ export class LiveMap extends EventTarget {
       ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
       rows: this.#rows, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
     };
-    this.#ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
+    this.#ctx.setTransform(this.#pixelRatio, 0, 0, this.#pixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
     drawGrid(this.#ctx, view, palette);
     for (const draw of this.underlays) draw(scene);

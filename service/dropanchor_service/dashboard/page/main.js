@@ -11,6 +11,7 @@ import { length, place } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { translate } from "../i18n/document.js";
 import { listen } from "../map/gestures.js";
+import { Kiosk, kioskAddress } from "./kiosk.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
 import { Notices } from "../panel/notices.js";
@@ -153,12 +154,14 @@ document.addEventListener("keydown", (event) => {
 
 showChoices();
 const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")));
+new Kiosk(() => table.shown, (tag) => select(tag));
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
 const share = new SharePanel(byId("share"), choice);
 byId("options").addEventListener("click", () => {
   byId("link").textContent = location.href;
+  /** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location);
   share.open();
 });
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));

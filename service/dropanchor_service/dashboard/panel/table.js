@@ -51,6 +51,11 @@ export class TagTable {
     this.#paint();
   }
 
+  /** The tags in the table, in its order. */
+  get shown() {
+    return this.#rows.map((row) => this.fleet.names[row]);
+  }
+
   /** Scroll to a tag. @param {string} tag */
   reveal(tag) {
     const place = this.#rows.indexOf(this.fleet.row(tag));

@@ -26,4 +26,6 @@ export default {
   "shared.ended": "This link no longer works",
   "shared.expired": "It expired on {time}. Ask the person who sent it for a new one.",
   "shared.revoked": "It was revoked, or it is damaged. Ask the person who sent it for a new one.",
+  "kiosk.open": "Open as a wall display",
+  "kiosk.what": "Large type, no controls; Esc leaves it. With ?kiosk=tags it shows one tag after another.",
 };

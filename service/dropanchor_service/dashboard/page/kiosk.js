@@ -1,0 +1,52 @@
+/** The page on a wall (`?kiosk`): large type, no controls, and a screen that stays on. `?kiosk=tags` shows one tag after another. */
+
+import { addressValues } from "../data/address.js";
+
+const EVERY_S = 10;
+const SHORTEST_S = 2;
+
+/** Whether the page is on a wall. */
+export const isKiosk = addressValues().has("kiosk");
+
+/** Return the address of the wall with the present view. @param {Location} location */
+export function kioskAddress({ origin, pathname, search, hash }) {
+  const query = new URLSearchParams(search);
+  query.set("kiosk", "");
+  return `${origin}${pathname}?${query.toString().replace(/kiosk=(?=&|$)/, "kiosk")}${hash}`;
+}
+
+export class Kiosk {
+  /** @param {() => string[]} shownTags in their order @param {(tag: string) => void} show */
+  constructor(shownTags, show) {
+    this.shownTags = shownTags;
+    this.show = show;
+    if (!isKiosk) return;
+    document.body.dataset.kiosk = "";
+    stayAwake();
+    document.addEventListener("visibilitychange", stayAwake);
+    document.addEventListener("keydown", ({ key }) => key === "Escape" && leave());
+    const values = addressValues();
+    const every_s = Math.max(SHORTEST_S, Number(values.get("every")) || EVERY_S);
+    if (values.get("kiosk") === "tags") setInterval(() => this.#next(), every_s * 1000);
+  }
+
+  #shown = "";
+
+  #next() {
+    const tags = this.shownTags();
+    if (tags.length === 0) return;
+    this.#shown = tags[(tags.indexOf(this.#shown) + 1) % tags.length];
+    this.show(this.#shown);
+  }
+}
+
+/** Keep the screen on while the page is visible. A browser that cannot leaves that to the system. */
+function stayAwake() {
+  if (document.visibilityState === "visible") navigator.wakeLock?.request("screen").catch(() => undefined);
+}
+
+function leave() {
+  const query = new URLSearchParams(location.search);
+  query.delete("kiosk");
+  location.search = query.toString();
+}
