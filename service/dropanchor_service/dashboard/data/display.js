@@ -12,11 +12,12 @@ const remembered = () => JSON.parse(storage?.getItem(KEY) ?? "{}");
 
 /**
  * Return what was chosen, or null when nothing allowed was.
- * @template {string} T @param {string} name as in the address @param {readonly T[]} allowed @returns {T | null}
+ * @template {string} T @param {string} name as in the address @param {readonly T[] | null} allowed null: any value
+ * @returns {T | null}
  */
 export function chosen(name, allowed) {
   const values = [...addressValues().getAll(name).reverse(), remembered()[name]];
-  const value = values.find((one) => allowed.includes(/** @type {T} */ (one)));
+  const value = values.find((one) => one !== undefined && (allowed?.includes(/** @type {T} */ (one)) ?? true));
   return /** @type {T | undefined} */ (value) ?? null;
 }
 

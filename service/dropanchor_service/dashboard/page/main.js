@@ -15,6 +15,7 @@ import { Kiosk, kioskAddress } from "./kiosk.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
 import { Notices } from "../panel/notices.js";
+import { Notifications } from "./notifications.js";
 import { Past } from "./past.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
@@ -154,6 +155,7 @@ document.addEventListener("keydown", (event) => {
 
 showChoices();
 const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")));
+new Notifications(byId("notifications"), zones.log, (event) => zones.pick(event));
 new Kiosk(() => table.shown, (tag) => select(tag));
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());

@@ -16,7 +16,7 @@ export function newestFirst(added, before) {
   return [...fresh, ...before].slice(0, KEPT);
 }
 
-/** Event: "change". */
+/** Events: "change", and "event" (detail: ServiceEvent) for each that happens from now on. */
 export class EventLog extends EventTarget {
   /** Newest first. @type {ServiceEvent[]} */
   events = [];
@@ -53,7 +53,9 @@ export class EventLog extends EventTarget {
     this.events = newestFirst(events, []);
     this.#become(true);
     for await (const { data } of eventsOf(response)) {
-      this.events = newestFirst([JSON.parse(data)], this.events);
+      const event = JSON.parse(data);
+      this.events = newestFirst([event], this.events);
+      this.dispatchEvent(new CustomEvent("event", { detail: event }));
       this.dispatchEvent(new Event("change"));
     }
   }

@@ -37,7 +37,7 @@ export class Zones {
     this.selectTag = selectTag;
     const box = byId("zone-list");
     this.handles = new Handles(byId("handles"), map, this.editor);
-    this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.#pick(event));
+    this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.pick(event));
     this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.#edit(id) });
     new ZoneForm(/** @type {HTMLFormElement} */ (byId("zone-form")), this.editor, () => this.#addCorner());
     byId("new-polygon").addEventListener("click", () => this.#begin({ type: "polygon", points: [] }));
@@ -75,8 +75,8 @@ export class Zones {
     this.#update();
   }
 
-  /** @param {import("./words.js").ServiceEvent} event */
-  #pick({ subject, data }) {
+  /** Show the tag and the zone of an event. @param {import("./words.js").ServiceEvent} event */
+  pick({ subject, data }) {
     if (data.zone !== null) this.select(data.zone);
     this.selectTag(subject);
   }

@@ -1,5 +1,6 @@
 /** All messages in English. */
 
+import notify from "./notify.js";
 import page from "./page.js";
 import tags from "./tags.js";
 import setup from "./setup.js";
@@ -8,4 +9,4 @@ import phone from "./phone.js";
 import service from "./service.js";
 import share from "./share.js";
 
-export default { ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
+export default { ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
