@@ -10,7 +10,7 @@ from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
-from dropanchor_service.security.identity import Authenticator, Scope
+from dropanchor_service.security.identity import Authenticator, IdentityProvider, Scope
 from dropanchor_service.security.share_links import ShareLinks
 from service.dashboard.marked_language import speak_marked, unmarked
 from service.dashboard.place import live_api_bench
@@ -28,7 +28,7 @@ def test_a_link_of_a_group_is_created_copied_used_and_revoked(chromium: Browser,
     bench.move("cart", "van", x=[1.0, 4.0], y=1.0)
     bench.answers.site.set_tag("van", TagSettings(group="vans"))
     secret = keys.add("boss", Scope.ADMIN)
-    providers = {share_links.SOURCE: links, api_keys.SOURCE: keys}
+    providers: dict[str, IdentityProvider] = {share_links.SOURCE: links, api_keys.SOURCE: keys}
     with running_server(bench.app(DASHBOARD, authenticator=Authenticator(providers)), bench.stopping) as port:
         url = f"http://127.0.0.1:{port}/"
         with open_page(chromium, url) as boss:

@@ -11,6 +11,7 @@ import { length, place } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { translate } from "../i18n/document.js";
 import { listen } from "../map/gestures.js";
+import { installKeyboard } from "./keyboard.js";
 import { Kiosk, kioskAddress } from "./kiosk.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
@@ -148,9 +149,6 @@ document.addEventListener("keydown", (event) => {
   if (document.querySelector("dialog[open]")) return;
   if (event.key === "Escape" && measure.active) measure.turn(false);
   else if (event.key === "Escape") select(null);
-  if (event.key !== "/" || event.target === filter) return;
-  event.preventDefault();
-  filter.focus();
 });
 
 showChoices();
@@ -160,6 +158,8 @@ new Kiosk(() => table.shown, (tag) => select(tag));
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));
+installDialog(byId("show-keys"), /** @type {HTMLDialogElement} */ (byId("keys")));
+installKeyboard(/** @type {HTMLDialogElement} */ (byId("keys")), filter);
 const share = new SharePanel(byId("share"), choice);
 byId("options").addEventListener("click", () => {
   byId("link").textContent = location.href;

@@ -1,5 +1,6 @@
 /** All messages in German. */
 
+import keys from "./keys.js";
 import notify from "./notify.js";
 import page from "./page.js";
 import tags from "./tags.js";
@@ -9,4 +10,4 @@ import phone from "./phone.js";
 import service from "./service.js";
 import share from "./share.js";
 
-export default { ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
+export default { ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
