@@ -81,7 +81,7 @@ class Answers:
     def tags_in_group(self, group: str) -> list[str]:
         """Return the tags whose settings name this group."""
         names = [tag.name for tag in self.tags.listed()]
-        return [name for name, is_in in zip(names, self.site.are_in(names, [group]), strict=True) if is_in]
+        return [name for name, is_in in zip(names, self.site.groups.are_in(names, [group]), strict=True) if is_in]
 
     def forget(self, tag: Tag) -> None:
         """Remove a tag from the answers until it sends again."""
