@@ -28,7 +28,7 @@ export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
 export async function request(url, options) {
-  const response = await fetch(url, { ...options, headers: authorization(), cache: "no-store" });
+  const response = await fetch(url, { cache: "no-store", ...options, headers: authorization() });
   if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
   if (response.status === UNAVAILABLE) {
     const problem = await response.json();
@@ -59,6 +59,16 @@ export async function send(url, method, body, conditions = {}) {
   if (response.ok) return response;
   const { detail } = await response.json();
   throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
+}
+
+/** Send a file. Return the answer. Throws Error with the sentence of the service when it refuses the file.
+ * @param {URL} url @param {File} file @returns {Promise<any>} */
+export async function upload(url, file) {
+  const headers = { ...authorization(), "content-type": file.type || "application/octet-stream" };
+  const response = await fetch(url, { method: "POST", headers, body: file, cache: "no-store" });
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.detail);
+  return answer;
 }
 
 /** @returns {Record<string, string>} */

@@ -1,5 +1,6 @@
 /** All messages in English. */
 
+import plans from "./plans.js";
 import keys from "./keys.js";
 import notify from "./notify.js";
 import page from "./page.js";
@@ -10,4 +11,4 @@ import phone from "./phone.js";
 import service from "./service.js";
 import share from "./share.js";
 
-export default { ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
+export default { ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
