@@ -13,9 +13,8 @@ class SilentTags:
 
     def __init__(self, tags: TagTable) -> None:
         self._tags = tags
-        self._known_ns = tags.copy_counts()[
-            "last_heard_ns"
-        ].copy()  # by row: the start of the last silence that was named
+        # By row: the start of the last silence that was named.
+        self._known_ns = tags.copy_counts()["last_heard_ns"].copy()
 
     def take(self, now_ns: int, limit: int) -> list[str]:
         """Return the names of up to `limit` tags that have fallen silent, the longest silent first.
