@@ -1,4 +1,4 @@
-"""Events of a killed service: nothing stored is lost, nothing is invented, and webhooks get everything in order.
+"""Events of a killed service: nothing stored is lost, nothing is invented, and destinations get everything in order.
 
 DROPANCHOR_RECEIVER_DOWN_S sets for how long the receiver is down.
 """
@@ -29,7 +29,7 @@ WEST = {"id": "west", "shape": {"type": "circle", "x": 0.0, "y": 0.0, "radius_m"
 def settings(folder: Path) -> Path:
     file = folder / "dropanchor.toml"
     file.write_text(
-        'engine = "paper"\n[webhooks]\nallow_networks = ["127.0.0.0/8"]\nretry_s = 0.5\n[[site.anchors]]\nid = "7"\n'
+        'engine = "paper"\n[delivery]\nallow_networks = ["127.0.0.0/8"]\nretry_s = 0.5\n[[site.anchors]]\nid = "7"\n'
     )
     return file
 
@@ -75,7 +75,7 @@ def test_events_survive_two_kills_and_a_receiver_that_is_down(tmp_path: Path) ->
     options = ("--config", str(settings(tmp_path)), "--data-dir", str(data))
     with running_service(*options) as service:
         service.put("/api/v1/zones/west", WEST)
-        service.put("/api/v1/webhooks/mes", {"id": "mes", "url": receiver.url, "secret": SECRET})
+        service.put("/api/v1/destinations/mes", {"type": "webhook", "id": "mes", "url": receiver.url, "secret": SECRET})
         start_at(service, NEAR_M)
         stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
         before = stored(service)
@@ -90,7 +90,7 @@ def test_events_survive_two_kills_and_a_receiver_that_is_down(tmp_path: Path) ->
         service.stop(signal.SIGKILL)
     with running_service(*options) as service, running_receiver(receiver):
         wait_until(lambda: len({event["id"] for event in receiver.accepted}) == 2 * len(TAGS), 60.0)
-        wait_until(lambda: service.get("/api/v1/webhooks/mes")["pending"] == 0)
+        wait_until(lambda: service.get("/api/v1/destinations/mes")["pending"] == 0)
         everything = stored(service)
     first = {event["id"]: event for event in reversed(receiver.accepted)}
     assert first == {event["id"]: event for event in everything}
@@ -111,7 +111,9 @@ def test_a_kill_while_events_are_delivered_repeats_some_and_loses_none(tmp_path:
     with running_receiver(receiver):
         with running_service(*options) as service:
             service.put("/api/v1/zones/west", WEST)
-            service.put("/api/v1/webhooks/mes", {"id": "mes", "url": receiver.url, "secret": SECRET})
+            service.put(
+                "/api/v1/destinations/mes", {"type": "webhook", "id": "mes", "url": receiver.url, "secret": SECRET}
+            )
             receiver.release.clear()
             start_at(service, NEAR_M)
             stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
@@ -119,7 +121,7 @@ def test_a_kill_while_events_are_delivered_repeats_some_and_loses_none(tmp_path:
             service.stop(signal.SIGKILL)  # requests are on their way, and none is answered
         receiver.release.set()
         with running_service(*options) as service:
-            wait_until(lambda: service.get("/api/v1/webhooks/mes")["pending"] == 0, 60.0)
+            wait_until(lambda: service.get("/api/v1/destinations/mes")["pending"] == 0, 60.0)
             ids = {event["id"] for event in stored(service)}
     assert {event["id"] for event in receiver.accepted} == ids
     assert len(ids) == len(TAGS)
