@@ -1,6 +1,6 @@
 """Open the way to a destination of any type, and refuse those to which nothing could be delivered."""
 
-import importlib.util
+import importlib
 from contextlib import AbstractAsyncContextManager
 
 from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
@@ -49,7 +49,7 @@ class Channels:
                 raise ChannelError("an e-mail needs a mail server: set `server` in `[email]` of the settings")
             case MqttDestination() if self._mqtt.server is None:
                 raise ChannelError("MQTT needs a broker: set `server` in `[mqtt]` of the settings")
-            case MqttDestination() if importlib.util.find_spec("paho") is None:
+            case MqttDestination() if not _is_installed("paho.mqtt"):
                 raise ChannelError("MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'")
 
     def _check_webhook(self, webhook: WebhookDestination) -> None:
@@ -63,3 +63,11 @@ class Channels:
             raise ChannelError(str(error)) from error
         except OSError:
             pass  # the name may exist later; until then the queue says what is wrong
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        importlib.import_module(package)
+    except ModuleNotFoundError:
+        return False
+    return True

@@ -35,7 +35,9 @@ def test_the_disk_is_that_of_the_data_folder(tmp_path: Path) -> None:
 
 
 def test_the_end_of_a_certificate_is_known_and_moves_when_it_is_renewed(tmp_path: Path) -> None:
-    folder = SecurityFolder.make(tmp_path / "security", Table(site="yard", hosts=("127.0.0.1",), listen=()), days=10)
+    folder = SecurityFolder.make(
+        tmp_path / "security", Table(site="yard", hosts=("127.0.0.1",), listen=("tls/0.0.0.0:7447",)), days=10
+    )
     folder.add_tag("a", days=5)
     folder.add_tag("b", days=3)
     own = Certificate(*self_signed(tmp_path))
