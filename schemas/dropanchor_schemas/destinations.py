@@ -1,8 +1,9 @@
 """Models of destinations: who gets which events, how, and what became of them."""
 
+import re
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.events import Event, EventType
 from dropanchor_schemas.site import Id, Number, StrictBool
@@ -11,7 +12,23 @@ SECRET_PREFIX = "whsec_"
 ADDRESS = r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$"
 TOPIC = r"^([A-Za-z0-9._ /:-]|\{site\}|\{tag\}|\{type\})+$"
 
-Address = Annotated[str, Field(max_length=254, pattern=ADDRESS)]
+
+def _require_address(text: str) -> str:
+    if not re.fullmatch(ADDRESS, text):
+        raise ValueError("an address such as shift@example.com was expected")
+    return text
+
+
+def _require_topic(text: str) -> str:
+    if not re.fullmatch(TOPIC, text):
+        raise ValueError("a topic such as yard/{tag}/event was expected; {site}, {tag} and {type} are replaced")
+    return text
+
+
+Address = Annotated[
+    str, Field(max_length=254, json_schema_extra={"pattern": ADDRESS}), AfterValidator(_require_address)
+]
+Topic = Annotated[str, Field(max_length=512, json_schema_extra={"pattern": TOPIC}), AfterValidator(_require_topic)]
 
 
 class _Destination(BaseModel):
@@ -55,10 +72,8 @@ class MqttDestination(_Destination):
     """A topic of the MQTT broker in the settings: one message (QoS 1) for each event."""
 
     type: Literal["mqtt"]
-    topic: str = Field(
+    topic: Topic = Field(
         default="dropanchor/{site}/{tag}/event",
-        max_length=512,
-        pattern=TOPIC,
         description="The topic. `{site}`, `{tag}` and `{type}` stand for those of the event.",
     )
 

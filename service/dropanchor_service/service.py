@@ -139,10 +139,8 @@ class Service:
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
         if self._checkpoints is None:
-            folder = self._settings.data_dir
-            reason = (
-                "data_dir is not set" if folder is None else f"not possible with the engine {self._settings.engine}"
-            )
+            engine = f"not possible with the engine {self._settings.engine}"
+            reason = "data_dir is not set" if self._settings.data_dir is None else engine
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
 
@@ -233,9 +231,7 @@ class Service:
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
         if self._thread.is_alive or "ingest" in self._supervision.dead_threads:
-            _log.error(
-                "the ingest thread did not stop cleanly, so no last checkpoint is written; the previous one stays"
-            )
+            _log.error("the ingest thread did not stop cleanly: the previous checkpoint stays the newest one")
         else:
             checkpoints.stop()
 

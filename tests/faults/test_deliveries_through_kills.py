@@ -15,6 +15,7 @@ import orjson
 import zenoh
 
 from dropanchor_schemas.keys import all_tags
+from support.mail_server import MailServer, running_mail_server
 from support.receiver import Receiver, running_receiver
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, free_port, wait_until
@@ -126,6 +127,27 @@ def test_a_kill_while_events_are_delivered_repeats_some_and_loses_none(tmp_path:
     assert {event["id"] for event in receiver.accepted} == ids
     assert len(ids) == len(TAGS)
     assert len(receiver.accepted) > len(TAGS)
+
+
+def test_mails_that_a_kill_interrupts_come_after_the_restart(tmp_path: Path) -> None:
+    server = MailServer(answer="451 not now")
+    file = settings(tmp_path)
+    file.write_text(f'{file.read_text()}[email]\nserver = "127.0.0.1"\nport = {server.port}\ntls = "none"\n')
+    options = ("--config", str(file), "--data-dir", str(tmp_path / "data"))
+    with running_mail_server(server):
+        with running_service(*options) as service:
+            service.put("/api/v1/zones/west", WEST)
+            shift = {"type": "email", "id": "shift", "to": ["shift@example.com"], "digest_s": 0}
+            service.put("/api/v1/destinations/shift", shift)
+            start_at(service, NEAR_M)
+            stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
+            wait_until(lambda: server.attempts > 0)
+            service.stop(signal.SIGKILL)
+        server.answer = "250 OK"
+        with running_service(*options) as service:
+            wait_until(lambda: service.get("/api/v1/destinations/shift")["pending"] == 0, 60.0)
+    said = [line for mail in server.mails for line in mail.get_content().splitlines() if " entered " in line]
+    assert sorted(said) == sorted(f"{tag} entered west." for tag in TAGS)
 
 
 def test_events_come_over_zenoh_in_the_order_of_the_store(tmp_path: Path) -> None:

@@ -82,8 +82,8 @@ export class ItemEditor extends EventTarget {
   }
 }
 
-/** Return the sentence of an error without the path of the field. @param {unknown} error */
+/** Return the sentence of an error without the paths of fields. @param {unknown} error */
 function messageOf(error) {
-  const text = (error instanceof Error ? error.message : String(error)).replace(/^body(\.\w+)*\.?/, "").replace(/^: /, "");
+  const text = (error instanceof Error ? error.message : String(error)).replace(/body(\.\w+)+: /g, "");
   return text.charAt(0).toUpperCase() + text.slice(1);
 }

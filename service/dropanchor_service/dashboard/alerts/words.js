@@ -28,7 +28,7 @@ export function stuckIn(states) {
 
 /** @type {Record<string, (rule: Item) => string>} */
 const RULES = {
-  too_close: ({ distance_m, delay_s }) => `closer than ${distance_m} m for ${age(delay_s)}`,
+  too_close: ({ distance_m, delay_s }) => `closer than ${distance_m} m for ${delay_s} s`,
   battery_low: ({ fraction }) => `battery below ${percent(fraction)}`,
   lost: ({ after_s }) => `lost for ${age(after_s)}`,
   ambiguous: ({ after_s }) => `ambiguous for ${age(after_s)}`,
