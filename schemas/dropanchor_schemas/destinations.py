@@ -15,13 +15,15 @@ TOPIC = r"^([A-Za-z0-9._ /:-]|\{site\}|\{tag\}|\{type\})+$"
 
 def _require_address(text: str) -> str:
     if not re.fullmatch(ADDRESS, text):
-        raise ValueError("an address such as shift@example.com was expected")
+        raise ValueError(f"{text!r} is no address such as shift@example.com")
     return text
 
 
 def _require_topic(text: str) -> str:
     if not re.fullmatch(TOPIC, text):
-        raise ValueError("a topic such as yard/{tag}/event was expected; {site}, {tag} and {type} are replaced")
+        raise ValueError(
+            f"{text!r} is no topic such as yard/{{tag}}/event; {{site}}, {{tag}} and {{type}} are replaced"
+        )
     return text
 
 

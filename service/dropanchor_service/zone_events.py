@@ -6,8 +6,6 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Self
 
-from pydantic import ValidationError
-
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.queue import Patience
@@ -47,9 +45,9 @@ class ZoneEvents:
             self._database = Database(folder)
             self.store = EventStore(self._database, site.site.id, partial(addressees, destinations))
             states = self.store.states()
-        except (OSError, ValidationError, sqlite3.Error) as error:
+        except (OSError, ValueError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
-        deliveries, channels = Deliveries(self._database), _channels(settings)
+        deliveries, channels = Deliveries(self._database), _channels(settings, site)
         patience = Patience(settings.delivery.retry_s, round(settings.delivery.give_up_hours * 3600e9))
         self._delivery = DeliveryThread(destinations, deliveries, channels, patience, now_ns)
         self._events = EventThread(
@@ -76,9 +74,15 @@ class ZoneEvents:
         return [] if self._events.problem is None else [self._events.problem]
 
 
-def _channels(settings: Settings) -> Channels:
+def _channels(settings: Settings, site: SiteStore) -> Channels:
+    """Return the ways to destinations. Raises SettingsError."""
+
+    def name_of(tag: str) -> str:
+        name = site.tag_settings(tag).name
+        return f"{name} ({tag})" if name else tag
+
     delivery = settings.delivery
     try:
-        return Channels(delivery, settings.email, settings.mqtt)
+        return Channels(delivery, settings.email, settings.mqtt, name_of)
     except OSError as error:
         raise SettingsError(f"delivery.authorities: {delivery.authorities} cannot be read: {error}") from error

@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from collections.abc import Iterator
 from typing import Any
 
@@ -116,6 +118,20 @@ def test_prometheus_finds_alertmanager_and_alertmanager_its_files_where_compose_
     secret = configuration["global"]["smtp_auth_password_file"].removeprefix("/run/secrets/")
     assert secret in service["secrets"]
     assert secret in compose["secrets"]
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments"),
+    [
+        ("promtool", ["check", "rules", "prometheus/alerts.yml"]),
+        ("amtool", ["check-config", "alertmanager/alertmanager.yml"]),
+    ],
+)
+def test_the_tools_of_prometheus_accept_the_files(program: str, arguments: list[str]) -> None:
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed: the other tests here read the file without it")
+    checked = subprocess.run([program, *arguments], cwd=DEPLOY, capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
 def test_no_two_panels_overlap_and_all_have_a_title() -> None:

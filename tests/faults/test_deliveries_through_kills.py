@@ -21,6 +21,7 @@ from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, free_port, wait_until
 
 TAGS = [f"tag-{number}" for number in range(10)]
+NAMES = {"tag-0": "Cart"}
 DOWN_S = float(os.environ.get("DROPANCHOR_RECEIVER_DOWN_S", "5"))
 SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="
 NEAR_M, FAR_M = 4.0, 40.0
@@ -39,7 +40,7 @@ def start_at(service: Running, x: float) -> None:
     """Put all tags at this place: their estimators start again there."""
     for tag in TAGS:
         start = {"x": x, "y": 0.0, "heading_rad": 0.0, "std_m": 0.05}
-        service.put(f"/api/v1/tags/{tag}/settings", {"start": start})
+        service.put(f"/api/v1/tags/{tag}/settings", {"name": NAMES.get(tag, ""), "start": start})
 
 
 def stand(service: Running, x: float, until: Any, timeout_s: float = 90.0) -> None:
@@ -147,7 +148,7 @@ def test_mails_that_a_kill_interrupts_come_after_the_restart(tmp_path: Path) -> 
         with running_service(*options) as service:
             wait_until(lambda: service.get("/api/v1/destinations/shift")["pending"] == 0, 60.0)
     said = [line for mail in server.mails for line in mail.get_content().splitlines() if " entered " in line]
-    assert sorted(said) == sorted(f"{tag} entered west." for tag in TAGS)
+    assert sorted(said) == sorted(["Cart (tag-0) entered west.", *(f"{tag} entered west." for tag in TAGS[1:])])
 
 
 def test_events_come_over_zenoh_in_the_order_of_the_store(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from dropanchor_schemas.events import EventType
 from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.registry import addressees, open_destinations
+from dropanchor_service.delivery.sentences import NameOf
 from dropanchor_service.delivery.thread import DeliveryThread
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries, QueueState
@@ -31,6 +32,7 @@ class DeliveryBench:
         email: EmailSettings | None = None,
         mqtt: MqttSettings | None = None,
         folder: Path | None = None,
+        name_of: NameOf = str,
         **delivery: Any,
     ) -> None:
         """folder: where everything is stored, None: nowhere. delivery: settings of `[delivery]`."""
@@ -39,7 +41,7 @@ class DeliveryBench:
         self.store = EventStore(database, "yard", lambda draft: addressees(self.destinations, draft))
         self.deliveries = Deliveries(database)
         settings = DeliverySettings.model_validate({"allow_networks": LOOPBACK, "timeout_s": 2.0} | delivery)
-        self.channels = Channels(settings, email or EmailSettings(), mqtt or MqttSettings())
+        self.channels = Channels(settings, email or EmailSettings(), mqtt or MqttSettings(), name_of)
         patience = Patience(retry_s=0.2, give_up_ns=round(give_up_s * 1e9))
         self.thread = DeliveryThread(self.destinations, self.deliveries, self.channels, patience, time.time_ns)
 

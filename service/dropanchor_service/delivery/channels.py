@@ -7,6 +7,7 @@ from dropanchor_schemas.destinations import Destination, EmailDestination, MqttD
 from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
 from dropanchor_service.delivery.channel import Channel, ChannelError, tls_context
 from dropanchor_service.delivery.mail import open_mail
+from dropanchor_service.delivery.sentences import NameOf
 from dropanchor_service.delivery.signature import SecretError, key_of
 from dropanchor_service.delivery.webhook import open_webhook
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
@@ -15,11 +16,14 @@ from dropanchor_service.settings.events import DeliverySettings, EmailSettings, 
 class Channels:
     """The ways to all destinations, as the settings want them."""
 
-    def __init__(self, delivery: DeliverySettings, email: EmailSettings, mqtt: MqttSettings) -> None:
-        """Raises OSError when the file of authorities cannot be read."""
+    def __init__(
+        self, delivery: DeliverySettings, email: EmailSettings, mqtt: MqttSettings, name_of: NameOf = str
+    ) -> None:
+        """name_of: by default, the id of the tag. Raises OSError when the file of authorities cannot be read."""
         self._delivery = delivery
         self._email = email
         self._mqtt = mqtt
+        self._name_of = name_of
         # A library may change its context, so each has its own.
         self._webhook_tls, self._email_tls, self._mqtt_tls = (tls_context(delivery.authorities) for _ in range(3))
 
@@ -30,7 +34,8 @@ class Channels:
             case WebhookDestination():
                 return open_webhook(destination, self._webhook_tls, timeout_s, self._delivery.allow_networks)
             case EmailDestination():
-                return open_mail(destination, self._email, self._email_tls, timeout_s, self._delivery.page)
+                page = self._delivery.page
+                return open_mail(destination, self._email, self._email_tls, timeout_s, page, self._name_of)
             case MqttDestination():
                 from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
 

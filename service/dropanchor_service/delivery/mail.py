@@ -14,7 +14,7 @@ import aiosmtplib
 from dropanchor_schemas.destinations import EmailDestination
 from dropanchor_schemas.events import Event
 from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
-from dropanchor_service.delivery.sentences import kind, link, place_and_time, sentence, site_of
+from dropanchor_service.delivery.sentences import NameOf, kind, link, place_and_time, sentence, site_of
 from dropanchor_service.settings.events import EmailSettings
 
 MAX_EVENTS = 10_000  # in one mail, which is then about 1 MB
@@ -32,13 +32,14 @@ class MailChannel:
     tls: ssl.SSLContext
     timeout_s: float
     page: str | None
+    name_of: NameOf
 
     @property
     def portion(self) -> Portion:
         return Portion(MAX_EVENTS, is_mixed=True, pause_s=self.destination.digest_s)
 
     async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
-        outcome = await self._send(mail_of(events, self.settings.sender, self.destination.to, self.page))
+        outcome = await self._send(mail_of(events, self.settings.sender, self.destination.to, self.page, self.name_of))
         return [outcome] * len(events)
 
     async def _send(self, mail: EmailMessage) -> Outcome:
@@ -72,36 +73,41 @@ class MailChannel:
 
 @asynccontextmanager
 async def open_mail(
-    destination: EmailDestination, settings: EmailSettings, tls: ssl.SSLContext, timeout_s: float, page: str | None
+    destination: EmailDestination,
+    settings: EmailSettings,
+    tls: ssl.SSLContext,
+    timeout_s: float,
+    page: str | None,
+    name_of: NameOf,
 ) -> AsyncIterator[MailChannel]:
     """Open the way to people. Every mail makes a connection of its own, since mails are rare."""
-    yield MailChannel(destination, settings, tls, timeout_s, page)
+    yield MailChannel(destination, settings, tls, timeout_s, page, name_of)
 
 
-def mail_of(events: Sequence[bytes], sender: str, to: Sequence[str], page: str | None) -> EmailMessage:
+def mail_of(events: Sequence[bytes], sender: str, to: Sequence[str], page: str | None, name_of: NameOf) -> EmailMessage:
     """Return the mail about these events. The same events make the same `Message-ID`, so that doubles are known."""
     parsed = [Event.model_validate_json(event) for event in events]
     ids = hashlib.sha256(" ".join(event.id for event in parsed).encode()).hexdigest()[:32]
     mail = EmailMessage()
-    mail["Subject"] = _subject(parsed)
+    mail["Subject"] = _subject(parsed, name_of)
     mail["From"] = sender
     mail["To"] = ", ".join(to)
     mail["Date"] = formatdate()
     mail["Message-ID"] = f"<{ids}@{sender.rpartition('@')[2]}>"
     mail["Auto-Submitted"] = "auto-generated"
-    mail.set_content(_text(parsed, page))
+    mail.set_content(_text(parsed, page, name_of))
     return mail
 
 
-def _subject(events: Sequence[Event]) -> str:
+def _subject(events: Sequence[Event], name_of: NameOf) -> str:
     more = f", and {len(events) - 1:,} more events" if len(events) > 1 else ""
-    return f"[{site_of(events[0])}] {sentence(events[0])}{more}"
+    return f"[{site_of(events[0])}] {sentence(events[0], name_of)}{more}"
 
 
-def _text(events: Sequence[Event], page: str | None) -> str:
+def _text(events: Sequence[Event], page: str | None, name_of: NameOf) -> str:
     linked = page if len(events) <= LINKED else None
     parts = [_summary(events)] if len(events) > LINKED else []
-    parts += [_paragraph(event, linked) for event in events]
+    parts += [_paragraph(event, linked, name_of) for event in events]
     if page is not None and linked is None:
         parts.append(f"The page: {page}")
     return "\n\n".join(parts) + "\n"
@@ -112,8 +118,8 @@ def _summary(events: Sequence[Event]) -> str:
     return "\n".join([f"{len(events):,} events:", *counted])
 
 
-def _paragraph(event: Event, page: str | None) -> str:
-    lines = [f"{sentence(event)}.", f"{place_and_time(event)}; event {int(event.sequence)}"]
+def _paragraph(event: Event, page: str | None, name_of: NameOf) -> str:
+    lines = [f"{sentence(event, name_of)}.", f"{place_and_time(event)}; event {int(event.sequence)}"]
     return "\n".join([*lines, link(page, event)] if page is not None else lines)
 
 

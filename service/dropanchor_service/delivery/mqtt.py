@@ -2,7 +2,7 @@
 
 import asyncio
 import ssl
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -80,7 +80,7 @@ class Connection:
         self._answers[sent.mid] = answer
         return await answer
 
-    def _pass(self, handle: Any, *values: Any) -> None:
+    def _pass(self, handle: Callable[..., None], *values: object) -> None:
         self._loop.call_soon_threadsafe(handle, *values)
 
     def _greeted(self, reason: ReasonCode) -> None:
@@ -97,10 +97,11 @@ class Connection:
             answer.set_result(reason)
 
     def _ended(self, reason: ReasonCode | None) -> None:
+        why = "was closed" if reason is None else f"was ended by the broker: {reason}"
         waiting: list[asyncio.Future[Any]] = [self._connected, *self._answers.values()]
         for future in waiting:
             if not future.done():
-                future.set_exception(BrokerGoneError(f"the broker ended the connection: {reason}"))
+                future.set_exception(BrokerGoneError(f"the connection {why}"))
                 future.exception()  # nobody may wait for it any longer
         self._answers.clear()
 

@@ -18,7 +18,7 @@ WEBHOOKS_FILE_NAME = "webhooks.json"  # of services that knew no other destinati
 def open_destinations(folder: Path | None) -> NamedItems[Destination]:
     """Load the file, which only the service's user may read: it holds the secrets.
 
-    Raises OSError or pydantic's ValidationError.
+    Raises OSError or ValueError.
     """
     path = None if folder is None else folder / FILE_NAME
     if path is not None and not path.exists():

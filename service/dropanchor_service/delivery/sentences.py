@@ -8,6 +8,9 @@ from dropanchor_schemas.events import Event, EventData, EventType
 from dropanchor_service.events.store import rfc3339
 
 SOURCE_PREFIX = "urn:dropanchor:site:"
+NameOf = Callable[[str], str]
+"""Returns how people call a tag."""
+
 _AROUND_NS = 300_000_000_000  # of the past that a link shows, before and after the event
 
 _SENTENCES: Mapping[EventType, Callable[[str, str, EventData], str]] = {
@@ -36,9 +39,12 @@ _KINDS: Mapping[EventType, str] = {
 }
 
 
-def sentence(event: Event) -> str:
-    """Return what happened in one line, such as `cart-3 entered Loading dock`."""
-    return " ".join(_SENTENCES[event.type](event.subject, _place(event.data), event.data).split())
+def sentence(event: Event, name_of: NameOf) -> str:
+    """Return what happened in one line, such as `Cart 3 (cart-3) entered Loading dock`."""
+    data = event.data
+    if data.other_tag is not None:
+        data = data.model_copy(update={"other_tag": name_of(data.other_tag)})
+    return " ".join(_SENTENCES[event.type](name_of(event.subject), _place(data), data).split())
 
 
 def kind(event: Event) -> str:

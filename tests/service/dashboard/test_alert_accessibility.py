@@ -68,7 +68,7 @@ def test_no_violation_in_the_lists_and_the_forms(
         page.page.locator("#confirm").get_by_role("button", name="Cancel").click()
         alerts.get_by_label("Addresses").fill("no address")
         alerts.get_by_role("button", name="Save destination").click()
-        alerts.get_by_text("An address such as shift@example.com was expected").wait_for()
+        alerts.get_by_text("'address' is no address such as shift@example.com").wait_for()
         check("refused")
         alerts.get_by_role("button", name="Cancel").click()
         alerts.get_by_role("button", name="New webhook").click()

@@ -49,16 +49,16 @@ def server_context(folder: Path) -> tuple[ssl.SSLContext, Path]:
 
 def test_a_mail_says_who_did_what_where_and_when_and_links_to_the_moment() -> None:
     server = MailServer()
-    bench = bench_of(server, page="https://yard.example.com/")
+    bench = bench_of(server, page="https://yard.example.com/", name_of=lambda tag: f"Cart ({tag})")
     with running_mail_server(server), delivering(bench):
         bench.happen("cart-3")
         wait_until(lambda: bench.counts() == (0, 0))
     (mail,) = server.mails
     assert (mail["From"], mail["To"]) == ("yard@example.com", "shift@example.com")
-    assert mail["Subject"] == "[yard] cart-3 entered Loading dock"
+    assert mail["Subject"] == "[yard] Cart (cart-3) entered Loading dock"
     assert mail["Auto-Submitted"] == "auto-generated"
     said, where, link = mail.get_content().splitlines()[:3]
-    assert said == "cart-3 entered Loading dock."
+    assert said == "Cart (cart-3) entered Loading dock."
     assert where.endswith("x 3.2 m, y 1.7 m; probability 0.99; event 1")
     assert link.startswith("https://yard.example.com/#from=20")
     assert link.endswith("&tag=cart-3")
