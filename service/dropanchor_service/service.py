@@ -109,7 +109,7 @@ class Service:
     def _register_gauges(self) -> None:
         self.metrics.register(HealthGauges(self.tags, self._health, self.clock.now_ns, self._publishers))
         expiries = partial(expiries_of, self._certificate, self._credentials)
-        self.metrics.register(OperationGauges(self.problems, self.impairments, settings.data_dir, expiries))
+        self.metrics.register(OperationGauges(self.problems, self.impairments, self._settings.data_dir, expiries))
         self.metrics.register(
             FleetGauges(self.tags, self._pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )

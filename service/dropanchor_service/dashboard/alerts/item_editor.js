@@ -1,6 +1,6 @@
 /** Edit a destination or a rule. Nothing changes for others until it is saved. */
 
-import { ChangedMeanwhileError } from "../data/access.js";
+import { CHANGED_MEANWHILE_SENTENCE, ChangedMeanwhileError } from "../data/access.js";
 import { newId } from "../zones/editor.js";
 
 /** @typedef {import("./items.js").Item} Item */
@@ -76,7 +76,7 @@ export class ItemEditor extends EventTarget {
 
   /** @param {string} problem @param {boolean} [conflict] */
   #say(problem, conflict = false) {
-    this.problem = conflict ? "Somebody else has changed this meanwhile. Nothing was saved." : problem;
+    this.problem = conflict ? `${CHANGED_MEANWHILE_SENTENCE} Nothing was saved.` : problem;
     this.conflict = conflict;
     this.dispatchEvent(new Event("change"));
   }

@@ -25,7 +25,7 @@ export class Items {
 
   /** Save an item. Throws as sendChange does. @param {Item} item @param {string | null} etag of the present one; null: it is new */
   save(item, etag) {
-    return sendChange(this.url(item.id), "PUT", item, etag === null ? {} : { "if-match": etag });
+    return sendChange(this.url(item.id), "PUT", item, etag === null ? { "if-none-match": "*" } : { "if-match": etag });
   }
 
   /** Delete an item. Throws as sendChange does. @param {string} id @param {string} etag */

@@ -55,6 +55,7 @@ def test_a_change_of_somebody_else_is_not_overwritten() -> None:
     assert ask(app, "PUT", MES, json=webhook(tags=["a"]), headers={"if-match": etag}).status_code == 200
     assert kind_of(ask(app, "PUT", MES, json=webhook(), headers={"if-match": etag})) == "changed-meanwhile"
     assert kind_of(ask(app, "DELETE", MES, headers={"if-match": etag})) == "changed-meanwhile"
+    assert kind_of(ask(app, "PUT", MES, json=webhook(), headers={"if-none-match": "*"})) == "changed-meanwhile"
 
 
 def test_webhooks_of_an_older_service_become_destinations(tmp_path: Path) -> None:
