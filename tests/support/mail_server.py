@@ -1,6 +1,7 @@
 """A real SMTP server on loopback, in a thread of the test."""
 
 import ssl
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -17,13 +18,14 @@ from support.zenoh_router import free_port
 
 @dataclass
 class MailServer:
-    """What came, in order of arrival. answer: to every mail. refused: recipients, and what they are answered with."""
+    """What came, in order of arrival, and when. answer: to every mail. refused: recipients, and what they are answered with."""
 
     port: int = field(default_factory=free_port)
     answer: str = "250 OK"
     refused: dict[str, str] = field(default_factory=dict)
     login: tuple[str, str] | None = None
     mails: list[EmailMessage] = field(default_factory=list)
+    arrived_s: list[float] = field(default_factory=list)
     attempts: int = 0
     was_encrypted: list[bool] = field(default_factory=list)
 
@@ -42,6 +44,7 @@ class MailServer:
         self.was_encrypted.append(server.transport.get_extra_info("sslcontext") is not None)
         if self.answer.startswith("250"):
             assert isinstance(envelope.content, bytes)
+            self.arrived_s.append(time.monotonic())
             self.mails.append(message_from_bytes(envelope.content, policy=default))
         return self.answer
 

@@ -74,6 +74,7 @@ def test_events_that_happen_within_the_pause_become_one_mail() -> None:
             bench.happen(f"cart-{number}")
         wait_until(lambda: bench.counts() == (0, 0))
     first, digest = server.mails
+    assert server.arrived_s[1] - server.arrived_s[0] > 0.9
     assert first["Subject"] == "[yard] first entered Loading dock"
     assert digest["Subject"] == "[yard] cart-0 entered Loading dock, and 29 more events"
     lines = digest.get_content().splitlines()
