@@ -18,7 +18,7 @@ from support.zenoh_router import free_port
 
 @dataclass
 class MailServer:
-    """What came, in order of arrival, and when. answer: to every mail. refused: recipients, and what they are answered with."""
+    """What came, in order of arrival, and when. answer: to every mail. refused: what recipients are answered with."""
 
     port: int = field(default_factory=free_port)
     answer: str = "250 OK"
