@@ -20,13 +20,17 @@ from dropanchor_tag_client.options import apply_defaults
 from dropanchor_tag_client.session import ConnectError
 
 _PROGRAM = "dropanchor-tag"
+_ADAFRUIT = (
+    "IMUs on I2C need Adafruit's libraries",
+    "adafruit-extended-bus adafruit-circuitpython-bno055 adafruit-circuitpython-bno08x adafruit-circuitpython-icm20x",
+)
 _EXTRAS = {
     "numpy": ("this command needs numpy", "numpy"),
     "serial": ("modules on a serial port need pyserial", "pyserial"),
-    "adafruit_extended_bus": ("IMUs on I2C need Adafruit's libraries", "adafruit-extended-bus"),
-    "adafruit_bno055": ("the BNO055 needs Adafruit's library", "adafruit-circuitpython-bno055"),
-    "adafruit_bno08x": ("the BNO085 needs Adafruit's library", "adafruit-circuitpython-bno08x"),
-    "adafruit_icm20x": ("the ICM-20948 needs Adafruit's library", "adafruit-circuitpython-icm20x"),
+    "adafruit_extended_bus": _ADAFRUIT,
+    "adafruit_bno055": _ADAFRUIT,
+    "adafruit_bno08x": _ADAFRUIT,
+    "adafruit_icm20x": _ADAFRUIT,
     "paho": ("MQTT needs paho-mqtt", "paho-mqtt"),
     "shtab": ("completion needs shtab", "shtab"),
 }

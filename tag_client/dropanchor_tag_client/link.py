@@ -4,6 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple, Self
 
 import zenoh
@@ -59,15 +60,13 @@ class Link:
     def put(self, payload: bytes, encoding: str) -> None:
         self._publisher.put(payload, encoding=encoding)
 
-    def delivery(self) -> threading.Event:
-        """Return an event that is set when the router has what was put before, or the link is down.
+    def delivery(self) -> Callable[[], bool]:
+        """Return a function that tells whether the router has what was put before, or the link is down.
 
         A query follows the messages on their way, and the router ends it once it has passed them on.
         """
-        delivered = threading.Event()
-        ended: Any = zenoh.handlers.Callback(lambda _: None, delivered.set)
-        self.session.get(self._pose_key, ended, timeout=LOST_LINK_S)
-        return delivered
+        replies: Any = self.session.get(self._pose_key, zenoh.handlers.DefaultHandler(), timeout=LOST_LINK_S)
+        return partial(_is_closed, replies)
 
     def close(self) -> None:
         self._token.undeclare()
@@ -137,3 +136,13 @@ class Linker:
                 self._next_log_s = time.monotonic() + _LOG_EVERY_S
                 _log.warning("%s Still trying; messages go to the spool.", error)
             return None
+
+
+def _is_closed(channel: Any) -> bool:
+    """Discard what waits in a channel. Return whether it is closed."""
+    try:
+        while channel.try_recv() is not None:
+            pass
+    except zenoh.ZError:
+        return True
+    return False

@@ -38,11 +38,14 @@ class SpoolCounts(NamedTuple):
 
 
 class _Chunk(NamedTuple):
-    """The oldest messages of the spool. dropped_before: number that the spool had dropped when they were sent."""
+    """The oldest messages of the spool.
+
+    dropped_before: number that the spool had dropped when they were sent. is_delivered: whether the router has them.
+    """
 
     messages: int
     dropped_before: int
-    delivered: threading.Event
+    is_delivered: Callable[[], bool]
 
 
 class SpoolingPublisher:
@@ -204,7 +207,7 @@ class SpoolingPublisher:
             self._chunk = None
             with self._condition:
                 self._leave_live()
-        elif chunk.delivered.is_set():
+        elif chunk.is_delivered():
             self._chunk = None
             if chunk.dropped_before == self._spool.dropped:  # else a part of it is no longer in the spool
                 self._spool.remove(chunk.messages)

@@ -3,9 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
-from queue import Empty, SimpleQueue
+from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
 from typing import Any, Self
 
@@ -41,7 +39,8 @@ class Upkeep:
         self._period_s = period_s
         self._due_s: dict[TagClient, float] = {}
         self._subscribers: dict[TagClient, Any] = {}
-        self._received: SimpleQueue[tuple[TagClient, bytes] | None] = SimpleQueue()  # None: stop
+        self._replies: dict[TagClient, Any] = {}
+        self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="upkeep", daemon=True)
 
     def __enter__(self) -> Self:
@@ -51,18 +50,16 @@ class Upkeep:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._received.put(None)
+        self._stop.set()
         self._thread.join()
         for subscriber in self._subscribers.values():
             subscriber.undeclare()
 
     def _run(self) -> None:
-        while True:
-            with suppress(Empty):
-                received = self._received.get(timeout=min(_POLL_S, self._period_s))
-                if received is None:
-                    return
-                self._apply(*received)
+        while not self._stop.wait(min(_POLL_S, self._period_s)):
+            for client in list(self._subscribers):
+                for payload in self._received(client):
+                    self._apply(client, payload)
             self._visit()
 
     def _visit(self) -> None:
@@ -76,18 +73,23 @@ class Upkeep:
                 self._ask(client, client.session)
 
     def _ask(self, client: TagClient, session: zenoh.Session) -> None:
-        """Ask for the settings of a tag, also after changes that it missed; the answer comes to `_received`."""
+        """Ask for the settings of a tag, also after changes that it missed.
 
-        def on_message(message: zenoh.Sample) -> None:
-            self._received.put((client, bytes(message.payload)))
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                on_message(reply.ok)
-
+        Channels take the answers. Zenoh would run a callback on a thread of its own, and the process would abort if it
+        ended before that thread.
+        """
+        key = client.settings_key
         if client not in self._subscribers:
-            self._subscribers[client] = session.declare_subscriber(client.settings_key, on_message)
-        session.get(client.settings_key, on_reply, timeout=_ANSWER_S)
+            self._subscribers[client] = session.declare_subscriber(key, zenoh.handlers.RingChannel(1))
+        self._replies[client] = session.get(key, zenoh.handlers.DefaultHandler(), timeout=_ANSWER_S)
+
+    def _received(self, client: TagClient) -> Iterator[bytes]:
+        """Yield the settings that have arrived for a tag: the answers, then the newest change."""
+        while (reply := _take(self._replies[client])) is not None:
+            if reply.ok is not None:
+                yield bytes(reply.ok.payload)
+        if (change := _take(self._subscribers[client])) is not None:
+            yield bytes(change.payload)
 
     def _apply(self, client: TagClient, payload: bytes) -> None:
         settings = parse(payload)
@@ -103,3 +105,11 @@ class Upkeep:
             client.publish_health(**values)
         except zenoh.ZError as error:
             _log.warning("tag %s: its health could not be sent: %s", client.tag, error)
+
+
+def _take(channel: Any) -> Any:
+    """Return what waits in a channel, None if nothing does or it is closed."""
+    try:
+        return channel.try_recv()
+    except zenoh.ZError:
+        return None

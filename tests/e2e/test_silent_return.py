@@ -1,9 +1,10 @@
-"""What a tag published while it was cut off is used, although it is silent when it is back."""
+"""What a tag published and the service did not receive is used, although the tag is silent then."""
 
+from dropanchor_schemas import keys
 from dropanchor_tag_client import TagClient
 from support.relay import running_relay
 from support.service import Running, running_service
-from support.zenoh_router import free_endpoint, start_router_process, wait_until
+from support.zenoh_router import dropping_router, free_endpoint, start_router_process, wait_until
 
 
 def used(service: Running) -> int:
@@ -52,3 +53,13 @@ def test_after_a_router_that_was_killed() -> None:
     finally:
         router.kill()
         router.communicate()
+
+
+def test_after_messages_that_the_router_dropped() -> None:
+    with (
+        dropping_router(keys.samples_key("default", "a")) as endpoint,
+        running_service("--zenoh-connect", endpoint) as service,
+        TagClient("a", connect=endpoint, batch_samples=1) as tag,
+    ):
+        publish(tag, 20)
+        wait_until(lambda: used(service) == 20)

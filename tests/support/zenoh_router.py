@@ -95,6 +95,17 @@ def router_process(endpoint: str) -> Iterator["subprocess.Popen[str]"]:
         router.communicate()
 
 
+@contextmanager
+def dropping_router(key: str) -> Iterator[str]:
+    """Run a router that delivers the first put on the key and drops those that follow within a minute."""
+    endpoint = free_endpoint()
+    rules = [{"key_expr": key, "freq": 1 / 60}]
+    dropped = {"downsampling": [{"id": "drop", "messages": ["put"], "flows": ["egress"], "rules": rules}]}
+    config = json.dumps(json.loads(configuration("router", [endpoint])) | dropped)
+    with zenoh.open(zenoh.Config.from_json5(config)):
+        yield endpoint
+
+
 def wait_until(condition: Callable[[], object], timeout_s: float = 40.0) -> None:
     """Wait until the condition is true. Fail the test when it is still false after `timeout_s`."""
     deadline, pause_s = time.monotonic() + timeout_s, 0.005

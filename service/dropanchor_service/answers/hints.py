@@ -18,7 +18,8 @@ _HINTS = {
     StateReason.SEVERAL_MODES: _MOVE_HINT,
     StateReason.RESOLVED: "",
     StateReason.RANGES_MISSING: "No more ranges arrive: is the anchor on, and is the tag in range?",
-    StateReason.IMU_MISSING: "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
+    StateReason.IMU_MISSING: "No IMU samples have arrived for a while, or all were equal: check the tag, then walk "
+    "a few metres.",
     StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
     "the site says it is?",
     StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move the tag away from it.",

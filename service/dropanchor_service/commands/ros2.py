@@ -96,6 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.tag is None:
             raise ValueError("which tag is the robot? --tag says so, or --credentials")
         mounted = mounting(arguments.forward, arguments.up)
+        _say(f"connecting to the router of the ROS nodes at {arguments.ros_connect} (--ros-connect)")
         with ExitStack() as stack:
             node = RosNode(stack.enter_context(opened_session(_ros_options(arguments))), arguments.domain, _NODE)
             reads = arguments.imu or arguments.range

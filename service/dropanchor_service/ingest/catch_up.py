@@ -77,6 +77,13 @@ class CatchUp:
             self._silent.add(key)
             self._open(key)
 
+    def on_newest(self, key: str, payload: bytes, encoding: str) -> None:
+        """Ask the caches of a tag that has fallen silent, unless this newest message of a publisher was fused."""
+        number = number_of(payload, encoding)
+        known = self._states_of(key).get(number.boot_id) if number else None
+        if number is not None and known is not None and not known.has(number.sequence):
+            self.on_silent(key)
+
     def on_cached(self, key: str, payload: bytes, encoding: str, arrival_ns: int) -> None:
         """Suspend a message from a cache, if its tag is catching up."""
         suspended = Suspended(key, payload, encoding, arrival_ns, number_of(payload, encoding))

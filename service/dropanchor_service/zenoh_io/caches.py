@@ -24,6 +24,7 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import TagTable
 from dropanchor_service.zenoh_io.channel import drain
+from dropanchor_service.zenoh_io.silent_tags import SilentTags
 
 ANSWER_S = 2.0
 MIN_MESSAGES = 100  # that a cache is asked for
@@ -32,6 +33,8 @@ RATE_QUANTILE = 0.9  # of the tags' rates; the first round covers these tags, th
 MARGIN = 1.2  # on the number of messages that a rate predicts
 RETRY_S = 0.1  # pause before the same tag is asked again
 SILENT_S = 1.0  # after it came back online, until a tag counts as silent
+CHECK_S = 1.0  # between two searches for tags that have fallen silent
+CHECKED_TAGS = 20  # of these at a time, so that a service that is stuck asks few
 REPLIES = 2**16  # queue length; a full queue would block the receive thread and delay live messages
 
 _log = logging.getLogger(__name__)
@@ -59,9 +62,12 @@ class ZenohCaches:
         self._clock = clock
         self._later: deque[tuple[float, str, int]] = deque()  # queries to repeat: when, key, missing
         self._returned: deque[tuple[float, str, int]] = deque()  # tags online again: when to look, name, last heard ns
+        self._silent_tags = SilentTags(tags)
+        self._next_check_s = 0.0
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
         self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # before this process started
-        self._thread = threading.Thread(target=self._run, name="caches", daemon=True)
+        # No daemon: Zenoh's threads for callbacks inherit that, and one that outlives Python aborts the process.
+        self._thread = threading.Thread(target=self._run, name="caches")
 
     @property
     def new_publisher_limit(self) -> int:
@@ -87,8 +93,7 @@ class ZenohCaches:
     def ask_if_silent(self, name: str) -> None:
         """Ask the caches of a tag that came online and sends nothing, for what it sent while it was away.
 
-        Zenoh itself fetches what is missing before a live message. After a heartbeat of the publisher it does so
-        too, but not on keys with a verbatim chunk such as `@v1`; `test_heartbeats` shows both.
+        Zenoh itself fetches what is missing before a live message. See also `_check_silent`.
         """
         heard_ns = self._last_heard_ns(name)
         if heard_ns:
@@ -97,9 +102,9 @@ class ZenohCaches:
     def _run(self) -> None:
         while True:
             try:
-                task = self._tasks.get(timeout=RETRY_S if self._later or self._returned else None)
+                task = self._tasks.get(timeout=RETRY_S if self._later or self._returned else CHECK_S)
             except Empty:
-                task = self._ask_later
+                task = self._on_idle
             if task is None:
                 return
             try:
@@ -107,6 +112,27 @@ class ZenohCaches:
             except Exception as error:
                 self._metrics.faults.labels("caches").inc()
                 self._rare.exception("caches", error)
+
+    def _on_idle(self) -> None:
+        self._ask_later()
+        if time.monotonic() >= self._next_check_s:
+            self._next_check_s = time.monotonic() + CHECK_S
+            self._check_silent()
+
+    def _check_silent(self) -> None:
+        """Ask the caches of tags that have fallen silent for their newest message, which may have been lost on its way.
+
+        After a heartbeat of the publisher, Zenoh fetches such messages itself, but not on keys with a verbatim chunk
+        such as `@v1`; `test_heartbeats` shows both.
+        """
+        for name in self._silent_tags.take(self._clock.now_ns(), CHECKED_TAGS):
+            key = keys.samples_key(self._site, name)
+            self._get(key, 1, zenoh.handlers.Callback(partial(self._on_newest, key)))
+
+    def _on_newest(self, key: str, reply: Any) -> None:
+        message = reply.ok
+        if message is not None:
+            self._catch_up.on_newest(key, bytes(message.payload), payload_encoding(str(message.encoding)))
 
     def _ask_later(self) -> None:
         """Repeat the queries that are due, and ask the caches of tags that came back and are silent."""

@@ -36,7 +36,8 @@ class ZenohLink:
         self._opened = ExitStack()
         self._session: zenoh.Session | None = None
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._connect, name="zenoh link", daemon=True)
+        # No daemon: Zenoh's threads for callbacks inherit that, and one that outlives Python aborts the process.
+        self._thread = threading.Thread(target=self._connect, name="zenoh link")
 
     def __enter__(self) -> Self:
         if self._settings.connect:

@@ -1,25 +1,12 @@
 """Zenoh recovers the last messages of a publisher from its heartbeats, but not on keys with a chunk such as `@v1`."""
 
-import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import zenoh
 
-from support.zenoh_router import configuration, connected_session, free_endpoint, wait_until
+from support.zenoh_router import connected_session, dropping_router, wait_until
 
 BEATS = 5  # that a subscriber gets before the test concludes that it ignores them
-
-
-@contextmanager
-def dropping_router(key: str) -> Iterator[str]:
-    """Run a router that delivers the first put on the key and drops those that follow within a minute."""
-    endpoint = free_endpoint()
-    rules = [{"key_expr": key, "freq": 1 / 60}]
-    dropped = {"downsampling": [{"id": "drop", "messages": ["put"], "flows": ["egress"], "rules": rules}]}
-    config = json.dumps(json.loads(configuration("router", [endpoint])) | dropped)
-    with zenoh.open(zenoh.Config.from_json5(config)):
-        yield endpoint
 
 
 def received_after_a_loss(key: str, is_enough: Callable[[list[bytes], int], bool]) -> list[bytes]:

@@ -135,7 +135,7 @@ def test_an_absent_chip_says_what_to_check(monkeypatch: pytest.MonkeyPatch, caps
 def test_a_missing_library_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(sys.modules, "adafruit_extended_bus", None)
     assert main(["imu", "--device", "bno055", "--tag", "a"]) == 2
-    assert "pip install adafruit-extended-bus" in capsys.readouterr().err
+    assert "pip install adafruit-extended-bus adafruit-circuitpython-bno055" in capsys.readouterr().err
 
 
 def motions(forward: str, up: str, turn: float = 1.0) -> Motion:

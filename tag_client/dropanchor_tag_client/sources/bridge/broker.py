@@ -5,9 +5,8 @@ import ssl
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 from paho.mqtt.client import Client, MQTTMessage
@@ -22,8 +21,7 @@ class BrokerError(ValueError):
     """The broker cannot be used as it was named."""
 
 
-@dataclass(frozen=True)
-class BrokerSettings:
+class BrokerSettings(NamedTuple):
     """url: mqtt://host:port, mqtts:// (TLS), ws:// or wss:// (WebSocket); a host alone means mqtt://.
 
     ca, cert, key: PEM files for TLS; without ca, the certificates that the system trusts.
@@ -50,8 +48,7 @@ class BrokerSettings:
         return parts.scheme, parts.hostname, port or _PORTS[parts.scheme], parts.path
 
 
-@dataclass(frozen=True)
-class Received:
+class Received(NamedTuple):
     """A message and when it arrived, ns UTC."""
 
     topic: str

@@ -18,10 +18,10 @@ range_m = 0.01
 import math
 import re
 import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Measurement, json_of
@@ -42,8 +42,7 @@ class _MissingError(Exception):
     """The payload has nothing at a path."""
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(NamedTuple):
     """One table `[[rule]]`."""
 
     topic: str
@@ -52,7 +51,7 @@ class Rule:
     fields: dict[str, _Path]
     each: str | None = None
     time_unit: str = "ns"
-    scale: dict[str, float] = field(default_factory=dict)
+    scale: Mapping[str, float] = MappingProxyType({})
 
     def parse(self, topic: str, value: Any, t_ns: int) -> Iterator[Measurement | Dropped]:
         wildcards = _wildcards(self.topic, topic)
@@ -65,7 +64,7 @@ class Rule:
             return
         for part in parts:
             try:
-                yield Measurement(self._tag(wildcards, value, part), self.kind, self._fields(part, value, t_ns))
+                yield Measurement(self._tag(wildcards, value, part), self.kind, self._values(part, value, t_ns))
             except _MissingError as missing:
                 yield Dropped(Drop.NOT_UNDERSTOOD, f"{topic}: the payload has no usable {missing}")
 
@@ -78,7 +77,7 @@ class Rule:
 
         return _PLACE.sub(replaced, self.tag)
 
-    def _fields(self, part: Any, value: Any, t_ns: int) -> dict[str, Any]:
+    def _values(self, part: Any, value: Any, t_ns: int) -> dict[str, Any]:
         found = {name: self._field(part, value, name, path) for name, path in self.fields.items()}
         return {"t_ns": t_ns} | found
 

@@ -1,5 +1,6 @@
 /** All messages in German. */
 
+import alerts from "./alerts.js";
 import plans from "./plans.js";
 import keys from "./keys.js";
 import notify from "./notify.js";
@@ -11,4 +12,4 @@ import phone from "./phone.js";
 import service from "./service.js";
 import share from "./share.js";
 
-export default { ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
+export default { ...alerts, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };

@@ -1,7 +1,6 @@
 /** Zones and events. */
 
 export default {
-  "zones.label": "Zonen und Ereignisse",
   "zones.hidden": "Die Seite zeigt die Vergangenheit. Die Listen der Zonen und Ereignisse sind ausgeblendet, weil sie die Gegenwart zeigen.",
   "zones.title": "Zonen",
   "zones.none": "noch keine",
@@ -11,7 +10,6 @@ export default {
   "zones.edit": "Bearbeiten",
   "zones.edit_one": "{zone} bearbeiten",
   "zones.on_map": "{zone} · {tags}",
-  "zones.stuck": { one: "{n} Ereignis ließ sich nicht über Webhooks zustellen.", other: "{n} Ereignisse ließen sich nicht über Webhooks zustellen." },
   "zone.zone": "Zone",
   "zone.points": "Punkte der Zone",
   "zone.new_polygon": "Neues Polygon",

@@ -1,7 +1,6 @@
 /** Zones and events. */
 
 export default {
-  "zones.label": "Zones and events",
   "zones.hidden": "The page shows the past. The lists of zones and events are hidden, because they show the present.",
   "zones.title": "Zones",
   "zones.none": "none yet",
@@ -11,7 +10,6 @@ export default {
   "zones.edit": "Edit",
   "zones.edit_one": "Edit {zone}",
   "zones.on_map": "{zone} · {tags}",
-  "zones.stuck": { one: "{n} event could not be delivered by webhooks.", other: "{n} events could not be delivered by webhooks." },
   "zone.zone": "Zone",
   "zone.points": "Points of the zone",
   "zone.new_polygon": "New polygon",

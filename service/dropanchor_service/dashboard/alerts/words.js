@@ -1,0 +1,41 @@
+/** Destinations and rules in words. */
+
+import { age, length, percent, speed } from "../data/format.js";
+import { has, t } from "../i18n/language.js";
+
+/** @typedef {import("./items.js").Item} Item */
+/** @typedef {{destination: Item, has_secret: boolean, pending: number, oldest_ns: number | null, dead: number, problem: string | null}} DestinationState */
+
+/** Return where events go, such as `e-mail to shift@example.com`. @param {Item} destination */
+export function whereTo({ type, to, url, topic }) {
+  return has(`destination.${type}_to`) ? t(`destination.${type}_to`, { to: (to ?? []).join(", "), url, topic }) : type;
+}
+
+/** Return the state of a queue in words. @param {DestinationState} state */
+export function queueWords({ destination, pending, dead }) {
+  const parts = destination.enabled ? [] : [t("queue.off")];
+  if (pending > 0) parts.push(t("queue.waiting", { n: pending }));
+  if (dead > 0) parts.push(t("queue.dead", { n: dead }));
+  return parts.join(" · ") || t("queue.nothing");
+}
+
+/** Return how many events failing deliveries hold up, and those that were given up. @param {readonly DestinationState[]} states */
+export function stuckIn(states) {
+  return states.reduce((sum, { pending, dead, problem }) => sum + dead + (problem === null ? 0 : pending), 0);
+}
+
+/** Return when a rule makes an event, and for whom. @param {Item} rule */
+export function ruleWords(rule) {
+  const key = `rule.words.${rule.type}`;
+  const { distance_m, delay_s, after_s, fraction } = rule;
+  const words = has(key) ? t(key, { distance: length(distance_m), time: age(delay_s ?? after_s), share: percent(fraction) }) : rule.type;
+  const who = [...rule.groups.map((/** @type {string} */ group) => t("rule.group", { group })), ...rule.tags];
+  return t("rule.who", { rule: words, who: who.length === 0 ? t("rule.all") : who.join(", ") });
+}
+
+/** Return what a zone watches beside entering and leaving; empty: nothing. @param {import("../zones/zone_store.js").Zone} zone */
+export function zoneWords({ dwell_s, speed_mps }) {
+  const inside = dwell_s === null ? "" : t("rule.zone.inside", { time: age(dwell_s) });
+  const faster = speed_mps === null ? "" : t("rule.zone.faster", { speed: speed(speed_mps) });
+  return inside && faster ? t("rule.zone.both", { inside, faster }) : inside || faster;
+}
