@@ -139,7 +139,7 @@ def test_rules_are_made_and_edited_and_those_of_zones_lead_to_the_zone(chromium:
         form.get_by_label("Closer than").fill("4")
         form.get_by_role("button", name="Save rule").click()
         expect(form.get_by_role("alert")).to_contain_text("Somebody else changed this meanwhile")
-        form.get_by_role("button", name="Load the newer one").click()
+        form.get_by_role("button", name="Take the newer one").click()
         expect(form.get_by_label("Closer than")).to_have_value("9")
         form.get_by_role("button", name="Delete…").click()
         page.page.get_by_role("button", name="Delete rule").click()

@@ -1,6 +1,6 @@
 /** Destinations and rules in words. */
 
-import { age, length, percent, speed } from "../data/format.js";
+import { age, distance, percent, speedLimit } from "../data/format.js";
 import { has, t } from "../i18n/language.js";
 
 /** @typedef {import("./items.js").Item} Item */
@@ -28,7 +28,7 @@ export function stuckIn(states) {
 export function ruleWords(rule) {
   const key = `rule.words.${rule.type}`;
   const { distance_m, delay_s, after_s, fraction } = rule;
-  const words = has(key) ? t(key, { distance: length(distance_m), time: age(delay_s ?? after_s), share: percent(fraction) }) : rule.type;
+  const words = has(key) ? t(key, { distance: distance(distance_m ?? 0, 4), time: age(delay_s ?? after_s), share: percent(fraction) }) : rule.type;
   const who = [...rule.groups.map((/** @type {string} */ group) => t("rule.group", { group })), ...rule.tags];
   return t("rule.who", { rule: words, who: who.length === 0 ? t("rule.all") : who.join(", ") });
 }
@@ -36,6 +36,6 @@ export function ruleWords(rule) {
 /** Return what a zone watches beside entering and leaving; empty: nothing. @param {import("../zones/zone_store.js").Zone} zone */
 export function zoneWords({ dwell_s, speed_mps }) {
   const inside = dwell_s === null ? "" : t("rule.zone.inside", { time: age(dwell_s) });
-  const faster = speed_mps === null ? "" : t("rule.zone.faster", { speed: speed(speed_mps) });
+  const faster = speed_mps === null ? "" : t("rule.zone.faster", { speed: speedLimit(speed_mps) });
   return inside && faster ? t("rule.zone.both", { inside, faster }) : inside || faster;
 }

@@ -85,6 +85,9 @@ export function distance(value_m, digits = 6) {
 /** Format a speed. @param {number | null | undefined} value_mps @param {number} [decimals] */
 export const speed = (value_mps, decimals = 2) => `${speedNumber(value_mps, decimals)} ${units.velocity.symbol}`;
 
+/** Format a limit of speed, without needless digits. @param {number} value_mps */
+export const speedLimit = (value_mps) => `${decimal(Number((value_mps * units.velocity.factor).toPrecision(4)), 0, 3)} ${units.velocity.symbol}`;
+
 /** Format a speed without its unit. @param {number | null | undefined} value_mps @param {number} decimals */
 export const speedNumber = (value_mps, decimals) => fixed(known(value_mps) ? value_mps * units.velocity.factor : NaN, decimals);
 
