@@ -1,7 +1,8 @@
-"""What the service keeps on disk: the site, the pose history and the recordings, as the settings enable them."""
+"""What the service keeps on disk: site, floor plans, pose history and recordings, as the settings enable them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Self
 
 from pydantic import ValidationError
@@ -11,6 +12,7 @@ from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
@@ -19,13 +21,17 @@ from dropanchor_service.store import SiteStore, TagTable
 
 
 class Persistence:
-    """The history (`tracks`) and the recorder, each None when disabled. They write while this context is open."""
+    """Floor plans, and the history (`tracks`) and the recorder, each None when disabled.
+
+    The last two write while this context is open. Creating it raises SettingsError when the plans cannot be read.
+    """
 
     def __init__(
         self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics
     ) -> None:
         self._settings = settings
         self._opened = ExitStack()
+        self.plans = _open_plans(settings.data_dir)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         folder = settings.data_dir
@@ -94,6 +100,13 @@ def file_limits_of(settings: RecordingSettings) -> Limits:
         keep_ns=round(settings.keep_days * 86_400e9),
         max_bytes=int(settings.most_mib * 2**20),
     )
+
+
+def _open_plans(folder: Path | None) -> PlanStore:
+    try:
+        return PlanStore(folder)
+    except (OSError, ValidationError) as error:
+        raise SettingsError(f"data_dir: the floor plans in {folder} cannot be read: {error}") from error
 
 
 def open_site(settings: Settings) -> SiteStore:

@@ -135,10 +135,8 @@ class Service:
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
         if self._checkpoints is None:
-            folder = self._settings.data_dir
-            reason = (
-                "data_dir is not set" if folder is None else f"not possible with the engine {self._settings.engine}"
-            )
+            no_folder = self._settings.data_dir is None
+            reason = "data_dir is not set" if no_folder else f"not possible with the engine {self._settings.engine}"
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
 
@@ -290,6 +288,7 @@ class Service:
             impaired=self.impairments,
             recorder=self._persistence.recorder,
             events=self._zone_events.parts,
+            plans=self._persistence.plans,
             registry=self.metrics.registry,
             stopping=self._stopping,
             receive=self._receive,

@@ -20,6 +20,7 @@ from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.tracks import Retention, Tracks
+from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
@@ -66,6 +67,7 @@ class ApiBench:
         endpoints: tuple[str, ...] = (),
         cors_origins: tuple[str, ...] = (),
         events: EventParts | None = None,
+        plans: PlanStore | None = None,
     ) -> FastAPI:
         return create_app(
             self.answers,
@@ -82,6 +84,7 @@ class ApiBench:
             endpoints=endpoints,
             cors_origins=cors_origins,
             events=events,
+            plans=plans,
         )
 
 
