@@ -51,6 +51,16 @@ export async function sendChange(url, method, body, conditions) {
   throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
 }
 
+/** Send a file. Return the answer. Throws Error with the sentence of the service when it refuses the file.
+ * @param {URL} url @param {File} file @returns {Promise<any>} */
+export async function upload(url, file) {
+  const headers = { ...authorization(), "content-type": file.type || "application/octet-stream" };
+  const response = await fetch(url, { method: "POST", headers, body: file, cache: "no-store" });
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.detail);
+  return answer;
+}
+
 /** @returns {Record<string, string>} */
 function authorization() {
   const key = sessionStorage.getItem(STORAGE_KEY);

@@ -11,8 +11,10 @@ import { fixed } from "../data/format.js";
 import { listen } from "../map/gestures.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
+import { Plans } from "../plan/plans.js";
 import { Notices } from "../panel/notices.js";
 import { Past } from "./past.js";
+import { cornersOf } from "../plan/transform.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
@@ -36,6 +38,7 @@ const chips = new StateChips(byId("chips"), fleet, choice);
 const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const setup = new Setup(map, fleet, roster, choice, connection);
+const plans = new Plans(map, roster, choice, connection, setup);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -160,6 +163,8 @@ Object.defineProperty(window, "dropanchor", {
     },
     events: () => zones.log.current,
     zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
+    draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },
+    plans: () => plans.store.plans.map((plan) => ({ id: plan.id, placement: plan.placement, isReady: plans.images.isReady(plan.image) })),
     drawing: () => ({ ...map.stats, still: map.still }),
     anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),
     tags: () => fleet.names.map((tag, row) => ({
