@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from playwright.sync_api import Browser, FilePayload, Locator, expect
 
 from dropanchor_schemas.plans import ControlPoint, Plan
 from dropanchor_schemas.site import Anchor, Georeference, Site
+from dropanchor_service.security.api_keys import SOURCE, ApiKeys
+from dropanchor_service.security.identity import Authenticator, Scope
 from service.dashboard.plan_place import PlanPlace, plan_place
-from support.browser import WatchedPage, watched_page
+from support.browser import WatchedPage, open_page, watched_page
 from support.plan_files import geotiff_file, image_file, pdf_file, svg_file
 from support.zenoh_router import wait_until
 
@@ -269,6 +272,27 @@ def test_a_change_of_another_page_is_not_overwritten(chromium: Browser, place: P
         assert place.plans.all["hall"].name == "Theirs"
         outcome.get_by_role("button", name="Take the newer one").click()
         expect(form.get_by_label("Name")).to_have_value("Theirs")
+
+
+@pytest.mark.parametrize(("scope", "edits", "deletes"), [(Scope.READ, 0, 0), (Scope.WRITE, 1, 0), (Scope.ADMIN, 1, 1)])
+def test_a_key_shows_the_plans_and_only_the_buttons_that_it_may_use(
+    chromium: Browser, tmp_path: Path, scope: Scope, edits: int, deletes: int
+) -> None:
+    keys = ApiKeys(tmp_path)
+    secret = keys.add("somebody", scope)
+    with (
+        plan_place(authenticator=Authenticator({SOURCE: keys})) as place,
+        open_page(chromium, place.url) as page,
+    ):
+        place.put("hall", svg_file('<rect width="100" height="50" fill="red"/>'))
+        page.page.locator("#key").fill(secret)
+        page.page.get_by_role("button", name="Open").click()
+        page.wait_for("dropanchor.plans()[0]?.isReady")
+        assert page.page.get_by_role("button", name="Set up floor plans").count() == edits
+        if edits:
+            form = edit(page, open_panel(page), "hall")
+            expect(form.get_by_role("button", name="Save plan")).to_be_visible()
+            assert form.get_by_role("button", name="Delete…").count() == deletes
 
 
 def test_a_plan_is_deleted_after_a_question_and_an_undo_brings_it_back(chromium: Browser, place: PlanPlace) -> None:

@@ -26,7 +26,7 @@ export function drawPlan(ctx, view, { image, placement, opacity }, levels) {
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette @param {import("./plan_editor.js").Draft} draft */
 export function drawEditedPlan(ctx, view, palette, { image, placement, points }) {
   ctx.save();
-  ctx.strokeStyle = ctx.fillStyle = palette.accent;
+  ctx.strokeStyle = palette.accent;
   ctx.lineWidth = 2;
   ctx.beginPath();
   for (const [x, y] of cornersOf(placement, image)) ctx.lineTo(view.screenX(x), view.screenY(y));
@@ -41,6 +41,8 @@ export function drawEditedPlan(ctx, view, palette, { image, placement, points })
  * @param {import("./transform.js").Point} point @param {number} number */
 function drawPoint(ctx, view, palette, shown, point, number) {
   const [px, py] = [view.screenX(shown[0]), view.screenY(shown[1])];
+  ctx.strokeStyle = palette.accent;
+  ctx.lineWidth = 2;
   ctx.beginPath();
   ctx.moveTo(px - CROSS_PX, py);
   ctx.lineTo(px + CROSS_PX, py);

@@ -74,6 +74,7 @@ export class PlanPanel {
     this.#part("delete").hidden = !changes.mayDelete;
     for (const mode of /** @type {const} */ (["move", "pick"])) this.#part(mode).setAttribute("aria-pressed", String(editor.mode === mode));
     write(this.#part("how"), HOW[editor.mode]);
+    if (!editor.isOpen) this.#say("");
     if (editor.draft) this.#fillForm(editor.draft);
     this.points.update();
   }
@@ -98,6 +99,7 @@ export class PlanPanel {
   #fillForm({ name, opacity, dark_inverted, floor, placement, image }) {
     const isOther = this.#filled !== this.editor.revision;
     this.#filled = this.editor.revision;
+    if (isOther) this.#say("");
     /** @type {Record<string, string | number>} */
     const values = {
       name, opacity, floor: floor?.name ?? "", bottom: floor?.bottom_m ?? "", top: floor?.top_m ?? "",

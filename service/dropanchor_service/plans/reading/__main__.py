@@ -3,6 +3,7 @@
 The only argument is a `Request` as JSON.
 """
 
+import os
 import resource
 import sys
 
@@ -12,9 +13,11 @@ from dropanchor_service.plans.reading.refused import RefusedError
 
 CPU_S = 60
 MEMORY_BYTES = 3 * 2**30
+NICENESS = 10  # the estimators come first
 
 
 def main() -> None:
+    os.nice(NICENESS)
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     request = Request.model_validate_json(sys.argv[1])
