@@ -1,6 +1,7 @@
 """The images of floor plans: one file each, named by a digest of its content."""
 
 import hashlib
+import re
 from collections.abc import Collection
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from dropanchor_service.runtime.atomic_file import write_atomically
 
 _ENDINGS: dict[ImageType, str] = {"image/png": ".png", "image/jpeg": ".jpg", "image/svg+xml": ".svg"}
 _DIGEST_CHARACTERS = 32
+_NAME = re.compile(r"[0-9a-f]{32}\.(png|jpg|svg)(\.part)?")
 
 
 class ImageFolder:
@@ -44,12 +46,12 @@ class ImageFolder:
             self._path(self._folder, image).unlink(missing_ok=True)
 
     def keep_only(self, images: Collection[PlanImage]) -> None:
-        """Delete all other files in the folder. Raises OSError."""
+        """Delete all other images, and what a killed writer has left. Raises OSError."""
         if self._folder is None or not self._folder.is_dir():
             return
         kept = {self._path(self._folder, image) for image in images}
         for path in self._folder.iterdir():
-            if path not in kept:
+            if path not in kept and _NAME.fullmatch(path.name):
                 path.unlink()
 
     def _path(self, folder: Path, image: PlanImage) -> Path:

@@ -1,6 +1,7 @@
 """The floor plans of the site and their images: changed over REST, kept through a restart."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from threading import Lock
 
@@ -89,8 +90,9 @@ class PlanStore:
         used = {plan.image.id for plan in self.all.values()}
         unused = [image for image in self._images.values() if image.id not in used]
         for image in unused[:-MAX_UNUSED]:
-            self._folder.remove(image)
             del self._images[image.id]
+            with suppress(OSError):  # the change itself is saved, and the next start tries again
+                self._folder.remove(image)
 
 
 def _require(allows: Allows, current: Plan | None) -> None:

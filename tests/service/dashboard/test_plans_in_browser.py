@@ -201,6 +201,14 @@ def test_the_map_shows_the_pixels_of_the_plan_in_light_and_inverted_in_dark(
         wait_until(is_inverted)
 
 
+def test_an_image_that_did_not_arrive_is_requested_again(chromium: Browser, place: PlanPlace) -> None:
+    with watched_page(chromium, place.url) as page:
+        page.page.route("**/plan-images/*", lambda route: route.abort(), times=1)
+        place.put("hall", image_file(WIDTH, HEIGHT))
+        page.wait_for("dropanchor.plans().length === 1", timeout_s=5)
+        page.wait_for("dropanchor.plans()[0].isReady", timeout_s=20)
+
+
 @pytest.mark.parametrize(
     ("uploaded", "size"),
     [

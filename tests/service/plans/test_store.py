@@ -30,12 +30,13 @@ def test_a_restart_keeps_plans_with_their_images_and_nothing_else(tmp_path: Path
     store = PlanStore(tmp_path)
     used, unused = add(store), add(store, b"others")
     put(store, plan(used))
-    (tmp_path / "plans" / "killed.png.part").write_bytes(b"half")
+    (tmp_path / "plans" / f"{unused.id}.png.part").write_bytes(b"half")
+    (tmp_path / "plans" / "notes.txt").write_text("of a person")
     again = PlanStore(tmp_path)
     assert again.all == {"hall": plan(used)}
     assert again.content(used) == b"pixels"
     assert again.image(unused.id) is None
-    assert files(tmp_path) == {f"{used.id}.png"}
+    assert files(tmp_path) == {f"{used.id}.png", "notes.txt"}
 
 
 @pytest.mark.parametrize("in_memory", [True, False])

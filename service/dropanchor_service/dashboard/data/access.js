@@ -22,7 +22,7 @@ export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
 export async function request(url, options) {
-  const response = await fetch(url, { ...options, headers: authorization(), cache: "no-store" });
+  const response = await fetch(url, { cache: "no-store", ...options, headers: authorization() });
   if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
   if (response.status === UNAVAILABLE) {
     const problem = await response.json();

@@ -28,6 +28,8 @@ export function isElsewhere(floors, chosen, height_m) {
 export class Floors extends EventTarget {
   /** @type {FloorOfSite[]} */
   all = [];
+  /** At first the one at the height of the anchor, or the lowest; null: there is at most one. @type {FloorOfSite | null} */
+  chosen = null;
   #name = sessionStorage.getItem(STORAGE_KEY) ?? "";
 
   /** @param {HTMLSelectElement} select */
@@ -35,14 +37,6 @@ export class Floors extends EventTarget {
     super();
     this.select = select;
     select.addEventListener("change", () => this.choose(select.value));
-  }
-
-  /** The chosen floor: at first the one at the height of the anchor, or the lowest; null: there is at most one.
-   * @returns {FloorOfSite | null} */
-  get chosen() {
-    if (this.all.length < 2) return null;
-    const { all } = this;
-    return all.find(({ name }) => name === this.#name) ?? all.find((floor) => reaches(floor, 0)) ?? all[all.length - 1];
   }
 
   /** @param {readonly Plan[]} plans */
@@ -66,6 +60,9 @@ export class Floors extends EventTarget {
   }
 
   #changed() {
+    const { all } = this;
+    const found = all.find(({ name }) => name === this.#name) ?? all.find((floor) => reaches(floor, 0)) ?? all.at(-1);
+    this.chosen = all.length < 2 ? null : (found ?? null);
     this.select.value = this.chosen?.name ?? "";
     this.dispatchEvent(new Event("change"));
   }

@@ -119,8 +119,8 @@ export class PlanEditor extends EventTarget {
     if (!draft || !seen) return;
     const { points, ...plan } = { ...draft, control_points: draft.points.filter(isPlaced) };
     const done = await this.changes.edit(`Plan ${draft.name || draft.id} changed.`, pathOf(draft.id), plan, seen, () => this.#takeNewer(draft.id));
+    await this.store.refresh(); // first, so that the map does not show the old plan in between
     if (done && this.draft === draft) this.discard();
-    await this.store.refresh();
   }
 
   async remove() {

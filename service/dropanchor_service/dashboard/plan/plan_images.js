@@ -7,8 +7,9 @@ import { api } from "../data/connection.js";
 
 const MAX_SIDE_PX = 4096;
 const MIN_SIDE_PX = 256;
+const RETRY_MS = 5000;
 
-/** Event: "change", when an image has arrived. */
+/** Event: "change", when an image has arrived or is worth another request. */
 export class PlanImages extends EventTarget {
   /** By id and look; empty while the image is on its way. @type {Map<string, HTMLCanvasElement[]>} */
   #levels = new Map();
@@ -32,22 +33,18 @@ export class PlanImages extends EventTarget {
     for (const key of this.#levels.keys()) if (!ids.has(key.split(" ")[0])) this.#levels.delete(key);
   }
 
-  /** Request the images again that have not arrived. */
-  retry() {
-    for (const [key, levels] of this.#levels) if (levels.length === 0) this.#levels.delete(key);
-  }
-
   /** @param {string} key @param {PlanImage} image @param {boolean} inverted */
   async #load(key, image, inverted) {
     this.#levels.set(key, []);
     try {
-      const blob = await (await request(api(`plan-images/${image.id}`), {})).blob();
+      const blob = await (await request(api(`plan-images/${image.id}`), { cache: "force-cache" })).blob();
       const levels = halved(drawn(await decoded(blob, image.media_type), image, inverted));
       if (this.#levels.has(key)) this.#levels.set(key, levels);
-      this.dispatchEvent(new Event("change"));
     } catch {
-      // The connection of the page says what is wrong. `retry` requests the image again.
+      await new Promise((resolve) => setTimeout(resolve, RETRY_MS)); // the connection of the page says what is wrong
+      this.#levels.delete(key);
     }
+    this.dispatchEvent(new Event("change"));
   }
 }
 

@@ -24,7 +24,7 @@ export class Plans {
     this.editor = new PlanEditor(map, setup.changes, this.store);
     new PlanPanel(byId("plans"), byId("edit-plans"), byId("confirm"), this.editor, setup.changes);
     this.#drawOn(map);
-    map.isElsewhere = (row) => isElsewhere(this.floors.all, this.floors.chosen, roster.height(map.fleet.names[row]));
+    map.isElsewhere = (row) => this.floors.chosen !== null && isElsewhere(this.floors.all, this.floors.chosen, roster.height(map.fleet.names[row]));
     giveTo(map, [this.editor]);
     for (const source of [this.images, this.floors]) source.addEventListener("change", () => map.redraw());
     this.store.addEventListener("change", () => this.#takePlans());
@@ -32,7 +32,7 @@ export class Plans {
     for (const other of [choice, setup.anchors]) other.addEventListener("change", () => this.#giveWay(setup, choice));
     byId("history").addEventListener("click", () => this.editor.close());
     connection.addEventListener("settings", () => this.store.refresh());
-    connection.addEventListener("status", () => connection.status === "live" && this.#connected());
+    connection.addEventListener("status", () => connection.status === "live" && this.store.refresh());
   }
 
   /** @param {import("../map/map.js").LiveMap} map */
@@ -56,11 +56,6 @@ export class Plans {
     this.images.keep(this.store.plans.map(({ image }) => image));
     this.floors.setPlans(this.store.plans);
     this.map.redraw();
-  }
-
-  #connected() {
-    this.images.retry();
-    this.store.refresh();
   }
 
   /** While plans are edited, no tag is selected and no anchor is edited.
