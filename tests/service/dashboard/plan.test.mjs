@@ -2,6 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { floorsOf, isElsewhere } from "../../../service/dropanchor_service/dashboard/plan/floors.js";
+import { latLonIn } from "../../../service/dropanchor_service/dashboard/plan/geodesy.js";
 import { aligned, cornersOf, isInside, pixelOf, residuals, siteOf } from "../../../service/dropanchor_service/dashboard/plan/transform.js";
 import { isWorldFile, worldOf } from "../../../service/dropanchor_service/dashboard/plan/world_file.js";
 
@@ -53,6 +54,12 @@ test("points that say nothing about the scale leave the plan as it is", () => {
   assert.deepEqual(aligned(START, SIZE, [same, { ...same, x: 2 }], null), START);
   assert.deepEqual(aligned(START, SIZE, [same, { ...same, column_px: 9 }], null), START);
   assert.deepEqual(aligned(START, SIZE, [], null), START);
+});
+
+test("latitude and longitude are read from what maps copy", () => {
+  assert.deepEqual(latLonIn(" 52.5163, 13.3777 "), { lat: 52.5163, lon: 13.3777 });
+  assert.deepEqual(latLonIn("-33.9° 151"), { lat: -33.9, lon: 151 });
+  for (const text of ["", "52.5", "91, 0", "north, east", "1, 2, 3"]) assert.equal(latLonIn(text), null, text);
 });
 
 /** @param {string} name @param {number} bottom_m @param {number} top_m @returns {any} */

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, FilePayload, Locator, expect
+from pymap3d.enu import geodetic2enu
 
 from dropanchor_schemas.plans import ControlPoint, Plan
 from dropanchor_schemas.site import Anchor, Georeference, Site
@@ -201,6 +202,15 @@ def test_the_map_shows_the_pixels_of_the_plan_in_light_and_inverted_in_dark(
         wait_until(is_inverted)
 
 
+def test_the_buttons_appear_although_the_first_request_for_the_access_fails(
+    chromium: Browser, place: PlanPlace
+) -> None:
+    with watched_page(chromium, place.url) as page:
+        page.page.route("**/api/v1/access", lambda route: route.abort(), times=2)
+        page.page.reload()
+        expect(page.page.get_by_role("button", name="Set up floor plans")).to_be_visible(timeout=20_000)
+
+
 def test_an_image_that_did_not_arrive_is_requested_again(chromium: Browser, place: PlanPlace) -> None:
     with watched_page(chromium, place.url) as page:
         page.page.route("**/plan-images/*", lambda route: route.abort(), times=1)
@@ -266,6 +276,23 @@ def test_a_georeferenced_image_lies_right_at_once(chromium: Browser) -> None:
         expect(form).to_be_visible(timeout=30_000)
         placement = place.plans.all["hall"].placement
         assert (placement.x, placement.y, placement.m_per_px) == pytest.approx((11.0, 4.0, 0.05))
+
+
+def test_a_point_is_placed_by_latitude_and_longitude(chromium: Browser) -> None:
+    origin = Georeference(lat=52.5, lon=13.4, rotation_rad=0.4)
+    with plan_place(Site(anchors=[Anchor(id="17")], georeference=origin)) as place:
+        place.put("hall", image_file(WIDTH, HEIGHT))
+        with watched_page(chromium, place.url) as page:
+            form = edit(page, open_panel(page), "hall")
+            form.get_by_role("button", name="Add point").click()
+            click_pixel(page, 100, 100)
+            form.get_by_label("Point 1: latitude, longitude").fill("52.5021, 13.3982")
+            form.get_by_role("button", name="Save plan").click()
+            expect(form).to_be_hidden()
+        (point,) = place.plans.all["hall"].control_points
+        east, north, _ = geodetic2enu(52.5021, 13.3982, 0.0, origin.lat, origin.lon, 0.0)
+        there = complex(east, north) * complex(math.cos(-0.4), math.sin(-0.4))
+        assert abs(complex(point.x, point.y) - there) < 0.01
 
 
 def test_a_change_of_another_page_is_not_overwritten(chromium: Browser, place: PlanPlace) -> None:

@@ -30,6 +30,8 @@ export class PlanEditor extends EventTarget {
   mode = "";
   /** Distance between the first two points, if a person knows it. @type {number | null} */
   distance_m = null;
+  /** Where the site lies on the Earth, if that is known. @type {import("./geodesy.js").Georeference | null} */
+  georeference = null;
   /** Grows whenever the draft is read anew. */
   revision = 0;
   #isDirty = false;

@@ -1,6 +1,8 @@
 /** The list of points by which a plan is aligned: where each is, and how far the plan is off there. */
 
 import { fixed } from "../data/format.js";
+import { toCentimetre } from "../setup/gestures.js";
+import { latLonIn, siteOfLatLon } from "./geodesy.js";
 import { numberOf } from "../setup/tag_form.js";
 import { isPlaced, residuals } from "./transform.js";
 
@@ -22,7 +24,7 @@ export class PlanPoints {
     const { draft, map } = this.editor;
     if (!draft) return;
     const { points } = draft;
-    const shown = JSON.stringify([draft.id, points.length, map.anchors]);
+    const shown = JSON.stringify([draft.id, points.length, map.anchors, this.editor.georeference]);
     if (shown !== this.#shown) this.list.replaceChildren(...points.map((_, i) => this.#line(i)));
     this.#shown = shown;
     this.distance.hidden = points.length < 2 || points.filter(isPlaced).length > 1;
@@ -42,8 +44,21 @@ export class PlanPoints {
     const off = document.createElement("small");
     const remove = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: "Remove", ariaLabel: `Remove point ${index + 1}` });
     remove.addEventListener("click", () => this.editor.removePoint(index));
-    line.append(name, x, y, this.#anchors(index), off, remove);
+    line.append(name, x, y, this.#anchors(index), off, remove, this.#latLon(index));
     return line;
+  }
+
+  /** Return a field for latitude and longitude. @param {number} index */
+  #latLon(index) {
+    const { georeference } = this.editor;
+    const field = Object.assign(document.createElement("input"), { className: "lat-lon", placeholder: "or latitude, longitude", ariaLabel: `Point ${index + 1}: latitude, longitude`, autocomplete: "off", hidden: georeference === null });
+    field.addEventListener("input", () => {
+      const found = latLonIn(field.value);
+      if (!found || !georeference) return;
+      this.editor.mode = "";
+      this.editor.placePoint(index, .../** @type {[number, number]} */ (siteOfLatLon(georeference, found).map(toCentimetre)));
+    });
+    return field;
   }
 
   /** Return a choice of the anchors as places. @param {number} index */

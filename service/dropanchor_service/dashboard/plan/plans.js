@@ -31,6 +31,7 @@ export class Plans {
     this.editor.addEventListener("change", () => this.#keepApart(setup, choice));
     for (const other of [choice, setup.anchors]) other.addEventListener("change", () => this.#giveWay(setup, choice));
     byId("history").addEventListener("click", () => this.editor.close());
+    connection.addEventListener("site", (event) => (this.editor.georeference = /** @type {CustomEvent} */ (event).detail.georeference));
     connection.addEventListener("settings", () => this.store.refresh());
     connection.addEventListener("status", () => connection.status === "live" && this.store.refresh());
   }
