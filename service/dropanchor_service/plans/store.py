@@ -1,6 +1,5 @@
 """The floor plans of the site and their images: changed over REST, kept through a restart."""
 
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock
@@ -9,7 +8,7 @@ from dropanchor_schemas.plans import Plan, PlanImage
 from dropanchor_service.plans.images import ImageFolder
 from dropanchor_service.plans.reading.messages import ReadPlan
 from dropanchor_service.store.items import NamedItems, adapter_of
-from dropanchor_service.store.site import Allows, ChangedMeanwhileError
+from dropanchor_service.store.preconditions import Precondition, always
 
 MAX_PLANS = 64
 MAX_UNUSED = 8
@@ -20,7 +19,7 @@ class ImageMissingError(Exception):
     """The image of a plan has not been uploaded, or is no longer there."""
 
 
-class PlanStore:
+class PlanStore(NamedItems[Plan]):
     """Any thread may use it. A plan is valid once `plans.json` is written; its image is on the disk before."""
 
     def __init__(self, folder: Path | None) -> None:
@@ -28,21 +27,11 @@ class PlanStore:
 
         Raises OSError or pydantic's ValidationError when a file cannot be read.
         """
-        self._lock = Lock()
-        self._plans = NamedItems(adapter_of(Plan), None if folder is None else folder / "plans.json", MAX_PLANS)
+        super().__init__(adapter_of(Plan), None if folder is None else folder / "plans.json", MAX_PLANS)
+        self._images_lock = Lock()
         self._folder = ImageFolder(None if folder is None else folder / "plans")
         self._images: dict[str, PlanImage] = {plan.image.id: plan.image for plan in self.all.values()}
         self._folder.keep_only(self._images.values())
-
-    @property
-    def all(self) -> Mapping[str, Plan]:
-        """The plans by id. The mapping never changes."""
-        return self._plans.all
-
-    @property
-    def version(self) -> int:
-        """Grows with every change of a plan."""
-        return self._plans.version
 
     def image(self, image: str) -> PlanImage | None:
         """Return the image with this id; None if it was not uploaded or is no longer kept."""
@@ -55,34 +44,26 @@ class PlanStore:
     def add_image(self, read: ReadPlan) -> PlanImage:
         """Store an image that a plan can then use. Raises OSError."""
         made = read.description
-        with self._lock:
+        with self._images_lock:
             image = self._folder.write(read.content, made.media_type, made.width_px, made.height_px)
             self._images.pop(image.id, None)  # the newest is the last
             self._images[image.id] = image
             self._drop_unused()
         return image
 
-    def put(self, plan: Plan, allows: Allows) -> None:
-        """Add or replace a plan and save it.
-
-        Raises ImageMissingError, FullError, OSError, and ChangedMeanwhileError when `allows` refuses.
-        """
-        with self._lock:
-            _require(allows, self.all.get(plan.id))
-            if self._images.get(plan.image.id) != plan.image:
+    def put(self, name: str, item: Plan, allows: Precondition = always) -> None:
+        """Add or replace a plan and save it. Raises ImageMissingError, and what `NamedItems.put` raises."""
+        with self._images_lock:
+            if self.image(item.image.id) != item.image:
                 raise ImageMissingError
-            self._plans.put(plan.id, plan)
+            super().put(name, item, allows)
             self._drop_unused()
 
-    def remove(self, name: str, allows: Allows) -> None:
-        """Remove a plan. Its image stays for a while, so that a person can undo this.
-
-        Raises KeyError when there is none, OSError, and ChangedMeanwhileError when `allows` refuses.
-        """
-        with self._lock:
+    def remove(self, name: str, allows: Precondition = always) -> None:
+        """Remove a plan as `NamedItems.remove` does. Its image stays for a while, so that a person can undo this."""
+        with self._images_lock:
             plan = self.all[name]
-            _require(allows, plan)
-            self._plans.remove(name)
+            super().remove(name, allows)
             self._images[plan.image.id] = self._images.pop(plan.image.id)
             self._drop_unused()
 
@@ -93,8 +74,3 @@ class PlanStore:
             del self._images[image.id]
             with suppress(OSError):  # the change itself is saved, and the next start tries again
                 self._folder.remove(image)
-
-
-def _require(allows: Allows, current: Plan | None) -> None:
-    if not allows(current):
-        raise ChangedMeanwhileError

@@ -28,7 +28,7 @@ class PlanPlace(Place):
         """Put a plan of this file with its centre at the origin."""
         image = self.plans.add_image(read_plan(content, Request(media_type=file_type_of(content, ""))))
         made = Plan(id=plan, image=image, placement=Placement(x=0, y=0, m_per_px=m_per_px), floor=floor, **fields)
-        self.plans.put(made, lambda _: True)
+        self.plans.put(plan, made)
         return made
 
 

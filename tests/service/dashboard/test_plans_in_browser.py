@@ -300,7 +300,7 @@ def test_a_change_of_another_page_is_not_overwritten(chromium: Browser, place: P
     with watched_page(chromium, place.url) as page:
         form = edit(page, open_panel(page), "hall")
         form.get_by_label("Name").fill("Mine")
-        place.plans.put(mine.model_copy(update={"name": "Theirs"}), lambda _: True)
+        place.plans.put("hall", mine.model_copy(update={"name": "Theirs"}))
         form.get_by_role("button", name="Save plan").click()
         outcome = page.page.locator("#outcome")
         expect(outcome).to_contain_text("Somebody else changed the same meanwhile")

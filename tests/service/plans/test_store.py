@@ -7,7 +7,7 @@ import pytest
 from dropanchor_schemas.plans import Placement, Plan, PlanImage
 from dropanchor_service.plans.reading.messages import Description, ReadPlan
 from dropanchor_service.plans.store import MAX_UNUSED, ImageMissingError, PlanStore
-from dropanchor_service.store.site import ChangedMeanwhileError
+from dropanchor_service.store.preconditions import ChangedMeanwhileError
 
 
 def add(store: PlanStore, content: bytes = b"pixels") -> PlanImage:
@@ -19,7 +19,7 @@ def plan(image: PlanImage, name: str = "hall") -> Plan:
 
 
 def put(store: PlanStore, made: Plan) -> None:
-    store.put(made, lambda _: True)
+    store.put(made.id, made)
 
 
 def files(folder: Path) -> set[str]:
@@ -59,10 +59,10 @@ def test_the_image_of_a_deleted_plan_stays_for_an_undo_until_newer_ones_follow(t
     for number in range(MAX_UNUSED + 5):
         add(store, f"image {number}".encode())
     assert len(files(tmp_path)) == MAX_UNUSED + 1
-    store.remove("hall", lambda _: True)
+    store.remove("hall")
     put(store, plan(image))
     assert store.content(image) == b"pixels"
-    store.remove("hall", lambda _: True)
+    store.remove("hall")
     for number in range(MAX_UNUSED):
         add(store, f"newer {number}".encode())
     assert store.content(image) is None
@@ -74,8 +74,8 @@ def test_a_change_that_was_not_expected_is_refused() -> None:
     store = PlanStore(None)
     put(store, plan(add(store)))
     with pytest.raises(ChangedMeanwhileError):
-        store.put(plan(add(store)), lambda current: current is None)
+        store.put("hall", plan(add(store)), lambda current: current is None)
     with pytest.raises(ChangedMeanwhileError):
         store.remove("hall", lambda _: False)
     with pytest.raises(KeyError):
-        store.remove("roof", lambda _: True)
+        store.remove("roof")
