@@ -303,7 +303,7 @@ def test_a_change_of_another_page_is_not_overwritten(chromium: Browser, place: P
         place.plans.put("hall", mine.model_copy(update={"name": "Theirs"}))
         form.get_by_role("button", name="Save plan").click()
         outcome = page.page.locator("#outcome")
-        expect(outcome).to_contain_text("Somebody else changed the same meanwhile")
+        expect(outcome).to_contain_text("Somebody else changed this meanwhile")
         assert place.plans.all["hall"].name == "Theirs"
         outcome.get_by_role("button", name="Take the newer one").click()
         expect(form.get_by_label("Name")).to_have_value("Theirs")
