@@ -22,6 +22,7 @@ from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
+from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import events_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
@@ -41,7 +42,6 @@ from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.api.routes.track_file import track_file_router
 from dropanchor_service.api.routes.tracks import tracks_router
-from dropanchor_service.api.routes.webhooks import webhooks_router
 from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
 from dropanchor_service.api.routes.zones import zones_router
 from dropanchor_service.phones.intake import Receive
@@ -83,7 +83,8 @@ def create_app(
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
     no limit. cors_origins: of other web pages that may use the interface. events:
-    zones, events and webhooks; None keeps them in memory and watches nothing. plans: None keeps them in memory.
+    zones, events and destinations; None keeps them in memory and watches nothing. plans: None keeps them in
+    memory.
     """
     plans = plans or PlanStore(None)
     events = events or EventParts.in_memory(answers.site.site.id)
@@ -110,7 +111,7 @@ def create_app(
         zones_router(events.items),
         zone_occupancy_router(events),
         events_router(events.store, stopping),
-        webhooks_router(events),
+        destinations_router(events),
         health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
@@ -183,9 +184,9 @@ _TAGS = [
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
     {"name": "plans", "description": "Floor plans below the tags on the map, and their images."},
-    {"name": "zones", "description": "Areas of the site, groups of tags, and the rules that make events."},
+    {"name": "zones", "description": "Areas of the site, and the rules that make events."},
     {"name": "events", "description": "What has happened, as CloudEvents."},
-    {"name": "webhooks", "description": "Events over HTTP to other systems."},
+    {"name": "destinations", "description": "Who gets events by webhook, e-mail or MQTT."},
     {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},

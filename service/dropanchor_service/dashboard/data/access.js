@@ -61,6 +61,16 @@ export async function upload(url, file) {
   return answer;
 }
 
+/**
+ * Ask for an action that has no body. Return the response. Throws Error with the sentence of the service when it refuses.
+ * @param {URL} url @param {"POST" | "DELETE"} method
+ */
+export async function requestChange(url, method) {
+  const response = await fetch(url, { method, headers: authorization(), cache: "no-store" });
+  if (response.ok) return response;
+  throw new Error((await response.json()).detail);
+}
+
 /** @returns {Record<string, string>} */
 function authorization() {
   const key = sessionStorage.getItem(STORAGE_KEY);

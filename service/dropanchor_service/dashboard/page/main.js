@@ -1,5 +1,6 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
+import { Alerts } from "../alerts/alerts.js";
 import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
@@ -46,6 +47,7 @@ const measure = new Measure(map, byId("measure"), byId("measured"));
 map.pressed = (px, py) => measure.press(px, py) || zones.press(px, py);
 const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
 const zones = new Zones(map, connection, (tag) => fleet.row(tag) >= 0 && select(tag));
+const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones);
 
 /** @param {string | null} tag */
 function select(tag) {
@@ -162,6 +164,7 @@ Object.defineProperty(window, "dropanchor", {
       return Array.from({ length: trail?.length ?? 0 }, (_, i) => /** @type {any} */ (trail).x[/** @type {any} */ (trail).at(i)]);
     },
     events: () => zones.log.current,
+    destinations: () => alerts.store.states.map(({ destination, pending, dead }) => ({ id: destination.id, pending, dead })),
     zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
     draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },
     plans: () => plans.store.plans.map((plan) => ({ id: plan.id, placement: plan.placement, isReady: plans.images.isReady(plan.image) })),

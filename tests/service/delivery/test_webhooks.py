@@ -1,60 +1,23 @@
 """Events reach a real receiver in order per tag, through refusals, outages and slow answers."""
 
 import asyncio
-import ipaddress
 import ssl
 import time
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from dropanchor_schemas.destinations import WebhookDestination
 from dropanchor_schemas.events import EventType
-from dropanchor_schemas.webhooks import Webhook
-from dropanchor_service.events.database import Database
-from dropanchor_service.events.deliveries import Deliveries
-from dropanchor_service.events.drafts import Draft
-from dropanchor_service.events.store import EventStore
+from dropanchor_service.delivery import queue
+from dropanchor_service.delivery.channel import Outcome, Verdict
+from dropanchor_service.delivery.signature import headers
 from dropanchor_service.security.authority import Authority, Issued
-from dropanchor_service.webhooks import queue
-from dropanchor_service.webhooks.queue import Patience
-from dropanchor_service.webhooks.registry import addressees, open_webhooks
-from dropanchor_service.webhooks.sender import Outcome, Sender, Verdict
-from dropanchor_service.webhooks.signature import headers
-from dropanchor_service.webhooks.thread import WebhookThread
+from support.delivery import SECRET, DeliveryBench, in_order
 from support.receiver import Receiver, running_receiver
 from support.zenoh_router import wait_until
-
-SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="
-LOOPBACK = [ipaddress.ip_network("127.0.0.0/8")]
-
-
-class Bench:
-    """Webhooks of this process, without a service."""
-
-    def __init__(self, give_up_s: float = 3600.0, timeout_s: float = 2.0) -> None:
-        database = Database(None)
-        self.webhooks = open_webhooks(None)
-        self.store = EventStore(database, "yard", lambda draft: addressees(self.webhooks, draft))
-        self.deliveries = Deliveries(database)
-        sender = Sender(timeout_s, LOOPBACK)
-        patience = Patience(retry_s=0.2, give_up_ns=round(give_up_s * 1e9))
-        self.thread = WebhookThread(self.webhooks, self.deliveries, sender, patience, time.time_ns)
-
-    def hook(self, receiver: Receiver, name: str = "mes", **fields: object) -> None:
-        url = f"http://127.0.0.1:{receiver.port}/events"
-        self.webhooks.put(name, Webhook(id=name, url=url, secret=SECRET, **fields))  # type: ignore[arg-type]
-
-    def happen(self, *tags: str) -> None:
-        now_ns = time.time_ns()
-        self.store.commit(
-            [Draft(EventType.ZONE_ENTER, tag, {"t_ns": now_ns, "since_ns": now_ns, "zone": "dock"}) for tag in tags], {}
-        )
-
-    def counts(self, name: str = "mes") -> tuple[int, int]:
-        return self.deliveries.counts().get(name, (0, 0))
 
 
 @pytest.fixture(autouse=True)
@@ -63,32 +26,21 @@ def _fast(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def delivering(bench: Bench, receiver: Receiver) -> Iterator[None]:
+def delivering(bench: DeliveryBench, receiver: Receiver) -> Iterator[None]:
     with running_receiver(receiver):
         bench.hook(receiver)
         with bench.thread:
             yield
 
 
-def in_order(receiver: Receiver) -> bool:
-    """Return whether the first arrivals of the events of every tag came in order."""
-    seen: set[str] = set()
-    by_tag: dict[str, list[str]] = defaultdict(list)
-    for event in receiver.accepted:
-        if event["id"] not in seen:
-            seen.add(event["id"])
-            by_tag[event["subject"]].append(event["sequence"])
-    return all(sequences == sorted(sequences) for sequences in by_tag.values())
-
-
 def test_every_event_comes_once_in_order_and_signed() -> None:
-    bench, receiver = Bench(), Receiver()
+    bench, receiver = DeliveryBench(), Receiver()
     with delivering(bench, receiver):
         for _ in range(20):
             bench.happen("a", "b", "c")
         wait_until(lambda: bench.counts() == (0, 0))
     assert len(receiver.accepted) == 60
-    assert in_order(receiver)
+    assert in_order(receiver.accepted)
     sent, body = receiver.requests[0]
     assert sent["content-type"].startswith("application/cloudevents+json")
     assert sent.items() >= headers(SECRET, sent["webhook-id"], int(sent["webhook-timestamp"]), body).items()
@@ -98,7 +50,7 @@ def test_every_event_comes_once_in_order_and_signed() -> None:
 
 @pytest.mark.parametrize("status", [500, 503, 429])
 def test_an_unavailable_receiver_gets_everything_later_in_order(status: int) -> None:
-    bench, receiver = Bench(), Receiver(status=status)
+    bench, receiver = DeliveryBench(), Receiver(status=status)
     with delivering(bench, receiver):
         for _ in range(5):
             bench.happen("a", "b")
@@ -109,11 +61,11 @@ def test_an_unavailable_receiver_gets_everything_later_in_order(status: int) -> 
         wait_until(lambda: bench.counts() == (0, 0))
         assert bench.thread.problem_of("mes") is None
     assert len(receiver.accepted) == 10
-    assert in_order(receiver)
+    assert in_order(receiver.accepted)
 
 
 def test_a_refused_event_becomes_a_dead_letter_and_holds_up_only_its_tag() -> None:
-    bench, receiver = Bench(), Receiver(refused_subjects={"bad"})
+    bench, receiver = DeliveryBench(), Receiver(refused_subjects={"bad"})
     with delivering(bench, receiver):
         bench.happen("bad", "good", "bad", "good")
         wait_until(lambda: receiver.subjects() == ["good", "good"])
@@ -123,11 +75,11 @@ def test_a_refused_event_becomes_a_dead_letter_and_holds_up_only_its_tag() -> No
         assert bench.deliveries.retry("mes") == 2
         wait_until(lambda: bench.counts() == (0, 0))
     assert receiver.subjects() == ["good", "good", "bad", "bad"]
-    assert in_order(receiver)
+    assert in_order(receiver.accepted)
 
 
 def test_an_event_that_is_too_old_becomes_a_dead_letter() -> None:
-    bench, receiver = Bench(give_up_s=0.5), Receiver(status=500)
+    bench, receiver = DeliveryBench(give_up_s=0.5), Receiver(status=500)
     with delivering(bench, receiver):
         bench.happen("a")
         wait_until(lambda: bench.counts() == (0, 1))
@@ -135,7 +87,7 @@ def test_an_event_that_is_too_old_becomes_a_dead_letter() -> None:
 
 
 def test_a_receiver_that_does_not_answer_delays_no_other() -> None:
-    bench, slow, fast = Bench(timeout_s=0.3), Receiver(), Receiver()
+    bench, slow, fast = DeliveryBench(timeout_s=0.3), Receiver(), Receiver()
     with running_receiver(slow), delivering(bench, fast):
         slow.release.clear()
         bench.hook(slow, "slow")
@@ -147,7 +99,7 @@ def test_a_receiver_that_does_not_answer_delays_no_other() -> None:
 
 
 def test_a_redirect_is_not_followed() -> None:
-    bench, receiver = Bench(), Receiver(status=302)
+    bench, receiver = DeliveryBench(), Receiver(status=302)
     with delivering(bench, receiver):
         bench.happen("a")
         wait_until(lambda: bench.counts() == (0, 1))
@@ -155,8 +107,8 @@ def test_a_redirect_is_not_followed() -> None:
 
 
 def test_a_name_that_turns_inside_later_is_refused_at_every_delivery(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench, receiver = Bench(), Receiver()
-    monkeypatch.setattr("dropanchor_service.webhooks.sender.resolved", lambda _: ["10.0.0.1"])
+    bench, receiver = DeliveryBench(), Receiver()
+    monkeypatch.setattr("dropanchor_service.delivery.webhook.resolved", lambda _: ["10.0.0.1"])
     with delivering(bench, receiver):
         bench.happen("a")
         wait_until(lambda: "10.0.0.1, which is not public" in (bench.thread.problem_of("mes") or ""))
@@ -164,7 +116,7 @@ def test_a_name_that_turns_inside_later_is_refused_at_every_delivery(monkeypatch
 
 
 def test_a_webhook_gets_only_what_it_wants() -> None:
-    bench, receiver = Bench(), Receiver()
+    bench, receiver = DeliveryBench(), Receiver()
     with delivering(bench, receiver):
         bench.hook(receiver, tags=["a"], zones=["dock"], types=[EventType.ZONE_ENTER])
         bench.hook(receiver, "off", enabled=False)
@@ -172,22 +124,21 @@ def test_a_webhook_gets_only_what_it_wants() -> None:
         bench.hook(receiver, "gate", zones=["gate"])
         bench.happen("a", "b")
         wait_until(lambda: receiver.subjects() == ["a"])
-    assert bench.deliveries.counts() == {}
+    assert bench.deliveries.states() == {}
 
 
 def test_a_certificate_must_be_of_the_host_in_the_url_although_the_address_is_what_is_called(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dropanchor_service.webhooks.sender.resolved", lambda _: ["127.0.0.1"])
+    monkeypatch.setattr("dropanchor_service.delivery.webhook.resolved", lambda _: ["127.0.0.1"])
     authority, receiver = Authority.make("yard"), Receiver()
     (tmp_path / "ca.pem").write_bytes(authority.issued.certificate)
-    sender = Sender(2.0, LOOPBACK, tmp_path / "ca.pem")
-    body = b'{"id": "1", "subject": "a"}'
+    bench = DeliveryBench(authorities=tmp_path / "ca.pem")
 
     async def send_to(host: str) -> Outcome:
-        async with sender.client() as client:
-            webhook = Webhook(id="mes", url=f"https://{host}:{receiver.port}/", secret=SECRET)
-            return await sender.send(client, webhook, body)
+        url = f"https://{host}:{receiver.port}/"
+        async with bench.channels.open(WebhookDestination(type="webhook", id="mes", url=url, secret=SECRET)) as channel:
+            return (await channel.send([b'{"id": "1", "subject": "a"}']))[0]
 
     with running_receiver(receiver, server_context(authority.server("mes", ["mes.example.com"], 1), tmp_path)):
         assert asyncio.run(send_to("mes.example.com")).verdict is Verdict.ACCEPTED

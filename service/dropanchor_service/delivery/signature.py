@@ -6,7 +6,7 @@ import hashlib
 import hmac
 from collections.abc import Mapping
 
-from dropanchor_schemas.webhooks import SECRET_PREFIX
+from dropanchor_schemas.destinations import SECRET_PREFIX
 
 MIN_BYTES, MAX_BYTES = 24, 64
 

@@ -7,8 +7,8 @@ import ipaddress
 
 import pytest
 
-from dropanchor_service.webhooks.addresses import RefusedAddressError, UrlError, allowed, checked_url, resolved
-from dropanchor_service.webhooks.signature import SecretError, headers, key_of
+from dropanchor_service.delivery.addresses import RefusedAddressError, UrlError, allowed, checked_url, resolved
+from dropanchor_service.delivery.signature import SecretError, headers, key_of
 
 SECRET = f"whsec_{base64.b64encode(bytes(range(32))).decode()}"
 

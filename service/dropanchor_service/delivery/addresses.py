@@ -53,7 +53,7 @@ def allowed(addresses: Sequence[str], networks: Iterable[Network]) -> str:
         if not _is_public(address) and not any(address in network for network in listed):
             raise RefusedAddressError(
                 f"the receiver has the address {address}, which is not public: an administrator can allow it with "
-                "`allow_networks` in `[webhooks]` of the settings"
+                "`allow_networks` in `[delivery]` of the settings"
             )
     return addresses[0]
 

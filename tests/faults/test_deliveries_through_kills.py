@@ -1,4 +1,4 @@
-"""Events of a killed service: nothing stored is lost, nothing is invented, and webhooks get everything in order.
+"""Events of a killed service: nothing stored is lost, nothing is invented, and destinations get everything in order.
 
 DROPANCHOR_RECEIVER_DOWN_S sets for how long the receiver is down.
 """
@@ -15,11 +15,13 @@ import orjson
 import zenoh
 
 from dropanchor_schemas.keys import all_tags
+from support.mail_server import MailServer, running_mail_server
 from support.receiver import Receiver, running_receiver
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, free_port, wait_until
 
 TAGS = [f"tag-{number}" for number in range(10)]
+NAMES = {"tag-0": "Cart"}
 DOWN_S = float(os.environ.get("DROPANCHOR_RECEIVER_DOWN_S", "5"))
 SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="
 NEAR_M, FAR_M = 4.0, 40.0
@@ -29,7 +31,7 @@ WEST = {"id": "west", "shape": {"type": "circle", "x": 0.0, "y": 0.0, "radius_m"
 def settings(folder: Path) -> Path:
     file = folder / "dropanchor.toml"
     file.write_text(
-        'engine = "paper"\n[webhooks]\nallow_networks = ["127.0.0.0/8"]\nretry_s = 0.5\n[[site.anchors]]\nid = "7"\n'
+        'engine = "paper"\n[delivery]\nallow_networks = ["127.0.0.0/8"]\nretry_s = 0.5\n[[site.anchors]]\nid = "7"\n'
     )
     return file
 
@@ -38,7 +40,7 @@ def start_at(service: Running, x: float) -> None:
     """Put all tags at this place: their estimators start again there."""
     for tag in TAGS:
         start = {"x": x, "y": 0.0, "heading_rad": 0.0, "std_m": 0.05}
-        service.put(f"/api/v1/tags/{tag}/settings", {"start": start})
+        service.put(f"/api/v1/tags/{tag}/settings", {"name": NAMES.get(tag, ""), "start": start})
 
 
 def stand(service: Running, x: float, until: Any, timeout_s: float = 90.0) -> None:
@@ -75,7 +77,7 @@ def test_events_survive_two_kills_and_a_receiver_that_is_down(tmp_path: Path) ->
     options = ("--config", str(settings(tmp_path)), "--data-dir", str(data))
     with running_service(*options) as service:
         service.put("/api/v1/zones/west", WEST)
-        service.put("/api/v1/webhooks/mes", {"id": "mes", "url": receiver.url, "secret": SECRET})
+        service.put("/api/v1/destinations/mes", {"type": "webhook", "id": "mes", "url": receiver.url, "secret": SECRET})
         start_at(service, NEAR_M)
         stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
         before = stored(service)
@@ -90,7 +92,7 @@ def test_events_survive_two_kills_and_a_receiver_that_is_down(tmp_path: Path) ->
         service.stop(signal.SIGKILL)
     with running_service(*options) as service, running_receiver(receiver):
         wait_until(lambda: len({event["id"] for event in receiver.accepted}) == 2 * len(TAGS), 60.0)
-        wait_until(lambda: service.get("/api/v1/webhooks/mes")["pending"] == 0)
+        wait_until(lambda: service.get("/api/v1/destinations/mes")["pending"] == 0)
         everything = stored(service)
     first = {event["id"]: event for event in reversed(receiver.accepted)}
     assert first == {event["id"]: event for event in everything}
@@ -111,7 +113,9 @@ def test_a_kill_while_events_are_delivered_repeats_some_and_loses_none(tmp_path:
     with running_receiver(receiver):
         with running_service(*options) as service:
             service.put("/api/v1/zones/west", WEST)
-            service.put("/api/v1/webhooks/mes", {"id": "mes", "url": receiver.url, "secret": SECRET})
+            service.put(
+                "/api/v1/destinations/mes", {"type": "webhook", "id": "mes", "url": receiver.url, "secret": SECRET}
+            )
             receiver.release.clear()
             start_at(service, NEAR_M)
             stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
@@ -119,11 +123,32 @@ def test_a_kill_while_events_are_delivered_repeats_some_and_loses_none(tmp_path:
             service.stop(signal.SIGKILL)  # requests are on their way, and none is answered
         receiver.release.set()
         with running_service(*options) as service:
-            wait_until(lambda: service.get("/api/v1/webhooks/mes")["pending"] == 0, 60.0)
+            wait_until(lambda: service.get("/api/v1/destinations/mes")["pending"] == 0, 60.0)
             ids = {event["id"] for event in stored(service)}
     assert {event["id"] for event in receiver.accepted} == ids
     assert len(ids) == len(TAGS)
     assert len(receiver.accepted) > len(TAGS)
+
+
+def test_mails_that_a_kill_interrupts_come_after_the_restart(tmp_path: Path) -> None:
+    server = MailServer(answer="451 not now")
+    file = settings(tmp_path)
+    file.write_text(f'{file.read_text()}[email]\nserver = "127.0.0.1"\nport = {server.port}\ntls = "none"\n')
+    options = ("--config", str(file), "--data-dir", str(tmp_path / "data"))
+    with running_mail_server(server):
+        with running_service(*options) as service:
+            service.put("/api/v1/zones/west", WEST)
+            shift = {"type": "email", "id": "shift", "to": ["shift@example.com"], "digest_s": 0}
+            service.put("/api/v1/destinations/shift", shift)
+            start_at(service, NEAR_M)
+            stand(service, NEAR_M, lambda: of_kind(service, "enter") == len(TAGS))
+            wait_until(lambda: server.attempts > 0)
+            service.stop(signal.SIGKILL)
+        server.answer = "250 OK"
+        with running_service(*options) as service:
+            wait_until(lambda: service.get("/api/v1/destinations/shift")["pending"] == 0, 60.0)
+    said = [line for mail in server.mails for line in mail.get_content().splitlines() if " entered " in line]
+    assert sorted(said) == sorted(["Cart (tag-0) entered west.", *(f"{tag} entered west." for tag in TAGS[1:])])
 
 
 def test_events_come_over_zenoh_in_the_order_of_the_store(tmp_path: Path) -> None:
