@@ -86,7 +86,8 @@ def create_app(
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
     no limit. cors_origins: of other web pages that may use the interface. events:
-    zones, events and destinations; None keeps them in memory and watches nothing. plans: None keeps them in memory.
+    zones, events and destinations; None keeps them in memory and watches nothing. plans: None keeps them in
+    memory.
     """
     plans = plans or PlanStore(None)
     events = events or EventParts.in_memory(answers.site.site.id)
@@ -190,7 +191,7 @@ _TAGS = [
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
     {"name": "plans", "description": "Floor plans below the tags on the map, and their images."},
-    {"name": "zones", "description": "Areas of the site, groups of tags, and the rules that make events."},
+    {"name": "zones", "description": "Areas of the site, and the rules that make events."},
     {"name": "events", "description": "What has happened, as CloudEvents."},
     {"name": "destinations", "description": "Who gets events by webhook, e-mail or MQTT."},
     {"name": "shares", "description": "Links that show the page, read only, until they expire."},

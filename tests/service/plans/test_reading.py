@@ -99,6 +99,7 @@ def test_a_page_of_a_pdf_is_drawn_at_200_dots_per_inch_or_fewer() -> None:
         (svg_file('<rect fill="url(https://example.com/a)"/>'), "refers to another file"),
         (svg_file('<rect style="fill:URL( //example.com/a)"/>'), "refers to another file"),
         (svg_file("<style>@import 'https://example.com/a.css'</style>"), "style"),
+        (svg_file("<style>g {}<title/>@import 'https://example.com/a.css'</style>"), "style"),
         (svg_file(r"<style>rect { fill: u\72l(//example.com) }</style>"), "style"),
     ],
 )

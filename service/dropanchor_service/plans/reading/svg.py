@@ -56,7 +56,7 @@ def _clean(element: ElementTree.Element) -> None:
             )
         found.attrib = dict(_kept_attributes(found))
         if name == "style":
-            _require_local(found.text or "")
+            _require_local("".join(found.itertext()))
 
 
 def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
