@@ -55,7 +55,6 @@ class Kind(Enum):
     BODY_TOO_LARGE = (413, "The request body is too large")
     INVALID_REQUEST = (422, "The request is not valid")
     SHAPE_REFUSED = (422, "The shape cannot be a zone")
-    PLAN_IMAGE_REFUSED = (422, "The file cannot be a floor plan")
     DESTINATION_REFUSED = (422, "The destination cannot be used")
     PLAN_IMAGE_REFUSED = (422, "The file cannot be a floor plan")
     SAMPLES_REJECTED = (422, "The samples cannot be decoded")
