@@ -11,6 +11,8 @@ from playwright.sync_api import Page, Route
 
 from dropanchor_service.api.app import DASHBOARD
 
+EXAMPLES = ("EPSG:25832", "https://", "URL", "shift@example.com")
+"""In the fields of forms, the same in every language."""
 LOAD = "const { default: all } = await import(process.argv[1]); console.log(JSON.stringify(all));"
 RECORD = """
 const write = CanvasRenderingContext2D.prototype.fillText;
@@ -66,7 +68,7 @@ def unmarked(page: Page, *data: str) -> set[str]:
     found = set()
     for text in page.evaluate(TEXTS):
         rest = re.sub(r"⟦[^⟦⟧]*⟧", " ", text)
-        for known in sorted(("Dropanchor", *data), key=len, reverse=True):
+        for known in sorted(("Dropanchor", *EXAMPLES, *data), key=len, reverse=True):
             rest = rest.replace(known, " ")
         if re.search(r"[^\W\d_]", SYMBOLS.sub(" ", rest)):
             found.add(text)

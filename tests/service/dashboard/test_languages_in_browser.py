@@ -27,7 +27,6 @@ from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
 
-EXAMPLES = ("EPSG:25832", "https://", "URL", "shift@example.com")
 NAMES = [state.name.lower() for state in State]
 
 
@@ -63,7 +62,7 @@ def open_marked(stack: ExitStack, chromium: Browser, url: str) -> WatchedPage:
 def test_every_text_about_tags_zones_anchors_and_settings_is_from_the_catalogue(
     chromium: Browser, yard: ZonePlace
 ) -> None:
-    data = (*NAMES, "cart-3", "Yard", "Dock", "yard", "dock", "17", "default", *EXAMPLES)
+    data = (*NAMES, "cart-3", "Yard", "Dock", "yard", "dock", "17", "default")
     with ExitStack() as stack:
         page = open_marked(stack, chromium, yard.url)
         page.page.locator("tr[data-tag='lost']").wait_for()
