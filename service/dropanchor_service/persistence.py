@@ -1,4 +1,4 @@
-"""What the service keeps on disk: the site, the pose history and the recordings, as the settings enable them."""
+"""What the service keeps on disk: the site, the pose history, the recordings and more, as the settings enable them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -6,6 +6,7 @@ from typing import Self
 
 from pydantic import ValidationError
 
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
@@ -102,3 +103,13 @@ def open_site(settings: Settings) -> SiteStore:
         return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
     except (OSError, ValidationError) as error:
         raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error
+
+
+def open_omlox(settings: Settings) -> OmloxItems:
+    """Return what omlox clients have stored. Raises SettingsError."""
+    try:
+        return OmloxItems.opened(settings.data_dir)
+    except (OSError, ValidationError) as error:
+        raise SettingsError(
+            f"data_dir: the objects of omlox clients in {settings.data_dir} cannot be read: {error}"
+        ) from error
