@@ -20,15 +20,20 @@ from dropanchor_service.store import SiteStore, TagTable
 
 
 class Persistence:
-    """The history (`tracks`) and the recorder, each None when disabled. They write while this context is open."""
+    """The history (`tracks`) and the recorder, each None when disabled, and what omlox clients have stored.
+
+    History and recorder write while this context is open.
+    """
 
     def __init__(
         self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics
     ) -> None:
+        """Raises SettingsError when what omlox clients have stored cannot be read."""
         self._settings = settings
         self._opened = ExitStack()
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
+        self.omlox = _open_omlox(settings)
         folder = settings.data_dir
         if folder is None:
             return
@@ -105,7 +110,7 @@ def open_site(settings: Settings) -> SiteStore:
         raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error
 
 
-def open_omlox(settings: Settings) -> OmloxItems:
+def _open_omlox(settings: Settings) -> OmloxItems:
     """Return what omlox clients have stored. Raises SettingsError."""
     try:
         return OmloxItems.opened(settings.data_dir)

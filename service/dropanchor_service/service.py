@@ -34,7 +34,7 @@ from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.persistence import Persistence, open_omlox, open_site
+from dropanchor_service.persistence import Persistence, open_site
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of
@@ -99,7 +99,6 @@ class Service:
         self._zone_events = ZoneEvents(
             settings, self.site, self.tags, self.latest, self._health, self.clock.now_ns, self.metrics
         )
-        self._omlox = open_omlox(settings)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
@@ -301,5 +300,5 @@ class Service:
             authenticator=self._authenticator,
             rate_limiter=RateLimiter(self._settings.http.requests_per_s, self._settings.http.burst),
             cors_origins=self._settings.http.cors_origins,
-            omlox=self._omlox,
+            omlox=self._persistence.omlox,
         )
