@@ -28,6 +28,8 @@ def document_of(router: APIRouter, url: str) -> dict[str, Any]:
     for model in (OmloxProblem, FenceEvent, Feature, FeatureCollection):
         schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
         schemas |= schema.pop("$defs", {}) | {model.__name__: schema}
+    for unused in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(unused, None)
     document["components"]["securitySchemes"] = {"bearer": {"type": "http", "scheme": "bearer"}}
     document["security"] = [{"bearer": []}, {}]
     for operations in document["paths"].values():

@@ -2,13 +2,14 @@
 
 from threading import Event
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
 from dropanchor_service.api.omlox.feed.socket import Doorkeeper, feed_router
 from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.parameters import refuse_pages
 from dropanchor_service.api.omlox.routes.fences import fences_router
 from dropanchor_service.api.omlox.routes.providers import providers_router
 from dropanchor_service.api.omlox.routes.trackables import trackables_router
@@ -21,15 +22,15 @@ VERSIONS = ("v2", "v1")
 
 def add_omlox(app: FastAPI, hub: Hub, doorkeeper: Doorkeeper, stopping: Event) -> None:
     """Add the interface to the application, with a document of its own. stopping: ends the WebSockets when set."""
-    described, feed = _described(hub), feed_router(hub, doorkeeper, stopping)
+    described, feed = _described(hub, doorkeeper), feed_router(hub, doorkeeper, stopping)
     for version in VERSIONS:
         prefix = f"{OMLOX_PREFIX}{version}"
         for router in (described, feed, _document_router(described, prefix)):
             app.include_router(router, prefix=prefix, include_in_schema=False)
 
 
-def _described(hub: Hub) -> APIRouter:
-    router = APIRouter()
+def _described(hub: Hub, doorkeeper: Doorkeeper) -> APIRouter:
+    router = APIRouter(dependencies=[Depends(refuse_pages(doorkeeper.origins))])
     for part in (trackables_router(hub), providers_router(hub), zones_router(hub), fences_router(hub)):
         router.include_router(part)
     return router

@@ -83,9 +83,17 @@ RING = [[13.4, 52.5], [13.401, 52.5], [13.401, 52.501], [13.4, 52.5]]
         ({"region": {"type": "Point", "coordinates": [500, 800]}, "radius": 5}, "shape-refused", "degrees"),
         ({"region": {"type": "Point", "coordinates": [2.3, 48.8]}, "radius": 5}, "invalid-request", "100000"),
         ({"region": {"type": "Point", "coordinates": [13.4, 52.5]}, "radius": 1e6}, "invalid-request", "10000"),
-        ({"region": {"type": "Point", "coordinates": [1, 2]}, "radius": 5, "crs": "local"}, "invalid-request", "zone_id"),
+        (
+            {"region": {"type": "Point", "coordinates": [1, 2]}, "radius": 5, "crs": "local"},
+            "invalid-request",
+            "zone_id",
+        ),
         ({"region": {"type": "Line", "coordinates": []}}, "invalid-request", "Point"),
-        ({"region": {"type": "Point", "coordinates": [1, 2]}, "radius": 5, "crs": "EPSG:3857"}, "invalid-request", "crs"),
+        (
+            {"region": {"type": "Point", "coordinates": [1, 2]}, "radius": 5, "crs": "EPSG:3857"},
+            "invalid-request",
+            "crs",
+        ),
     ],
 )
 def test_a_fence_that_cannot_be_a_zone_is_refused_with_a_reason(body: dict[str, Any], kind: str, words: str) -> None:

@@ -159,3 +159,17 @@ def test_keys_allow_here_what_they_allow_in_our_own_interface(tmp_path: Path) ->
     refused = bench.ask("GET", "providers")
     assert kind_of(refused) == "unauthenticated"
     assert refused.json()["code"] == 401
+
+
+def test_a_body_without_content_type_is_read_as_json_but_not_from_another_page() -> None:
+    bench = OmloxBench(cors_origins=("https://map.example",))
+    body = b'{"type": "virtual", "name": "Truck"}'
+
+    def created(**headers: str) -> int:
+        return bench.ask("POST", "trackables", content=body, headers=headers).status_code
+
+    assert created() == 201
+    assert created(origin="https://evil.example") == 403
+    assert created(origin="https://map.example") == 201
+    assert created(origin="http://test") == 201
+    assert len(bench.get("trackables")) == 3

@@ -19,6 +19,7 @@ from dropanchor_service.api.omlox.models import (
     TrackableMotion,
 )
 from dropanchor_service.api.omlox.parameters import (
+    LENIENT,
     ChangeQuery,
     FenceId,
     InsideQuery,
@@ -47,7 +48,7 @@ EXAMPLE = {
 
 
 def fences_router(hub: Hub) -> APIRouter:
-    router = APIRouter(prefix="/fences", tags=["fences"])
+    router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
     _add_object_routes(router, hub)
     _add_inside_routes(router, hub)

@@ -18,7 +18,7 @@ from dropanchor_service.api.omlox.models import (
     Trackable,
 )
 from dropanchor_service.api.omlox.own_properties import without_own
-from dropanchor_service.api.omlox.parameters import PlaceQuery, ProviderId, SpatialQuery, errors, many, one
+from dropanchor_service.api.omlox.parameters import LENIENT, PlaceQuery, ProviderId, SpatialQuery, errors, many, one
 from dropanchor_service.api.omlox.projection import projection_of
 from dropanchor_service.api.omlox.trackable_changes import forget, name_tag, save
 from dropanchor_service.api.routes.known_tag import known_tag
@@ -35,7 +35,7 @@ TAKES_NO_POSITIONS = (
 
 
 def providers_router(hub: Hub) -> APIRouter:
-    router = APIRouter(prefix="/providers", tags=["providers"])
+    router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
     _add_refused_routes(router)
     _add_object_routes(router, hub)
@@ -85,20 +85,24 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
 
 def _add_refused_routes(router: APIRouter) -> None:
     """Add the routes on which other hubs take positions. They answer why this one does not."""
-    for path in ("/locations", "/proximities", "/{provider_id}/location", "/{provider_id}/proximity"):
-        router.add_api_route(
-            path,
-            _refuse_positions,
-            methods=["PUT"],
-            operation_id="put" + path.replace("/", "_").replace("{provider_id}", "provider"),
-            summary="Refused: this service computes positions and takes none",
-            status_code=204,
-            responses=errors(Kind.NOT_OFFERED),
-        )
 
+    async def refuse() -> None:
+        raise ProblemError(Kind.NOT_OFFERED, TAKES_NO_POSITIONS)
 
-async def _refuse_positions() -> None:
-    raise ProblemError(Kind.NOT_OFFERED, TAKES_NO_POSITIONS)
+    async def refuse_of(provider_id: ProviderId) -> None:  # noqa: ARG001 - the document names it
+        await refuse()
+
+    for what, path in (("location", "locations"), ("proximity", "proximities")):
+        for operation, route, answer in ((what, f"/{{provider_id}}/{what}", refuse_of), (path, f"/{path}", refuse)):
+            router.add_api_route(
+                route,
+                answer,
+                methods=["PUT"],
+                operation_id=f"put_{operation}",
+                summary="Refused: this service computes positions and takes none",
+                status_code=204,
+                responses=errors(Kind.NOT_OFFERED),
+            )
 
 
 def _add_object_routes(router: APIRouter, hub: Hub) -> None:

@@ -20,6 +20,7 @@ from dropanchor_service.api.omlox.models import (
     TrackableMotion,
 )
 from dropanchor_service.api.omlox.parameters import (
+    LENIENT,
     ChangeQuery,
     PlaceQuery,
     SpatialQuery,
@@ -40,7 +41,7 @@ EXAMPLE = {"type": "virtual", "name": "Forklift 3", "location_providers": ["tag-
 
 
 def trackables_router(hub: Hub) -> APIRouter:
-    router = APIRouter(prefix="/trackables", tags=["trackables"])
+    router = APIRouter(prefix="/trackables", tags=["trackables"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
     _add_object_routes(router, hub)
     _add_place_routes(router, hub)
