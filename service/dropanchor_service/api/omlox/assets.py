@@ -44,8 +44,15 @@ class Assets:
 
     def of_tags(self, tags: Iterable[Tag]) -> list[Asset]:
         """Return the trackables that carry these tags."""
-        found = {identifier: self.find(identifier) for identifier in (self.id_of(tag.name) for tag in tags)}
-        return [asset for asset in found.values() if asset is not None]
+        claimed, made = self.claimed(), self._items.trackables.all
+        found: dict[UUID, Asset] = {}
+        for tag in tags:
+            identifier = claimed.get(tag.name)
+            if identifier is None:
+                found[self.own_id(tag.name)] = self._own(tag)
+            elif str(identifier) in made:
+                found[identifier] = Asset(made[str(identifier)], None)
+        return list(found.values())
 
     def id_of(self, tag: str) -> UUID:
         """Return the id of the trackable that carries a tag."""

@@ -51,7 +51,7 @@ class Hub:
         best = best_of(locations)
         if best is None:
             return None
-        values = asset.trackable.model_dump(mode="json", include={"id", "name", "geometry", "extrusion", "properties"})
+        values = asset.trackable.model_dump(mode="json", include={"id", "name", "extrusion", "properties"})
         return without_nulls(values | {"location": best})
 
     def motions(self, assets: Sequence[Asset], projection: Projection) -> list[Answer]:

@@ -113,7 +113,6 @@ class TrackableMotion(_Object):
     id: UUID
     location: Location
     name: str | None = None
-    geometry: Polygon | None = None
     extrusion: float | None = None
     properties: Properties | None = None
 

@@ -37,8 +37,7 @@ def change(hub: Hub, asset: Asset, trackable: Trackable) -> Asset:
     update = {"id": None, "name": None, "location_providers": None, "properties": without_own(trackable.properties)}
     save(hub.items.tag_trackables, tag.name, trackable.model_copy(update=update))
     name_tag(hub, tag.name, trackable.name)
-    changed = hub.assets.find(asset.trackable.id) if asset.trackable.id else None
-    return changed or asset
+    return hub.assets.of_tags([tag])[0]
 
 
 def remove(hub: Hub, asset: Asset) -> None:

@@ -22,6 +22,7 @@ import createClient from "openapi-fetch";
 import type { components, paths } from "./omlox.js";
 
 type Trackable = components["schemas"]["Trackable"];
+type News = { event: string; payload?: components["schemas"]["TrackableMotion"][] };
 
 const address = process.argv[2];
 const client = createClient<paths>({ baseUrl: `http://${address}/omlox/v2` });
@@ -42,7 +43,7 @@ const { data: fences } = await client.GET("/fences");
 const socket = new WebSocket(`ws://${address}/omlox/v2/ws/socket`);
 socket.onopen = () => socket.send(JSON.stringify({ event: "subscribe", topic: "trackable_motions" }));
 socket.onmessage = ({ data }) => {
-    const { event, payload } = JSON.parse(data) as { event: string; payload?: components["schemas"]["TrackableMotion"][] };
+    const { event, payload } = JSON.parse(data) as News;
     if (event === "subscribed") {
         console.log(JSON.stringify({ own, coordinates: location.position.coordinates, error, fences }));
         return;

@@ -175,8 +175,7 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(_UNKNOWN),
     )
     def list_trackables(provider_id: ProviderId) -> Response:
-        asset = hub.assets.find(hub.assets.id_of(known_tag(hub.answers, provider_id).name))
-        return json_response(hub.trackables([] if asset is None else [asset]))
+        return json_response(hub.trackables(hub.assets.of_tags([known_tag(hub.answers, provider_id)])))
 
     @router.get(
         "/{provider_id}/fences",
