@@ -54,12 +54,13 @@ def test_a_subscription_brings_each_new_location_as_an_object(bench: OmloxBench,
 def test_a_place_that_is_not_known_is_never_sent(bench: OmloxBench, socket: Socket) -> None:
     socket.subscribe("location_updates")
     socket.subscribe("trackable_motions")
-    for name, fields in {
+    poses: dict[str, dict[str, Any]] = {
         "ambiguous": {"state": State.AMBIGUOUS},
         "lost": {"state": State.LOST},
         "turned": {"frame": Frame.RELATIVE},
         "nowhere": {"x": float("nan")},
-    }.items():
+    }
+    for name, fields in poses.items():
         bench.poses.move(name, **fields)
     bench.poses.move("known")
     found = [socket.next()["payload"] for _ in range(2)]
@@ -88,10 +89,11 @@ def test_motions_and_geojson_have_their_own_topics(bench: OmloxBench, version: s
 def test_parameters_select_what_is_sent(bench: OmloxBench, socket: Socket) -> None:
     bench.poses.move("tag-1", "tag-2")
     second = bench.id_of("tag-2")
-    for topic, params in {
+    subscriptions: dict[str, dict[str, Any]] = {
         "location_updates": {"provider_id": ["TAG-2", "x"], "provider_type": "uwb", "source": "17", "accuracy": "0.6"},
         "trackable_motions": {"id": second.upper()},
-    }.items():
+    }
+    for topic, params in subscriptions.items():
         socket.subscribe(topic, **params)
     socket.subscribe("location_updates", accuracy=0.1)
     socket.subscribe("location_updates", floor=3)

@@ -90,7 +90,11 @@ def test_a_generated_python_client_reads_and_changes_the_hub(
     bench: OmloxBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module = generated_python(document(bench, tmp_path), monkeypatch)
-    models, api = module("models"), lambda name: module(f"api.{name}")
+    models = module("models")
+
+    def api(name: str) -> Any:
+        return module(f"api.{name}")
+
     with bench.running() as port, module("client").Client(f"http://127.0.0.1:{port}/omlox/v2") as client:
         (own,) = api("trackables.list_trackables").sync(client=client)
         assert own.location_providers == ["tag-1"]

@@ -1,6 +1,7 @@
 """Trackables and location providers: what clients create, change and delete."""
 
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 import pytest
@@ -152,7 +153,7 @@ def test_keys_allow_here_what_they_allow_in_our_own_interface(tmp_path: Path) ->
     reader, writer, admin = (keys.add(scope.word, scope) for scope in Scope)
     tag = keys.add_for_tag("phone", "tag-1")
 
-    def status(secret: str, method: str, path: str, **options: object) -> int:
+    def status(secret: str, method: str, path: str, **options: Any) -> int:
         headers = {"authorization": f"Bearer {secret}"} if secret else {}
         return bench.ask(method, path, headers=headers, **options).status_code
 
