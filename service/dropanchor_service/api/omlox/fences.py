@@ -93,7 +93,10 @@ class Fences:
     def _zone(self, name: str, fence: Fence, present: SiteZone | None) -> SiteZone:
         values: dict[str, Any] = {} if present is None else present.model_dump()
         try:
-            zone = SiteZone.model_validate(values | {"id": name, "name": fence.name or "", "shape": self._shape(fence)})
+            zone = SiteZone.model_validate(
+                values
+                | {"id": name, "name": "" if fence.name in (None, name) else fence.name, "shape": self._shape(fence)}
+            )
             vertices_of(zone.shape)
         except ValidationError as error:
             found = error.errors()[0]

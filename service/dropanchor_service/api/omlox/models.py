@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 from uuid import UUID
 
-from pydantic import BaseModel, ConfigDict, Field
+import orjson
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.site import Number
 from dropanchor_schemas.zones import MAX_POINTS
@@ -17,7 +18,29 @@ MAX_RINGS = 8
 
 LOCAL, WGS84 = "local", "EPSG:4326"
 
+MAX_BYTES = 65_536
+MAX_DEPTH = 32
+
+
+def _storable(value: object) -> object:
+    """Return what a client sends as it can be stored and returned. Raises ValueError."""
+    try:
+        written = orjson.dumps(value)
+    except TypeError as error:
+        raise ValueError(f"cannot be stored as JSON: {error}") from error
+    if len(written) > MAX_BYTES or _depth(value) > MAX_DEPTH:
+        raise ValueError(f"may have at most {MAX_BYTES} bytes of JSON and {MAX_DEPTH} levels")
+    stored: object = orjson.loads(written)
+    return stored
+
+
+def _depth(value: object) -> int:
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    return 1 + max(map(_depth, inner), default=0)
+
+
 Properties = dict[str, Any]
+StoredProperties = Annotated[Properties, AfterValidator(_storable)]
 Position = Annotated[list[Number], Field(min_length=2, max_length=3)]
 ProviderType = Literal["uwb", "gps", "wifi", "rfid", "ibeacon", "virtual", "unknown"]
 Milliseconds = Annotated[Number, Field(ge=-1, description="Milliseconds; -1: without end. Stored, not used.")]
@@ -82,14 +105,14 @@ class LocationProvider(_Fencing):
     id: str = Field(max_length=64, description="Id of the tag.")
     type: ProviderType
     name: Name | None = None
-    sensors: Any = None
-    properties: Properties | None = None
+    sensors: Annotated[Any, AfterValidator(_storable)] = None
+    properties: StoredProperties | None = None
 
 
 class LocatingRule(_Object):
     """Which of several providers counts. Stored and returned; this service takes the most accurate one."""
 
-    expression: str
+    expression: Annotated[str, Field(max_length=1000)]
     priority: Number
 
 
@@ -101,9 +124,9 @@ class Trackable(_Fencing):
     name: Name | None = None
     geometry: Polygon | None = None
     extrusion: Metres | None = None
-    location_providers: Annotated[list[str], Field(max_length=1000)] | None = None
+    location_providers: Annotated[list[Annotated[str, Field(max_length=64)]], Field(max_length=1000)] | None = None
     radius: Metres | None = None
-    properties: Properties | None = None
+    properties: StoredProperties | None = None
     locating_rules: Annotated[list[LocatingRule], Field(max_length=100)] | None = None
 
 
@@ -132,9 +155,9 @@ class Fence(_Object):
     tolerance_timeout: Milliseconds | None = None
     exit_delay: Milliseconds | None = None
     crs: str | None = Field(default=None, description="`local` or `EPSG:4326`, which is meant without it.")
-    zone_id: str | None = Field(default=None, description="Required with the crs `local`.")
+    zone_id: str | None = Field(default=None, max_length=64, description="Required with the crs `local`.")
     elevation_ref: Literal["floor", "wgs84"] | None = None
-    properties: Properties | None = None
+    properties: StoredProperties | None = None
 
 
 class Zone(_Object):

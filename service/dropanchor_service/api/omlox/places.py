@@ -44,8 +44,8 @@ class Places:
         self._answers = answers
         self._assets = assets
 
-    def of_tags(self, tags: Sequence[Tag] | None, projection: Projection) -> list[Answer]:
-        """Return the `Location` of each of these tags, or of all, that has one."""
+    def of_tags(self, tags: Sequence[Tag], projection: Projection) -> list[Answer]:
+        """Return the `Location` of each of these tags that has one."""
         return self.of_poses(self._answers.rows(tags), projection)
 
     def of_poses(self, poses: Any, projection: Projection) -> list[Answer]:

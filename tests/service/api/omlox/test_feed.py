@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -126,6 +127,25 @@ def test_entries_and_exits_are_sent_in_order_and_can_be_selected(bench: OmloxBen
     assert (second.event_type, second.exit_time) == ("region_exit", "1970-01-01T00:00:00.005Z")
     assert str(third.trackable_id) == bench_id(bench, "tag-3")
     assert third.provider_id is None
+
+
+def test_an_event_that_is_stored_while_others_are_read_is_sent_once(
+    bench: OmloxBench, socket: Socket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = bench.zones.store.after
+    tags = iter(["tag-2"])
+
+    def read_late(*arguments: Any) -> Any:
+        happen(bench, *islice(tags, 1))
+        return read(*arguments)
+
+    socket.subscribe("fence_events")
+    monkeypatch.setattr(bench.zones.store, "after", read_late)
+    happen(bench, "tag-1")
+    assert len(socket.next()["payload"]) == 2
+    happen(bench, "tag-3")
+    (event,) = socket.next()["payload"]
+    assert event["trackable_id"] == bench_id(bench, "tag-3")
 
 
 def test_fence_events_as_geojson_have_the_shape_of_the_fence(bench: OmloxBench, socket: Socket) -> None:

@@ -186,3 +186,32 @@ def test_a_damaged_file_ends_the_start_with_a_sentence(tmp_path: Path) -> None:
     site = SiteStore(YARD, {})
     with pytest.raises(SettingsError, match="omlox"):
         Persistence(Settings(data_dir=tmp_path), TagTable(), site, lambda: 0, Metrics())
+
+
+def nested(levels: int) -> str:
+    return '{"a":' * levels + "1" + "}" * levels
+
+
+@pytest.mark.parametrize(
+    "properties",
+    [
+        nested(40),
+        nested(900),
+        nested(100_000),
+        '{"a": 123456789012345678901234567890}',
+        r'{"a": "\ud800"}',
+        '{"a": "%s"}',
+    ],
+)
+def test_properties_that_cannot_be_returned_are_refused_and_harm_no_other_object(properties: str) -> None:
+    bench = OmloxBench()
+    bench.poses.move("tag-1")
+    text = properties.replace("%s", "x" * 70_000)
+    body = '{"id": "tag-1", "type": "uwb", "region": {"type": "Point", "coordinates": [13.4, 52.5]}, "radius": 5, '
+    headers = {"content-type": "application/json"}
+    for method, path in (("PUT", "providers/tag-1"), ("POST", "fences"), ("POST", "trackables")):
+        known = body if path.startswith("providers") else body.replace('"id": "tag-1", ', "").replace("uwb", "omlox")
+        found = bench.refusal(method, path, content=f'{known}"properties": {text}}}', headers=headers)
+        assert found[:2] == ("invalid-request", 400)
+    assert len(bench.get("trackables/summary")) == len(bench.get("providers/summary")) == 1
+    assert bench.get("fences/summary") == []

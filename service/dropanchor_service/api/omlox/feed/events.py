@@ -38,7 +38,8 @@ class EventFeed:
         if self._position == newest:
             return
         stored = self._hub.events.after(self._position, MAX_EVENTS, self._selection)
-        self._position = stored[-1].sequence if len(stored) == MAX_EVENTS else newest
+        last = stored[-1].sequence if stored else newest
+        self._position = last if len(stored) == MAX_EVENTS else max(last, newest)  # it may have grown meanwhile
         found = [answer for event in stored if (answer := self._object(event)) is not None]
         if found:
             yield [collection(map(self._feature, found))] if self._project else found

@@ -29,7 +29,7 @@ from dropanchor_service.api.routes.stream import stopped_within
 from dropanchor_service.security.identity import Authenticator, Identity, Scope, UnauthenticatedError
 
 PERIOD_S = 0.1
-IDLE_SHARE = 3.0  # a client gets no more than a quarter of a core: the pause is so many times the work before it
+PAUSE_PER_WORK = 3.0  # so a connection takes at most a quarter of a core
 CONNECTIONS_PER_CLIENT = 16
 MAX_SUBSCRIPTIONS = 32  # of one connection
 
@@ -164,18 +164,23 @@ class Connection:
     async def _send_news(self, stopping: Event) -> None:
         pause_s = PERIOD_S
         while not await stopped_within(pause_s, stopping):
-            pause_s = PERIOD_S
-            for number, subscription in list(self._subscriptions.items()):
-                began_s = time.monotonic()
-                messages = await asyncio.to_thread(self._news, number, subscription)
-                pause_s += IDLE_SHARE * (time.monotonic() - began_s)
-                for message in messages:
-                    async with self._sending:
-                        if number in self._subscriptions or message["event"] == "error":
-                            await self._send(message)
+            if not self._subscriptions:
+                continue
+            began_s = time.monotonic()
+            news = await asyncio.to_thread(self._news)
+            pause_s = PERIOD_S + PAUSE_PER_WORK * (time.monotonic() - began_s)
+            for number, message in news:
+                async with self._sending:
+                    if number in self._subscriptions or message["event"] == "error":
+                        await self._send(message)
         await self._socket.close(RESTART, "The service stops. Connect again.")
 
-    def _news(self, number: int, subscription: Subscription) -> list[dict[str, Any]]:
+    def _news(self) -> list[tuple[int, dict[str, Any]]]:
+        """Return the messages that are due, and the number of the subscription of each."""
+        subscriptions = list(self._subscriptions.items())
+        return [(number, message) for number, one in subscriptions for message in self._news_of(number, one)]
+
+    def _news_of(self, number: int, subscription: Subscription) -> list[dict[str, Any]]:
         """Return the messages that are due to a subscription. End it if it is no longer possible."""
         try:
             self._require_valid(subscription)
