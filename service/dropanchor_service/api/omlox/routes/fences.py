@@ -50,8 +50,11 @@ EXAMPLE = {
 def fences_router(hub: Hub) -> APIRouter:
     router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
+    _add_collection_changes(router, hub)
     _add_object_routes(router, hub)
-    _add_inside_routes(router, hub)
+    _add_change_route(router, hub)
+    _add_routes_for_places_inside(router, hub)
+    _add_routes_for_objects_inside(router, hub)
     return router
 
 
@@ -71,6 +74,8 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         projection = query.projection(hub)
         return many([hub.fences.answer(zone, projection) for zone in hub.fences.all()], query, fence_feature)
 
+
+def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
     @router.post(
         "",
         operation_id="create_fence",
@@ -115,6 +120,20 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
     def get_fence(fence_id: FenceId, query: Annotated[PlaceQuery, Query()]) -> Response:
         return one(hub.fences.answer(hub.fences.find(fence_id), query.projection(hub)), query, fence_feature)
 
+    @router.delete(
+        "/{fence_id}",
+        operation_id="delete_fence",
+        summary="Delete a fence",
+        description="Its events stay. What is inside makes no exit.",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.NOT_SAVED),
+    )
+    def delete_fence(fence_id: FenceId) -> Response:
+        hub.fences.delete(hub.fences.find(fence_id))
+        return Response(status_code=204)
+
+
+def _add_change_route(router: APIRouter, hub: Hub) -> None:
     @router.put(
         "/{fence_id}",
         operation_id="put_fence",
@@ -134,24 +153,8 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         hub.fences.save(present.id, fence, present)
         return Response(status_code=204)
 
-    @router.delete(
-        "/{fence_id}",
-        operation_id="delete_fence",
-        summary="Delete a fence",
-        description="Its events stay. What is inside makes no exit.",
-        status_code=204,
-        responses=errors(_UNKNOWN, Kind.NOT_SAVED),
-    )
-    def delete_fence(fence_id: FenceId) -> Response:
-        hub.fences.delete(hub.fences.find(fence_id))
-        return Response(status_code=204)
 
-
-def _add_inside_routes(router: APIRouter, hub: Hub) -> None:
-    def tags_in(fence_id: FenceId, query: SpatialQuery) -> list[Tag]:
-        tags = {tag.name: tag for tag in hub.answers.tags.listed()}
-        return hub.inside.tags_in(hub.fences.find(fence_id), query.spatial_query, tags)
-
+def _add_routes_for_places_inside(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{fence_id}/locations",
         operation_id="list_fence_locations",
@@ -160,7 +163,7 @@ def _add_inside_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(*_INSIDE, *_PLACED),
     )
     def list_locations(fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
-        tags = tags_in(fence_id, query)
+        tags = _tags_in(hub, fence_id, query)
         return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
 
     @router.get(
@@ -171,9 +174,11 @@ def _add_inside_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(*_INSIDE, *_PLACED),
     )
     def list_motions(fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
-        assets = hub.assets.of_tags(tags_in(fence_id, query))
+        assets = hub.assets.of_tags(_tags_in(hub, fence_id, query))
         return many(hub.motions(assets, query.projection(hub)), query, motion_feature)
 
+
+def _add_routes_for_objects_inside(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{fence_id}/providers",
         operation_id="list_fence_providers",
@@ -182,7 +187,7 @@ def _add_inside_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(*_INSIDE),
     )
     def list_providers(fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        return json_response(hub.providers(tags_in(fence_id, query)))
+        return json_response(hub.providers(_tags_in(hub, fence_id, query)))
 
     @router.get(
         "/{fence_id}/trackables",
@@ -192,4 +197,9 @@ def _add_inside_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(*_INSIDE),
     )
     def list_trackables(fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        return json_response(hub.trackables(hub.assets.of_tags(tags_in(fence_id, query))))
+        return json_response(hub.trackables(hub.assets.of_tags(_tags_in(hub, fence_id, query))))
+
+
+def _tags_in(hub: Hub, fence_id: FenceId, query: SpatialQuery) -> list[Tag]:
+    tags = {tag.name: tag for tag in hub.answers.tags.listed()}
+    return hub.inside.tags_in(hub.fences.find(fence_id), query.spatial_query, tags)

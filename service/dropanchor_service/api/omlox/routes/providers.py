@@ -37,8 +37,11 @@ TAKES_NO_POSITIONS = (
 def providers_router(hub: Hub) -> APIRouter:
     router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
+    _add_create_route(router, hub)
     _add_refused_routes(router)
     _add_object_routes(router, hub)
+    _add_delete_route(router, hub)
+    _add_location_route(router, hub)
     _add_related_routes(router, hub)
     return router
 
@@ -68,6 +71,8 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
     def list_locations(query: Annotated[PlaceQuery, Query()]) -> Response:
         return many(hub.places.of_tags(hub.answers.tags.listed(), query.projection(hub)), query, location_feature)
 
+
+def _add_create_route(router: APIRouter, hub: Hub) -> None:
     @router.post(
         "",
         operation_id="create_provider",
@@ -134,6 +139,8 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         _saved(hub, provider)
         return Response(status_code=204)
 
+
+def _add_delete_route(router: APIRouter, hub: Hub) -> None:
     @router.delete(
         "/{provider_id}",
         operation_id="delete_provider",
@@ -152,7 +159,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         return Response(status_code=204)
 
 
-def _add_related_routes(router: APIRouter, hub: Hub) -> None:
+def _add_location_route(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{provider_id}/location",
         operation_id="get_provider_location",
@@ -167,6 +174,8 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
             raise hub.no_location([tag])
         return one(locations[0], query, location_feature)
 
+
+def _add_related_routes(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{provider_id}/trackables",
         operation_id="list_provider_trackables",

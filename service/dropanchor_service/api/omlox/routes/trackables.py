@@ -43,8 +43,11 @@ EXAMPLE = {"type": "virtual", "name": "Forklift 3", "location_providers": ["tag-
 def trackables_router(hub: Hub) -> APIRouter:
     router = APIRouter(prefix="/trackables", tags=["trackables"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
+    _add_collection_changes(router, hub)
     _add_object_routes(router, hub)
-    _add_place_routes(router, hub)
+    _add_change_route(router, hub)
+    _add_location_routes(router, hub)
+    _add_motion_route(router, hub)
     _add_related_routes(router, hub)
     return router
 
@@ -82,6 +85,8 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
     def list_motions(query: Annotated[PlaceQuery, Query()]) -> Response:
         return many(hub.motions(hub.assets.all(), query.projection(hub)), query, motion_feature)
 
+
+def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
     @router.post(
         "",
         operation_id="create_trackable",
@@ -123,6 +128,20 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
     def get_trackable(trackable_id: TrackableId) -> Response:
         return json_response(hub.trackables([found(hub, trackable_id)])[0])
 
+    @router.delete(
+        "/{trackable_id}",
+        operation_id="delete_trackable",
+        summary="Delete a trackable that a client has created",
+        description="Its tags get trackables of their own again.",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.STANDS_FOR_A_TAG, Kind.NOT_SAVED),
+    )
+    def delete_trackable(trackable_id: TrackableId) -> Response:
+        remove(hub, found(hub, trackable_id))
+        return Response(status_code=204)
+
+
+def _add_change_route(router: APIRouter, hub: Hub) -> None:
     @router.put(
         "/{trackable_id}",
         operation_id="put_trackable",
@@ -138,20 +157,8 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
     ) -> Response:
         return json_response(hub.trackables([change(hub, found(hub, trackable_id), trackable)])[0])
 
-    @router.delete(
-        "/{trackable_id}",
-        operation_id="delete_trackable",
-        summary="Delete a trackable that a client has created",
-        description="Its tags get trackables of their own again.",
-        status_code=204,
-        responses=errors(_UNKNOWN, Kind.STANDS_FOR_A_TAG, Kind.NOT_SAVED),
-    )
-    def delete_trackable(trackable_id: TrackableId) -> Response:
-        remove(hub, found(hub, trackable_id))
-        return Response(status_code=204)
 
-
-def _add_place_routes(router: APIRouter, hub: Hub) -> None:
+def _add_location_routes(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{trackable_id}/location",
         operation_id="get_trackable_location",
@@ -177,6 +184,8 @@ def _add_place_routes(router: APIRouter, hub: Hub) -> None:
         tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
         return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
 
+
+def _add_motion_route(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{trackable_id}/motion",
         operation_id="get_motion",

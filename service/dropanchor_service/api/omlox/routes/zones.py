@@ -17,7 +17,12 @@ ForeignId = Annotated[str | None, Query(description="Return only the zone of the
 
 def zones_router(hub: Hub) -> APIRouter:
     router = APIRouter(prefix="/zones", tags=["zones"])
+    _add_list_routes(router, hub)
+    _add_object_route(router, hub)
+    return router
 
+
+def _add_list_routes(router: APIRouter, hub: Hub) -> None:
     @router.get("", operation_id="list_zone_ids", summary="List the ids of the zones", responses=errors())
     def list_ids(foreign_id: ForeignId = None) -> list[str]:
         return [zone["id"] for zone in zone_answers(hub.answers.site.site, foreign_id)]
@@ -32,6 +37,8 @@ def zones_router(hub: Hub) -> APIRouter:
     def list_zones(foreign_id: ForeignId = None) -> Response:
         return json_response(list(zone_answers(hub.answers.site.site, foreign_id)))
 
+
+def _add_object_route(router: APIRouter, hub: Hub) -> None:
     @router.get(
         "/{zone_id}",
         operation_id="get_zone",
@@ -44,5 +51,3 @@ def zones_router(hub: Hub) -> APIRouter:
             if zone["id"] == str(zone_id):
                 return json_response(zone)
         raise ProblemError(Kind.UNKNOWN_ZONE, f"There is no zone with the id {zone_id}.")
-
-    return router
