@@ -50,7 +50,8 @@ EXAMPLE = {
 def fences_router(hub: Hub) -> APIRouter:
     router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
     _add_list_routes(router, hub)
-    _add_collection_changes(router, hub)
+    _add_create_route(router, hub)
+    _add_collection_delete(router, hub)
     _add_object_routes(router, hub)
     _add_change_route(router, hub)
     _add_routes_for_places_inside(router, hub)
@@ -75,7 +76,7 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         return many([hub.fences.answer(zone, projection) for zone in hub.fences.all()], query, fence_feature)
 
 
-def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
+def _add_create_route(router: APIRouter, hub: Hub) -> None:
     @router.post(
         "",
         operation_id="create_fence",
@@ -96,6 +97,8 @@ def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
         projection = projection_of(hub.answers.site.site, fence.crs)
         return json_response(hub.fences.answer(zone, projection), status=201)
 
+
+def _add_collection_delete(router: APIRouter, hub: Hub) -> None:
     @router.delete(
         "",
         operation_id="delete_fences",
