@@ -17,7 +17,7 @@ class EventType(StrEnum):
     TAG_BATTERY_LOW = "dropanchor.tag.battery_low"
     TAG_LOST = "dropanchor.tag.lost"
     TAG_AMBIGUOUS = "dropanchor.tag.ambiguous"
-    WEBHOOK_TEST = "dropanchor.webhook.test"
+    DESTINATION_TEST = "dropanchor.destination.test"
 
 
 class _Answer(BaseModel):
@@ -50,7 +50,7 @@ class Event(_Answer):
     id: str = Field(description="Unique. A receiver that has seen it drops the event.")
     source: str = Field(description="`urn:dropanchor:site:` and the id of the site.")
     type: EventType
-    subject: str = Field(description="Id of the tag; of a test, the id of the webhook.")
+    subject: str = Field(description="Id of the tag; of a test, the id of the destination.")
     time: str = Field(description="RFC 3339, UTC.")
     sequence: str = Field(description="Position in the order of all events of the service: 20 digits, which sort.")
     datacontenttype: Literal["application/json"] = "application/json"

@@ -1,7 +1,8 @@
-"""What the service keeps on disk: the site, the pose history, the recordings and more, as the settings enable them."""
+"""What the service keeps on disk: site, floor plans, history, recordings and more, as the settings enable them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Self
 
 from pydantic import ValidationError
@@ -12,6 +13,7 @@ from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
@@ -20,17 +22,18 @@ from dropanchor_service.store import SiteStore, TagTable
 
 
 class Persistence:
-    """The history (`tracks`) and the recorder, each None when disabled, and what omlox clients have stored.
+    """Floor plans, what omlox clients have stored, and the history (`tracks`) and recorder, both None when disabled.
 
-    History and recorder write while this context is open.
+    History and recorder write while this context is open. Creating it raises SettingsError when a file that people have
+    filled cannot be read.
     """
 
     def __init__(
         self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics
     ) -> None:
-        """Raises SettingsError when what omlox clients have stored cannot be read."""
         self._settings = settings
         self._opened = ExitStack()
+        self.plans = _open_plans(settings.data_dir)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         self.omlox = _open_omlox(settings)
@@ -100,6 +103,13 @@ def file_limits_of(settings: RecordingSettings) -> Limits:
         keep_ns=round(settings.keep_days * 86_400e9),
         max_bytes=int(settings.most_mib * 2**20),
     )
+
+
+def _open_plans(folder: Path | None) -> PlanStore:
+    try:
+        return PlanStore(folder)
+    except (OSError, ValidationError) as error:
+        raise SettingsError(f"data_dir: the floor plans in {folder} cannot be read: {error}") from error
 
 
 def open_site(settings: Settings) -> SiteStore:

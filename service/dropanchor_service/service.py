@@ -5,6 +5,7 @@ import os
 import socket
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
+from functools import partial
 from threading import Event
 from types import TracebackType
 from typing import Self
@@ -33,11 +34,12 @@ from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
+from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.persistence import Persistence, open_site
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
-from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of
+from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of, expiries_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, TagTable
 from dropanchor_service.zenoh_io.caches import ZenohCaches
@@ -106,6 +108,8 @@ class Service:
 
     def _register_gauges(self) -> None:
         self.metrics.register(HealthGauges(self.tags, self._health, self.clock.now_ns, self._publishers))
+        expiries = partial(expiries_of, self._certificate, self._credentials)
+        self.metrics.register(OperationGauges(self.problems, self.impairments, self._settings.data_dir, expiries))
         self.metrics.register(
             FleetGauges(self.tags, self._pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
         )
@@ -135,10 +139,8 @@ class Service:
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
         if self._checkpoints is None:
-            folder = self._settings.data_dir
-            reason = (
-                "data_dir is not set" if folder is None else f"not possible with the engine {self._settings.engine}"
-            )
+            engine = f"not possible with the engine {self._settings.engine}"
+            reason = "data_dir is not set" if self._settings.data_dir is None else engine
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
 
@@ -229,9 +231,7 @@ class Service:
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
         if self._thread.is_alive or "ingest" in self._supervision.dead_threads:
-            _log.error(
-                "the ingest thread did not stop cleanly, so no last checkpoint is written; the previous one stays"
-            )
+            _log.error("the ingest thread did not stop cleanly: the previous checkpoint stays the newest one")
         else:
             checkpoints.stop()
 
@@ -290,6 +290,7 @@ class Service:
             impaired=self.impairments,
             recorder=self._persistence.recorder,
             events=self._zone_events.parts,
+            plans=self._persistence.plans,
             registry=self.metrics.registry,
             stopping=self._stopping,
             receive=self._receive,

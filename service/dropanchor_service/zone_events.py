@@ -1,4 +1,4 @@
-"""Zones, events and webhooks, as the settings want them."""
+"""Zones, events and their delivery, as the settings want them."""
 
 import sqlite3
 from collections.abc import Callable, Sequence
@@ -6,9 +6,11 @@ from contextlib import ExitStack
 from functools import partial
 from typing import Self
 
-from pydantic import ValidationError
-
 from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.delivery.channels import Channels
+from dropanchor_service.delivery.queue import Patience
+from dropanchor_service.delivery.registry import addressees, open_destinations
+from dropanchor_service.delivery.thread import DeliveryThread
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.store import EventStore
@@ -16,14 +18,9 @@ from dropanchor_service.events.thread import EventThread, Retention
 from dropanchor_service.events.watcher import Fleet, Watcher
 from dropanchor_service.metrics.events import EventMetrics
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.settings.events import WebhookSettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, TagTable
-from dropanchor_service.webhooks.queue import Patience
-from dropanchor_service.webhooks.registry import addressees, open_webhooks
-from dropanchor_service.webhooks.sender import Sender
-from dropanchor_service.webhooks.thread import WebhookThread
 from dropanchor_service.zones.items import ZoneItems
 
 
@@ -44,15 +41,15 @@ class ZoneEvents:
         self._opened = ExitStack()
         folder = settings.data_dir
         try:
-            items, webhooks = ZoneItems.opened(folder), open_webhooks(folder)
+            items, destinations = ZoneItems.opened(folder), open_destinations(folder)
             self._database = Database(folder)
-            self.store = EventStore(self._database, site.site.id, partial(addressees, webhooks))
+            self.store = EventStore(self._database, site.site.id, partial(addressees, destinations))
             states = self.store.states()
-        except (OSError, ValidationError, sqlite3.Error) as error:
+        except (OSError, ValueError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
-        deliveries, sender = Deliveries(self._database), _sender(settings.webhooks)
-        patience = Patience(settings.webhooks.retry_s, round(settings.webhooks.give_up_hours * 3600e9))
-        self._webhooks = WebhookThread(webhooks, deliveries, sender, patience, now_ns)
+        deliveries, channels = Deliveries(self._database), _channels(settings, site)
+        patience = Patience(settings.delivery.retry_s, round(settings.delivery.give_up_hours * 3600e9))
+        self._delivery = DeliveryThread(destinations, deliveries, channels, patience, now_ns)
         self._events = EventThread(
             Watcher(Fleet(site, tags, latest, health, now_ns), items, states),
             self.store,
@@ -60,12 +57,12 @@ class ZoneEvents:
             now_ns,
             settings.events.period_ms * 1e-3,
         )
-        self.parts = EventParts(items, self.store, webhooks, deliveries, sender, self._webhooks.problem_of)
-        metrics.register(EventMetrics(self._events, self.store, deliveries, self._webhooks))
+        self.parts = EventParts(items, self.store, destinations, deliveries, channels, self._delivery.problem_of)
+        metrics.register(EventMetrics(self._events, self.store, deliveries, self._delivery, now_ns))
 
     def __enter__(self) -> Self:
         self._opened.callback(self._database.close)
-        self._opened.enter_context(self._webhooks)
+        self._opened.enter_context(self._delivery)
         self._opened.enter_context(self._events)
         return self
 
@@ -77,8 +74,15 @@ class ZoneEvents:
         return [] if self._events.problem is None else [self._events.problem]
 
 
-def _sender(settings: WebhookSettings) -> Sender:
+def _channels(settings: Settings, site: SiteStore) -> Channels:
+    """Return the ways to destinations. Raises SettingsError."""
+
+    def name_of(tag: str) -> str:
+        name = site.tag_settings(tag).name
+        return f"{name} ({tag})" if name else tag
+
+    delivery = settings.delivery
     try:
-        return Sender(settings.timeout_s, settings.allow_networks, settings.authorities)
+        return Channels(delivery, settings.email, settings.mqtt, name_of)
     except OSError as error:
-        raise SettingsError(f"webhooks.authorities: {settings.authorities} cannot be read: {error}") from error
+        raise SettingsError(f"delivery.authorities: {delivery.authorities} cannot be read: {error}") from error

@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,6 +16,7 @@ from support.service import ROOT, running_service
 
 DEPLOY = ROOT / "deploy"
 BOARD = DEPLOY / "grafana" / "dashboards" / "dropanchor.json"
+RUNBOOK = ROOT / "service" / "docs" / "how-to" / "answer-alerts.md"
 ALERTS = DEPLOY / "prometheus" / "alerts.yml"
 MADE_BY_PROMETHEUS = {"up": {"job", "instance"}}
 ADDED_BY_PROMETHEUS = {"job", "instance"}
@@ -79,6 +82,56 @@ def test_every_alert_says_what_happened_and_what_to_do() -> None:
         assert rule["labels"]["severity"] in ("critical", "warning")
         assert rule["annotations"]["summary"]
         assert rule["annotations"]["action"]
+
+
+def test_every_alert_names_its_section_in_the_runbook_and_no_section_is_left_over() -> None:
+    for rule in rules():
+        assert rule["annotations"]["runbook"] == f"{RUNBOOK.relative_to(ROOT).as_posix()}#{rule['alert'].lower()}"
+    sections = re.findall(r"^## (\w+)$", RUNBOOK.read_text(), re.MULTILINE)
+    assert sorted(sections) == sorted(rule["alert"] for rule in rules())
+
+
+def test_alertmanager_tells_receivers_that_exist_about_alerts_that_exist() -> None:
+    configuration = yaml.safe_load((DEPLOY / "alertmanager" / "alertmanager.yml").read_text())
+    known = {receiver["name"] for receiver in configuration["receivers"]}
+    top = configuration["route"]
+    assert {route["receiver"] for route in (top, *top["routes"])} <= known
+    alerts, severities = {rule["alert"] for rule in rules()}, {rule["labels"]["severity"] for rule in rules()}
+    matchers = [matcher for route in top["routes"] for matcher in route["matchers"]]
+    for inhibition in configuration["inhibit_rules"]:
+        matchers += inhibition["source_matchers"] + inhibition["target_matchers"]
+    for matcher in matchers:
+        found = re.fullmatch(r'(alertname|severity)=~?"([\w|]+)"', matcher)
+        assert found is not None, matcher
+        assert set(found[2].split("|")) <= (alerts if found[1] == "alertname" else severities)
+
+
+def test_prometheus_finds_alertmanager_and_alertmanager_its_files_where_compose_runs_them() -> None:
+    compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
+    prometheus = yaml.safe_load((DEPLOY / "prometheus" / "prometheus.yml").read_text())
+    (target,) = prometheus["alerting"]["alertmanagers"][0]["static_configs"][0]["targets"]
+    name, port = target.split(":")
+    service = compose["services"][name]
+    assert any(published.endswith(f":{port}") for published in service["ports"])
+    assert "./alertmanager:/etc/alertmanager:ro" in service["volumes"]
+    configuration = yaml.safe_load((DEPLOY / "alertmanager" / "alertmanager.yml").read_text())
+    secret = configuration["global"]["smtp_auth_password_file"].removeprefix("/run/secrets/")
+    assert secret in service["secrets"]
+    assert secret in compose["secrets"]
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments"),
+    [
+        ("promtool", ["check", "rules", "prometheus/alerts.yml"]),
+        ("amtool", ["check-config", "alertmanager/alertmanager.yml"]),
+    ],
+)
+def test_the_tools_of_prometheus_accept_the_files(program: str, arguments: list[str]) -> None:
+    if shutil.which(program) is None:
+        pytest.skip(f"{program} is not installed: the other tests here read the file without it")
+    checked = subprocess.run([program, *arguments], cwd=DEPLOY, capture_output=True, text=True, check=False)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
 def test_no_two_panels_overlap_and_all_have_a_title() -> None:

@@ -73,3 +73,21 @@ def test_a_replay_without_a_picture_needs_no_extra(tmp_path: Path) -> None:
     ended = python("-c", without(*EXTRA, "filterpy") + COMMAND, *replay, timeout_s=COMPILING_S)
     assert ended.returncode == 0
     assert "RMSE" in ended.stdout
+
+
+def test_a_service_without_the_extra_mqtt_delivers_otherwise_and_says_how_to_install_it() -> None:
+    check = """
+from dropanchor_schemas.destinations import MqttDestination
+from dropanchor_service.delivery.channels import Channels
+from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
+channels = Channels(DeliverySettings(), EmailSettings(), MqttSettings(server="broker"))
+try:
+    channels.check(MqttDestination(type="mqtt", id="mes"))
+except ValueError as error:
+    print(error)
+"""
+    ended = python("-c", without("paho") + check)
+    assert (ended.returncode, ended.stdout) == (
+        0,
+        "MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'\n",
+    ), ended.stderr

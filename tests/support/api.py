@@ -21,6 +21,7 @@ from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.tracks import Retention, Tracks
+from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
@@ -68,6 +69,7 @@ class ApiBench:
         cors_origins: tuple[str, ...] = (),
         events: EventParts | None = None,
         omlox: OmloxItems | None = None,
+        plans: PlanStore | None = None,
     ) -> FastAPI:
         return create_app(
             self.answers,
@@ -85,6 +87,7 @@ class ApiBench:
             cors_origins=cors_origins,
             events=events,
             omlox=omlox,
+            plans=plans,
         )
 
 

@@ -29,7 +29,7 @@ def circle(name: str = "dock", x: float = 0.0, y: float = 0.0, radius_m: float =
 
 @dataclass
 class EventBench:
-    """folder: where everything is stored, None: nowhere. addressees: webhooks of each event."""
+    """folder: where everything is stored, None: nowhere. addressees: destinations of each event."""
 
     folder: Path | None = None
     addressees: Sequence[str] = ()

@@ -26,6 +26,7 @@ from dropanchor_service.api.omlox.router import add_omlox
 from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
+from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import events_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
@@ -34,6 +35,8 @@ from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
 from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
 from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
+from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES, plan_images_router
+from dropanchor_service.api.routes.plans import plans_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.remote_settings import remote_settings_router
@@ -43,10 +46,10 @@ from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.api.routes.track_file import track_file_router
 from dropanchor_service.api.routes.tracks import tracks_router
-from dropanchor_service.api.routes.webhooks import webhooks_router
 from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
 from dropanchor_service.api.routes.zones import zones_router
 from dropanchor_service.phones.intake import Receive
+from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
@@ -75,6 +78,7 @@ def create_app(
     cors_origins: Sequence[str] = (),
     events: EventParts | None = None,
     omlox: OmloxItems | None = None,
+    plans: PlanStore | None = None,
 ) -> FastAPI:
     """Return the application with all routes and middleware.
 
@@ -84,9 +88,10 @@ def create_app(
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
     no limit. cors_origins: of other web pages that may use the interface. events:
-    zones, events and webhooks; None keeps them in memory and watches nothing. omlox: what omlox clients have said; None
-    keeps it in memory.
+    zones, events and destinations; None keeps them in memory and watches nothing. plans, omlox: floor plans, and what
+    omlox clients have said; None keeps them in memory.
     """
+    plans = plans or PlanStore(None)
     events = events or EventParts.in_memory(answers.site.site.id)
     app = _app_without_routes(authenticator, rate_limiter, cors_origins)
     for router in (
@@ -97,7 +102,7 @@ def create_app(
         track_file_router(answers),
         tracks_router(answers),
         history_router(answers),
-        stream_router(answers, stopping),
+        stream_router(answers, stopping, lambda: (answers.site.version, plans.version)),
         site_router(answers.site),
         access_router(),
         connect_router(answers.site, endpoints, credentials),
@@ -106,10 +111,12 @@ def create_app(
         ingest_health_router(receive_health),
         ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
         recordings_router(recorder),
+        plans_router(plans),
+        plan_images_router(plans, answers.site),
         zones_router(events.items),
         zone_occupancy_router(events),
         events_router(events.store, stopping),
-        webhooks_router(events),
+        destinations_router(events),
         health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
@@ -133,7 +140,7 @@ def _app_without_routes(
         redoc_url=None,
         redirect_slashes=False,
     )
-    app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES)
+    app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES, of_paths={f"{PREFIX}/plan-images": MAX_UPLOAD_BYTES})
     app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
@@ -183,9 +190,10 @@ _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
-    {"name": "zones", "description": "Areas of the site, groups of tags, and the rules that make events."},
+    {"name": "plans", "description": "Floor plans below the tags on the map, and their images."},
+    {"name": "zones", "description": "Areas of the site, and the rules that make events."},
     {"name": "events", "description": "What has happened, as CloudEvents."},
-    {"name": "webhooks", "description": "Events over HTTP to other systems."},
+    {"name": "destinations", "description": "Who gets events by webhook, e-mail or MQTT."},
     {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
     {"name": "recordings", "description": "MCAP files with raw samples and poses."},
     {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},

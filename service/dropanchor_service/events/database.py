@@ -1,4 +1,4 @@
-"""The SQLite file of the events, the states behind them, and the queues of webhooks.
+"""The SQLite file of the events, the states behind them, and the queues of destinations.
 
 One connection serves all threads, under a lock: every statement takes well under a millisecond, except the writing of a
 storm of events.
@@ -17,7 +17,7 @@ from typing import Any
 from dropanchor_service.history.damaged_file import is_damage, move_aside
 
 FILE_NAME = "events.sqlite"
-VERSION = 1
+VERSION = 2
 BUSY_S = 5.0
 
 _SCHEMA = f"""
@@ -32,8 +32,8 @@ CREATE TABLE states (
     PRIMARY KEY (source, item, tag, other)
 ) WITHOUT ROWID;
 CREATE TABLE deliveries (
-    webhook TEXT NOT NULL, sequence INTEGER NOT NULL, refusals INTEGER NOT NULL DEFAULT 0, dead TEXT,
-    PRIMARY KEY (webhook, sequence)
+    destination TEXT NOT NULL, sequence INTEGER NOT NULL, refusals INTEGER NOT NULL DEFAULT 0, dead TEXT,
+    PRIMARY KEY (destination, sequence)
 ) WITHOUT ROWID;
 PRAGMA user_version = {VERSION};
 """
@@ -105,6 +105,11 @@ class Database:
     def _prepare(self, connection: sqlite3.Connection) -> None:
         version = connection.execute("PRAGMA user_version").fetchone()[0]
         tables = connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
+        if version == 1:
+            connection.executescript(
+                "BEGIN; ALTER TABLE deliveries RENAME webhook TO destination; PRAGMA user_version = 2; COMMIT;"
+            )
+            version = VERSION
         if version not in (0, VERSION) or (version == 0 and tables):
             raise EventFileError(
                 f"{self._path} has schema version {version}, but this service needs {VERSION}: move the file away"

@@ -1,4 +1,4 @@
-"""The persistent queues of webhooks. An event leaves its queue when the receiver has accepted it."""
+"""The persistent queues of destinations. An event leaves its queue when the receiver has accepted it."""
 
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
@@ -9,7 +9,7 @@ MAX_LISTED = 1000
 
 
 class Delivery(NamedTuple):
-    """An event that waits for a webhook. refusals: how often the receiver has refused it."""
+    """An event that waits for a destination. refusals: how often the receiver has refused it."""
 
     sequence: int
     tag: str
@@ -18,85 +18,102 @@ class Delivery(NamedTuple):
     body: bytes
 
 
+class QueueState(NamedTuple):
+    """How many events wait and are dead. oldest_ns: when the oldest that waits happened, None: none waits."""
+
+    pending: int = 0
+    dead: int = 0
+    oldest_ns: int | None = None
+
+
 class Deliveries:
-    """The queues of all webhooks. Any thread may use it. Every method raises sqlite3.Error."""
+    """The queues of all destinations. Any thread may use it. Every method raises sqlite3.Error."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def heads(self, webhook: str, limit: int, window: int, waiting: Collection[str] = ()) -> list[Delivery]:
+    def oldest(self, destination: str, limit: int, waiting: Collection[str] = ()) -> list[Delivery]:
+        """Return the oldest events of the queue, at most `limit`. waiting: tags that are left out."""
+        rows = self._database.rows(
+            "SELECT sequence, tag, t_ns, refusals, body FROM deliveries JOIN events USING (sequence) "
+            "WHERE destination = ? AND dead IS NULL ORDER BY sequence LIMIT ?",
+            destination,
+            limit,
+        )
+        return [delivery for delivery in map(Delivery._make, rows) if delivery.tag not in waiting]
+
+    def heads(self, destination: str, limit: int, window: int, waiting: Collection[str] = ()) -> list[Delivery]:
         """Return the oldest event of each tag, at most `limit`, from the first `window` events of the queue.
 
         waiting: tags that are left out.
         """
-        rows = self._database.rows(
-            "SELECT sequence, tag, t_ns, refusals, body FROM deliveries JOIN events USING (sequence) "
-            "WHERE webhook = ? AND dead IS NULL ORDER BY sequence LIMIT ?",
-            webhook,
-            window,
-        )
         found: dict[str, Delivery] = {}
-        for row in rows:
-            delivery = Delivery(*row)
-            if delivery.tag not in waiting and len(found) < limit:
+        for delivery in self.oldest(destination, window, waiting):
+            if len(found) < limit:
                 found.setdefault(delivery.tag, delivery)
         return list(found.values())
 
-    def remove(self, webhook: str, sequences: Sequence[int]) -> None:
+    def remove(self, destination: str, sequences: Sequence[int]) -> None:
         """Take delivered events from the queue."""
-        with self._database.transaction() as connection:
-            connection.executemany(
-                "DELETE FROM deliveries WHERE webhook = ? AND sequence = ?", [(webhook, n) for n in sequences]
-            )
+        self._each("DELETE FROM deliveries", destination, sequences)
 
-    def refuse(self, webhook: str, sequence: int) -> None:
-        """Count a refusal by the receiver."""
-        with self._database.transaction() as connection:
-            connection.execute(
-                "UPDATE deliveries SET refusals = refusals + 1 WHERE webhook = ? AND sequence = ?", (webhook, sequence)
-            )
+    def refuse(self, destination: str, sequences: Sequence[int]) -> None:
+        """Count a refusal of each event by the receiver."""
+        self._each("UPDATE deliveries SET refusals = refusals + 1", destination, sequences)
 
-    def bury(self, webhook: str, sequences: Sequence[int], reason: str) -> None:
+    def bury(self, destination: str, sequences: Sequence[int], reason: str) -> None:
         """Make dead letters of these events."""
-        with self._database.transaction() as connection:
-            connection.executemany(
-                "UPDATE deliveries SET dead = ? WHERE webhook = ? AND sequence = ?",
-                [(reason, webhook, n) for n in sequences],
-            )
+        self._each("UPDATE deliveries SET dead = ?", destination, sequences, reason)
 
-    def expired(self, webhook: str, before_ns: int) -> list[int]:
+    def expired(self, destination: str, before_ns: int) -> list[int]:
         """Return queued events that are older than this time."""
         rows = self._database.rows(
             "SELECT sequence FROM deliveries JOIN events USING (sequence) "
-            "WHERE webhook = ? AND dead IS NULL AND t_ns < ? ORDER BY sequence LIMIT ?",
-            webhook,
+            "WHERE destination = ? AND dead IS NULL AND t_ns < ? ORDER BY sequence LIMIT ?",
+            destination,
             before_ns,
             MAX_LISTED,
         )
         return [row[0] for row in rows]
 
-    def dead(self, webhook: str) -> list[tuple[bytes, str]]:
+    def dead(self, destination: str) -> list[tuple[bytes, str]]:
         """Return the oldest dead letters: body and reason."""
         return self._database.rows(
             "SELECT body, dead FROM deliveries JOIN events USING (sequence) "
-            "WHERE webhook = ? AND dead IS NOT NULL ORDER BY sequence LIMIT ?",
-            webhook,
+            "WHERE destination = ? AND dead IS NOT NULL ORDER BY sequence LIMIT ?",
+            destination,
             MAX_LISTED,
         )
 
-    def retry(self, webhook: str) -> int:
-        """Put the dead letters of a webhook back into its queue. Return how many."""
+    def retry(self, destination: str) -> int:
+        """Put the dead letters of a destination back into its queue. Return how many."""
+        sql = "UPDATE deliveries SET dead = NULL, refusals = 0 WHERE destination = ? AND dead IS NOT NULL"
         with self._database.transaction() as connection:
-            return connection.execute(
-                "UPDATE deliveries SET dead = NULL, refusals = 0 WHERE webhook = ? AND dead IS NOT NULL", (webhook,)
-            ).rowcount
+            return connection.execute(sql, (destination,)).rowcount
 
-    def drop(self, webhook: str) -> None:
-        """Empty the queue of a webhook that no longer exists."""
+    def drop_dead(self, destination: str) -> None:
+        """Delete the dead letters of a destination."""
         with self._database.transaction() as connection:
-            connection.execute("DELETE FROM deliveries WHERE webhook = ?", (webhook,))
+            connection.execute("DELETE FROM deliveries WHERE destination = ? AND dead IS NOT NULL", (destination,))
 
-    def counts(self) -> dict[str, tuple[int, int]]:
-        """Return, by webhook, how many events wait and how many are dead."""
-        rows = self._database.rows("SELECT webhook, count(*) - count(dead), count(dead) FROM deliveries GROUP BY 1")
-        return {webhook: (pending, dead) for webhook, pending, dead in rows}
+    def drop(self, destination: str) -> None:
+        """Empty the queue of a destination that no longer exists."""
+        with self._database.transaction() as connection:
+            connection.execute("DELETE FROM deliveries WHERE destination = ?", (destination,))
+
+    def states(self) -> dict[str, QueueState]:
+        """Return the state of every queue that is not empty, by destination."""
+        rows = self._database.rows(
+            "SELECT destination, pending, dead, (SELECT t_ns FROM events WHERE sequence = first) FROM ("
+            "SELECT destination, count(*) - count(dead) AS pending, count(dead) AS dead, "
+            "min(CASE WHEN dead IS NULL THEN sequence END) AS first FROM deliveries GROUP BY destination)"
+        )
+        return {destination: QueueState(*state) for destination, *state in rows}
+
+    def _each(self, change: str, destination: str, sequences: Sequence[int], *values: str) -> None:
+        """Change the delivery of each event, in one transaction. values: of the placeholders in `change`."""
+        with self._database.transaction() as connection:
+            connection.executemany(
+                f"{change} WHERE destination = ? AND sequence = ?",
+                [(*values, destination, sequence) for sequence in sequences],
+            )

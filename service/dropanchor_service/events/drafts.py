@@ -26,10 +26,10 @@ class Draft:
         return self.data.get("zone")
 
 
-def webhook_test(webhook: str) -> Draft:
-    """Return an event that only shows that a webhook works."""
+def destination_test(destination: str) -> Draft:
+    """Return an event that only shows that a destination works."""
     now_ns = time.time_ns()
-    return Draft(EventType.WEBHOOK_TEST, webhook, {"t_ns": now_ns, "since_ns": now_ns, "name": webhook})
+    return Draft(EventType.DESTINATION_TEST, destination, {"t_ns": now_ns, "since_ns": now_ns, "name": destination})
 
 
 class StateKey(NamedTuple):

@@ -57,7 +57,7 @@ class EventStore:
     """The stored events. Any thread may use it. Every method raises sqlite3.Error."""
 
     def __init__(self, database: Database, site: str, addressees: Addressees = lambda _: ()) -> None:
-        """addressees: returns the webhooks that an event goes to."""
+        """addressees: returns the destinations that an event goes to."""
         self.database = database
         self.site = site
         self._addressees = addressees
@@ -66,7 +66,7 @@ class EventStore:
         self.dropped_deliveries = 0
 
     def commit(self, drafts: Sequence[Draft], states: States) -> None:
-        """Store events and states, and queue the events for their webhooks."""
+        """Store events and states, and queue the events for their destinations."""
         with self.database.transaction() as connection:
             found = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence").fetchone()
             first = int(found[0]) + 1
@@ -76,11 +76,11 @@ class EventStore:
             ]
             connection.executemany("INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)", rows)
             connection.executemany(
-                "INSERT INTO deliveries (webhook, sequence) VALUES (?, ?)",
+                "INSERT INTO deliveries (destination, sequence) VALUES (?, ?)",
                 [
-                    (webhook, number)
+                    (destination, number)
                     for number, draft in enumerate(drafts, first)
-                    for webhook in self._addressees(draft)
+                    for destination in self._addressees(draft)
                 ],
             )
             connection.executemany(

@@ -1,49 +1,64 @@
-"""Metrics of events and webhooks."""
+"""Metrics of events and their delivery."""
 
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from dropanchor_service.events.deliveries import Deliveries
+from dropanchor_service.delivery.thread import DeliveryThread
+from dropanchor_service.events.deliveries import Deliveries, QueueState
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.events.thread import EventThread
-from dropanchor_service.webhooks.thread import WebhookThread
 
 
 class EventMetrics(Collector):
     """Metrics that are read from the events and the queues at every scrape."""
 
-    def __init__(self, thread: EventThread, store: EventStore, deliveries: Deliveries, webhooks: WebhookThread) -> None:
+    def __init__(
+        self,
+        thread: EventThread,
+        store: EventStore,
+        deliveries: Deliveries,
+        delivery: DeliveryThread,
+        now_ns: Callable[[], int],
+    ) -> None:
         self._thread = thread
         self._store = store
         self._deliveries = deliveries
-        self._webhooks = webhooks
+        self._delivery = delivery
+        self._now_ns = now_ns
 
     def collect(self) -> Iterable[Metric]:
-        thread, counts = self._thread, self._webhooks.counts
+        thread, counts = self._thread, self._delivery.counts
         yield CounterMetricFamily("dropanchor_events", "Events stored.", thread.stored)
         yield CounterMetricFamily(
             "dropanchor_events_busy_seconds", "CPU time of finding and storing events.", thread.busy_s
         )
         yield GaugeMetricFamily("dropanchor_events_failing", "1 while events cannot be stored.", bool(thread.problem))
-        yield CounterMetricFamily("dropanchor_webhook_delivered", "Events delivered to webhooks.", counts.delivered)
+        yield CounterMetricFamily("dropanchor_delivery_delivered", "Events delivered.", counts.delivered)
         yield CounterMetricFamily(
-            "dropanchor_webhook_failed_attempts", "Attempts to deliver an event that failed.", counts.failed_attempts
+            "dropanchor_delivery_failed_attempts", "Attempts to deliver an event that failed.", counts.failed_attempts
         )
         yield CounterMetricFamily(
-            "dropanchor_webhook_dropped",
-            "Events deleted by age or size before their webhook had them.",
+            "dropanchor_delivery_dropped",
+            "Events deleted by age or size before their destination had them.",
             self._store.dropped_deliveries,
         )
         yield from self._queues()
 
     def _queues(self) -> Iterable[Metric]:
         try:
-            queued = self._deliveries.counts().values()
+            states = list(self._deliveries.states().values())
         except sqlite3.Error:
             return
-        pending, dead = sum(counts[0] for counts in queued), sum(counts[1] for counts in queued)
-        yield GaugeMetricFamily("dropanchor_webhook_pending", "Events that wait for delivery.", pending)
-        yield GaugeMetricFamily("dropanchor_webhook_dead_letters", "Events whose delivery was given up.", dead)
+        pending, dead = sum(state.pending for state in states), sum(state.dead for state in states)
+        yield GaugeMetricFamily("dropanchor_delivery_pending", "Events that wait for delivery.", pending)
+        yield GaugeMetricFamily("dropanchor_delivery_dead_letters", "Events whose delivery was given up.", dead)
+        yield GaugeMetricFamily(
+            "dropanchor_delivery_age_seconds", "Age of the oldest event that waits for delivery.", self._age_s(states)
+        )
+
+    def _age_s(self, states: Iterable[QueueState]) -> float:
+        oldest = [state.oldest_ns for state in states if state.oldest_ns is not None]
+        return max(0.0, (self._now_ns() - min(oldest)) * 1e-9) if oldest else 0.0

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,6 +11,7 @@ from prometheus_client.registry import CollectorRegistry
 import dropanchor_service
 from dropanchor_service.api import export as openapi
 from dropanchor_service.metrics.health import HealthGauges
+from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.persistence import Persistence
 from dropanchor_service.reference import (
@@ -69,6 +71,7 @@ def _registry(folder: Path) -> CollectorRegistry:
     Persistence(settings, tags, site, lambda: 0, metrics)
     metrics.register(FleetGauges(tags, PendingTags(0), latest, lambda: 0, lambda: 0))
     metrics.register(HealthGauges(tags, HealthTable(), lambda: 0, NoClockOffsets()))
+    metrics.register(OperationGauges(list, list, folder, lambda: {"http": datetime.fromtimestamp(0, UTC)}))
     ZoneEvents(Settings(), site, tags, latest, HealthTable(), lambda: 0, metrics)
     return metrics.registry
 

@@ -1,11 +1,13 @@
 """Load the credentials that the settings name."""
 
 import logging
-from datetime import timedelta
+from contextlib import suppress
+from datetime import datetime, timedelta
 
 from dropanchor_service.security import api_keys, oidc
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
+from dropanchor_service.security.authority import expiry
 from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import Authenticator, IdentityProvider
@@ -33,6 +35,24 @@ def credentials_of(settings: Settings) -> SecurityFolder | None:
             "%s; renew it with `dropanchor security renew`, or with `dropanchor tag add --renew` for a tag", sentence
         )
     return folder
+
+
+def expiries_of(certificate: Certificate | None, credentials: SecurityFolder | None) -> dict[str, datetime]:
+    """Return when each certificate ends, by its name: `http`, those of the site, and of `tags` the first one.
+
+    It reads the files again, since they may have been renewed. What cannot be read is left out.
+    """
+    found: dict[str, datetime] = {}
+    with suppress(OSError, ValueError):
+        if certificate is not None:
+            found["http"] = expiry(certificate.certificate.read_bytes())
+    with suppress(SecurityError):
+        if credentials is not None:
+            folder = SecurityFolder.open(credentials.path)
+            found |= folder.expiries()
+            of_tags = [folder.table.tags[name].expires for name in folder.table.admitted]
+            found |= {"tags": min(of_tags)} if of_tags else {}
+    return found
 
 
 def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -> Certificate | None:

@@ -108,11 +108,14 @@ class SecurityFolder:
         It checks the certificates in the folder and those of admitted tags.
         """
         limit = datetime.now(UTC) + within
-        expiries = {f"the certificate {self.certificate(name)}": self._expires(name) for name in ("ca", *ROLES)}
+        expiries = {f"the certificate {self.certificate(name)}": end for name, end in self.expiries().items()}
         expiries |= {f"the certificate of tag {name!r}": self.table.tags[name].expires for name in self.table.admitted}
-        return [
-            f"{what} expires on {end:%Y-%m-%d}" for what, end in expiries.items() if end is not None and end < limit
-        ]
+        return [f"{what} expires on {end:%Y-%m-%d}" for what, end in expiries.items() if end < limit]
+
+    def expiries(self) -> dict[str, datetime]:
+        """Return when each certificate in the folder expires, by its name. Those that are missing are left out."""
+        found = {name: self._expires(name) for name in ("ca", *ROLES)}
+        return {name: end for name, end in found.items() if end is not None}
 
     def add_tag(self, name: str, days: int, renew: bool = False) -> Path:
         """Issue a certificate to a tag, and return the folder to copy onto it.

@@ -13,7 +13,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_patte
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
-from dropanchor_service.settings.events import EventSettings, WebhookSettings
+from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 
 
 def _is_endpoint(text: str) -> str:
@@ -265,7 +265,9 @@ class Settings(_Section):
     history: HistorySettings = HistorySettings()
     recording: RecordingSettings = RecordingSettings()
     events: EventSettings = EventSettings()
-    webhooks: WebhookSettings = WebhookSettings()
+    delivery: DeliverySettings = DeliverySettings()
+    email: EmailSettings = EmailSettings()
+    mqtt: MqttSettings = MqttSettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}
     tag_defaults: TagSettings = Field(

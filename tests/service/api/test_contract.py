@@ -29,12 +29,13 @@ BEYOND_THE_SCHEMA = {
     "put_site": [positive_data_acceptance],
     "put_tag_settings": [positive_data_acceptance],
     "put_zone": [positive_data_acceptance],
-    "put_webhook": [positive_data_acceptance],
-    "put_tag_group": [positive_data_acceptance],
+    "put_destination": [positive_data_acceptance],
+    "put_plan": [positive_data_acceptance],
+    "delete_plan": [positive_data_acceptance],
+    "upload_plan_image": [positive_data_acceptance],
     "put_event_rule": [positive_data_acceptance],
     "delete_zone": [positive_data_acceptance],
-    "delete_webhook": [positive_data_acceptance],
-    "delete_tag_group": [positive_data_acceptance],
+    "delete_destination": [positive_data_acceptance],
     "delete_event_rule": [positive_data_acceptance],
     "ingest_health": [positive_data_acceptance],
     "get_phyphox_code": [positive_data_acceptance],
@@ -45,7 +46,8 @@ BEYOND_THE_SCHEMA = {
 }
 """Rules that a schema cannot express: `from` and `to` are at most 31 days apart; each anchor is listed once; without
 credentials a request names the tag; a message holds a sample or a value; `If-Match` is the current tag of a resource;
-edges do not cross; a URL is public and a secret long. And that Sensor Logger's 499 is a refusal."""
+edges do not cross; an image is one, and was uploaded; a URL is public and a
+secret long. And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(str.isprintable)

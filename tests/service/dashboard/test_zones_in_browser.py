@@ -2,18 +2,11 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import replace
 from threading import Event
 
 import pytest
 from playwright.sync_api import Browser, expect
 
-from dropanchor_schemas.webhooks import Webhook
-from dropanchor_service.api.routes import event_examples as examples
-from dropanchor_service.events.database import Database
-from dropanchor_service.events.deliveries import Deliveries
-from dropanchor_service.events.drafts import webhook_test
-from dropanchor_service.events.store import EventStore
 from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
 from support.browser import WatchedPage, watched_page
 
@@ -122,15 +115,3 @@ def test_nothing_is_counted_while_the_connection_is_lost_and_missed_events_come_
         with served(place, port=port):
             expect(page.page.locator("#events summary")).to_contain_text("cart-3 left Yard", timeout=40_000)
             expect(page.page.locator("#zone-list li")).to_contain_text("empty")
-
-
-def test_a_line_says_how_many_events_webhooks_could_not_deliver(chromium: Browser) -> None:
-    store = EventStore(Database(None), "yard", lambda _: ["mes"])
-    store.commit([webhook_test("mes"), webhook_test("mes")], {})
-    place = zone_place()
-    place.parts = replace(place.parts, store=store, deliveries=Deliveries(store.database))
-    place.parts.deliveries.bury("mes", [1, 2], "the receiver answered 404 Not Found")
-    place.parts.webhooks.put("mes", Webhook(id="mes", url="https://mes.example.com", secret=examples.SECRET))
-    with served(place), watched_page(chromium, place.url) as page:
-        page.page.locator("#zone-list summary").click()
-        expect(page.page.get_by_text("2 events could not be delivered by webhooks.")).to_be_visible()

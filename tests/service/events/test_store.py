@@ -71,7 +71,7 @@ def test_a_failed_transaction_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(sqlite3.IntegrityError):
         store.commit([draft("fine"), draft("bad")], {})
     assert len(store.after(0, 10)) == 1
-    assert Deliveries(database).counts() == {"hook": (1, 0)}
+    assert Deliveries(database).states()["hook"][:2] == (1, 0)
     store.commit([draft("later")], {})
     assert [event.sequence for event in store.after(0, 10)] == [1, 2]
 
@@ -115,6 +115,19 @@ def test_a_damaged_file_is_moved_aside_and_another_version_is_refused(tmp_path: 
         Database(tmp_path)
 
 
+def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
+    bench = EventBench(tmp_path, addressees=["hook"])
+    bench.store.commit([draft("a")], {})
+    with bench.database.transaction() as connection:
+        connection.execute("ALTER TABLE deliveries RENAME destination TO webhook")
+        connection.execute("PRAGMA user_version = 1")
+    bench.database.close()
+    database = Database(tmp_path)
+    assert Deliveries(database).states()["hook"].pending == 1
+    assert database.rows("PRAGMA user_version") == [(2,)]
+    database.close()
+
+
 def test_a_storm_of_ten_thousand_tags_is_stored_complete_and_in_order(tmp_path: Path) -> None:
     bench = EventBench(tmp_path, addressees=["hook"])
     bench.put(circle())
@@ -122,5 +135,5 @@ def test_a_storm_of_ten_thousand_tags_is_stored_complete_and_in_order(tmp_path: 
     bench.stay(0.2, *tags, x=30.0)
     assert len(bench.stay(2.0, *tags, x=0.0)) == 10_000
     assert {event.subject for event in bench.events()} == set(tags)
-    assert Deliveries(bench.database).counts() == {"hook": (10_000, 0)}
+    assert Deliveries(bench.database).states()["hook"][:2] == (10_000, 0)
     assert bench.stay(2.0, *tags, x=0.0) == []

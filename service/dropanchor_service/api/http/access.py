@@ -26,7 +26,7 @@ KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
 _SITE = "/api/v1/site"
-_WEBHOOKS = "/api/v1/webhooks/"
+_DESTINATIONS = "/api/v1/destinations/"
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
     "`dropanchor key add NAME --scope read`; for the samples of a tag, with `--tag TAG` instead of `--scope`."
@@ -132,10 +132,10 @@ def _is_protected(path: str) -> bool:
 
 
 def required_scope(method: str, path: str) -> AccessScope:
-    """Return READ for reading, ADMIN for deleting and for changing the site or a webhook, WRITE for other changes."""
+    """Return READ for reading, ADMIN for deleting, and for changing the site or a destination; WRITE for others."""
     if method in ("GET", "HEAD", "OPTIONS"):
         return AccessScope.READ
-    is_admin = method == "DELETE" or path == _SITE or path.startswith(_WEBHOOKS)
+    is_admin = method == "DELETE" or path == _SITE or path.startswith(_DESTINATIONS)
     return AccessScope.ADMIN if is_admin else AccessScope.WRITE
 
 

@@ -1,6 +1,7 @@
 """Limits that protect clients from each other: the size of bodies, and deadlines for requests and for reading."""
 
 import asyncio
+from collections.abc import Mapping
 from typing import Any
 
 import h11
@@ -15,34 +16,41 @@ from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError,
 class BodyLimit:
     """ASGI middleware that answers 413 to a larger body, by its `content-length` or once it has grown too large."""
 
-    def __init__(self, app: ASGIApp, max_bytes: int) -> None:
+    def __init__(self, app: ASGIApp, max_bytes: int, of_paths: Mapping[str, int] | None = None) -> None:
+        """max_bytes: of the paths that are not in of_paths."""
         self._app = app
         self._max_bytes = max_bytes
-        self._detail = f"A request body may have at most {max_bytes} bytes."
+        self._of_paths = of_paths or {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        max_bytes = self._of_paths.get(scope["path"], self._max_bytes)
         content_length = Headers(scope=scope).get("content-length", "0")
-        if content_length.isdigit() and int(content_length[:20]) > self._max_bytes:
-            response = problem_response(Request(scope), Kind.BODY_TOO_LARGE, self._detail)
+        if content_length.isdigit() and int(content_length[:20]) > max_bytes:
+            response = problem_response(Request(scope), Kind.BODY_TOO_LARGE, _too_large(max_bytes))
             await response(scope, receive, send)
             return
-        await self._app(scope, self._counted(receive), send)
+        await self._app(scope, _counted(receive, max_bytes), send)
 
-    def _counted(self, receive: Receive) -> Receive:
-        received = 0
 
-        async def counted() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
-            if received > self._max_bytes:
-                raise ProblemError(Kind.BODY_TOO_LARGE, self._detail)
-            return message
+def _counted(receive: Receive, max_bytes: int) -> Receive:
+    received = 0
 
-        return counted
+    async def counted() -> Message:
+        nonlocal received
+        message = await receive()
+        received += len(message.get("body", b""))
+        if received > max_bytes:
+            raise ProblemError(Kind.BODY_TOO_LARGE, _too_large(max_bytes))
+        return message
+
+    return counted
+
+
+def _too_large(max_bytes: int) -> str:
+    return f"A request body may have at most {max_bytes} bytes."
 
 
 class EscapedPath:
@@ -61,31 +69,36 @@ class EscapedPath:
 class GuardedProtocol(H11Protocol):
     """HTTP/1.1 with two deadlines that uvicorn lacks.
 
-    It disconnects a client that does not complete its request in time, and one that stops reading its response.
+    It disconnects a client that does not complete its request in time, and one that stops reading its response. A large
+    body may take longer, as long as it does not come too slowly.
     """
 
     request_s = 10.0
+    least_bytes_per_s = 100_000
     stalled_s = 10.0
     stalled_at_shutdown_s = 0.5
 
     _deadline: asyncio.TimerHandle | None = None
     _stall: asyncio.TimerHandle | None = None
     _is_web_socket = False
+    _received = 0  # bytes, since the deadline was set
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
         # Pause the writer as soon as the kernel does not accept data, so that nothing piles up in this process. The
         # limit is 1 because asyncio's TLS transport treats even an empty buffer as full with 0.
         transport.set_write_buffer_limits(high=1)
-        self._deadline = self.loop.call_later(self.request_s, self._cut)
+        self._deadline = self.loop.call_later(self.request_s, self._cut_if_slow)
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
+        self._received += len(data)
         incomplete = not self._is_web_socket and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not incomplete:
             self._deadline = _cancelled(self._deadline)
         elif self._deadline is None:
-            self._deadline = self.loop.call_later(self.request_s, self._cut)
+            self._received = 0
+            self._deadline = self.loop.call_later(self.request_s, self._cut_if_slow)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         super().handle_websocket_upgrade(event)
@@ -118,6 +131,13 @@ class GuardedProtocol(H11Protocol):
         waiting = self._waiting()
         if waiting is not None:
             self._stall = self.loop.call_later(self.stalled_s, self._cut_if_stalled, waiting)
+
+    def _cut_if_slow(self) -> None:
+        if self._received < self.request_s * self.least_bytes_per_s:
+            self._cut()
+        else:
+            self._received = 0
+            self._deadline = self.loop.call_later(self.request_s, self._cut_if_slow)
 
     def _cut_if_stalled(self, waiting_then: int) -> None:
         waiting = self._waiting()

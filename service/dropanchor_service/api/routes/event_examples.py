@@ -1,4 +1,4 @@
-"""Examples of the responses about zones, events and webhooks, for the OpenAPI document."""
+"""Examples of the responses about zones, events and destinations, for the OpenAPI document."""
 
 from typing import Any
 
@@ -53,24 +53,21 @@ EVENTS: dict[str, Any] = {"events": [EVENT], "next": None}
 SECRET = "whsec_ZHJvcGFuY2hvci1leGFtcGxlLXNlY3JldC0wMQ=="
 WEBHOOK: dict[str, Any] = {
     "id": "mes",
+    "enabled": True,
+    "types": ["dropanchor.zone.enter", "dropanchor.zone.exit"],
+    "zones": ["dock"],
+    "tags": [],
+    "type": "webhook",
     "url": "https://mes.example.com/events",
     "secret": SECRET,
-    "enabled": True,
-    "types": ["dropanchor.zone.enter", "dropanchor.zone.exit"],
-    "zones": ["dock"],
-    "tags": [],
 }
-WEBHOOK_STATUS: dict[str, Any] = {
-    "id": "mes",
-    "url": "https://mes.example.com/events",
+DESTINATION_STATE: dict[str, Any] = {
+    "destination": WEBHOOK | {"secret": None},
     "has_secret": True,
-    "enabled": True,
-    "types": ["dropanchor.zone.enter", "dropanchor.zone.exit"],
-    "zones": ["dock"],
-    "tags": [],
-    "pending": 0,
+    "pending": 2,
+    "oldest_ns": 1_800_000_000_000_000_000,
     "dead": 0,
     "problem": None,
 }
-WEBHOOK_TEST: dict[str, Any] = {"delivered": True, "detail": "the receiver answered 200 OK"}
+DESTINATION_TEST: dict[str, Any] = {"delivered": True, "detail": "the receiver answered 200 OK"}
 DEAD_LETTERS: dict[str, Any] = {"dead_letters": [{"event": EVENT, "reason": "the receiver answered 404 Not Found"}]}

@@ -1,30 +1,29 @@
-"""What the routes for zones, events and webhooks work on."""
+"""What the routes for zones, events and destinations work on."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Self
 
-from dropanchor_schemas.webhooks import Webhook
+from dropanchor_schemas.destinations import Destination
+from dropanchor_service.delivery.channels import Channels
+from dropanchor_service.delivery.registry import open_destinations
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries
 from dropanchor_service.events.store import EventStore
+from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 from dropanchor_service.store.items import NamedItems
-from dropanchor_service.webhooks.registry import open_webhooks
-from dropanchor_service.webhooks.sender import Sender
 from dropanchor_service.zones.items import ZoneItems
-
-TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
 class EventParts:
-    """problem_of: returns why the last attempt of a webhook failed."""
+    """problem_of: returns what went wrong at the last attempt of a destination."""
 
     items: ZoneItems
     store: EventStore
-    webhooks: NamedItems[Webhook]
+    destinations: NamedItems[Destination]
     deliveries: Deliveries
-    sender: Sender
+    channels: Channels
     problem_of: Callable[[str], str | None]
 
     @classmethod
@@ -34,8 +33,8 @@ class EventParts:
         return cls(
             ZoneItems.opened(None),
             EventStore(database, site),
-            open_webhooks(None),
+            open_destinations(None),
             Deliveries(database),
-            Sender(TIMEOUT_S, ()),
+            Channels(DeliverySettings(), EmailSettings(), MqttSettings()),
             lambda _: None,
         )

@@ -38,7 +38,7 @@ def path_id(what: str, example: str) -> Callable[..., str]:
     return read
 
 
-WebhookId = Annotated[str, Depends(path_id("webhook", "mes"))]
+DestinationId = Annotated[str, Depends(path_id("destination", "mes"))]
 
 
 def item_response(item: BaseModel, answer: BaseModel | None = None) -> Response:

@@ -5,7 +5,7 @@ Every client reads the store at its own pace. A slow client gets the newest pose
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Sequence
 from threading import Event
 from typing import Annotated, Any
 
@@ -31,9 +31,9 @@ _NAP_S = 0.2
 _DESCRIPTION = """\
 Server-sent events. The first event, `snapshot`, holds every tag that has a pose. Each `poses` event then holds the tags
 that have changed since. The data of both is a `PoseFrame`. A tag that no longer meets the conditions of the query is
-sent once more, so that a client sees it leave. An event `settings` says that the site, an anchor or the settings of a
-tag have changed; its data holds the time alone. A client that reads slowly gets the newest poses when it is
-ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every
+sent once more, so that a client sees it leave. An event `settings` says that the site, an anchor, a floor plan or the
+settings of a tag have changed; its data holds the time alone. A client that reads slowly gets the newest poses when it
+is ready again. A client that stops reading is disconnected. While nothing changes, the service sends a comment every
 5 s."""
 
 
@@ -43,7 +43,11 @@ class StreamQuery(PoseQuery):
     )
 
 
-def stream_router(answers: Answers, stopping: Event) -> APIRouter:
+Versions = Callable[[], Sequence[int]]
+"""Returns numbers of which one grows with every change of settings."""
+
+
+def stream_router(answers: Answers, stopping: Event, versions: Versions) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -55,7 +59,7 @@ def stream_router(answers: Answers, stopping: Event) -> APIRouter:
         responses=_event_stream() | problems(Kind.INVALID_REQUEST),
     )
     async def stream_poses(query: Annotated[StreamQuery, Query()]) -> Response:
-        events = _events(Changes(answers, query.tags, query.wanted), 1 / query.max_hz, stopping)
+        events = _events(Changes(answers, versions, query.tags, query.wanted), 1 / query.max_hz, stopping)
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
 
@@ -65,14 +69,15 @@ def stream_router(answers: Answers, stopping: Event) -> APIRouter:
 class Changes:
     """Tracks which changes one client has not received yet."""
 
-    def __init__(self, answers: Answers, names: list[str], wanted: PoseFilter = EVERYTHING) -> None:
+    def __init__(self, answers: Answers, versions: Versions, names: list[str], wanted: PoseFilter = EVERYTHING) -> None:
         self._answers = answers
+        self._versions = versions
         self._names = names
         self._wanted = wanted
         self._matching = np.empty(0, np.int64)  # rows that met the conditions when they were last looked at
         self._version = 0
         self._sent: dict[str, tuple[str, bool]] = {}  # tag → (state, online)
-        self._site_version = answers.site.version
+        self._seen_versions = versions()
         self._checked_s = time.monotonic()
 
     def snapshot(self) -> Answer:
@@ -89,10 +94,9 @@ class Changes:
         return self._frame(poses) if len(poses) else None
 
     def settings(self) -> Answer | None:
-        """Return an answer with the time if the site or the settings of a tag have changed, otherwise None."""
-        version, before = self._answers.site.version, self._site_version
-        self._site_version = version
-        return None if version == before else {"t_ns": self._answers.now_ns()}
+        """Return an answer with the time if settings have changed, otherwise None."""
+        before, self._seen_versions = self._seen_versions, self._versions()
+        return None if before == self._seen_versions else {"t_ns": self._answers.now_ns()}
 
     def _newer(self) -> Array:
         self._version, poses = self._answers.latest.since(self._version)

@@ -22,7 +22,7 @@ export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
 export async function request(url, options) {
-  const response = await fetch(url, { ...options, headers: authorization(), cache: "no-store" });
+  const response = await fetch(url, { cache: "no-store", ...options, headers: authorization() });
   if (response.status === 401 || response.status === 403) throw new KeyRequiredError(`${url.pathname} requires another key`);
   if (response.status === UNAVAILABLE) {
     const problem = await response.json();
@@ -49,6 +49,26 @@ export async function sendChange(url, method, body, conditions) {
   if (response.ok) return response.headers.get("etag") ?? "";
   const { detail } = await response.json();
   throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
+}
+
+/** Send a file. Return the answer. Throws Error with the sentence of the service when it refuses the file.
+ * @param {URL} url @param {File} file @returns {Promise<any>} */
+export async function upload(url, file) {
+  const headers = { ...authorization(), "content-type": file.type || "application/octet-stream" };
+  const response = await fetch(url, { method: "POST", headers, body: file, cache: "no-store" });
+  const answer = await response.json();
+  if (!response.ok) throw new Error(answer.detail);
+  return answer;
+}
+
+/**
+ * Ask for an action that has no body. Return the response. Throws Error with the sentence of the service when it refuses.
+ * @param {URL} url @param {"POST" | "DELETE"} method
+ */
+export async function requestChange(url, method) {
+  const response = await fetch(url, { method, headers: authorization(), cache: "no-store" });
+  if (response.ok) return response;
+  throw new Error((await response.json()).detail);
 }
 
 /** @returns {Record<string, string>} */

@@ -1,6 +1,6 @@
 /** Change anchors and tags: only what this page has seen, and undo the last changes. */
 
-import { ChangedMeanwhileError, request, sendChange } from "./access.js";
+import { ChangedMeanwhileError, KeyRequiredError, request, sendChange } from "./access.js";
 import { api, getJson } from "./connection.js";
 
 /** @typedef {{value: any, etag: string}} Seen a resource as this page has read it */
@@ -8,6 +8,7 @@ import { api, getJson } from "./connection.js";
 /** @typedef {{what: string, keep: () => void, take: () => void}} Conflict */
 
 const UNDO_STEPS = 20;
+const RETRY_MS = 3000;
 
 /** Events: "done" (detail: what), "failed" (detail: a sentence), "conflict" (detail: Conflict), "access". */
 export class Changes extends EventTarget {
@@ -15,6 +16,7 @@ export class Changes extends EventTarget {
   #undo = [];
   /** @type {"none" | "read" | "write" | "admin"} */
   #scope = "none";
+  #retry = 0;
 
   get mayWrite() {
     return this.#scope === "write" || this.#scope === "admin";
@@ -30,12 +32,14 @@ export class Changes extends EventTarget {
     return last !== undefined && (last.body !== null || this.mayDelete);
   }
 
-  /** Request what the key of this page allows. */
+  /** Request what the key of this page allows, until the service answers. */
   async requestAccess() {
+    clearTimeout(this.#retry);
     try {
       this.#scope = (await getJson(api("access"))).scope;
-    } catch {
+    } catch (error) {
       this.#scope = "none";
+      if (!(error instanceof KeyRequiredError)) this.#retry = setTimeout(() => this.requestAccess(), RETRY_MS);
     }
     this.dispatchEvent(new Event("access"));
   }

@@ -11,6 +11,7 @@ import { AMBIGUOUS, STATES } from "../data/states.js";
 
 const LABELS_UP_TO = 80;
 const TICK_PX = 9;
+const ELSEWHERE_ALPHA = 0.45;
 
 /** @param {number} count dots on the screen */
 export const markerRadius = (count) => (count <= 200 ? 5.5 : count <= 1500 ? 4 : 3);
@@ -26,6 +27,23 @@ export function drawMarkers(scene) {
     paintMarkers(scene, group, rows, radius);
   }
   scene.ctx.globalAlpha = 1;
+}
+
+/** Draw tags of other floors as faint rings. @param {Scene} scene @param {Int32Array} rows */
+export function drawElsewhere({ ctx, view, palette, fleet }, rows) {
+  const radius = markerRadius(rows.length);
+  ctx.beginPath();
+  for (const row of rows) {
+    if (!fleet.hasPose(row) || fleet.isTurned(row)) continue;
+    const [x, y] = [view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row])];
+    ctx.moveTo(x + radius, y);
+    ctx.arc(x, y, radius, 0, 2 * Math.PI);
+  }
+  ctx.globalAlpha = ELSEWHERE_ALPHA;
+  ctx.strokeStyle = palette["ink-3"];
+  ctx.lineWidth = 1.5;
+  ctx.stroke();
+  ctx.globalAlpha = 1;
 }
 
 /** Return whether the tag is drawn as its hypotheses instead of one dot. Without north these are no places of the map. @param {import("../data/fleet.js").Fleet} fleet

@@ -3,7 +3,7 @@
 import { drawAnchors, drawGrid, drawRings, drawScaleBar } from "./draw_site.js";
 import { drawEvidence } from "./draw_evidence.js";
 import { drawEllipses, drawGhosts, drawRangeRings, drawTrails } from "./draw_doubt.js";
-import { drawColours, drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
+import { drawColours, drawElsewhere, drawLabels, drawMarkers, drawSelection, hasGhosts } from "./draw_tags.js";
 import { DENSITY_ABOVE, drawDensity } from "./density.js";
 import { drawTrack } from "./draw_track.js";
 import { follow } from "../data/motion.js";
@@ -33,10 +33,12 @@ export class LiveMap extends EventTarget {
   trackOf = () => null;
   /** Return whether a click was meant for something else than the tags. */
   pressed = (/** @type {number} */ _px, /** @type {number} */ _py) => false;
+  /** Return whether a tag is on a floor that the map does not show. */
+  isElsewhere = (/** @type {number} */ _row) => false;
   /** Keep all tags in view until the user moves the map. */
   autoFit = true;
   /** For tests and the console: figures of the last drawing. */
-  stats = { drawings: 0, ms: 0, visible: 0, density: false, labels: /** @type {number[][]} */ ([]) };
+  stats = { drawings: 0, ms: 0, visible: 0, elsewhere: 0, density: false, labels: /** @type {number[][]} */ ([]) };
   #ctx;
   #rows = new Int32Array(0);
   #isScheduled = false;
@@ -208,10 +210,12 @@ export class LiveMap extends EventTarget {
     const { view, fleet, choice } = this;
     const palette = fleet.current ? this.palette : withoutStates(this.palette);
     const isShown = (/** @type {number} */ row) => choice.shows(fleet, row);
+    const isHere = (/** @type {number} */ row) => isShown(row) && !this.isElsewhere(row);
     this.#rows = rowsInView(fleet, view, isShown);
+    const [here, elsewhere] = [this.#rows.filter((row) => !this.isElsewhere(row)), this.#rows.filter(this.isElsewhere)];
     const scene = {
       ctx: this.#ctx, view, palette, fleet, trails: this.trails, roster: this.roster, anchors: this.anchors,
-      rows: this.#rows, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
+      rows: here, selected: fleet.row(choice.selected), hovered: this.hovered, now_ms,
     };
     this.#ctx.setTransform(devicePixelRatio, 0, 0, devicePixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
@@ -219,7 +223,9 @@ export class LiveMap extends EventTarget {
     for (const draw of this.underlays) draw(scene);
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
     if (centre) drawRings(this.#ctx, view, palette, centre);
-    this.#drawTags(scene, isShown);
+    drawElsewhere(scene, elsewhere);
+    this.stats.elsewhere = elsewhere.length;
+    this.#drawTags(scene, isHere);
     for (const draw of this.overlays) draw(scene);
     drawScaleBar(this.#ctx, view, palette);
   }

@@ -1,5 +1,6 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
+import { Alerts } from "../alerts/alerts.js";
 import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
@@ -11,8 +12,10 @@ import { fixed } from "../data/format.js";
 import { listen } from "../map/gestures.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
+import { Plans } from "../plan/plans.js";
 import { Notices } from "../panel/notices.js";
 import { Past } from "./past.js";
+import { cornersOf } from "../plan/transform.js";
 import { Roster } from "../data/roster.js";
 import { Setup } from "../setup/setup.js";
 import { TagTable } from "../panel/table.js";
@@ -36,6 +39,7 @@ const chips = new StateChips(byId("chips"), fleet, choice);
 const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const setup = new Setup(map, fleet, roster, choice, connection);
+const plans = new Plans(map, roster, choice, connection, setup);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -43,6 +47,7 @@ const measure = new Measure(map, byId("measure"), byId("measured"));
 map.pressed = (px, py) => measure.press(px, py) || zones.press(px, py);
 const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
 const zones = new Zones(map, connection, (tag) => fleet.row(tag) >= 0 && select(tag));
+const alerts = new Alerts(byId("alerts"), byId("confirm"), connection, zones);
 
 /** @param {string | null} tag */
 function select(tag) {
@@ -159,7 +164,10 @@ Object.defineProperty(window, "dropanchor", {
       return Array.from({ length: trail?.length ?? 0 }, (_, i) => /** @type {any} */ (trail).x[/** @type {any} */ (trail).at(i)]);
     },
     events: () => zones.log.current,
+    destinations: () => alerts.store.states.map(({ destination, pending, dead }) => ({ id: destination.id, pending, dead })),
     zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
+    draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },
+    plans: () => plans.store.plans.map((plan) => ({ id: plan.id, placement: plan.placement, isReady: plans.images.isReady(plan.image) })),
     drawing: () => ({ ...map.stats, still: map.still }),
     anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),
     tags: () => fleet.names.map((tag, row) => ({

@@ -14,16 +14,13 @@ export class ZoneList {
     this.act = act;
     this.list = /** @type {HTMLElement} */ (box.querySelector("ul"));
     this.count = /** @type {HTMLElement} */ (box.querySelector('[data-part="count"]'));
-    this.stuck = /** @type {HTMLElement} */ (box.querySelector('[data-part="stuck"]'));
     this.adding = /** @type {HTMLElement} */ (box.querySelector('[data-part="new"]'));
   }
 
   /** @param {boolean} current whether the counts are @param {string | null} selected id of a zone @param {boolean} editing */
   update(current, selected, editing) {
-    const { zones, inside, stuck, mayWrite } = this.store;
+    const { zones, inside, mayWrite } = this.store;
     write(this.count, zones.length === 0 ? "none yet" : zones.length.toLocaleString("en"));
-    write(this.stuck, stuck === 0 ? "" : `${counted(stuck, "event")} could not be delivered by webhooks.`);
-    this.stuck.hidden = stuck === 0;
     this.adding.hidden = !mayWrite || editing;
     const shown = JSON.stringify([zones.map(({ id, name, colour }) => [id, name, colour]), mayWrite]);
     if (shown !== this.#shown) this.list.replaceChildren(...zones.map((zone) => this.#line(zone)));

@@ -1,4 +1,4 @@
-/** The zones of the service, how many tags are in each, and the events that webhooks could not deliver. */
+/** The zones of the service, and how many tags are in each. */
 
 import { request, sendChange } from "../data/access.js";
 import { api, getJson } from "../data/connection.js";
@@ -30,8 +30,6 @@ export class ZoneStore extends EventTarget {
   zones = [];
   /** Tags inside, by zone. @type {Map<string, number>} */
   inside = new Map();
-  /** Events that wait because deliveries fail, and those that were given up. */
-  stuck = 0;
   /** @type {"none" | "read" | "write" | "admin"} */
   scope = "none";
   #timer = 0;
@@ -64,11 +62,10 @@ export class ZoneStore extends EventTarget {
 
   /** Request everything now. A failure leaves what was known: the page's connection says what is wrong. */
   async refresh() {
-    const paths = ["zones", "zone-occupancy", "webhooks"];
-    const [zones, occupancy, webhooks] = await Promise.all(paths.map((path) => getJson(api(path)).catch(() => null)));
+    const paths = ["zones", "zone-occupancy"];
+    const [zones, occupancy] = await Promise.all(paths.map((path) => getJson(api(path)).catch(() => null)));
     if (zones) this.zones = zones.zones;
     if (occupancy) this.inside = new Map(occupancy.zones.map((/** @type {{zone: string, tags: number}} */ { zone, tags }) => [zone, tags]));
-    if (webhooks) this.stuck = webhooks.webhooks.reduce((/** @type {number} */ sum, /** @type {Webhook} */ hook) => sum + stuckIn(hook), 0);
     this.dispatchEvent(new Event("change"));
   }
 
@@ -90,8 +87,3 @@ export class ZoneStore extends EventTarget {
     await this.refresh();
   }
 }
-
-/** @typedef {{pending: number, dead: number, problem: string | null}} Webhook */
-
-/** @param {Webhook} webhook */
-const stuckIn = ({ pending, dead, problem }) => dead + (problem === null ? 0 : pending);

@@ -38,7 +38,7 @@ export class Zones {
     const box = byId("zone-list");
     this.handles = new Handles(byId("handles"), map, this.editor);
     this.events = new EventList(/** @type {HTMLDetailsElement} */ (byId("events")), this.log, (event) => this.#pick(event));
-    this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.#edit(id) });
+    this.list = new ZoneList(box, this.store, { select: (id) => this.select(id), edit: (id) => this.edit(id) });
     new ZoneForm(/** @type {HTMLFormElement} */ (byId("zone-form")), this.editor, () => this.#addCorner());
     byId("new-polygon").addEventListener("click", () => this.#begin({ type: "polygon", points: [] }));
     byId("new-circle").addEventListener("click", () => this.#begin(this.#newCircle()));
@@ -90,8 +90,9 @@ export class Zones {
     }, REFRESH_MS);
   }
 
-  /** @param {string} id */
-  #edit(id) {
+  /** Open the list and edit a zone. @param {string} id */
+  edit(id) {
+    /** @type {HTMLDetailsElement} */ (byId("zone-list")).open = true;
     this.select(id);
     this.editor.open(id);
   }

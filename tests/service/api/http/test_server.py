@@ -134,6 +134,16 @@ def test_a_slow_but_complete_request_and_a_long_stream_are_served() -> None:
         assert next(events)[1]["tags"] == ["a"]
 
 
+def test_a_large_body_may_take_longer_than_the_deadline_while_it_comes_fast_enough() -> None:
+    piece, pieces = b"\0" * 300_000, 5
+    head = f"POST /api/v1/plan-images HTTP/1.1\r\nhost: x\r\ncontent-length: {pieces * len(piece)}\r\n\r\n"
+    with serving(make_api_bench(), ShortDeadlines) as port, closing(_connected(port, head.encode())) as client:
+        for _ in range(pieces):
+            time.sleep(0.4 * ShortDeadlines.request_s)
+            client.sendall(piece)
+        assert _answer(client).startswith(b"HTTP/1.1 422")
+
+
 def test_a_large_body_is_refused_by_its_content_length() -> None:
     head = f"PUT /api/v1/site HTTP/1.1\r\nhost: x\r\ncontent-length: {MAX_BODY_BYTES + 1}\r\n\r\n"
     with serving(make_api_bench()) as port, closing(_connected(port, head.encode())) as client:

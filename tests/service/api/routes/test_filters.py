@@ -57,7 +57,7 @@ def test_a_stream_tells_once_that_a_tag_has_left(bench: ApiBench) -> None:
     def tags(frame: Any) -> list[str]:
         return [] if frame is None else list(frame["tags"])
 
-    changes = Changes(bench.answers, [], PoseFilter(box=(0.0, 0.0, 2.0, 2.0)))
+    changes = Changes(bench.answers, list, [], PoseFilter(box=(0.0, 0.0, 2.0, 2.0)))
     assert tags(changes.snapshot()) == ["cart-1"]
     bench.move("Cart-2", x=6.0, y=0.0)
     assert tags(changes.next()) == []
@@ -70,7 +70,7 @@ def test_a_stream_tells_once_that_a_tag_has_left(bench: ApiBench) -> None:
 
 def test_a_stream_tells_once_that_a_tag_is_in_another_state(bench: ApiBench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dropanchor_service.api.routes.stream.STATE_CHECK_S", 0.0)
-    changes = Changes(bench.answers, [], PoseFilter(states=["tracking"]))
+    changes = Changes(bench.answers, list, [], PoseFilter(states=["tracking"]))
     assert list(changes.snapshot()["tags"]) == ["cart-1", "drone"]
     bench.now_ns += 60_000_000_000
     frame = changes.next()

@@ -1,7 +1,5 @@
-"""Zones, rules, events and webhooks over REST."""
+"""Zones, rules and events over REST."""
 
-import ipaddress
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,19 +11,14 @@ from prometheus_client import CollectorRegistry
 
 from dropanchor_schemas.events import EventList, EventType
 from dropanchor_service.api import create_app
-from dropanchor_service.api.http.access import required_scope
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.events.drafts import Draft, StateKey, StateValue
-from dropanchor_service.security.identity import Scope
-from dropanchor_service.webhooks.registry import FILE_NAME, open_webhooks
-from dropanchor_service.webhooks.sender import Sender
 from dropanchor_service.zones.items import ZoneItems
 from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.http_server import running_server
-from support.receiver import Receiver, running_receiver
 
-ZONE, RULE, SECRET = examples.ZONE, examples.RULE, examples.SECRET
+ZONE, RULE = examples.ZONE, examples.RULE
 
 
 def app_of(parts: EventParts, bench: ApiBench | None = None) -> FastAPI:
@@ -144,10 +137,6 @@ def test_a_stream_begins_after_the_last_id_and_goes_on_with_new_events() -> None
         bench.stopping.set()
 
 
-def webhook(**changes: Any) -> dict[str, Any]:
-    return {"id": "mes", "url": "http://127.0.0.1:9/", "secret": SECRET} | changes
-
-
 def test_the_tags_in_each_known_zone_are_counted_from_entry_to_exit() -> None:
     parts = EventParts.in_memory("yard")
     app = app_of(parts)
@@ -160,89 +149,3 @@ def test_the_tags_in_each_known_zone_are_counted_from_entry_to_exit() -> None:
     assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": [{"zone": "dock", "tags": 1}]}
     parts.store.commit([], {StateKey("zone", "dock", "b"): outside})
     assert ask(app, "GET", "/api/v1/zone-occupancy").json() == {"zones": []}
-
-
-def with_loopback(folder: Path | None = None) -> EventParts:
-    sender = Sender(2.0, [ipaddress.ip_network("127.0.0.0/8")])
-    return replace(EventParts.in_memory("yard"), sender=sender, webhooks=open_webhooks(folder))
-
-
-def test_a_webhook_never_returns_its_secret_and_keeps_it(tmp_path: Path) -> None:
-    parts = with_loopback(tmp_path)
-    app = app_of(parts)
-    made = ask(app, "PUT", "/api/v1/webhooks/mes", json=webhook())
-    assert made.json()["has_secret"] is True
-    changed = ask(app, "PUT", "/api/v1/webhooks/mes", json=webhook(secret=None, tags=["a"]))
-    answers = [made, changed, *(ask(app, "GET", f"/api/v1/webhooks{path}") for path in ("", "/mes"))]
-    assert all(response.status_code == 200 and SECRET not in response.text for response in answers)
-    again = ask(
-        app, "PUT", "/api/v1/webhooks/mes", json=webhook(url="http://127.0.0.1:8/"), headers={"if-none-match": "*"}
-    )
-    assert kind_of(again) == "changed-meanwhile"
-    assert parts.webhooks.all["mes"].url == "http://127.0.0.1:9/"
-    assert parts.webhooks.all["mes"].secret == SECRET
-    assert open_webhooks(tmp_path).all["mes"].secret == SECRET
-    assert (tmp_path / FILE_NAME).stat().st_mode & 0o077 == 0
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"url": "http://10.0.0.1/"}, "allow_networks"),
-        ({"url": "http://169.254.169.254/"}, "allow_networks"),
-        ({"url": "ftp://example.com/"}, "https://"),
-        ({"url": "https://me:word@example.com/"}, "password"),
-        ({"secret": None}, "needs a secret"),
-        ({"secret": "whsec_c2hvcnQ="}, "openssl"),
-    ],
-)
-def test_a_webhook_that_cannot_work_is_refused_with_a_sentence(change: Mapping[str, Any], words: str) -> None:
-    response = ask(app_of(with_loopback()), "PUT", "/api/v1/webhooks/mes", json=webhook(**change))
-    assert kind_of(response) == "webhook-refused"
-    assert words in response.json()["detail"]
-    assert SECRET not in response.text
-
-
-def test_a_test_event_says_what_the_receiver_answered() -> None:
-    app, receiver = app_of(with_loopback()), Receiver()
-    with running_receiver(receiver):
-        ask(app, "PUT", "/api/v1/webhooks/mes", json=webhook(url=receiver.url))
-        tested = ask(app, "POST", "/api/v1/webhooks/mes/test").json()
-    assert tested == {"delivered": True, "detail": "the receiver answered 200 OK"}
-    assert receiver.accepted[0]["type"] == "dropanchor.webhook.test"
-    failed = ask(app, "POST", "/api/v1/webhooks/mes/test").json()
-    assert failed["delivered"] is False
-    assert "ConnectError" in failed["detail"]
-
-
-def test_dead_letters_are_listed_and_retried_and_go_with_their_webhook() -> None:
-    parts = with_loopback()
-    app = app_of(parts)
-    ask(app, "PUT", "/api/v1/webhooks/mes", json=webhook())
-    with parts.store.database.transaction() as connection:
-        connection.executemany("INSERT INTO deliveries VALUES ('mes', ?, 0, ?)", [(1, "refused"), (2, None)])
-    happen(parts, "a", "b")
-    status = ask(app, "GET", "/api/v1/webhooks/mes").json()
-    assert (status["pending"], status["dead"]) == (1, 1)
-    letters = ask(app, "GET", "/api/v1/webhooks/mes/dead-letters").json()["dead_letters"]
-    assert [(letter["event"]["subject"], letter["reason"]) for letter in letters] == [("a", "refused")]
-    assert ask(app, "POST", "/api/v1/webhooks/mes/dead-letters/retry").json() == {"retried": 1}
-    assert ask(app, "GET", "/api/v1/webhooks/mes").json()["pending"] == 2
-    assert ask(app, "DELETE", "/api/v1/webhooks/mes").status_code == 204
-    assert parts.deliveries.counts() == {}
-    assert kind_of(ask(app, "POST", "/api/v1/webhooks/mes/test")) == "unknown-webhook"
-
-
-def test_only_an_administrator_changes_a_webhook() -> None:
-    assert required_scope("PUT", "/api/v1/webhooks/mes") is Scope.ADMIN
-    assert required_scope("POST", "/api/v1/webhooks/mes/test") is Scope.ADMIN
-    assert required_scope("GET", "/api/v1/webhooks") is Scope.READ
-    assert required_scope("PUT", "/api/v1/zones/dock") is Scope.WRITE
-
-
-def test_there_is_a_limit_of_webhooks() -> None:
-    app = app_of(with_loopback())
-    for number in range(20):
-        path = f"/api/v1/webhooks/{number}"
-        assert ask(app, "PUT", path, json=webhook(id=str(number))).status_code == 200
-    assert kind_of(ask(app, "PUT", "/api/v1/webhooks/more", json=webhook(id="more"))) == "items-full"

@@ -1,0 +1,134 @@
+"""Models of destinations: who gets which events, how, and what became of them."""
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from dropanchor_schemas.events import Event, EventType
+from dropanchor_schemas.site import Id, Number, StrictBool
+
+SECRET_PREFIX = "whsec_"
+ADDRESS = r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$"
+TOPIC = r"^([A-Za-z0-9._ /:-]|\{site\}|\{tag\}|\{type\})+$"
+
+
+def _require_address(text: str) -> str:
+    if not re.fullmatch(ADDRESS, text):
+        raise ValueError(f"{text!r} is no address such as shift@example.com")
+    return text
+
+
+def _require_topic(text: str) -> str:
+    if not re.fullmatch(TOPIC, text):
+        raise ValueError(
+            f"{text!r} is no topic such as yard/{{tag}}/event; {{site}}, {{tag}} and {{type}} are replaced"
+        )
+    return text
+
+
+Address = Annotated[
+    str, Field(max_length=254, json_schema_extra={"pattern": ADDRESS}), AfterValidator(_require_address)
+]
+Topic = Annotated[str, Field(max_length=512, json_schema_extra={"pattern": TOPIC}), AfterValidator(_require_topic)]
+
+
+class _Destination(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    id: Id = Field(description="Id of the destination, as in its path.")
+    enabled: StrictBool = Field(default=True, description="Whether new events are queued for it.")
+    types: list[EventType] = Field(default=[], max_length=50, description="Only events of these types; empty: all.")
+    zones: Annotated[list[Id], Field(max_length=1000)] = Field(
+        default=[], description="Only events of these zones; empty: all."
+    )
+    tags: Annotated[list[Id], Field(max_length=10_000)] = Field(
+        default=[], description="Only events of these tags; empty: all."
+    )
+
+
+class WebhookDestination(_Destination):
+    """A receiver of events over HTTP: one signed POST for each event."""
+
+    type: Literal["webhook"]
+    url: str = Field(max_length=2000, description="Where events are posted: https:// or http://.")
+    secret: str | None = Field(
+        default=None,
+        max_length=200,
+        description="Key of the signature: `whsec_` and the Base64 of 24 to 64 random bytes. It is never returned. "
+        "null keeps the present one.",
+    )
+
+
+class EmailDestination(_Destination):
+    """People who get events by e-mail. The mail server is in the settings."""
+
+    type: Literal["email"]
+    to: list[Address] = Field(min_length=1, max_length=50, description="Addresses of the recipients.")
+    digest_s: Annotated[Number, Field(ge=0, le=600)] = Field(
+        default=60.0, description="Least time between two mails. A mail has all events that happened meanwhile."
+    )
+
+
+class MqttDestination(_Destination):
+    """A topic of the MQTT broker in the settings: one message (QoS 1) for each event."""
+
+    type: Literal["mqtt"]
+    topic: Topic = Field(
+        default="dropanchor/{site}/{tag}/event",
+        description="The topic. `{site}`, `{tag}` and `{type}` stand for those of the event.",
+    )
+
+
+Destination = Annotated[WebhookDestination | EmailDestination | MqttDestination, Field(discriminator="type")]
+
+
+class DestinationState(BaseModel):
+    """A destination and its queue."""
+
+    model_config = ConfigDict(frozen=True)
+
+    destination: Destination = Field(description="As it was put, but without its secret.")
+    has_secret: bool = Field(description="Whether the service knows the secret of a webhook.")
+    pending: int = Field(description="Events that wait for delivery.")
+    oldest_ns: int | None = Field(description="UTC, ns: when the oldest of them happened; null: none waits.")
+    dead: int = Field(description="Dead letters: events whose delivery was given up.")
+    problem: str | None = Field(description="What went wrong at the last attempt; null: nothing.")
+
+
+class DestinationList(BaseModel):
+    """The destinations of the site."""
+
+    destinations: list[DestinationState]
+
+
+class DestinationTest(BaseModel):
+    """What became of a test event."""
+
+    model_config = ConfigDict(frozen=True)
+
+    delivered: bool
+    detail: str = Field(description="What the receiver answered, or why there is no answer.")
+
+
+class DeadLetter(BaseModel):
+    """An event that was not delivered, and why."""
+
+    model_config = ConfigDict(frozen=True)
+
+    event: Event
+    reason: str
+
+
+class DeadLetterList(BaseModel):
+    """The oldest dead letters of a destination, at most 1000."""
+
+    dead_letters: list[DeadLetter]
+
+
+class Retried(BaseModel):
+    """How many dead letters went back to the queue."""
+
+    model_config = ConfigDict(frozen=True)
+
+    retried: int

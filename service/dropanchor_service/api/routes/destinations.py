@@ -1,0 +1,186 @@
+"""The routes for destinations: who gets which events, a test, and what could not be delivered."""
+
+from typing import Annotated
+
+import orjson
+from fastapi import APIRouter, Body
+from starlette.responses import Response
+
+from dropanchor_schemas.destinations import (
+    DeadLetterList,
+    Destination,
+    DestinationList,
+    DestinationState,
+    DestinationTest,
+    Retried,
+    WebhookDestination,
+)
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.http.etags import Conditions
+from dropanchor_service.api.routes import event_examples as examples
+from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.api.routes.events import reading
+from dropanchor_service.api.routes.items import CHANGE_KINDS, DestinationId, delete, found, item_response, put
+from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.delivery.channel import ChannelError, Verdict
+from dropanchor_service.events.deliveries import QueueState
+from dropanchor_service.events.drafts import destination_test
+from dropanchor_service.events.store import cloud_event
+
+_READ = (Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
+_ONE = (Kind.UNKNOWN_DESTINATION, *_READ)
+
+
+def destinations_router(parts: EventParts) -> APIRouter:
+    router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
+    _add_read_routes(router, parts)
+    _add_change_routes(router, parts)
+    _add_test_route(router, parts)
+    _add_dead_letter_routes(router, parts)
+    return router
+
+
+def _add_read_routes(router: APIRouter, parts: EventParts) -> None:
+    @router.get(
+        "/destinations",
+        operation_id="list_destinations",
+        summary="List the destinations and the state of their queues",
+        response_model=DestinationList,
+        responses=example_response({"destinations": [examples.DESTINATION_STATE]}) | problems(*_READ),
+    )
+    def list_destinations() -> Response:
+        with reading():
+            queues = parts.deliveries.states()
+        states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
+        return json_response({"destinations": [state.model_dump(mode="json") for state in states]})
+
+    @router.get(
+        "/destinations/{destination}",
+        operation_id="get_destination",
+        summary="Get a destination and the state of its queue",
+        response_model=DestinationState,
+        responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
+    )
+    def get_destination(destination: DestinationId) -> Response:
+        return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
+
+
+def _add_change_routes(router: APIRouter, parts: EventParts) -> None:
+    @router.put(
+        "/destinations/{destination}",
+        operation_id="put_destination",
+        summary="Create or replace a destination",
+        description="It gets the events from now on. A webhook inside needs `allow_networks` in the settings, an "
+        "e-mail a mail server, and MQTT a broker.",
+        response_model=DestinationState,
+        responses=example_response(examples.DESTINATION_STATE)
+        | problems(Kind.DESTINATION_REFUSED, *CHANGE_KINDS, *_READ),
+    )
+    def put_destination(
+        destination: DestinationId,
+        body: Annotated[Destination, Body(examples=[examples.WEBHOOK])],
+        allows: Conditions,
+    ) -> Response:
+        usable = _usable(parts, body)
+        put(parts.destinations, destination, body.id, usable, allows)
+        return _response(parts, usable)
+
+    @router.delete(
+        "/destinations/{destination}",
+        operation_id="delete_destination",
+        summary="Delete a destination and its queue",
+        status_code=204,
+        responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
+    )
+    def delete_destination(destination: DestinationId, allows: Conditions) -> Response:
+        response = delete(parts.destinations, destination, allows, Kind.UNKNOWN_DESTINATION)
+        with reading():
+            parts.deliveries.drop(destination)
+        return response
+
+
+def _add_test_route(router: APIRouter, parts: EventParts) -> None:
+    @router.post(
+        "/destinations/{destination}/test",
+        operation_id="test_destination",
+        summary="Send a test event to a destination now",
+        response_model=DestinationTest,
+        responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
+    )
+    async def test_destination(destination: DestinationId) -> Response:
+        known = found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+        try:
+            parts.channels.check_settings(known)
+        except ChannelError as error:
+            raise ProblemError(Kind.DESTINATION_REFUSED, f"{error}.") from error
+        async with parts.channels.open(known) as channel:
+            outcome = (await channel.send([cloud_event(destination_test(known.id), 0, parts.store.site)]))[0]
+        answer = {"delivered": outcome.verdict is Verdict.ACCEPTED, "detail": outcome.warning or outcome.detail}
+        return json_response(answer)
+
+
+def _add_dead_letter_routes(router: APIRouter, parts: EventParts) -> None:
+    @router.get(
+        "/destinations/{destination}/dead-letters",
+        operation_id="list_dead_letters",
+        summary="List the events whose delivery was given up",
+        response_model=DeadLetterList,
+        responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
+    )
+    def list_dead_letters(destination: DestinationId) -> Response:
+        found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+        with reading():
+            dead = parts.deliveries.dead(destination)
+        letters = [{"event": orjson.Fragment(body), "reason": reason} for body, reason in dead]
+        return json_response({"dead_letters": letters})
+
+    @router.post(
+        "/destinations/{destination}/dead-letters/retry",
+        operation_id="retry_dead_letters",
+        summary="Put the dead letters of a destination back into its queue",
+        response_model=Retried,
+        responses=example_response({"retried": 1}) | problems(*_ONE),
+    )
+    def retry_dead_letters(destination: DestinationId) -> Response:
+        found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+        with reading():
+            return json_response({"retried": parts.deliveries.retry(destination)})
+
+    @router.delete(
+        "/destinations/{destination}/dead-letters",
+        operation_id="delete_dead_letters",
+        summary="Drop the dead letters of a destination",
+        description="The events themselves stay.",
+        status_code=204,
+        responses=problems(*_ONE),
+    )
+    def delete_dead_letters(destination: DestinationId) -> Response:
+        found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+        with reading():
+            parts.deliveries.drop_dead(destination)
+        return Response(status_code=204)
+
+
+def _usable(parts: EventParts, destination: Destination) -> Destination:
+    """Return the destination, a webhook with its secret. Raises ProblemError when nothing could be delivered to it."""
+    present = parts.destinations.all.get(destination.id)
+    if isinstance(destination, WebhookDestination) and isinstance(present, WebhookDestination):
+        destination = destination.model_copy(update={"secret": destination.secret or present.secret})
+    try:
+        parts.channels.check(destination)
+    except ChannelError as error:
+        raise ProblemError(Kind.DESTINATION_REFUSED, f"{error}.") from error
+    return destination
+
+
+def _response(parts: EventParts, destination: Destination) -> Response:
+    with reading():
+        queue = parts.deliveries.states().get(destination.id, QueueState())
+    return item_response(destination, _state(parts, destination, queue))
+
+
+def _state(parts: EventParts, destination: Destination, queue: QueueState) -> DestinationState:
+    secret = destination.secret if isinstance(destination, WebhookDestination) else None
+    shown = destination.model_copy(update={"secret": None}) if secret else destination
+    problem = parts.problem_of(destination.id)
+    return DestinationState(destination=shown, has_secret=secret is not None, problem=problem, **queue._asdict())

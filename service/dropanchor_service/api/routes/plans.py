@@ -1,0 +1,38 @@
+"""The routes for floor plans."""
+
+from fastapi import APIRouter
+
+from dropanchor_schemas.plans import Plan, PlanList
+from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.routes import plan_examples as examples
+from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
+from dropanchor_service.api.routes.parameters import NO_QUERY
+from dropanchor_service.plans.store import PlanStore
+
+
+def plans_router(store: PlanStore) -> APIRouter:
+    router = APIRouter(tags=["plans"], dependencies=[NO_QUERY])
+    add_item_routes(router, _plans(store))
+    return router
+
+
+def _plans(store: PlanStore) -> Resource[Plan]:
+    def check_image(plan: Plan) -> None:
+        if store.image(plan.image.id) != plan.image:
+            detail = "Upload the image with POST /api/v1/plan-images, and put `image` of the answer here."
+            raise ProblemError(Kind.IMAGE_NOT_UPLOADED, detail)
+
+    return Resource(
+        store,
+        path="plans",
+        name="plan",
+        list_summary="List the floor plans",
+        model=Plan,
+        list_model=PlanList,
+        example=examples.PLAN,
+        unknown=Kind.UNKNOWN_PLAN,
+        put_description="Upload its image first. An event `settings` in the stream of poses tells every page.",
+        delete_description="The service keeps its image for a while, so that the same plan can be put again.",
+        check=check_image,
+        refusals=(Kind.IMAGE_NOT_UPLOADED,),
+    )

@@ -1,0 +1,89 @@
+/** Edit a destination or a rule. Nothing changes for others until it is saved. */
+
+import { CHANGED_MEANWHILE_SENTENCE, ChangedMeanwhileError } from "../data/access.js";
+import { newId } from "../zones/editor.js";
+
+/** @typedef {import("./items.js").Item} Item */
+
+/** Event: "change". "saved" when something was saved or deleted. */
+export class ItemEditor extends EventTarget {
+  /** What is being edited. Its id is empty while it is new. @type {Item | null} */
+  item = null;
+  /** Why the last attempt to save failed. */
+  problem = "";
+  /** Whether somebody else has changed the item. */
+  conflict = false;
+  #etag = /** @type {string | null} */ (null);
+
+  /** @param {import("./items.js").Items} items @param {() => readonly Item[]} known */
+  constructor(items, known) {
+    super();
+    this.items = items;
+    this.known = known;
+  }
+
+  get isNew() {
+    return this.#etag === null;
+  }
+
+  /** @param {Record<string, any>} item without an id */
+  begin(item) {
+    this.#etag = null;
+    this.item = { ...item, id: "" };
+    this.#say("");
+  }
+
+  /** Edit an item as it is now. @param {string} id */
+  async open(id) {
+    try {
+      const { item, etag } = await this.items.read(id);
+      this.item = item;
+      this.#etag = etag;
+      this.#say("");
+    } catch (error) {
+      this.#say(messageOf(error));
+    }
+  }
+
+  close() {
+    this.item = null;
+    this.#say("");
+  }
+
+  /** Save the item with these values. @param {Record<string, any>} values @param {string} name of which a new id is made */
+  save(values, name) {
+    const item = { .../** @type {Item} */ (this.item), ...values };
+    item.id ||= newId(name, this.known());
+    this.item = item;
+    return this.#attempt(() => this.items.save(item, this.#etag), () => this.#etag === null && (item.id = ""));
+  }
+
+  remove() {
+    return this.#attempt(() => this.items.remove(/** @type {Item} */ (this.item).id, this.#etag ?? ""), () => {});
+  }
+
+  /** @param {() => Promise<unknown>} send @param {() => void} undo */
+  async #attempt(send, undo) {
+    try {
+      await send();
+      this.close();
+      this.dispatchEvent(new Event("saved"));
+    } catch (error) {
+      undo();
+      this.#say(messageOf(error), error instanceof ChangedMeanwhileError);
+    }
+  }
+
+  /** @param {string} problem @param {boolean} [conflict] */
+  #say(problem, conflict = false) {
+    this.problem = conflict ? `${CHANGED_MEANWHILE_SENTENCE} Nothing was saved.` : problem;
+    this.conflict = conflict;
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** Return the sentence of an error without the paths of fields. @param {unknown} error */
+function messageOf(error) {
+  const text = (error instanceof Error ? error.message : String(error)).replace(/body(\.\w+)+: /g, "");
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

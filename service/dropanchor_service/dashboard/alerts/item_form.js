@@ -1,0 +1,96 @@
+/** The form of a destination or a rule. Fields with `data-for` belong to some types only. */
+
+/** @typedef {import("./items.js").Item} Item @typedef {HTMLInputElement | HTMLTextAreaElement} Field */
+
+export class ItemForm {
+  /** What is shown, so that what is being typed is not overwritten. @type {Item | null} */
+  #shown = null;
+
+  /** @param {HTMLFormElement} form @param {import("./item_editor.js").ItemEditor} editor
+   * @param {{title: (item: Item, isNew: boolean) => string, mayDelete: () => boolean, ask: () => Promise<boolean>}} act */
+  constructor(form, editor, act) {
+    this.form = form;
+    this.editor = editor;
+    this.act = act;
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      editor.save(this.#values(), this.#named());
+    });
+    form.addEventListener("reset", () => editor.close());
+    this.#part("newer").addEventListener("click", () => editor.item && editor.open(editor.item.id));
+    this.#part("delete").addEventListener("click", async () => (await act.ask()) && editor.remove());
+    editor.addEventListener("change", () => this.#update());
+  }
+
+  #update() {
+    const { item, isNew, problem, conflict } = this.editor;
+    this.form.hidden = item === null;
+    this.#write("problem", problem);
+    this.#part("newer").hidden = !conflict;
+    this.#part("delete").hidden = isNew || !this.act.mayDelete();
+    if (problem !== "") this.#part("problem").scrollIntoView({ block: "nearest" });
+    if (item !== null && problem === "" && item !== this.#shown) this.#show(item, isNew);
+    this.#shown = item;
+  }
+
+  /** @param {Item} item @param {boolean} isNew */
+  #show(item, isNew) {
+    this.#write("title", this.act.title(item, isNew));
+    for (const part of /** @type {NodeListOf<HTMLElement>} */ (this.form.querySelectorAll("[data-for]"))) {
+      part.hidden = !(part.dataset.for ?? "").split(" ").includes(item.type) || (part.dataset.new !== undefined && !isNew);
+    }
+    for (const field of this.#fields()) {
+      field.disabled = field.closest("[hidden]:not(form)") !== null;
+      if (!field.disabled) fill(field, item);
+    }
+    this.#fields().find((field) => !field.disabled)?.focus();
+  }
+
+  #fields() {
+    return /** @type {Field[]} */ ([...this.form.querySelectorAll("input, textarea")]);
+  }
+
+  #values() {
+    /** @type {Record<string, any>} */
+    const values = {};
+    for (const field of this.#fields()) {
+      if (field.disabled || field.dataset.as === "id") continue;
+      if (field.dataset.as === "choice") values[field.name] = [...(values[field.name] ?? []), .../** @type {HTMLInputElement} */ (field).checked ? [field.value] : []];
+      else values[field.name] = valueOf(field);
+    }
+    return values;
+  }
+
+  /** Return the text of which a new id is made. */
+  #named() {
+    return this.#fields().find((field) => field.dataset.as === "id" || field.name === "name")?.value ?? "";
+  }
+
+  /** @param {string} name @returns {HTMLElement} */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.form.querySelector(`[data-part="${name}"]`));
+  }
+
+  /** @param {string} name @param {string} text */
+  #write(name, text) {
+    const part = this.#part(name);
+    part.textContent = text;
+    part.hidden = text === "";
+  }
+}
+
+/** @param {Field} field @param {Item} item */
+function fill(field, item) {
+  const value = item[field.name];
+  if (field.dataset.as === "choice") /** @type {HTMLInputElement} */ (field).checked = value.includes(field.value);
+  else if (field.type === "checkbox") /** @type {HTMLInputElement} */ (field).checked = value;
+  else field.value = Array.isArray(value) ? value.join(", ") : String(value ?? "");
+}
+
+/** @param {Field} field */
+function valueOf(field) {
+  if (field.type === "checkbox") return /** @type {HTMLInputElement} */ (field).checked;
+  if (field.type === "number") return /** @type {HTMLInputElement} */ (field).valueAsNumber;
+  if (field.dataset.as === "list") return field.value.split(/[\s,]+/).filter((part) => part !== "");
+  return field.dataset.as === "secret" && field.value === "" ? null : field.value;
+}

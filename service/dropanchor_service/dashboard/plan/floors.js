@@ -1,0 +1,69 @@
+/** The floors that the plans show, the chosen one, and which tags are on another. */
+
+/** @typedef {import("./plan_store.js").Plan} Plan */
+/** @typedef {{name: string, bottom_m: number, ranges: [number, number][]}} FloorOfSite */
+
+const STORAGE_KEY = "dropanchor.floor";
+
+/** Return the floors, the highest first. Plans with the same name of a floor belong together. @param {readonly Plan[]} plans @returns {FloorOfSite[]} */
+export function floorsOf(plans) {
+  /** @type {Map<string, [number, number][]>} */
+  const ranges = new Map();
+  for (const { floor } of plans) if (floor) ranges.set(floor.name, [...(ranges.get(floor.name) ?? []), [floor.bottom_m, floor.top_m]]);
+  const floors = [...ranges].map(([name, of]) => ({ name, bottom_m: Math.min(...of.map(([bottom]) => bottom)), ranges: of }));
+  return floors.sort((a, b) => b.bottom_m - a.bottom_m);
+}
+
+/** @param {FloorOfSite} floor @param {number} height_m */
+export const reaches = ({ ranges }, height_m) => ranges.some(([bottom, top]) => height_m >= bottom && height_m < top);
+
+/** Return whether a height is on another floor. 0 m is what a tag has whose height nobody has set, so it says nothing.
+ * @param {readonly FloorOfSite[]} floors @param {FloorOfSite | null} chosen @param {number} height_m */
+export function isElsewhere(floors, chosen, height_m) {
+  if (!chosen || height_m === 0 || reaches(chosen, height_m)) return false;
+  return floors.some((floor) => reaches(floor, height_m));
+}
+
+/** Event: "change". */
+export class Floors extends EventTarget {
+  /** @type {FloorOfSite[]} */
+  all = [];
+  /** At first the one at the height of the anchor, or the lowest; null: there is at most one. @type {FloorOfSite | null} */
+  chosen = null;
+  #name = sessionStorage.getItem(STORAGE_KEY) ?? "";
+
+  /** @param {HTMLSelectElement} select */
+  constructor(select) {
+    super();
+    this.select = select;
+    select.addEventListener("change", () => this.choose(select.value));
+  }
+
+  /** @param {readonly Plan[]} plans */
+  setPlans(plans) {
+    this.all = floorsOf(plans);
+    this.select.replaceChildren(...this.all.map(({ name }) => new Option(name)));
+    this.select.hidden = this.all.length < 2;
+    this.#changed();
+  }
+
+  /** @param {string} name */
+  choose(name) {
+    this.#name = name;
+    sessionStorage.setItem(STORAGE_KEY, name);
+    this.#changed();
+  }
+
+  /** Return whether a plan is shown: it belongs to the chosen floor, or to all. @param {Plan} plan */
+  shows({ floor }) {
+    return floor === null || this.chosen === null || floor.name === this.chosen.name;
+  }
+
+  #changed() {
+    const { all } = this;
+    const found = all.find(({ name }) => name === this.#name) ?? all.find((floor) => reaches(floor, 0)) ?? all.at(-1);
+    this.chosen = all.length < 2 ? null : (found ?? null);
+    this.select.value = this.chosen?.name ?? "";
+    this.dispatchEvent(new Event("change"));
+  }
+}

@@ -1,0 +1,91 @@
+/** The images of plans, ready to be drawn: in halving sizes, so that a large one costs little when it is small on the map. */
+
+import { request } from "../data/access.js";
+import { api } from "../data/connection.js";
+
+/** @typedef {import("./plan_store.js").PlanImage} PlanImage */
+
+const MAX_SIDE_PX = 4096;
+const MIN_SIDE_PX = 256;
+const RETRY_MS = 5000;
+
+/** Event: "change", when an image has arrived or is worth another request. */
+export class PlanImages extends EventTarget {
+  /** By id and look; empty while the image is on its way. @type {Map<string, HTMLCanvasElement[]>} */
+  #levels = new Map();
+
+  /** Return the sizes of an image, the largest first; empty until it has arrived. @param {PlanImage} image @param {boolean} inverted */
+  of(image, inverted) {
+    const key = `${image.id} ${inverted}`;
+    const levels = this.#levels.get(key);
+    if (!levels) this.#load(key, image, inverted);
+    return levels ?? [];
+  }
+
+  /** Return whether an image has arrived. @param {PlanImage} image */
+  isReady(image) {
+    return [true, false].some((inverted) => (this.#levels.get(`${image.id} ${inverted}`) ?? []).length > 0);
+  }
+
+  /** Forget all images but these. @param {readonly PlanImage[]} images */
+  keep(images) {
+    const ids = new Set(images.map(({ id }) => id));
+    for (const key of this.#levels.keys()) if (!ids.has(key.split(" ")[0])) this.#levels.delete(key);
+  }
+
+  /** @param {string} key @param {PlanImage} image @param {boolean} inverted */
+  async #load(key, image, inverted) {
+    this.#levels.set(key, []);
+    try {
+      const blob = await (await request(api(`plan-images/${image.id}`), { cache: "force-cache" })).blob();
+      const levels = halved(drawn(await decoded(blob, image.media_type), image, inverted));
+      if (this.#levels.has(key)) this.#levels.set(key, levels);
+    } catch {
+      await new Promise((resolve) => setTimeout(resolve, RETRY_MS)); // the connection of the page says what is wrong
+      this.#levels.delete(key);
+    }
+    this.dispatchEvent(new Event("change"));
+  }
+}
+
+/** Return what can be drawn. Scripts never run in an image, whatever it contains. @param {Blob} blob @param {string} media_type */
+async function decoded(blob, media_type) {
+  if (media_type !== "image/svg+xml") return createImageBitmap(blob);
+  const image = new Image();
+  image.src = `data:${media_type};charset=utf-8,${encodeURIComponent(await blob.text())}`;
+  await image.decode();
+  return image;
+}
+
+/** @param {ImageBitmap | HTMLImageElement} source @param {PlanImage} image @param {boolean} inverted */
+function drawn(source, { media_type, width_px, height_px }, inverted) {
+  const largest = MAX_SIDE_PX / Math.max(width_px, height_px);
+  const scale = media_type === "image/svg+xml" ? largest : Math.min(1, largest); // only an SVG gains by more pixels
+  const canvas = scaled(source, width_px * scale, height_px * scale);
+  if (!inverted) return canvas;
+  const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  ctx.globalCompositeOperation = "difference";
+  ctx.fillStyle = "#fff";
+  ctx.fillRect(0, 0, canvas.width, canvas.height);
+  ctx.globalCompositeOperation = "destination-in"; // transparent pixels stay transparent
+  ctx.drawImage(source, 0, 0, canvas.width, canvas.height);
+  return canvas;
+}
+
+/** @param {HTMLCanvasElement} largest */
+function halved(largest) {
+  const levels = [largest];
+  for (let last = largest; Math.max(last.width, last.height) > MIN_SIDE_PX; levels.push(last)) last = scaled(last, last.width / 2, last.height / 2);
+  return levels;
+}
+
+/** @param {CanvasImageSource} source @param {number} width @param {number} height */
+function scaled(source, width, height) {
+  const canvas = document.createElement("canvas");
+  canvas.width = Math.max(1, Math.round(width));
+  canvas.height = Math.max(1, Math.round(height));
+  const ctx = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+  ctx.imageSmoothingQuality = "high";
+  ctx.drawImage(source, 0, 0, canvas.width, canvas.height);
+  return canvas;
+}

@@ -1,0 +1,207 @@
+/** The panel of the floor plans: a list, the upload of a file, and a form for the plan that is being edited. */
+
+import { confirmed } from "../setup/confirm.js";
+import { numberOf } from "../setup/tag_form.js";
+import { PlanPoints } from "./plan_points.js";
+import { isWorldFile, worldOf } from "./world_file.js";
+
+const DEGREES = 180 / Math.PI;
+const HOW = {
+  "": "",
+  move: "Drag the plan, or press arrow keys on the map: 0.1 m, with Shift 1 m.",
+  pick: "Click a place on the plan that you know, such as a corner of the hall.",
+  place: "Now say where this place is: click it on the map, choose an anchor, or type x and y.",
+};
+
+export class PlanPanel {
+  /** Revision of the draft in the form. */
+  #filled = 0;
+
+  /** @param {HTMLElement} panel @param {HTMLElement} toggle @param {HTMLDialogElement} dialog
+   * @param {import("./plan_editor.js").PlanEditor} editor @param {import("../data/changes.js").Changes} changes */
+  constructor(panel, toggle, dialog, editor, changes) {
+    this.panel = panel;
+    this.toggle = toggle;
+    this.dialog = dialog;
+    this.editor = editor;
+    this.changes = changes;
+    this.list = this.#part("list");
+    this.upload = /** @type {HTMLFormElement} */ (this.#part("upload"));
+    this.form = /** @type {HTMLFormElement} */ (this.#part("form"));
+    this.points = new PlanPoints(this.#part("points"), editor);
+    toggle.addEventListener("click", () => (editor.isOpen ? editor.close() : editor.open()));
+    this.#part("close").addEventListener("click", () => editor.close());
+    this.#part("delete").addEventListener("click", () => this.#delete());
+    this.#part("move").addEventListener("click", () => editor.setMode("move"));
+    this.#part("pick").addEventListener("click", () => editor.setMode("pick"));
+    this.upload.addEventListener("change", () => this.#chosen());
+    this.upload.addEventListener("submit", (event) => this.#send(event));
+    this.form.addEventListener("input", (event) => this.#typed(/** @type {HTMLInputElement} */ (event.target)));
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      editor.save();
+    });
+    this.form.addEventListener("reset", (event) => {
+      event.preventDefault();
+      editor.discard();
+    });
+    this.list.addEventListener("click", (event) => {
+      const id = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset.plan;
+      if (id !== undefined) editor.select(id);
+    });
+    for (const [source, name] of /** @type {[EventTarget, string][]} */ ([[editor, "change"], [changes, "access"]])) source.addEventListener(name, () => this.#update());
+    this.#update();
+  }
+
+  /** @param {string} name */
+  #part(name) {
+    return /** @type {HTMLElement} */ (this.panel.querySelector(`[data-part="${name}"]`));
+  }
+
+  /** @param {HTMLFormElement} form @param {string} name */
+  #field(form, name) {
+    return /** @type {HTMLInputElement} */ (form.elements.namedItem(name));
+  }
+
+  #update() {
+    const { editor, changes } = this;
+    this.toggle.hidden = !changes.mayWrite;
+    this.toggle.setAttribute("aria-pressed", String(editor.isOpen));
+    this.panel.hidden = !editor.isOpen;
+    this.#fillList();
+    this.form.hidden = editor.draft === null;
+    this.upload.hidden = editor.draft !== null;
+    this.#part("delete").hidden = !changes.mayDelete;
+    for (const mode of /** @type {const} */ (["move", "pick"])) this.#part(mode).setAttribute("aria-pressed", String(editor.mode === mode));
+    write(this.#part("how"), HOW[editor.mode]);
+    if (!editor.isOpen) this.#say("");
+    if (editor.draft) this.#fillForm(editor.draft);
+    this.points.update();
+  }
+
+  #fillList() {
+    const { draft, store } = this.editor;
+    const texts = store.plans.map(({ id, name, floor }) => (name || id) + (floor ? ` · ${floor.name}` : ""));
+    const shown = JSON.stringify([texts, draft?.id]);
+    if (this.list.dataset.shown === shown) return;
+    this.list.dataset.shown = shown;
+    this.list.replaceChildren(...store.plans.map(({ id }, i) => {
+      const button = Object.assign(document.createElement("button"), { type: "button", textContent: texts[i] });
+      button.dataset.plan = id;
+      button.setAttribute("aria-pressed", String(id === draft?.id));
+      const line = document.createElement("li");
+      line.append(button);
+      return line;
+    }));
+  }
+
+  /** @param {import("./plan_editor.js").Draft} draft */
+  #fillForm({ name, opacity, dark_inverted, floor, placement, image }) {
+    const isOther = this.#filled !== this.editor.revision;
+    this.#filled = this.editor.revision;
+    if (isOther) this.#say("");
+    /** @type {Record<string, string | number>} */
+    const values = {
+      name, opacity, floor: floor?.name ?? "", bottom: floor?.bottom_m ?? "", top: floor?.top_m ?? "",
+      x: rounded(placement.x, 2), y: rounded(placement.y, 2), turn: rounded(placement.rotation_rad * DEGREES, 2),
+      width: rounded(placement.m_per_px * image.width_px, 3), distance: this.editor.distance_m ?? "",
+    };
+    for (const [key, value] of Object.entries(values)) {
+      const field = this.#field(this.form, key);
+      if (isOther || (field !== document.activeElement && !isFloor(key))) field.value = String(value);
+    }
+    this.#field(this.form, "dark_inverted").checked = dark_inverted;
+    this.#requireHeights();
+  }
+
+  /** A floor needs a name and both heights, or none of them. */
+  #requireHeights() {
+    const fields = ["floor", "bottom", "top"].map((name) => this.#field(this.form, name));
+    const isGiven = fields.some(({ value }) => value !== "");
+    for (const field of fields) field.required = isGiven;
+    const [, bottom, top] = fields;
+    const isReversed = isGiven && top.valueAsNumber <= bottom.valueAsNumber;
+    top.setCustomValidity(isReversed ? "The upper end must be above the lower end." : "");
+  }
+
+  /** @param {HTMLInputElement} field */
+  #typed(field) {
+    const { draft } = this.editor;
+    if (!draft || field.closest("li")) return;
+    const number = numberOf(field);
+    if (field.name === "name") this.editor.change({ name: field.value });
+    else if (field.name === "dark_inverted") this.editor.change({ dark_inverted: field.checked });
+    else if (field.name === "distance") this.editor.setDistance(number !== null && number > 0 ? number : null);
+    else if (isFloor(field.name)) this.editor.change({ floor: this.#floor() });
+    else if (number === null || (field.name === "width" && number <= 0)) return; // the form says so when it is sent
+    else if (field.name === "opacity") this.editor.change({ opacity: number });
+    else this.editor.change({ placement: { ...draft.placement, ...placed(field.name, number, draft.image.width_px) } });
+  }
+
+  /** @returns {import("./plan_store.js").Floor | null} */
+  #floor() {
+    const [bottom, top] = ["bottom", "top"].map((name) => numberOf(this.#field(this.form, name)));
+    const name = this.#field(this.form, "floor").value.trim();
+    return name === "" || bottom === null || top === null ? null : { name, bottom_m: bottom, top_m: top };
+  }
+
+  /** Ask only what the chosen files need. */
+  #chosen() {
+    const files = [...(this.#field(this.upload, "file").files ?? [])];
+    const needs = { page: files.some(({ name }) => /\.pdf$/i.test(name)), crs: files.some(({ name }) => isWorldFile(name) || /\.tiff?$/i.test(name)) };
+    for (const [name, isNeeded] of Object.entries(needs)) {
+      const field = this.#field(this.upload, name);
+      field.disabled = !isNeeded;
+      /** @type {HTMLElement} */ (field.closest("label")).hidden = !isNeeded;
+    }
+  }
+
+  /** @param {Event} event */
+  async #send(event) {
+    event.preventDefault();
+    const files = [...(this.#field(this.upload, "file").files ?? [])];
+    const [world, file] = [files.find(({ name }) => isWorldFile(name)), files.find(({ name }) => !isWorldFile(name))];
+    this.#say(file ? "" : "Choose the image of the plan, too.");
+    if (!file) return;
+    write(this.#part("busy"), `Reading ${file.name} …`);
+    try {
+      const given = new FormData(this.upload);
+      const query = ["page", "crs"].map((name) => [name, String(given.get(name) ?? "")]).filter(([, value]) => value !== "");
+      const note = await this.editor.add(file, { ...Object.fromEntries(query), ...(world ? { world: await worldOf(world) } : {}) });
+      this.#say(note);
+      this.upload.reset();
+      this.#chosen();
+    } catch (error) {
+      this.#say(error instanceof Error ? error.message : String(error));
+    }
+    write(this.#part("busy"), "");
+  }
+
+  /** @param {string} text */
+  #say(text) {
+    write(this.#part("problem"), text);
+  }
+
+  async #delete() {
+    const question = `Delete the plan ${this.editor.draft?.name || this.editor.draft?.id}?`;
+    if (await confirmed(this.dialog, question, "Delete")) await this.editor.remove();
+  }
+}
+
+/** @param {string} name */
+const isFloor = (name) => name === "floor" || name === "bottom" || name === "top";
+
+/** @param {string} name of a field @param {number} number @param {number} width_px */
+function placed(name, number, width_px) {
+  if (name === "turn") return { rotation_rad: number / DEGREES };
+  return name === "width" ? { m_per_px: number / width_px } : { [name]: number };
+}
+
+/** @param {number} value @param {number} decimals */
+const rounded = (value, decimals) => Number(value.toFixed(decimals));
+
+/** @param {HTMLElement} target @param {string} text */
+function write(target, text) {
+  if (target.textContent !== text) target.textContent = text;
+  target.hidden = text === "";
+}

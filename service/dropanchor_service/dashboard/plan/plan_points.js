@@ -1,0 +1,88 @@
+/** The list of points by which a plan is aligned: where each is, and how far the plan is off there. */
+
+import { fixed } from "../data/format.js";
+import { toCentimetre } from "../setup/gestures.js";
+import { latLonIn, siteOfLatLon } from "./geodesy.js";
+import { numberOf } from "../setup/tag_form.js";
+import { isPlaced, residuals } from "./transform.js";
+
+/** Fewer points always fit exactly, so that their residuals say nothing. */
+const RESIDUALS_FROM = 3;
+
+export class PlanPoints {
+  #shown = "";
+
+  /** @param {HTMLElement} box @param {import("./plan_editor.js").PlanEditor} editor */
+  constructor(box, editor) {
+    this.editor = editor;
+    this.list = /** @type {HTMLElement} */ (box.querySelector("ol"));
+    this.residual = /** @type {HTMLElement} */ (box.querySelector('[data-part="residual"]'));
+    this.distance = /** @type {HTMLElement} */ (box.querySelector('[data-part="distance"]'));
+  }
+
+  update() {
+    const { draft, map } = this.editor;
+    if (!draft) return;
+    const { points } = draft;
+    const shown = JSON.stringify([draft.id, points.length, map.anchors, this.editor.georeference]);
+    if (shown !== this.#shown) this.list.replaceChildren(...points.map((_, i) => this.#line(i)));
+    this.#shown = shown;
+    this.distance.hidden = points.length < 2 || points.filter(isPlaced).length > 1;
+    const off = residuals(draft.placement, draft.image, points);
+    points.forEach((point, i) => this.#fill(i, point, off[i]));
+    const known = off.filter((one) => one !== null);
+    const isTelling = known.length >= RESIDUALS_FROM || known.some((one) => one > 0.01);
+    this.residual.textContent = isTelling ? `The plan is at most ${fixed(Math.max(...known), 2)} m off at these points.` : "";
+  }
+
+  /** @param {number} index */
+  #line(index) {
+    const line = document.createElement("li");
+    const name = Object.assign(document.createElement("span"), { textContent: `${index + 1}` });
+    const [x, y] = ["x", "y"].map((axis) => Object.assign(document.createElement("input"), { type: "number", step: "any", placeholder: `${axis} m`, ariaLabel: `Point ${index + 1}: ${axis} in m` }));
+    for (const field of [x, y]) field.addEventListener("input", () => this.editor.placePoint(index, numberOf(x), numberOf(y)));
+    const off = document.createElement("small");
+    const remove = Object.assign(document.createElement("button"), { type: "button", className: "text", textContent: "Remove", ariaLabel: `Remove point ${index + 1}` });
+    remove.addEventListener("click", () => this.editor.removePoint(index));
+    line.append(name, x, y, this.#anchors(index), off, remove, this.#latLon(index));
+    return line;
+  }
+
+  /** Return a field for latitude and longitude. @param {number} index */
+  #latLon(index) {
+    const { georeference } = this.editor;
+    const field = Object.assign(document.createElement("input"), { className: "lat-lon", placeholder: "or latitude, longitude", ariaLabel: `Point ${index + 1}: latitude, longitude`, autocomplete: "off", hidden: georeference === null });
+    field.addEventListener("input", () => {
+      const found = latLonIn(field.value);
+      if (!found || !georeference) return;
+      this.editor.mode = "";
+      this.editor.placePoint(index, .../** @type {[number, number]} */ (siteOfLatLon(georeference, found).map(toCentimetre)));
+    });
+    return field;
+  }
+
+  /** Return a choice of the anchors as places. @param {number} index */
+  #anchors(index) {
+    const { anchors } = this.editor.map;
+    const select = Object.assign(document.createElement("select"), { ariaLabel: `Point ${index + 1} is at anchor`, hidden: anchors.length === 0 });
+    select.append(new Option("at anchor…", ""), ...anchors.map(({ id }) => new Option(id)));
+    select.addEventListener("change", () => {
+      const anchor = anchors.find(({ id }) => id === select.value);
+      if (!anchor) return;
+      this.editor.mode = "";
+      this.editor.placePoint(index, anchor.x, anchor.y);
+    });
+    return select;
+  }
+
+  /** @param {number} index @param {import("./transform.js").Point} point @param {number | null} off_m */
+  #fill(index, point, off_m) {
+    const [, x, y, anchor, off] = this.list.children[index].children;
+    for (const [field, value] of /** @type {[HTMLInputElement, number | null][]} */ ([[x, point.x], [y, point.y]])) {
+      if (field !== document.activeElement && numberOf(field) !== value) field.value = value === null ? "" : String(value);
+    }
+    const at = this.editor.map.anchors.find((one) => one.x === point.x && one.y === point.y);
+    /** @type {HTMLSelectElement} */ (anchor).value = at?.id ?? "";
+    off.textContent = off_m === null ? "" : `${fixed(off_m, 2)} m off`;
+  }
+}

@@ -1,0 +1,1 @@
+"""Deliver events to destinations: webhooks, e-mail and MQTT."""

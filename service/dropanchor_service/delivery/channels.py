@@ -1,0 +1,78 @@
+"""Open the way to a destination of any type, and refuse those to which nothing could be delivered."""
+
+import importlib
+from contextlib import AbstractAsyncContextManager
+
+from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
+from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
+from dropanchor_service.delivery.channel import Channel, ChannelError, tls_context
+from dropanchor_service.delivery.mail import open_mail
+from dropanchor_service.delivery.sentences import NameOf
+from dropanchor_service.delivery.signature import SecretError, key_of
+from dropanchor_service.delivery.webhook import open_webhook
+from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
+
+
+class Channels:
+    """The ways to all destinations, as the settings want them."""
+
+    def __init__(
+        self, delivery: DeliverySettings, email: EmailSettings, mqtt: MqttSettings, name_of: NameOf = str
+    ) -> None:
+        """name_of: by default, the id of the tag. Raises OSError when the file of authorities cannot be read."""
+        self._delivery = delivery
+        self._email = email
+        self._mqtt = mqtt
+        self._name_of = name_of
+        # A library may change its context, so each has its own.
+        self._webhook_tls, self._email_tls, self._mqtt_tls = (tls_context(delivery.authorities) for _ in range(3))
+
+    def open(self, destination: Destination) -> AbstractAsyncContextManager[Channel]:
+        """Return the way to a destination as a context. It must have passed `check_settings`."""
+        timeout_s = self._delivery.timeout_s
+        match destination:
+            case WebhookDestination():
+                return open_webhook(destination, self._webhook_tls, timeout_s, self._delivery.allow_networks)
+            case EmailDestination():
+                page = self._delivery.page
+                return open_mail(destination, self._email, self._email_tls, timeout_s, page, self._name_of)
+            case MqttDestination():
+                from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
+
+                return open_mqtt(destination, self._mqtt, self._mqtt_tls, timeout_s)
+
+    def check(self, destination: Destination) -> None:
+        """Raise ChannelError when nothing could be delivered. It may resolve a name, and blocks then."""
+        self.check_settings(destination)
+        if isinstance(destination, WebhookDestination):
+            self._check_webhook(destination)
+
+    def check_settings(self, destination: Destination) -> None:
+        """Raise ChannelError when the settings lack what the type of the destination needs."""
+        match destination:
+            case EmailDestination() if self._email.server is None:
+                raise ChannelError("an e-mail needs a mail server: set `server` in `[email]` of the settings")
+            case MqttDestination() if self._mqtt.server is None:
+                raise ChannelError("MQTT needs a broker: set `server` in `[mqtt]` of the settings")
+            case MqttDestination() if not _is_installed("paho.mqtt"):
+                raise ChannelError("MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'")
+
+    def _check_webhook(self, webhook: WebhookDestination) -> None:
+        if webhook.secret is None:
+            raise ChannelError("a new webhook needs a secret, with which the receiver can check the signature")
+        try:
+            key_of(webhook.secret)
+            url = checked_url(webhook.url)
+            allowed(resolved(url), self._delivery.allow_networks)
+        except (SecretError, UrlError) as error:
+            raise ChannelError(str(error)) from error
+        except OSError:
+            pass  # the name may exist later; until then the queue says what is wrong
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        importlib.import_module(package)
+    except ModuleNotFoundError:
+        return False
+    return True

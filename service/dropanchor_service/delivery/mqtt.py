@@ -1,0 +1,182 @@
+"""Deliver events to a topic of an MQTT broker: one message (QoS 1) for each. This needs paho-mqtt."""
+
+import asyncio
+import ssl
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from typing import Any
+
+import orjson
+from paho.mqtt.client import Client
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
+
+from dropanchor_schemas.destinations import MqttDestination
+from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
+from dropanchor_service.delivery.sentences import SOURCE_PREFIX
+from dropanchor_service.settings.events import MqttSettings
+
+CONTENT_TYPE = "application/cloudevents+json; charset=utf-8"
+AT_ONCE = 256  # messages, each about another tag
+KEEP_ALIVE_S = 30
+QOS = 1
+_TRY_LATER = ("Quota exceeded",)
+
+
+class BrokerGoneError(Exception):
+    """The connection to the broker ended, or could not be made. The message says why."""
+
+
+class Connection:
+    """A connection to the broker. The event loop owns it; paho's thread only passes on what comes."""
+
+    def __init__(self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float) -> None:
+        """Raises ChannelError when the password cannot be read."""
+        self._settings = settings
+        self._loop = asyncio.get_running_loop()
+        self._connected: asyncio.Future[None] = self._loop.create_future()
+        self._answers: dict[int, asyncio.Future[ReasonCode]] = {}
+        self._client = Client(
+            CallbackAPIVersion.VERSION2, protocol=MQTTProtocolVersion.MQTTv5, reconnect_on_failure=False
+        )
+        self._client.connect_timeout = timeout_s
+        if settings.user is not None and settings.password_file is not None:
+            self._client.username_pw_set(settings.user, password_in(settings.password_file))
+        if settings.tls:
+            self._client.tls_set_context(tls)
+        self._client.on_connect = lambda _client, _data, _flags, reason, _properties: self._pass(self._greeted, reason)
+        self._client.on_disconnect = lambda _client, _data, _flags, reason, _properties: self._pass(self._ended, reason)
+        self._client.on_publish = lambda _client, _data, number, reason, _properties: self._pass(
+            self._answered, number, reason
+        )
+
+    async def open(self) -> None:
+        """Connect. Raises BrokerGoneError."""
+        host, port = self._settings.server or "", self._settings.port or (8883 if self._settings.tls else 1883)
+        try:
+            await asyncio.to_thread(self._client.connect, host, port, KEEP_ALIVE_S)
+        except (OSError, ValueError) as error:
+            raise BrokerGoneError(f"the broker {host}:{port} cannot be reached: {error}") from error
+        self._client.loop_start()
+        await self._connected
+
+    async def close(self) -> None:
+        self._client.disconnect()
+        await asyncio.to_thread(self._client.loop_stop)
+        self._ended(None)
+
+    async def publish(self, topic: str, payload: bytes) -> ReasonCode:
+        """Publish a message, and return what the broker answered. Raises BrokerGoneError."""
+        properties = Properties(PacketTypes.PUBLISH)
+        properties.ContentType = CONTENT_TYPE
+        sent = self._client.publish(topic, payload, QOS, properties=properties)
+        if sent.rc is not MQTTErrorCode.MQTT_ERR_SUCCESS:
+            raise BrokerGoneError("the connection to the broker is broken")
+        # The answer cannot come before this line: paho's thread passes it on through this event loop.
+        answer: asyncio.Future[ReasonCode] = self._loop.create_future()
+        self._answers[sent.mid] = answer
+        return await answer
+
+    def _pass(self, handle: Callable[..., None], *values: object) -> None:
+        self._loop.call_soon_threadsafe(handle, *values)
+
+    def _greeted(self, reason: ReasonCode) -> None:
+        if self._connected.done():
+            return
+        if reason.is_failure:
+            self._connected.set_exception(BrokerGoneError(f"the broker refuses the connection: {reason}"))
+        else:
+            self._connected.set_result(None)
+
+    def _answered(self, number: int, reason: ReasonCode) -> None:
+        answer = self._answers.pop(number, None)
+        if answer is not None and not answer.done():
+            answer.set_result(reason)
+
+    def _ended(self, reason: ReasonCode | None) -> None:
+        why = "was closed" if reason is None else f"was ended by the broker: {reason}"
+        waiting: list[asyncio.Future[Any]] = [self._connected, *self._answers.values()]
+        for future in waiting:
+            if not future.done():
+                future.set_exception(BrokerGoneError(f"the connection {why}"))
+                future.exception()  # nobody may wait for it any longer
+        self._answers.clear()
+
+
+class MqttChannel:
+    """Publishes events over one connection, which is made again after a failure."""
+
+    portion = Portion(AT_ONCE)
+
+    def __init__(
+        self, destination: MqttDestination, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float
+    ) -> None:
+        self._topic = destination.topic
+        self._settings = settings
+        self._tls = tls
+        self._timeout_s = timeout_s
+        self._connection: Connection | None = None
+
+    async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                await self._connect()
+        except TimeoutError:
+            await self.close()
+            return [self._late()] * len(events)
+        except (BrokerGoneError, ChannelError) as error:
+            await self.close()
+            return [Outcome(Verdict.UNAVAILABLE, str(error))] * len(events)
+        outcomes = await asyncio.gather(*map(self._publish, events))
+        if any(outcome.verdict is Verdict.UNAVAILABLE for outcome in outcomes):
+            await self.close()
+        return outcomes
+
+    async def close(self) -> None:
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            await connection.close()
+
+    async def _connect(self) -> None:
+        if self._connection is None:
+            self._connection = Connection(self._settings, self._tls, self._timeout_s)
+            await self._connection.open()
+
+    async def _publish(self, event: bytes) -> Outcome:
+        assert self._connection is not None
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                reason = await self._connection.publish(topic_of(self._topic, event), event)
+        except TimeoutError:
+            return self._late()
+        except (BrokerGoneError, ValueError) as error:
+            return Outcome(Verdict.UNAVAILABLE, str(error))
+        detail = f"the broker answered: {reason}"
+        if not reason.is_failure:
+            return Outcome(Verdict.ACCEPTED, detail)
+        return Outcome(Verdict.UNAVAILABLE if str(reason) in _TRY_LATER else Verdict.REFUSED, detail)
+
+    def _late(self) -> Outcome:
+        return Outcome(Verdict.UNAVAILABLE, f"the broker did not answer within {self._timeout_s:g} s")
+
+
+@asynccontextmanager
+async def open_mqtt(
+    destination: MqttDestination, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float
+) -> AsyncIterator[MqttChannel]:
+    """Open the way to a topic. The connection is made with the first event."""
+    channel = MqttChannel(destination, settings, tls, timeout_s)
+    try:
+        yield channel
+    finally:
+        await channel.close()
+
+
+def topic_of(template: str, event: bytes) -> str:
+    """Return the topic of an event. What is not allowed in one level of a topic is percent-escaped."""
+    parsed = orjson.loads(event)
+    values = {"site": parsed["source"].removeprefix(SOURCE_PREFIX), "tag": parsed["subject"], "type": parsed["type"]}
+    return template.format(**{name: chunk_from_id(value) for name, value in values.items()})

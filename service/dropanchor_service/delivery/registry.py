@@ -1,0 +1,47 @@
+"""The destinations: which of them an event goes to, and what may be saved."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import orjson
+
+from dropanchor_schemas.destinations import Destination
+from dropanchor_service.events.drafts import Draft
+from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.store.items import PRIVATE, NamedItems, adapter_of
+
+MAX_DESTINATIONS = 20
+FILE_NAME = "destinations.json"
+WEBHOOKS_FILE_NAME = "webhooks.json"  # of services that knew no other destinations
+
+
+def open_destinations(folder: Path | None) -> NamedItems[Destination]:
+    """Load the file, which only the service's user may read: it holds the secrets.
+
+    Raises OSError or ValueError.
+    """
+    path = None if folder is None else folder / FILE_NAME
+    if path is not None and not path.exists():
+        _take_over(path.with_name(WEBHOOKS_FILE_NAME), path)
+    return NamedItems(adapter_of(Destination), path, MAX_DESTINATIONS, PRIVATE)
+
+
+def addressees(destinations: NamedItems[Destination], draft: Draft) -> Sequence[str]:
+    """Return the ids of the destinations that want the event."""
+    return [destination.id for destination in destinations.all.values() if _wants(destination, draft)]
+
+
+def _take_over(webhooks: Path, path: Path) -> None:
+    """Make destinations of the webhooks in an older file, if there is one."""
+    if webhooks.exists():
+        found = {name: {**webhook, "type": "webhook"} for name, webhook in orjson.loads(webhooks.read_bytes()).items()}
+        write_atomically(path, [orjson.dumps(found)], PRIVATE)
+
+
+def _wants(destination: Destination, draft: Draft) -> bool:
+    return (
+        destination.enabled
+        and (not destination.types or draft.type in destination.types)
+        and (not destination.zones or draft.zone in destination.zones)
+        and (not destination.tags or draft.tag in destination.tags or draft.data.get("other_tag") in destination.tags)
+    )

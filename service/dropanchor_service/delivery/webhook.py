@@ -1,0 +1,84 @@
+"""Deliver events to a webhook: one signed POST for each."""
+
+import asyncio
+import ssl
+import time
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import ClassVar
+
+import httpx
+import orjson
+
+from dropanchor_schemas.destinations import WebhookDestination
+from dropanchor_service.delivery.addresses import Network, UrlError, allowed, checked_url, resolved
+from dropanchor_service.delivery.channel import Outcome, Portion, Verdict
+from dropanchor_service.delivery.signature import headers
+
+CONTENT_TYPE = "application/cloudevents+json; charset=utf-8"
+AT_ONCE = 32  # requests, each about another tag
+_TRY_LATER = (408, 425, 429)
+_MAX_ANSWER = 200
+
+
+@dataclass(frozen=True)
+class WebhookChannel:
+    """Posts events to allowed addresses only."""
+
+    webhook: WebhookDestination
+    client: httpx.AsyncClient
+    timeout_s: float
+    allow_networks: Sequence[Network]
+    portion: ClassVar[Portion] = Portion(AT_ONCE)
+
+    async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
+        return await asyncio.gather(*map(self._send, events))
+
+    async def _send(self, event: bytes) -> Outcome:
+        try:
+            async with asyncio.timeout(self.timeout_s):
+                return await self._post(event)
+        except TimeoutError:
+            return Outcome(Verdict.UNAVAILABLE, f"there was no answer within {self.timeout_s:g} s")
+        except UrlError as error:
+            return Outcome(Verdict.UNAVAILABLE, str(error))
+        except (httpx.HTTPError, OSError) as error:
+            return Outcome(Verdict.UNAVAILABLE, f"{type(error).__name__}: {error}")
+
+    async def _post(self, event: bytes) -> Outcome:
+        url = checked_url(self.webhook.url)
+        address = allowed(await asyncio.to_thread(resolved, url), self.allow_networks)
+        assert self.webhook.secret is not None
+        request = self.client.build_request(
+            "POST",
+            url.copy_with(host=address),
+            content=event,
+            headers={
+                "host": url.netloc.decode("ascii"),
+                "content-type": CONTENT_TYPE,
+                "user-agent": "dropanchor",
+                **headers(self.webhook.secret, orjson.loads(event)["id"], int(time.time()), event),
+            },
+            extensions={"sni_hostname": url.host},
+        )
+        response = await self.client.send(request, stream=True)  # of the answer, the status is enough
+        await response.aclose()
+        return _judged(response)
+
+
+@asynccontextmanager
+async def open_webhook(
+    webhook: WebhookDestination, tls: ssl.SSLContext, timeout_s: float, allow_networks: Sequence[Network]
+) -> AsyncIterator[WebhookChannel]:
+    """Open the way to a webhook. It follows no redirects and no proxy settings."""
+    async with httpx.AsyncClient(verify=tls, timeout=timeout_s, follow_redirects=False, trust_env=False) as client:
+        yield WebhookChannel(webhook, client, timeout_s, allow_networks)
+
+
+def _judged(response: httpx.Response) -> Outcome:
+    detail = f"the receiver answered {response.status_code} {response.reason_phrase[:_MAX_ANSWER]}".strip()
+    if response.is_success:
+        return Outcome(Verdict.ACCEPTED, detail)
+    later = response.is_server_error or response.status_code in _TRY_LATER
+    return Outcome(Verdict.UNAVAILABLE if later else Verdict.REFUSED, detail)

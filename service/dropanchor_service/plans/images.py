@@ -1,0 +1,58 @@
+"""The images of floor plans: one file each, named by a digest of its content."""
+
+import hashlib
+import re
+from collections.abc import Collection
+from pathlib import Path
+
+from dropanchor_schemas.plans import ImageType, PlanImage
+from dropanchor_service.runtime.atomic_file import write_atomically
+
+_ENDINGS: dict[ImageType, str] = {"image/png": ".png", "image/jpeg": ".jpg", "image/svg+xml": ".svg"}
+_DIGEST_CHARACTERS = 32
+_NAME = re.compile(r"[0-9a-f]{32}\.(png|jpg|svg)(\.part)?")
+
+
+class ImageFolder:
+    """Stores images in a folder, or in memory without one."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+        self._in_memory: dict[str, bytes] = {}
+
+    def write(self, content: bytes, media_type: ImageType, width_px: int, height_px: int) -> PlanImage:
+        """Store an image and describe it. Raises OSError."""
+        digest = hashlib.sha256(content).hexdigest()[:_DIGEST_CHARACTERS]
+        image = PlanImage(id=digest, media_type=media_type, width_px=width_px, height_px=height_px)
+        if self._folder is None:
+            self._in_memory[digest] = content
+        else:
+            write_atomically(self._path(self._folder, image), [content])
+        return image
+
+    def read(self, image: PlanImage) -> bytes | None:
+        """Return the content of an image; None if it is not there."""
+        if self._folder is None:
+            return self._in_memory.get(image.id)
+        try:
+            return self._path(self._folder, image).read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def remove(self, image: PlanImage) -> None:
+        """Delete an image. Raises OSError."""
+        self._in_memory.pop(image.id, None)
+        if self._folder is not None:
+            self._path(self._folder, image).unlink(missing_ok=True)
+
+    def keep_only(self, images: Collection[PlanImage]) -> None:
+        """Delete all other images, and what a killed writer has left. Raises OSError."""
+        if self._folder is None or not self._folder.is_dir():
+            return
+        kept = {self._path(self._folder, image) for image in images}
+        for path in self._folder.iterdir():
+            if path not in kept and _NAME.fullmatch(path.name):
+                path.unlink()
+
+    def _path(self, folder: Path, image: PlanImage) -> Path:
+        return folder / f"{image.id}{_ENDINGS[image.media_type]}"

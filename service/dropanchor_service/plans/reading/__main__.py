@@ -1,0 +1,33 @@
+"""Read a file from the standard input. Write a line with its `Description`, and then the image.
+
+The only argument is a `Request` as JSON.
+"""
+
+import os
+import resource
+import sys
+
+from dropanchor_service.plans.reading.messages import Description, ReadPlan, Request
+from dropanchor_service.plans.reading.read_plan import read_plan
+from dropanchor_service.plans.reading.refused import RefusedError
+
+CPU_S = 60
+MEMORY_BYTES = 3 * 2**30
+NICENESS = 10  # the estimators come first
+
+
+def main() -> None:
+    os.nice(NICENESS)
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    request = Request.model_validate_json(sys.argv[1])
+    try:
+        read = read_plan(sys.stdin.buffer.read(), request)
+    except RefusedError as error:
+        read = ReadPlan(Description(problem=str(error)), b"")
+    sys.stdout.buffer.write(read.description.model_dump_json().encode() + b"\n" + read.content)
+    sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    main()

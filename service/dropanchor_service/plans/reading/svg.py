@@ -1,0 +1,89 @@
+"""Let an SVG through if it only draws: no script, no other file, nothing outside the SVG namespace."""
+
+import re
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+from defusedxml.common import DefusedXmlException
+from defusedxml.ElementTree import fromstring
+
+from dropanchor_service.plans.reading.refused import RefusedError
+from dropanchor_service.plans.reading.svg_size import size_of
+
+MAX_ELEMENTS = 200_000
+NAMESPACE = "http://www.w3.org/2000/svg"
+_SVG = f"{{{NAMESPACE}}}"
+_HREFS = ("href", "{http://www.w3.org/1999/xlink}href")
+
+_DRAWING = re.compile(
+    "svg|g|defs|symbol|use|switch|title|desc|style|path|rect|circle|ellipse|line|polyline|polygon|text|tspan|textPath|"
+    "image|linearGradient|radialGradient|stop|pattern|clipPath|mask|marker|filter|fe[A-Za-z]+"
+)
+_WITHOUT_EFFECT = re.compile("metadata|view|cursor|animate|animateMotion|animateTransform|set|mpath|discard")
+_EMBEDDED = re.compile(r"data:image/(?:png|jpeg);base64,[A-Za-z0-9+/=\s]*")
+_REFERENCE = re.compile(r"(?:url|src|image|image-set)\s*\(\s*(.{0,40})", re.IGNORECASE | re.DOTALL)
+
+
+def sanitised(content: bytes) -> tuple[bytes, int, int]:
+    """Return an SVG that only draws, its width and its height in pixels. Raises RefusedError."""
+    try:
+        root = fromstring(content, forbid_entities=True, forbid_external=True)
+    except DefusedXmlException as error:
+        raise RefusedError("the SVG declares entities. Save it as plain SVG") from error
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise RefusedError(f"the SVG is damaged: {error}") from error
+    if root.tag != f"{_SVG}svg":
+        raise RefusedError("the file is XML, but no SVG")
+    if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
+        raise RefusedError(f"the SVG has more than {MAX_ELEMENTS} elements. Save it as PNG or PDF")
+    _clean(root)
+    width, height = size_of(root)
+    ElementTree.register_namespace("", NAMESPACE)
+    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True), width, height
+
+
+def _clean(element: ElementTree.Element) -> None:
+    """Remove what has no effect on the drawing, from the element and from all in it. Raises RefusedError."""
+    for found in list(element.iter()):
+        for child in list(found):
+            if not child.tag.startswith(_SVG) or _WITHOUT_EFFECT.fullmatch(_name(child)):
+                found.remove(child)
+    for found in element.iter():
+        name = _name(found)
+        if not _DRAWING.fullmatch(name):
+            raise RefusedError(
+                f"the SVG contains <{name[:40]}>, which is not allowed. Save it as plain SVG, PNG or PDF"
+            )
+        found.attrib = dict(_kept_attributes(found))
+        if name == "style":
+            _require_local("".join(found.itertext()))
+
+
+def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    for name, value in element.attrib.items():
+        if name in _HREFS:
+            yield "href", _local_href(_name(element), value)
+        elif name.lower().startswith("on"):
+            raise RefusedError(f"the SVG contains a script: the attribute {name[:40]}. Save it as plain SVG")
+        elif not name.startswith("{"):
+            _require_local(value)
+            yield name, value
+
+
+def _local_href(element: str, value: str) -> str:
+    if value.strip().startswith("#") or (element == "image" and _EMBEDDED.fullmatch(value.strip())):
+        return value.strip()
+    raise RefusedError(f"the SVG refers to another file: {value[:80]!r}. Embed its images when you save it")
+
+
+def _require_local(text: str) -> None:
+    """Raise RefusedError for a style or an attribute that could load something."""
+    if "\\" in text or "@import" in text.lower():
+        raise RefusedError("the SVG has a style that may load another file. Save it as plain SVG")
+    for reference in _REFERENCE.findall(text):
+        if not reference.lstrip("'\"").startswith("#"):
+            raise RefusedError(f"the SVG refers to another file: {reference!r}. Save it as plain SVG")
+
+
+def _name(element: ElementTree.Element) -> str:
+    return str(element.tag).removeprefix(_SVG)

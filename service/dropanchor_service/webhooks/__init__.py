@@ -1,1 +1,0 @@
-"""Webhooks: events delivered over HTTP."""

@@ -1,0 +1,79 @@
+"""The accessibility checker axe-core finds no violation in the views of alerts."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+from dropanchor_schemas.zones import LostRule, TooCloseRule
+from service.dashboard.alert_place import alert_place, happen, put_mail
+from service.dashboard.zone_place import ZonePlace, served
+from support.axe import axe_source, violations
+from support.browser import Scheme, watched_page
+
+pytestmark = pytest.mark.browser
+
+WIDER_THAN_ITS_PLACE = """() => [...document.querySelectorAll("#alerts *")]
+    .filter((one) => one.checkVisibility() && one.getBoundingClientRect().right > innerWidth + 1)
+    .map((one) => one.outerHTML)"""
+
+
+@pytest.fixture(scope="module")
+def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return axe_source(tmp_path_factory.mktemp("axe"))
+
+
+def busy_place() -> ZonePlace:
+    place = alert_place()
+    put_mail(place)
+    put_mail(place, "night-watch-of-the-northern-hall")
+    happen(place, "cart-3", "forklift-north-hall-17")
+    place.parts.deliveries.bury("shift", [1, 2], "the mail server answered 550 5.1.1 no such user here")
+    rules = place.parts.items.rules
+    rules.put(
+        "apart", TooCloseRule(type="too_close", id="apart", name="Keep apart", distance_m=3, groups=["forklifts"])
+    )
+    rules.put("lost", LostRule(type="lost", id="lost", name="Lost for long", after_s=600))
+    return place
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_no_violation_in_the_lists_and_the_forms(
+    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
+) -> None:
+    place = busy_place()
+    with (
+        served(place),
+        watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page,
+    ):
+
+        def check(view: str) -> None:
+            page.page.screenshot(path=tmp_path / f"{view}.png")
+            assert violations(page.page, axe) == [], view
+            assert page.page.evaluate(WIDER_THAN_ITS_PLACE) == [], view
+
+        page.wait_for("dropanchor.events() && dropanchor.destinations().length === 2")
+        page.page.locator("#alerts summary").click()
+        alerts = page.page.locator("#alerts")
+        alerts.get_by_role("button", name="Show what shift did not get").click()
+        alerts.get_by_role("list", name="Events that were not delivered").wait_for()
+        alerts.get_by_role("button", name="Test shift").click()
+        alerts.get_by_text("The test event was not delivered").wait_for()
+        check("alerts")
+        alerts.get_by_role("button", name="Edit shift").click()
+        alerts.get_by_role("button", name="Delete…").click()
+        page.page.locator("#confirm").wait_for()
+        check("asked")
+        page.page.locator("#confirm").get_by_role("button", name="Cancel").click()
+        alerts.get_by_label("Addresses").fill("no address")
+        alerts.get_by_role("button", name="Save destination").click()
+        alerts.get_by_text("'address' is no address such as shift@example.com").wait_for()
+        check("refused")
+        alerts.get_by_role("button", name="Cancel").click()
+        alerts.get_by_role("button", name="New webhook").click()
+        check("webhook")
+        alerts.get_by_role("button", name="Cancel").click()
+        alerts.get_by_role("button", name="Edit Keep apart").click()
+        alerts.get_by_label("Closer than").wait_for()
+        check("rule")

@@ -1,0 +1,140 @@
+"""Events reach a real MQTT broker over TLS: acknowledged, in order per tag, and through its restart."""
+
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+from paho.mqtt.client import Client
+
+from dropanchor_schemas.destinations import MqttDestination
+from dropanchor_service.delivery import queue
+from dropanchor_service.settings.events import MqttSettings
+from support.certificate import self_signed
+from support.delivery import DeliveryBench, in_order
+from support.mosquitto import PROGRAM, Mosquitto, mosquitto, needs_mosquitto
+from support.zenoh_router import wait_until
+
+pytestmark = needs_mosquitto
+
+
+@pytest.fixture(autouse=True)
+def _fast(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(queue, "FIRST_RETRY_S", 0.05)
+
+
+@contextmanager
+def secured_broker(folder: Path, rights: str = "topic readwrite #") -> Iterator[Mosquitto]:
+    """Run a broker with TLS, the user `yard` with the password `yard`, and these rights."""
+    assert PROGRAM is not None
+    certificate, key = self_signed(folder)
+    users, access = folder / "users", folder / "rights"
+    made = subprocess.run(
+        ["mosquitto_passwd", "-b", "-c", str(users), "yard", "yard"], check=False, capture_output=True
+    )
+    assert made.returncode == 0, made.stderr
+    access.write_text(f"user yard\n{rights}\n")
+    options = (f"certfile {certificate}", f"keyfile {key}", f"password_file {users}", f"acl_file {access}")
+    with mosquitto(folder, *options) as broker:
+        yield broker
+
+
+def bench_of(broker: Mosquitto, password: str = "yard", **delivery: Any) -> DeliveryBench:
+    file = broker.folder / "password"
+    file.write_text(f"{password}\n")
+    settings = MqttSettings(server="127.0.0.1", port=broker.port, user="yard", password_file=file)
+    return DeliveryBench(mqtt=settings, authorities=broker.folder / "broker.pem", **delivery)
+
+
+@contextmanager
+def listening(broker: Mosquitto) -> Iterator[list[tuple[str, dict[str, Any]]]]:
+    """Collect the topics and events that come until the block ends."""
+    got: list[tuple[str, dict[str, Any]]] = []
+    ready: list[int] = []
+
+    def begin(client: Client) -> None:
+        client.on_message = lambda _client, _data, message: got.append((message.topic, orjson.loads(message.payload)))
+        client.on_subscribe = lambda _client, _data, number, _reasons, _properties: ready.append(number)
+        client.subscribe("#", 1)
+
+    with broker.publisher(broker.folder / "broker.pem", "yard") as client:
+        begin(client)
+        wait_until(lambda: bool(ready))
+        yield got
+
+
+def put(bench: DeliveryBench, **fields: Any) -> None:
+    bench.put(MqttDestination(type="mqtt", id="mes", **fields))
+
+
+def test_every_event_is_published_once_in_order_to_the_topic_of_its_tag(tmp_path: Path) -> None:
+    with secured_broker(tmp_path) as broker, listening(broker) as got:
+        bench = bench_of(broker)
+        put(bench, topic="plant/{site}/{tag}/{type}")
+        with bench.thread:
+            for _ in range(20):
+                bench.happen("a", "b+/#c")
+            wait_until(lambda: bench.counts() == (0, 0))
+            wait_until(lambda: len(got) == 40)
+    assert {topic for topic, _ in got} == {
+        "plant/yard/a/dropanchor.zone.enter",
+        "plant/yard/b%2B%2F%23c/dropanchor.zone.enter",
+    }
+    events = [event for _, event in got]
+    assert len({event["id"] for event in events}) == 40
+    assert in_order(events)
+
+
+def test_a_broker_that_restarts_gets_everything(tmp_path: Path) -> None:
+    with secured_broker(tmp_path) as broker:
+        bench = bench_of(broker)
+        put(bench)
+        with bench.thread:
+            bench.happen("a")
+            wait_until(lambda: bench.counts() == (0, 0))
+            broker.stop()
+            for _ in range(5):
+                bench.happen("a", "b")
+            wait_until(lambda: bench.thread.problem_of("mes") is not None)
+            assert bench.counts() == (10, 0)
+            broker.start()
+            wait_until(lambda: bench.counts() == (0, 0))
+            assert bench.thread.problem_of("mes") is None
+
+
+def test_a_broker_without_the_right_to_publish_makes_dead_letters(tmp_path: Path) -> None:
+    with secured_broker(tmp_path, "topic read #") as broker:
+        bench = bench_of(broker)
+        put(bench)
+        with bench.thread:
+            bench.happen("a")
+            wait_until(lambda: bench.counts() == (0, 1))
+    assert bench.deliveries.dead("mes")[0][1] == "the broker answered: Not authorized"
+
+
+def test_a_wrong_password_is_said_and_mended_without_a_restart(tmp_path: Path) -> None:
+    with secured_broker(tmp_path) as broker:
+        bench = bench_of(broker, password="wrong")
+        put(bench)
+        with bench.thread:
+            bench.happen("a")
+            wait_until(lambda: "refuses the connection" in (bench.thread.problem_of("mes") or ""))
+            (tmp_path / "password").write_text("yard")
+            wait_until(lambda: bench.counts() == (0, 0))
+
+
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # paho leaves the socket to the collector
+def test_a_broker_whose_certificate_is_not_trusted_gets_nothing(tmp_path: Path) -> None:
+    with secured_broker(tmp_path) as broker:
+        settings = MqttSettings(server="127.0.0.1", port=broker.port)
+        bench = DeliveryBench(mqtt=settings)
+        put(bench)
+        with bench.thread:
+            bench.happen("a")
+            wait_until(lambda: "certificate" in (bench.thread.problem_of("mes") or "").lower())
+            assert bench.counts() == (1, 0)
