@@ -1,4 +1,4 @@
-"""What the service keeps on disk: site, floor plans, pose history and recordings, as the settings enable them."""
+"""What the service keeps on disk: site, floor plans, history, recordings and more, as the settings enable them."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -7,6 +7,7 @@ from typing import Self
 
 from pydantic import ValidationError
 
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
@@ -21,9 +22,10 @@ from dropanchor_service.store import SiteStore, TagTable
 
 
 class Persistence:
-    """Floor plans, and the history (`tracks`) and the recorder, each None when disabled.
+    """Floor plans, what omlox clients have stored, and the history (`tracks`) and recorder, both None when disabled.
 
-    The last two write while this context is open. Creating it raises SettingsError when the plans cannot be read.
+    History and recorder write while this context is open. Creating it raises SettingsError when a file that people have
+    filled cannot be read.
     """
 
     def __init__(
@@ -34,6 +36,7 @@ class Persistence:
         self.plans = _open_plans(settings.data_dir)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
+        self.omlox = _open_omlox(settings)
         folder = settings.data_dir
         if folder is None:
             return
@@ -115,3 +118,13 @@ def open_site(settings: Settings) -> SiteStore:
         return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
     except (OSError, ValidationError) as error:
         raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error
+
+
+def _open_omlox(settings: Settings) -> OmloxItems:
+    """Return what omlox clients have stored. Raises SettingsError."""
+    try:
+        return OmloxItems.opened(settings.data_dir)
+    except (OSError, ValidationError) as error:
+        raise SettingsError(
+            f"data_dir: the objects of omlox clients in {settings.data_dir} cannot be read: {error}"
+        ) from error

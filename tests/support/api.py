@@ -17,6 +17,7 @@ from dropanchor_schemas.site import Anchor, Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.tracks import Retention, Tracks
@@ -67,6 +68,7 @@ class ApiBench:
         endpoints: tuple[str, ...] = (),
         cors_origins: tuple[str, ...] = (),
         events: EventParts | None = None,
+        omlox: OmloxItems | None = None,
         plans: PlanStore | None = None,
     ) -> FastAPI:
         return create_app(
@@ -84,6 +86,7 @@ class ApiBench:
             endpoints=endpoints,
             cors_origins=cors_origins,
             events=events,
+            omlox=omlox,
             plans=plans,
         )
 

@@ -20,6 +20,10 @@ from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.shared_view import Members
+from dropanchor_service.api.omlox.feed.socket import Doorkeeper
+from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.items import OmloxItems
+from dropanchor_service.api.omlox.router import add_omlox
 from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
@@ -76,6 +80,7 @@ def create_app(
     rate_limiter: RateLimiter | None = None,
     cors_origins: Sequence[str] = (),
     events: EventParts | None = None,
+    omlox: OmloxItems | None = None,
     plans: PlanStore | None = None,
 ) -> FastAPI:
     """Return the application with all routes and middleware.
@@ -86,8 +91,8 @@ def create_app(
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
     no limit. cors_origins: of other web pages that may use the interface. events:
-    zones, events and destinations; None keeps them in memory and watches nothing. plans: None keeps them in
-    memory.
+    zones, events and destinations; None keeps them in memory and watches nothing. plans, omlox: floor plans, and what
+    omlox clients have said; None keeps them in memory.
     """
     plans = plans or PlanStore(None)
     events = events or EventParts.in_memory(answers.site.site.id)
@@ -120,6 +125,8 @@ def create_app(
     ):
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))
+    hub = Hub(answers, events.items.zones, events.store, omlox or OmloxItems.opened(None), max_tags)
+    add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
     if dashboard is not None:
         app.router.routes.extend(page_mounts(dashboard))
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]

@@ -7,7 +7,7 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from dropanchor_service.api.app import DASHBOARD, PREFIX
-from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_handlers
+from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import EscapedPath
 from dropanchor_service.api.routes.dashboard import page_mounts
@@ -36,6 +36,7 @@ def create_starting_app(reason: Callable[[], str], dashboard: Path = DASHBOARD) 
 
     @app.api_route("/metrics", methods=_METHODS)
     @app.api_route("/api/{path:path}", methods=_METHODS)
+    @app.api_route(f"{OMLOX_PREFIX}{{path:path}}", methods=_METHODS)
     async def refuse() -> None:
         raise ProblemError(Kind.NOT_READY, reason())
 

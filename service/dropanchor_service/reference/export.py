@@ -14,7 +14,14 @@ from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.persistence import Persistence
-from dropanchor_service.reference import metrics_page, rejections_page, rest_page, settings_page, states_page
+from dropanchor_service.reference import (
+    metrics_page,
+    omlox_page,
+    rejections_page,
+    rest_page,
+    settings_page,
+    states_page,
+)
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
 from dropanchor_service.store.clock_offsets import NoClockOffsets
@@ -31,6 +38,7 @@ def pages() -> dict[str, str]:
         texts = {
             "settings.md": settings_page.page(),
             "rest.md": rest_page.page(json.loads(openapi.text())),
+            "omlox.md": omlox_page.page(openapi.omlox_document()),
             "pose-states.md": states_page.page(),
             "metrics.md": metrics_page.page(registry),
             "rejections.md": rejections_page.page(),

@@ -62,7 +62,7 @@ def page(document: dict[str, Any]) -> str:
     groups = [tag["name"] for tag in document["tags"]]
     sections = [_INTRODUCTION]
     for group in groups:
-        rows = [_row(path, method, operation) for path, method, operation in _operations(document, group)]
+        rows = [row(path, method, operation) for path, method, operation in operations_in(document, group)]
         header = ("request", "answer", "query parameters", "status codes")
         sections.append(f"## {group.capitalize()}\n\n{table(header, rows)}")
         if group == "ingest":
@@ -89,7 +89,8 @@ def _stream_of_samples() -> str:
     )
 
 
-def _operations(document: dict[str, Any], group: str) -> list[tuple[str, str, dict[str, Any]]]:
+def operations_in(document: dict[str, Any], group: str) -> list[tuple[str, str, dict[str, Any]]]:
+    """Return path, method and operation of each operation of a group."""
     return [
         (path, method, operation)
         for path, operations in document["paths"].items()
@@ -98,6 +99,7 @@ def _operations(document: dict[str, Any], group: str) -> list[tuple[str, str, di
     ]
 
 
-def _row(path: str, method: str, operation: dict[str, Any]) -> tuple[str, str, str, str]:
+def row(path: str, method: str, operation: dict[str, Any]) -> tuple[str, str, str, str]:
+    """Return request, answer, query parameters and status codes of an operation."""
     query = [f"`{parameter['name']}`" for parameter in operation.get("parameters", []) if parameter["in"] == "query"]
     return f"`{method.upper()} {path}`", operation["summary"], ", ".join(query), ", ".join(operation["responses"])

@@ -1,20 +1,13 @@
 """Check with schemathesis that the interface follows its OpenAPI document, for valid and invalid requests."""
 
-import os
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import pytest
 import schemathesis
-from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
-from hypothesis.errors import Unsatisfiable
-from schemathesis.checks import load_all_checks
-from schemathesis.core.result import Ok
-from schemathesis.schemas import APIOperation
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
@@ -23,11 +16,7 @@ from dropanchor_service.history.tracks import Retention
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from support.api import make_api_bench
-
-Operation = APIOperation[Any, Any, Any, Any]
-
-EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
-"""Valid requests per operation, and as many invalid ones. The seed is fixed, so that every run sends the same."""
+from support.contract import Operation, assert_follows_the_document, operations_of
 
 BEYOND_THE_SCHEMA = {
     "delete_anchor": [positive_data_acceptance],
@@ -87,11 +76,7 @@ def operations() -> Iterator[Operation]:
     bench.recorder.record_messages([(0, b"payload", ENCODING_PACKED, bench.now_ns)])
     bench.recorder.writer.flush()
     bench.stopping.set()  # a stream ends after its first event
-    load_all_checks()
-    document = schemathesis.openapi.from_asgi("/api/v1/openapi.json", bench.app())
-    for found in document.get_all_operations():
-        assert isinstance(found, Ok)
-        yield found.ok()
+    yield from operations_of(bench.app(), "/api/v1/openapi.json")
 
 
 OPERATIONS = {operation.definition.raw["operationId"]: operation for operation in operations()}
@@ -99,25 +84,4 @@ OPERATIONS = {operation.definition.raw["operationId"]: operation for operation i
 
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_every_response_follows_the_document(name: str) -> None:
-    excluded = BEYOND_THE_SCHEMA.get(name, [])
-    asked = sum(_asked(OPERATIONS[name], mode, excluded) for mode in schemathesis.GenerationMode)
-    assert asked > 0
-
-
-def _asked(operation: Operation, mode: schemathesis.GenerationMode, excluded: list[Any]) -> int:
-    """Send requests of this kind and return how many. An operation without input has no invalid requests."""
-    count = 0
-
-    @seed(20)
-    @settings(max_examples=EXAMPLES, deadline=None, database=None, suppress_health_check=list(HealthCheck))
-    @given(case=operation.as_strategy(generation_mode=mode))
-    def ask(case: schemathesis.Case[Any]) -> None:
-        nonlocal count
-        count += 1
-        case.call_and_validate(excluded_checks=excluded)
-
-    try:
-        ask()
-    except Unsatisfiable:
-        assert mode is schemathesis.GenerationMode.NEGATIVE
-    return count
+    assert_follows_the_document(OPERATIONS[name], BEYOND_THE_SCHEMA.get(name, []))

@@ -30,6 +30,7 @@ def test_the_service_is_live_but_not_ready() -> None:
         ("POST", "/api/v1/ingest/a%2Fb"),
         ("DELETE", "/api/v1/anchors/1"),
         ("GET", "/metrics"),
+        ("GET", "/omlox/v2/trackables"),
     ],
 )
 def test_everything_else_says_what_the_service_still_does(method: str, path: str) -> None:

@@ -9,14 +9,20 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from dropanchor_service.api.http.errors import Kind, problem_response
+from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, problem_response
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.shared_view import Members, narrowed
 from dropanchor_service.security import share_links
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 from dropanchor_service.security.identity import Scope as AccessScope
 
-OPEN_PATHS = ("/api/v1/health/live", "/api/v1/health/ready", "/api/v1/openapi.json")
+OPEN_PATHS = (
+    "/api/v1/health/live",
+    "/api/v1/health/ready",
+    "/api/v1/openapi.json",
+    f"{OMLOX_PREFIX}v2/openapi.json",
+    f"{OMLOX_PREFIX}v1/openapi.json",
+)
 INGEST = "/api/v1/ingest/"
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
@@ -144,7 +150,7 @@ def secret_of(request: Request) -> str:
 
 def _is_protected(path: str) -> bool:
     """Return whether a path needs credentials. The dashboard's files do not: they hold no data of the site."""
-    return (path.startswith("/api/") or path == "/metrics") and path not in OPEN_PATHS
+    return (path.startswith(("/api/", OMLOX_PREFIX)) or path == "/metrics") and path not in OPEN_PATHS
 
 
 def required_scope(method: str, path: str) -> AccessScope:

@@ -14,6 +14,9 @@ from starlette.routing import Match
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:dropanchor:problem:"
 
+OMLOX_PREFIX = "/omlox/"
+"""Begin of the paths whose errors have the members of omlox errors, too."""
+
 _METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 _MAX_PARTS = 20
 _MAX_LOCATION = 200
@@ -35,6 +38,10 @@ class Kind(Enum):
     UNKNOWN_DESTINATION = (404, "The destination is unknown")
     UNKNOWN_PLAN = (404, "The floor plan is unknown")
     UNKNOWN_PLAN_IMAGE = (404, "The image of a floor plan is unknown")
+    UNKNOWN_TRACKABLE = (404, "The trackable is unknown")
+    UNKNOWN_FENCE = (404, "The fence is unknown")
+    NO_LOCATION = (404, "The place is not known")
+    NOT_OFFERED = (403, "The service does not offer this")
     METHOD_NOT_ALLOWED = (405, "The resource does not allow this method")
     NOT_ACCEPTABLE = (406, "The service offers none of the accepted media types")
     UNKNOWN_RECORDING = (404, "The recording does not exist")
@@ -48,6 +55,9 @@ class Kind(Enum):
     SITE_ID_FIXED = (409, "The site's id cannot change while the service runs")
     ANCHOR_ID_DIFFERS = (409, "The id in the body differs from the id in the path")
     ID_DIFFERS = (409, "The id in the body is not the one in the path")
+    EXISTS_ALREADY = (409, "There is a resource with this id already")
+    STANDS_FOR_A_TAG = (409, "The trackable stands for a tag")
+    PROVIDER_ASSIGNED = (409, "Another trackable carries the location provider")
     ITEMS_FULL = (409, "There are as many of these resources as the service allows")
     TAGS_FULL = (409, "The service has reached its limit of tags")
     IMAGE_NOT_UPLOADED = (409, "The image of the floor plan has not been uploaded")
@@ -96,7 +106,11 @@ def problem_response(
 ) -> Response:
     """Return a problem of this kind. status: overrides the status of the kind. members: extension members."""
     status = kind.status if status is None else status
-    problem = {"type": kind.type, "title": kind.title, "status": status, "detail": detail, "instance": _path(request)}
+    path = _path(request)
+    if path.startswith(OMLOX_PREFIX):
+        status = 400 if status == 422 else status  # the standard knows no 422
+        members = {"code": status, "message": detail} | dict(members or {})
+    problem = {"type": kind.type, "title": kind.title, "status": status, "detail": detail, "instance": path}
     # ASCII: a request may hold lone surrogates, which UTF-8 cannot encode.
     body = json.dumps(problem | dict(members or {}), ensure_ascii=True).encode()
     return Response(body, status, {"cache-control": "no-store", **(headers or {})}, MEDIA_TYPE)

@@ -10,7 +10,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from dropanchor_service.api.http.errors import Kind, ProblemError, problem_response
+from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError, problem_response
 
 
 class BodyLimit:
@@ -61,7 +61,7 @@ class EscapedPath:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         raw = scope.get("raw_path") or b""
-        if raw.startswith(b"/api/"):
+        if raw.startswith((b"/api/", OMLOX_PREFIX.encode())):
             scope = {**scope, "path": raw.decode("latin-1")}
         await self._app(scope, receive, send)
 

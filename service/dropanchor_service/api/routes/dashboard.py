@@ -8,6 +8,8 @@ from starlette.routing import Match, Mount
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
+from dropanchor_service.api.http.errors import OMLOX_PREFIX
+
 _HEADERS = {
     "cache-control": "no-cache",
     "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
@@ -31,14 +33,14 @@ def page_mounts(dashboard: Path) -> list[Mount]:
 
 
 class DashboardMount(Mount):
-    """Serves the dashboard at the root. It leaves out `/api/`, so that the interface answers its own 404 and 405."""
+    """Serves the dashboard at the root. It leaves out the interfaces, so that they answer their own 404 and 405."""
 
     def __init__(self, folder: Path) -> None:
         """Serve the files in `folder`. Raises RuntimeError when it does not exist."""
         super().__init__("/", app=_Files(directory=folder, html=True), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        if scope["type"] != "http" or scope["path"].startswith("/api/"):
+        if scope["type"] != "http" or scope["path"].startswith(("/api/", OMLOX_PREFIX)):
             return Match.NONE, {}
         is_read = scope["method"] in ("GET", "HEAD")
         match, child_scope = super().matches(scope)

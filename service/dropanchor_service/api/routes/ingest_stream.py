@@ -6,11 +6,8 @@ again: the numbers in the payload say that it is the same one, and it is counted
 
 import asyncio
 import time
-from collections import Counter
-from collections.abc import AsyncIterator, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator
 from threading import Event
-from urllib.parse import urlsplit
 
 from fastapi import APIRouter
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -20,6 +17,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
+from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError, is_of_another_page
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest import count_samples
 from dropanchor_service.phones.intake import Receive
@@ -44,26 +42,6 @@ class _ClosedError(Exception):
         super().__init__(reason)
         self.code = code
         self.reason = reason.encode()[:MAX_REASON_BYTES].decode(errors="ignore")
-
-
-class _Connections:
-    """Open connections of each key."""
-
-    def __init__(self) -> None:
-        self._open: Counter[str] = Counter()
-
-    @contextmanager
-    def one_more(self, client: str) -> Iterator[None]:
-        """Count a connection until the block ends. Raises _ClosedError when there are too many."""
-        if self._open[client] >= CONNECTIONS_PER_KEY:
-            raise _ClosedError(TOO_MANY, f"This key has {CONNECTIONS_PER_KEY} connections: end one, or make more keys.")
-        self._open[client] += 1
-        try:
-            yield
-        finally:
-            self._open[client] -= 1
-            if not self._open[client]:
-                del self._open[client]
 
 
 class _Acknowledgements:
@@ -126,11 +104,14 @@ class _Stream:
         self._stopping = stopping
         self._authenticator = authenticator
         self._rate_limiter = rate_limiter
-        self._connections = _Connections()
+        self._connections = OpenConnections(CONNECTIONS_PER_KEY)
         self._started_ns = time.time_ns()
 
     async def serve(self, socket: WebSocket) -> None:
-        """Serve an accepted connection until its end. Raises _ClosedError and WebSocketDisconnect."""
+        """Serve an accepted connection until its end.
+
+        Raises _ClosedError, TooManyConnectionsError and WebSocketDisconnect.
+        """
         identity = await self._identity(socket)
         tag = _tag(socket, identity)
         client = client_of(socket, identity)
@@ -145,7 +126,10 @@ class _Stream:
 
     async def _identity(self, socket: WebSocket) -> Identity | None:
         if self._authenticator is None:
-            _refuse_other_origin(socket)
+            if is_of_another_page(socket):
+                raise _ClosedError(
+                    FORBIDDEN, "A page of another origin may not send samples to a service without keys."
+                )
             return None
         offered = (name.removeprefix(KEY_PROTOCOL) for name in _protocols(socket) if name.startswith(KEY_PROTOCOL))
         secret = bearer_of(socket) or next(offered, "")
@@ -190,6 +174,8 @@ def ingest_stream_router(
         await socket.accept(PROTOCOL if PROTOCOL in _protocols(socket) else None)
         try:
             await stream.serve(socket)
+        except TooManyConnectionsError:
+            await socket.close(TOO_MANY, f"This key has {CONNECTIONS_PER_KEY} connections: end one, or make more keys.")
         except _ClosedError as end:
             await socket.close(end.code, end.reason)
         except WebSocketDisconnect:
@@ -226,10 +212,3 @@ def _tag(socket: WebSocket, identity: Identity | None) -> str:
     except InvalidKeyError as error:
         raise _ClosedError(UNREADABLE, f"The tag's name cannot be used: {error}.") from error
     return tag
-
-
-def _refuse_other_origin(socket: WebSocket) -> None:
-    """Without credentials, pages of other origins must not send samples through a browser beside the service."""
-    origin = socket.headers.get("origin")
-    if origin is not None and urlsplit(origin).netloc != socket.headers.get("host"):
-        raise _ClosedError(FORBIDDEN, "A page of another origin may not send samples to a service without keys.")

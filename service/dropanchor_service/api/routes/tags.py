@@ -113,7 +113,7 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
     def put_tag_settings(
         tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])], allows: Conditions
     ) -> Response:
-        _register(answers, tag, settings, max_tags, allows)
+        register_tag(answers, tag, settings, max_tags, allows)
         return resource_response(answers.site.tag_settings(tag))
 
 
@@ -135,7 +135,7 @@ def _add_delete_route(router: APIRouter, answers: Answers) -> None:
         return Response(status_code=204)
 
 
-def _register(answers: Answers, tag: str, settings: TagSettings, max_tags: int, allows: Precondition) -> None:
+def register_tag(answers: Answers, tag: str, settings: TagSettings, max_tags: int, allows: Precondition) -> None:
     """Store the settings of a tag, and register it if it is unknown. Raises ProblemError."""
     try:
         refuse_pattern(tag)

@@ -1,0 +1,1 @@
+"""The WebSocket of the omlox interface: topics, subscriptions, and what is sent to each client."""

@@ -1,0 +1,129 @@
+"""What the routes of the omlox interface share: query parameters, and how errors are documented."""
+
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from typing import Annotated, Any, Literal
+from uuid import UUID
+
+from fastapi import Depends, Path, Request
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from starlette.responses import Response
+
+from dropanchor_service.answers.answers import Answer
+from dropanchor_service.api.http.connections import is_of_another_page
+from dropanchor_service.api.http.errors import MEDIA_TYPE, Kind, ProblemError
+from dropanchor_service.api.omlox.geojson import collection
+from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.projection import Projection, projection_of
+from dropanchor_service.api.omlox.zones import has_zone
+from dropanchor_service.api.routes.parameters import id_of, json_response
+
+LENIENT = False
+"""Read a body without `content-type` as JSON: known clients send none. `refuse_pages` keeps other pages out instead."""
+
+_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
+_UNNEEDED = "Accepted: positions and events are always up to date."
+
+
+def _boolean(value: object) -> object:
+    if value not in ("true", "false", True, False):
+        raise ValueError("true or false was expected")
+    return value
+
+
+Flag = Annotated[bool, BeforeValidator(_boolean)]
+
+
+class PlaceQuery(BaseModel):
+    """The query of a route that returns positions. Parameters of other hubs are ignored."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    crs: Literal["local", "EPSG:4326"] | None = Field(
+        default=None,
+        description="`local`: the frame of the site, m. The default is EPSG:4326 if the site has a georeference.",
+    )
+    zone_id: str | None = Field(default=None, description="Id of a zone. All zones share the frame of the site.")
+    geojson: Flag = Field(default=False, description="Return GeoJSON, in EPSG:4326.")
+
+    def projection(self, hub: Hub) -> Projection:
+        """Return the projection that the client asks for. Raises ProblemError."""
+        require_zone(hub, self.zone_id)
+        return projection_of(hub.answers.site.site, self.crs, self.geojson)
+
+
+class SpatialQuery(BaseModel):
+    """The query of a route that tells what is inside a fence."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    spatial_query: Flag = Field(
+        default=False,
+        description="Go by the position alone, instead of by the entries and exits, which need certainty.",
+    )
+
+
+class InsideQuery(PlaceQuery, SpatialQuery):
+    """The query of a route that returns positions inside a fence."""
+
+
+class ChangeQuery(BaseModel):
+    """The query of a route that changes a trackable or a fence."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    force_location_update: Flag = Field(default=False, description=_UNNEEDED)
+    subdivide: Flag = Field(default=False, description="Accepted: edges stay as they are, straight in the site frame.")
+
+
+def refuse_pages(origins: Sequence[str]) -> Callable[[Request], Awaitable[None]]:
+    """Return the dependency that refuses changes by web pages of other origins than the service and these."""
+
+    async def refuse(request: Request) -> None:
+        if request.method not in ("GET", "HEAD") and is_of_another_page(request, origins):
+            raise ProblemError(
+                Kind.FORBIDDEN, "A page of another origin may not change this. Add its origin to http.cors_origins."
+            )
+
+    return refuse
+
+
+def require_zone(hub: Hub, name: str | None) -> None:
+    """Raise ProblemError if there is no zone with this id."""
+    if name is not None and not has_zone(hub.answers.site.site, name):
+        raise ProblemError(Kind.INVALID_REQUEST, "query.zone_id: there is no zone with this id; see /zones.")
+
+
+async def _provider_id(
+    provider_id: Annotated[str, Path(description="Id of a tag, percent-escaped.", examples=["tag-1"])],
+) -> str:
+    return id_of(provider_id)
+
+
+ProviderId = Annotated[str, Depends(_provider_id)]
+TrackableId = Annotated[UUID, Path(alias="trackable_id")]
+ZoneId = Annotated[UUID, Path(alias="zone_id")]
+FenceId = Annotated[UUID, Path(alias="fence_id")]
+
+
+def one(found: Answer, query: PlaceQuery, as_feature: Callable[[Answer], Answer]) -> Response:
+    """Return an object, or its GeoJSON."""
+    return json_response(as_feature(found) if query.geojson else found)
+
+
+def many(found: Iterable[Answer], query: PlaceQuery, as_feature: Callable[[Answer], Answer]) -> Response:
+    """Return a list of objects, or its GeoJSON."""
+    return json_response(collection(map(as_feature, found)) if query.geojson else list(found))
+
+
+def errors(*kinds: Kind) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI responses of a route that can fail with these kinds."""
+    content = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/OmloxProblem"}}}
+    by_status: dict[int | str, dict[str, Any]] = {}
+    for kind in (*_REFUSALS, Kind.INVALID_REQUEST, *kinds):
+        status = 400 if kind.status == 422 else kind.status
+        earlier = by_status.get(status, {}).get("description")
+        by_status[status] = {
+            "description": f"{earlier} {kind.title}." if earlier else f"{kind.title}.",
+            "content": content,
+        }
+    return by_status

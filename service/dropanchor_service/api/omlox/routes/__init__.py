@@ -1,0 +1,1 @@
+"""The routes of the omlox interface, one module per resource."""

@@ -1,0 +1,208 @@
+"""The routes for fences, which are the zones of this service."""
+
+from typing import Annotated
+from uuid import uuid4
+
+from fastapi import APIRouter, Body, Query
+from starlette.responses import Response
+
+from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
+from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.models import (
+    Feature,
+    FeatureCollection,
+    Fence,
+    Location,
+    LocationProvider,
+    Trackable,
+    TrackableMotion,
+)
+from dropanchor_service.api.omlox.parameters import (
+    LENIENT,
+    ChangeQuery,
+    FenceId,
+    InsideQuery,
+    PlaceQuery,
+    SpatialQuery,
+    errors,
+    many,
+    one,
+)
+from dropanchor_service.api.omlox.projection import projection_of
+from dropanchor_service.api.routes.parameters import json_response
+from dropanchor_service.store.tags import Tag
+
+_UNKNOWN = Kind.UNKNOWN_FENCE
+_PLACED = (Kind.NOT_GEOREFERENCED,)
+_INSIDE = (_UNKNOWN, Kind.EVENTS_UNREADABLE)
+_SAVED = (Kind.ITEMS_FULL, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED, *_PLACED)
+EXAMPLE = {
+    "name": "Dock",
+    "region": {
+        "type": "Polygon",
+        "coordinates": [[[13.4, 52.5], [13.4002, 52.5], [13.4002, 52.5001], [13.4, 52.5]]],
+    },
+    "crs": "EPSG:4326",
+}
+
+
+def fences_router(hub: Hub) -> APIRouter:
+    router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
+    _add_list_routes(router, hub)
+    _add_create_route(router, hub)
+    _add_collection_delete(router, hub)
+    _add_object_routes(router, hub)
+    _add_change_route(router, hub)
+    _add_routes_for_places_inside(router, hub)
+    _add_routes_for_objects_inside(router, hub)
+    return router
+
+
+def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get("", operation_id="list_fence_ids", summary="List the ids of the fences", responses=errors())
+    def list_ids() -> list[str]:
+        return [str(hub.fences.id_of(zone.id)) for zone in hub.fences.all()]
+
+    @router.get(
+        "/summary",
+        operation_id="list_fences",
+        summary="List the fences",
+        response_model=list[Fence] | FeatureCollection,
+        responses=errors(*_PLACED),
+    )
+    def list_fences(query: Annotated[PlaceQuery, Query()]) -> Response:
+        projection = query.projection(hub)
+        return many([hub.fences.answer(zone, projection) for zone in hub.fences.all()], query, fence_feature)
+
+
+def _add_create_route(router: APIRouter, hub: Hub) -> None:
+    @router.post(
+        "",
+        operation_id="create_fence",
+        summary="Create a fence",
+        description="It is a zone of this service from then on: a polygon without holes, or a circle around a point.",
+        status_code=201,
+        response_model=Fence,
+        responses=errors(Kind.SHAPE_REFUSED, Kind.EXISTS_ALREADY, *_SAVED),
+    )
+    def create_fence(
+        fence: Annotated[Fence, Body(examples=[EXAMPLE])],
+        query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
+    ) -> Response:
+        identifier = fence.id if fence.id is not None and fence.id.int else uuid4()
+        if any(hub.fences.id_of(zone.id) == identifier for zone in hub.fences.all()):
+            raise ProblemError(Kind.EXISTS_ALREADY, f"There is a fence with the id {identifier}: change it with PUT.")
+        zone = hub.fences.save(str(identifier), fence, None)
+        projection = projection_of(hub.answers.site.site, fence.crs)
+        return json_response(hub.fences.answer(zone, projection), status=201)
+
+
+def _add_collection_delete(router: APIRouter, hub: Hub) -> None:
+    @router.delete(
+        "",
+        operation_id="delete_fences",
+        summary="Delete all fences, which are all zones of this service",
+        status_code=204,
+        responses=errors(Kind.NOT_SAVED),
+    )
+    def delete_fences() -> Response:
+        for zone in hub.fences.all():
+            hub.fences.delete(zone)
+        return Response(status_code=204)
+
+
+def _add_object_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{fence_id}",
+        operation_id="get_fence",
+        summary="Get a fence",
+        response_model=Fence | Feature,
+        responses=errors(_UNKNOWN, *_PLACED),
+    )
+    def get_fence(fence_id: FenceId, query: Annotated[PlaceQuery, Query()]) -> Response:
+        return one(hub.fences.answer(hub.fences.find(fence_id), query.projection(hub)), query, fence_feature)
+
+    @router.delete(
+        "/{fence_id}",
+        operation_id="delete_fence",
+        summary="Delete a fence",
+        description="Its events stay. What is inside makes no exit.",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.NOT_SAVED),
+    )
+    def delete_fence(fence_id: FenceId) -> Response:
+        hub.fences.delete(hub.fences.find(fence_id))
+        return Response(status_code=204)
+
+
+def _add_change_route(router: APIRouter, hub: Hub) -> None:
+    @router.put(
+        "/{fence_id}",
+        operation_id="put_fence",
+        summary="Change a fence",
+        description="What only the zone has, such as the tags it concerns and its delay, stays as it is.",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.SHAPE_REFUSED, Kind.ID_DIFFERS, *_SAVED),
+    )
+    def put_fence(
+        fence_id: FenceId,
+        fence: Annotated[Fence, Body(examples=[EXAMPLE])],
+        query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
+    ) -> Response:
+        present = hub.fences.find(fence_id)
+        if fence.id is not None and fence.id.int and fence.id != fence_id:
+            raise ProblemError(Kind.ID_DIFFERS, f"The id is {fence_id} in the path and {fence.id} in the body.")
+        hub.fences.save(present.id, fence, present)
+        return Response(status_code=204)
+
+
+def _add_routes_for_places_inside(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{fence_id}/locations",
+        operation_id="list_fence_locations",
+        summary="List the locations of the tags in a fence",
+        response_model=list[Location] | FeatureCollection,
+        responses=errors(*_INSIDE, *_PLACED),
+    )
+    def list_locations(fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+        tags = _tags_in(hub, fence_id, query)
+        return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
+
+    @router.get(
+        "/{fence_id}/motions",
+        operation_id="list_fence_motions",
+        summary="List the motions of the trackables in a fence",
+        response_model=list[TrackableMotion] | FeatureCollection,
+        responses=errors(*_INSIDE, *_PLACED),
+    )
+    def list_motions(fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+        assets = hub.assets.of_tags(_tags_in(hub, fence_id, query))
+        return many(hub.motions(assets, query.projection(hub)), query, motion_feature)
+
+
+def _add_routes_for_objects_inside(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{fence_id}/providers",
+        operation_id="list_fence_providers",
+        summary="List the tags in a fence",
+        response_model=list[LocationProvider],
+        responses=errors(*_INSIDE),
+    )
+    def list_providers(fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+        return json_response(hub.providers(_tags_in(hub, fence_id, query)))
+
+    @router.get(
+        "/{fence_id}/trackables",
+        operation_id="list_fence_trackables",
+        summary="List the trackables in a fence",
+        response_model=list[Trackable],
+        responses=errors(*_INSIDE),
+    )
+    def list_trackables(fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+        return json_response(hub.trackables(hub.assets.of_tags(_tags_in(hub, fence_id, query))))
+
+
+def _tags_in(hub: Hub, fence_id: FenceId, query: SpatialQuery) -> list[Tag]:
+    tags = {tag.name: tag for tag in hub.answers.tags.listed()}
+    return hub.inside.tags_in(hub.fences.find(fence_id), query.spatial_query, tags)

@@ -1,0 +1,214 @@
+"""The routes for location providers, which are the tags."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Query
+from starlette.responses import Response
+
+from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.omlox.geojson import fence_feature, location_feature
+from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.models import (
+    Feature,
+    FeatureCollection,
+    Fence,
+    Location,
+    LocationProvider,
+    Trackable,
+)
+from dropanchor_service.api.omlox.own_properties import without_own
+from dropanchor_service.api.omlox.parameters import LENIENT, PlaceQuery, ProviderId, SpatialQuery, errors, many, one
+from dropanchor_service.api.omlox.projection import projection_of
+from dropanchor_service.api.omlox.trackable_changes import forget, name_tag, save
+from dropanchor_service.api.routes.known_tag import known_tag
+from dropanchor_service.api.routes.parameters import json_response, saving
+from dropanchor_service.store.tags import Tag
+
+_UNKNOWN = Kind.UNKNOWN_TAG
+_SAVED = (Kind.NOT_OFFERED, Kind.TAGS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
+EXAMPLE = {"id": "tag-1", "type": "uwb", "name": "Forklift 3", "properties": {"fleet": "north"}}
+TAKES_NO_POSITIONS = (
+    "This service computes the locations of its tags from ranges and inertial samples. It takes none from elsewhere: "
+    "send samples with a tag client, or locations to the hub that reads this one."
+)
+
+
+def providers_router(hub: Hub) -> APIRouter:
+    router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
+    _add_list_routes(router, hub)
+    _add_create_route(router, hub)
+    _add_refused_routes(router)
+    _add_object_routes(router, hub)
+    _add_delete_route(router, hub)
+    _add_location_route(router, hub)
+    _add_related_routes(router, hub)
+    return router
+
+
+def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get("", operation_id="list_provider_ids", summary="List the ids of the tags", responses=errors())
+    def list_ids() -> list[str]:
+        return [tag.name for tag in hub.answers.tags.listed()]
+
+    @router.get(
+        "/summary",
+        operation_id="list_providers",
+        summary="List the tags as location providers",
+        response_model=list[LocationProvider],
+        responses=errors(),
+    )
+    def list_providers() -> Response:
+        return json_response(hub.providers(hub.answers.tags.listed()))
+
+    @router.get(
+        "/locations",
+        operation_id="list_locations",
+        summary="List the locations of all tags whose place is known",
+        response_model=list[Location] | FeatureCollection,
+        responses=errors(Kind.NOT_GEOREFERENCED),
+    )
+    def list_locations(query: Annotated[PlaceQuery, Query()]) -> Response:
+        return many(hub.places.of_tags(hub.answers.tags.listed(), query.projection(hub)), query, location_feature)
+
+
+def _add_create_route(router: APIRouter, hub: Hub) -> None:
+    @router.post(
+        "",
+        operation_id="create_provider",
+        summary="Register a tag",
+        status_code=201,
+        response_model=LocationProvider,
+        responses=errors(Kind.EXISTS_ALREADY, *_SAVED),
+    )
+    def create_provider(provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]) -> Response:
+        known = hub.answers.tags.find(provider.id)
+        if known is not None and not hub.answers.tags.is_deleted(known.row):
+            raise ProblemError(Kind.EXISTS_ALREADY, f"There is a tag {provider.id!r}: change it with PUT.")
+        return json_response(hub.providers([_saved(hub, provider)])[0], status=201)
+
+
+def _add_refused_routes(router: APIRouter) -> None:
+    """Add the routes on which other hubs take positions. They answer why this one does not."""
+
+    async def refuse() -> None:
+        raise ProblemError(Kind.NOT_OFFERED, TAKES_NO_POSITIONS)
+
+    async def refuse_of(provider_id: ProviderId) -> None:  # noqa: ARG001 - the document names it
+        await refuse()
+
+    for what, path in (("location", "locations"), ("proximity", "proximities")):
+        for operation, route, answer in ((what, f"/{{provider_id}}/{what}", refuse_of), (path, f"/{path}", refuse)):
+            router.add_api_route(
+                route,
+                answer,
+                methods=["PUT"],
+                operation_id=f"put_{operation}",
+                summary="Refused: this service computes positions and takes none",
+                status_code=204,
+                responses=errors(Kind.NOT_OFFERED),
+            )
+
+
+def _add_object_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{provider_id}",
+        operation_id="get_provider",
+        summary="Get a tag as location provider",
+        response_model=LocationProvider,
+        responses=errors(_UNKNOWN),
+    )
+    def get_provider(provider_id: ProviderId) -> Response:
+        return json_response(hub.providers([known_tag(hub.answers, provider_id)])[0])
+
+    @router.put(
+        "/{provider_id}",
+        operation_id="put_provider",
+        summary="Set the name and the properties of a tag",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.ID_DIFFERS, *_SAVED),
+    )
+    def put_provider(
+        provider_id: ProviderId, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]
+    ) -> Response:
+        known_tag(hub.answers, provider_id)
+        if provider.id != provider_id:
+            raise ProblemError(
+                Kind.ID_DIFFERS, f"The id is {provider_id!r} in the path and {provider.id!r} in the body."
+            )
+        _saved(hub, provider)
+        return Response(status_code=204)
+
+
+def _add_delete_route(router: APIRouter, hub: Hub) -> None:
+    @router.delete(
+        "/{provider_id}",
+        operation_id="delete_provider",
+        summary="Delete a tag: its settings, its counters and its pose",
+        description="A tag that still sends is back with its next message.",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED),
+    )
+    def delete_provider(provider_id: ProviderId) -> Response:
+        tag = known_tag(hub.answers, provider_id)
+        forget(hub.items.providers, tag.name)
+        forget(hub.items.tag_trackables, tag.name)
+        with saving():
+            hub.answers.site.remove_tag(tag.name, hub.answers.now_ns())
+        hub.answers.forget(tag)
+        return Response(status_code=204)
+
+
+def _add_location_route(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{provider_id}/location",
+        operation_id="get_provider_location",
+        summary="Get the location of a tag",
+        response_model=Location | Feature,
+        responses=errors(_UNKNOWN, Kind.NO_LOCATION, Kind.NOT_GEOREFERENCED),
+    )
+    def get_location(provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
+        tag = known_tag(hub.answers, provider_id)
+        locations = hub.places.of_tags([tag], query.projection(hub))
+        if not locations:
+            raise hub.no_location([tag])
+        return one(locations[0], query, location_feature)
+
+
+def _add_related_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{provider_id}/trackables",
+        operation_id="list_provider_trackables",
+        summary="List the trackable that carries a tag",
+        response_model=list[Trackable],
+        responses=errors(_UNKNOWN),
+    )
+    def list_trackables(provider_id: ProviderId) -> Response:
+        return json_response(hub.trackables(hub.assets.of_tags([known_tag(hub.answers, provider_id)])))
+
+    @router.get(
+        "/{provider_id}/fences",
+        operation_id="list_provider_fences",
+        summary="List the fences in which a tag is",
+        response_model=list[Fence],
+        responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
+    )
+    def list_fences(provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
+        tag = known_tag(hub.answers, provider_id)
+        zones = hub.inside.zones_of([tag], query.spatial_query, hub.fences.all())
+        projection = projection_of(hub.answers.site.site, None)
+        return many([hub.fences.answer(zone, projection) for zone in zones], PlaceQuery(), fence_feature)
+
+
+def _saved(hub: Hub, provider: LocationProvider) -> Tag:
+    """Save a provider, and its name as that of the tag. Raises ProblemError."""
+    if provider.type not in ("uwb", "unknown"):
+        raise ProblemError(Kind.NOT_OFFERED, f"This service locates UWB tags, no providers of type {provider.type}.")
+    try:
+        chunk_from_id(provider.id)
+    except InvalidKeyError as error:
+        raise ProblemError(Kind.INVALID_REQUEST, f"body.id: cannot be the id of a tag: {error}.") from error
+    tag = name_tag(hub, provider.id, provider.name)
+    update = {"type": "uwb", "name": None, "properties": without_own(provider.properties)}
+    save(hub.items.providers, provider.id, provider.model_copy(update=update))
+    return tag

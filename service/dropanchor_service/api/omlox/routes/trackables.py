@@ -1,0 +1,226 @@
+"""The routes for trackables."""
+
+from typing import Annotated
+from uuid import uuid4
+
+from fastapi import APIRouter, Body, Query
+from starlette.responses import Response
+
+from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.omlox.assets import Asset
+from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
+from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.models import (
+    Feature,
+    FeatureCollection,
+    Fence,
+    Location,
+    LocationProvider,
+    Trackable,
+    TrackableMotion,
+)
+from dropanchor_service.api.omlox.parameters import (
+    LENIENT,
+    ChangeQuery,
+    PlaceQuery,
+    SpatialQuery,
+    TrackableId,
+    errors,
+    many,
+    one,
+)
+from dropanchor_service.api.omlox.places import best_of
+from dropanchor_service.api.omlox.projection import projection_of
+from dropanchor_service.api.omlox.trackable_changes import add, change, remove
+from dropanchor_service.api.routes.parameters import json_response
+
+_UNKNOWN = Kind.UNKNOWN_TRACKABLE
+_PLACED = (Kind.NOT_GEOREFERENCED,)
+_SAVED = (Kind.ITEMS_FULL, Kind.PROVIDER_ASSIGNED, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
+EXAMPLE = {"type": "virtual", "name": "Forklift 3", "location_providers": ["tag-1"], "properties": {"fleet": "north"}}
+
+
+def trackables_router(hub: Hub) -> APIRouter:
+    router = APIRouter(prefix="/trackables", tags=["trackables"], strict_content_type=LENIENT)
+    _add_list_routes(router, hub)
+    _add_collection_changes(router, hub)
+    _add_object_routes(router, hub)
+    _add_change_route(router, hub)
+    _add_location_routes(router, hub)
+    _add_motion_route(router, hub)
+    _add_related_routes(router, hub)
+    return router
+
+
+def found(hub: Hub, identifier: TrackableId) -> Asset:
+    """Return the trackable with this id. Raises ProblemError."""
+    asset = hub.assets.find(identifier)
+    if asset is None:
+        raise ProblemError(_UNKNOWN, f"There is no trackable with the id {identifier}.")
+    return asset
+
+
+def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get("", operation_id="list_trackable_ids", summary="List the ids of the trackables", responses=errors())
+    def list_ids() -> list[str]:
+        return [str(asset.trackable.id) for asset in hub.assets.all()]
+
+    @router.get(
+        "/summary",
+        operation_id="list_trackables",
+        summary="List the trackables",
+        response_model=list[Trackable],
+        responses=errors(),
+    )
+    def list_trackables() -> Response:
+        return json_response(hub.trackables(hub.assets.all()))
+
+    @router.get(
+        "/motions",
+        operation_id="list_motions",
+        summary="List the motions of all trackables whose place is known",
+        response_model=list[TrackableMotion] | FeatureCollection,
+        responses=errors(*_PLACED),
+    )
+    def list_motions(query: Annotated[PlaceQuery, Query()]) -> Response:
+        return many(hub.motions(hub.assets.all(), query.projection(hub)), query, motion_feature)
+
+
+def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
+    @router.post(
+        "",
+        operation_id="create_trackable",
+        summary="Create a trackable",
+        description="A tag that it lists belongs to it from then on, instead of to a trackable of its own.",
+        status_code=201,
+        response_model=Trackable,
+        responses=errors(Kind.EXISTS_ALREADY, *_SAVED),
+    )
+    def create_trackable(
+        trackable: Annotated[Trackable, Body(examples=[EXAMPLE])],
+        query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
+    ) -> Response:
+        identifier = trackable.id if trackable.id is not None and trackable.id.int else uuid4()
+        return json_response(hub.trackables([add(hub, trackable.model_copy(update={"id": identifier}))])[0], status=201)
+
+    @router.delete(
+        "",
+        operation_id="delete_trackables",
+        summary="Delete all trackables that clients have created",
+        status_code=204,
+        responses=errors(Kind.NOT_SAVED),
+    )
+    def delete_trackables() -> Response:
+        for asset in hub.assets.all():
+            if asset.own_tag is None:
+                remove(hub, asset)
+        return Response(status_code=204)
+
+
+def _add_object_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{trackable_id}",
+        operation_id="get_trackable",
+        summary="Get a trackable",
+        response_model=Trackable,
+        responses=errors(_UNKNOWN),
+    )
+    def get_trackable(trackable_id: TrackableId) -> Response:
+        return json_response(hub.trackables([found(hub, trackable_id)])[0])
+
+    @router.delete(
+        "/{trackable_id}",
+        operation_id="delete_trackable",
+        summary="Delete a trackable that a client has created",
+        description="Its tags get trackables of their own again.",
+        status_code=204,
+        responses=errors(_UNKNOWN, Kind.STANDS_FOR_A_TAG, Kind.NOT_SAVED),
+    )
+    def delete_trackable(trackable_id: TrackableId) -> Response:
+        remove(hub, found(hub, trackable_id))
+        return Response(status_code=204)
+
+
+def _add_change_route(router: APIRouter, hub: Hub) -> None:
+    @router.put(
+        "/{trackable_id}",
+        operation_id="put_trackable",
+        summary="Change a trackable",
+        description="The name of a trackable that stands for a tag is the name of the tag.",
+        response_model=Trackable,
+        responses=errors(_UNKNOWN, Kind.ID_DIFFERS, Kind.STANDS_FOR_A_TAG, Kind.CHANGED_MEANWHILE, *_SAVED),
+    )
+    def put_trackable(
+        trackable_id: TrackableId,
+        trackable: Annotated[Trackable, Body(examples=[EXAMPLE])],
+        query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
+    ) -> Response:
+        return json_response(hub.trackables([change(hub, found(hub, trackable_id), trackable)])[0])
+
+
+def _add_location_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{trackable_id}/location",
+        operation_id="get_trackable_location",
+        summary="Get the location of a trackable: of its tag whose place is known best",
+        response_model=Location | Feature,
+        responses=errors(_UNKNOWN, Kind.NO_LOCATION, *_PLACED),
+    )
+    def get_location(trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+        tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
+        best = best_of(hub.places.of_tags(tags, query.projection(hub)))
+        if best is None:
+            raise hub.no_location(tags)
+        return one(best, query, location_feature)
+
+    @router.get(
+        "/{trackable_id}/locations",
+        operation_id="list_trackable_locations",
+        summary="List the locations of the tags of a trackable, as far as their place is known",
+        response_model=list[Location] | FeatureCollection,
+        responses=errors(_UNKNOWN, *_PLACED),
+    )
+    def list_locations(trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+        tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
+        return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
+
+
+def _add_motion_route(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{trackable_id}/motion",
+        operation_id="get_motion",
+        summary="Get the motion of a trackable",
+        response_model=TrackableMotion | Feature,
+        responses=errors(_UNKNOWN, Kind.NO_LOCATION, *_PLACED),
+    )
+    def get_motion(trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+        asset = found(hub, trackable_id)
+        motions = hub.motions([asset], query.projection(hub))
+        if not motions:
+            raise hub.no_location(hub.assets.tags_of(asset.trackable))
+        return one(motions[0], query, motion_feature)
+
+
+def _add_related_routes(router: APIRouter, hub: Hub) -> None:
+    @router.get(
+        "/{trackable_id}/providers",
+        operation_id="list_trackable_providers",
+        summary="List the tags of a trackable",
+        response_model=list[LocationProvider],
+        responses=errors(_UNKNOWN),
+    )
+    def list_providers(trackable_id: TrackableId) -> Response:
+        return json_response(hub.providers(hub.assets.tags_of(found(hub, trackable_id).trackable)))
+
+    @router.get(
+        "/{trackable_id}/fences",
+        operation_id="list_trackable_fences",
+        summary="List the fences in which a trackable is",
+        response_model=list[Fence],
+        responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
+    )
+    def list_fences(trackable_id: TrackableId, query: Annotated[SpatialQuery, Query()]) -> Response:
+        tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
+        zones = hub.inside.zones_of(tags, query.spatial_query, hub.fences.all())
+        projection = projection_of(hub.answers.site.site, None)
+        return many([hub.fences.answer(zone, projection) for zone in zones], PlaceQuery(), fence_feature)

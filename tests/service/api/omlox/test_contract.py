@@ -1,0 +1,37 @@
+"""Check with schemathesis that the omlox interface follows its own OpenAPI document."""
+
+from collections.abc import Iterator
+
+import pytest
+from schemathesis.specs.openapi.checks import positive_data_acceptance
+
+from support.contract import Operation, assert_follows_the_document, operations_of
+from support.events import circle
+from support.omlox import OmloxBench
+
+REFUSES_VALID = (
+    "create_fence",
+    "create_provider",
+    "create_trackable",
+    "list_fences",
+    "list_locations",
+    "list_motions",
+)
+"""A schema cannot express that a fence has no holes and lies near the site, which names a tag may have, and that
+GeoJSON is never `local`. Beside these, whatever names an object may name one that does not exist."""
+
+
+def operations() -> Iterator[Operation]:
+    bench = OmloxBench()
+    bench.poses.move("tag-1", "a")
+    bench.zones.put(circle("dock"))
+    yield from operations_of(bench.app, "/omlox/v2/openapi.json")
+
+
+OPERATIONS = {operation.definition.raw["operationId"]: operation for operation in operations()}
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_every_response_follows_the_document(name: str) -> None:
+    may_refuse = name in REFUSES_VALID or "{" in OPERATIONS[name].path or name.startswith("put_")
+    assert_follows_the_document(OPERATIONS[name], [positive_data_acceptance] if may_refuse else [])
