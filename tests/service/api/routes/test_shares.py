@@ -1,5 +1,6 @@
 """Share links over REST: who may create them, what they show, and that they end."""
 
+import json
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -7,6 +8,7 @@ from urllib.parse import quote
 import httpx
 import jwt
 import pytest
+from websockets.sync.client import connect
 
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.security import api_keys, share_links
@@ -91,6 +93,19 @@ def test_a_link_of_a_tag_or_a_group_shows_these_tags_however_one_asks(
         "../../metrics",
     ):
         assert shared.ask("GET", path, secret).status_code == 403, path
+
+
+@pytest.mark.parametrize(("limit", "answer"), [({}, "subscribed"), ({"tag": "a"}, "error"), ({"group": "x"}, "error")])
+def test_a_link_of_a_tag_or_a_group_opens_no_feed_of_all_tags(
+    shared: Shared, limit: dict[str, str], answer: str
+) -> None:
+    secret = shared.create(**limit)["secret"]
+    with running_server(shared.app, shared.bench.stopping) as port:
+        url = f"ws://127.0.0.1:{port}/omlox/v2/ws/socket"
+        with connect(url, proxy=None) as socket:
+            request = {"event": "subscribe", "topic": "location_updates", "params": {"token": secret}}
+            socket.send(json.dumps(request))
+            assert json.loads(socket.recv(timeout=10))["event"] == answer
 
 
 def test_a_link_of_a_group_follows_its_members_and_of_an_empty_one_shows_nothing(shared: Shared) -> None:

@@ -151,6 +151,8 @@ class Connection:
             raise FeedError(Code.NOT_AUTHENTICATED, f"Authentication failed: {error}. {_AUTHENTICATE}") from error
         if identity.scope is None or identity.scope < Scope.READ:
             raise FeedError(Code.NOT_AUTHORIZED, "Subscribing needs a key with the scope read.")
+        if identity.limit is not None:
+            raise FeedError(Code.NOT_AUTHORIZED, "This share link shows its tags and nothing else.")
         return identity
 
     async def _wait_for_turn(self) -> None:
