@@ -82,3 +82,21 @@ def test_a_plan_is_given_a_floor_and_needs_both_heights(chromium: Browser, place
         form.get_by_role("button", name="Save plan").click()
         expect(form).to_be_hidden()
         assert place.plans.all["upper"].floor is None
+
+
+def test_a_link_brings_its_floor_and_the_wall_shows_one_floor_after_another(
+    chromium: Browser, place: PlanPlace
+) -> None:
+    place.put("upper", image_file(60, 20), floor=UPPER)
+    with watched_page(chromium, f"{place.url}#floor=Upper") as page:
+        choice = page.page.locator("#floor")
+        expect(choice).to_have_value("Upper")
+        choice.select_option("Ground")
+        page.wait_for("location.hash.includes('floor=Ground')")
+        page.page.evaluate("location.hash = '#floor=Upper'")
+        expect(choice).to_have_value("Upper")
+    with watched_page(chromium, f"{place.url}?kiosk=floors&every=2") as page:
+        for floor in ("Upper", "Ground", "Upper"):
+            expect(page.page.locator("#floor")).to_have_value(floor, timeout=8000)
+        expect(page.page.locator("#floor")).to_be_visible()
+        assert page.errors == []

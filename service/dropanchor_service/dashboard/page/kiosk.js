@@ -1,4 +1,5 @@
-/** The page on a wall (`?kiosk`): large type, no controls, and a screen that stays on. `?kiosk=tags` shows one tag after another. */
+/** The page on a wall (`?kiosk`): large type, no controls, and a screen that stays on. `?kiosk=tags` shows one tag after another,
+ * `?kiosk=floors` one floor after another. */
 
 import { addressValues } from "../data/address.js";
 
@@ -15,11 +16,11 @@ export function kioskAddress({ origin, pathname, search, hash }) {
   return `${origin}${pathname}?${query.toString().replace(/kiosk=(?=&|$)/, "kiosk")}${hash}`;
 }
 
+/** @typedef {{names: () => string[], show: (name: string) => void}} Series in their order */
+
 export class Kiosk {
-  /** @param {() => string[]} shownTags in their order @param {(tag: string) => void} show */
-  constructor(shownTags, show) {
-    this.shownTags = shownTags;
-    this.show = show;
+  /** @param {Record<string, Series>} series what the wall can show one after another, by the value of `kiosk` */
+  constructor(series) {
     if (!isKiosk) return;
     document.body.dataset.kiosk = "";
     stayAwake();
@@ -27,16 +28,18 @@ export class Kiosk {
     document.addEventListener("keydown", ({ key }) => key === "Escape" && leave());
     const values = addressValues();
     const every_s = Math.max(SHORTEST_S, Number(values.get("every")) || EVERY_S);
-    if (values.get("kiosk") === "tags") setInterval(() => this.#next(), every_s * 1000);
+    const chosen = series[values.get("kiosk") ?? ""];
+    if (chosen) setInterval(() => this.#next(chosen), every_s * 1000);
   }
 
   #shown = "";
 
-  #next() {
-    const tags = this.shownTags();
-    if (tags.length === 0) return;
-    this.#shown = tags[(tags.indexOf(this.#shown) + 1) % tags.length];
-    this.show(this.#shown);
+  /** @param {Series} series */
+  #next({ names, show }) {
+    const all = names();
+    if (all.length === 0) return;
+    this.#shown = all[(all.indexOf(this.#shown) + 1) % all.length];
+    show(this.#shown);
   }
 }
 

@@ -159,7 +159,10 @@ document.addEventListener("keydown", (event) => {
 showChoices();
 const address = new ViewAddress(choice, map, /** @type {HTMLInputElement} */ (byId("filter")));
 new Notifications(byId("notifications"), zones.log, (event) => zones.pick(event));
-new Kiosk(() => table.shown, (tag) => select(tag));
+new Kiosk({
+  tags: { names: () => table.shown, show: (tag) => select(tag) },
+  floors: { names: () => plans.floors.all.map(({ name }) => name), show: (name) => plans.floors.choose(name) },
+});
 listen(map, (row) => select(row < 0 ? null : fleet.names[row]));
 installTheme(byId("theme"), () => map.recolour());
 installDialog(byId("options"), /** @type {HTMLDialogElement} */ (byId("display")));

@@ -1,9 +1,9 @@
 /** The floors that the plans show, the chosen one, and which tags are on another. */
 
+import { addressValues, writeAddress } from "../data/address.js";
+
 /** @typedef {import("./plan_store.js").Plan} Plan */
 /** @typedef {{name: string, bottom_m: number, ranges: [number, number][]}} FloorOfSite */
-
-const STORAGE_KEY = "dropanchor.floor";
 
 /** Return the floors, the highest first. Plans with the same name of a floor belong together. @param {readonly Plan[]} plans @returns {FloorOfSite[]} */
 export function floorsOf(plans) {
@@ -30,13 +30,13 @@ export class Floors extends EventTarget {
   all = [];
   /** At first the one at the height of the anchor, or the lowest; null: there is at most one. @type {FloorOfSite | null} */
   chosen = null;
-  #name = sessionStorage.getItem(STORAGE_KEY) ?? "";
 
   /** @param {HTMLSelectElement} select */
   constructor(select) {
     super();
     this.select = select;
     select.addEventListener("change", () => this.choose(select.value));
+    addEventListener("hashchange", () => this.#changed());
   }
 
   /** @param {readonly Plan[]} plans */
@@ -49,8 +49,7 @@ export class Floors extends EventTarget {
 
   /** @param {string} name */
   choose(name) {
-    this.#name = name;
-    sessionStorage.setItem(STORAGE_KEY, name);
+    writeAddress({ floor: name });
     this.#changed();
   }
 
@@ -61,7 +60,8 @@ export class Floors extends EventTarget {
 
   #changed() {
     const { all } = this;
-    const found = all.find(({ name }) => name === this.#name) ?? all.find((floor) => reaches(floor, 0)) ?? all.at(-1);
+    const wanted = addressValues().get("floor");
+    const found = all.find(({ name }) => name === wanted) ?? all.find((floor) => reaches(floor, 0)) ?? all.at(-1);
     this.chosen = all.length < 2 ? null : (found ?? null);
     this.select.value = this.chosen?.name ?? "";
     this.dispatchEvent(new Event("change"));

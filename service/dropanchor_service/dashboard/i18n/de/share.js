@@ -27,5 +27,5 @@ export default {
   "shared.expired": "Er ist am {time} abgelaufen. Bitten Sie die Person, die ihn geschickt hat, um einen neuen.",
   "shared.revoked": "Er wurde widerrufen oder ist beschädigt. Bitten Sie die Person, die ihn geschickt hat, um einen neuen.",
   "kiosk.open": "Als Wandanzeige öffnen",
-  "kiosk.what": "Große Schrift, keine Bedienelemente; Esc beendet sie. Mit ?kiosk=tags zeigt sie ein Tag nach dem anderen.",
+  "kiosk.what": "Große Schrift, keine Bedienelemente; Esc beendet sie. Mit ?kiosk=tags zeigt sie ein Tag nach dem anderen, mit ?kiosk=floors ein Stockwerk nach dem anderen.",
 };

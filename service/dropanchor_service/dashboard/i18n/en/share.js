@@ -27,5 +27,5 @@ export default {
   "shared.expired": "It expired on {time}. Ask the person who sent it for a new one.",
   "shared.revoked": "It was revoked, or it is damaged. Ask the person who sent it for a new one.",
   "kiosk.open": "Open as a wall display",
-  "kiosk.what": "Large type, no controls; Esc leaves it. With ?kiosk=tags it shows one tag after another.",
+  "kiosk.what": "Large type, no controls; Esc leaves it. With ?kiosk=tags it shows one tag after another, with ?kiosk=floors one floor.",
 };
