@@ -42,7 +42,7 @@ def ambiguous(place: Place, tag: str, *modes: tuple[float, float, float]) -> Non
 def test_without_a_tag_the_page_shows_how_to_start_one(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url) as page:
         page.page.locator("#empty").wait_for(state="visible")
-        page.page.wait_for_function("document.querySelector('#command').textContent.includes('--connect')")
+        page.wait_for("document.querySelector('#command').textContent.includes('--connect')")
         command = page.page.locator("#command").inner_text()
         assert command.startswith(f"{sysconfig.get_path('scripts')}/dropanchor-tag simulate")
         assert "--connect tcp/127.0.0.1:19747" in command

@@ -50,7 +50,7 @@ def test_units_are_chosen_remembered_and_used_everywhere_while_settings_stay_si(
         radius, fast = page.locator("[name='radius_m']"), page.get_by_label("Too fast above")
         expect(radius).to_have_value("10")
         expect(fast).to_have_value("5.592")
-        page.get_by_label("Name").last.fill("Pier")
+        page.locator("#zone-form").get_by_label("Name").fill("Pier")
         page.get_by_role("button", name="Save zone").click()
         wait_until(lambda: place.zones["dock"].name == "Pier")
         assert (radius_of(place), place.zones["dock"].speed_mps) == (3.048, 2.5)

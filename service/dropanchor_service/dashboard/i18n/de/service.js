@@ -55,7 +55,7 @@ export default {
   "say.start_unknown": "Legen Sie fest, wo das Tag startet (`start` in seinen Einstellungen), oder verwenden Sie die Engine fleet.",
   "say.several_modes": "Gehen Sie ein paar Meter, aber nicht gerade auf den Anker zu oder von ihm weg.",
   "say.ranges_missing": "Es kommen keine Distanzen mehr an: Ist der Anker eingeschaltet und das Tag in Reichweite?",
-  "say.imu_missing": "Seit einer Weile sind keine IMU-Messwerte angekommen: Prüfen Sie das Tag, und gehen Sie dann ein paar Meter.",
+  "say.imu_missing": "Seit einer Weile sind keine IMU-Messwerte angekommen, oder alle waren gleich: Prüfen Sie das Tag, und gehen Sie dann ein paar Meter.",
   "say.ranges_rejected": "Die Distanzen widersprechen der Spur: Ist die Sichtlinie frei, und steht der Anker dort, wo es der Standort angibt?",
   "say.heading_disturbed": "Eisen oder ein Magnet stört den Kompass: Entfernen Sie das Tag davon.",
   "say.fault": "Die Schätzung musste neu beginnen. Wiederholt sich das, prüfen Sie, was das Tag sendet.",

@@ -55,7 +55,7 @@ export default {
   "say.start_unknown": "Set where the tag starts (`start` in its settings), or use the engine fleet.",
   "say.several_modes": "Walk a few metres, but not straight towards the anchor or away from it.",
   "say.ranges_missing": "No more ranges arrive: is the anchor on, and is the tag in range?",
-  "say.imu_missing": "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
+  "say.imu_missing": "No IMU samples have arrived for a while, or all were equal: check the tag, then walk a few metres.",
   "say.ranges_rejected": "The ranges contradict the track: is the line of sight free, and is the anchor where the site says it is?",
   "say.heading_disturbed": "Iron or a magnet disturbs the compass: move the tag away from it.",
   "say.fault": "The estimate had to start again. If this repeats, check what the tag sends.",
