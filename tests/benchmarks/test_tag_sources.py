@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
+
 from benchmarks import proc
 from benchmarks.tag_sources import Process, imu, mqtt, publish, serial
 from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
@@ -76,6 +78,7 @@ def cost(source: str, run: Run, folder: Path) -> Cost:
     return Cost(statistics.median(imports), resident_mb, cpu, arrived, sent)
 
 
+@pytest.mark.benchmark
 @needs_mosquitto
 def test_the_cost_of_each_source_is_measured_and_within_its_limits(tmp_path: Path) -> None:
     costs = {name: cost(source, run, tmp_path) for name, (source, _, run) in SOURCES.items()}

@@ -13,6 +13,12 @@ from playwright.sync_api import Browser, Page, sync_playwright
 _ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 Scheme = Literal["light", "dark"]
 
+LOOKS = [((1280, 800), "light"), ((1280, 800), "dark"), ((820, 1180), "light"), ((390, 844), "dark")]
+every_look = pytest.mark.parametrize(
+    ("size", "scheme"), LOOKS, ids=lambda value: value if isinstance(value, str) else f"{value[0]}x{value[1]}"
+)
+"""Every size and both colour schemes. The other two pairs would cost minutes."""
+
 
 @contextmanager
 def running_chromium() -> Iterator[Browser]:

@@ -10,13 +10,10 @@ from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_api_bench
 from support.axe import axe_source, violations
-from support.browser import Scheme, WatchedPage, watched_page
+from support.browser import Scheme, WatchedPage, every_look, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
-
-light_and_dark = pytest.mark.parametrize("scheme", ["light", "dark"])
-sizes = pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +31,7 @@ def assert_no_violation(page: WatchedPage, axe: str) -> None:
     assert violations(page.page, axe) == []
 
 
-@light_and_dark
-@sizes
+@every_look
 def test_no_violation_without_a_tag(
     chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:
@@ -44,8 +40,7 @@ def test_no_violation_without_a_tag(
         assert_no_violation(page, axe)
 
 
-@light_and_dark
-@sizes
+@every_look
 def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_selected(
     chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:
@@ -62,8 +57,7 @@ def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_s
         assert_no_violation(page, axe)
 
 
-@light_and_dark
-@sizes
+@every_look
 def test_no_violation_after_the_connection_is_lost(
     chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:

@@ -9,7 +9,7 @@ from dropanchor_schemas.zones import LostRule, TooCloseRule
 from service.dashboard.alert_place import alert_place, happen, put_mail
 from service.dashboard.zone_place import ZonePlace, served
 from support.axe import axe_source, violations
-from support.browser import Scheme, watched_page
+from support.browser import Scheme, every_look, watched_page
 
 pytestmark = pytest.mark.browser
 
@@ -37,8 +37,7 @@ def busy_place() -> ZonePlace:
     return place
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
+@every_look
 def test_no_violation_in_the_lists_and_the_forms(
     chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
 ) -> None:

@@ -17,7 +17,7 @@ from dropanchor_service.estimation.columns import Frame, State
 from dropanchor_service.history.tracks import Retention
 from service.dashboard.place import Place, live_api_bench
 from support.axe import axe_source, violations
-from support.browser import Scheme, WatchedPage, watched_page
+from support.browser import Scheme, WatchedPage, every_look, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -25,7 +25,6 @@ pytestmark = pytest.mark.browser
 SECOND = 1_000_000_000
 RETENTION = Retention(SECOND, 0.1, 5 * SECOND, 10**18, 2**40)
 MINUTES = 5
-SIZES = [(1280, 800), (820, 1180), (390, 844)]
 
 
 def write_past(place: Place, end_ns: int, *, minutes: int = MINUTES) -> None:
@@ -231,8 +230,7 @@ def test_the_trail_of_a_tag_begins_before_the_page_was_opened(chromium: Browser,
             assert (xs[0], xs[-1]) == (-19.0, 0.0)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@every_look
 def test_the_past_is_accessible_and_nothing_is_cut_off(
     chromium: Browser, past: tuple[Place, int], axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
 ) -> None:

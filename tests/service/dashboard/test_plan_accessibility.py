@@ -8,10 +8,10 @@ from playwright.sync_api import Browser, expect
 from dropanchor_schemas.plans import ControlPoint, Floor
 from dropanchor_schemas.site import TagSettings
 from service.dashboard.plan_place import PlanPlace, plan_place
-from service.dashboard.test_accessibility import axe, light_and_dark, sizes
+from service.dashboard.test_accessibility import axe
 from service.dashboard.test_plans_in_browser import edit, file, open_panel
 from support.axe import violations
-from support.browser import Scheme, WatchedPage, watched_page
+from support.browser import Scheme, WatchedPage, every_look, watched_page
 from support.plan_files import svg_file
 
 __all__ = ["axe"]  # a fixture
@@ -39,8 +39,7 @@ def hall(place: PlanPlace) -> None:
     place.put("upper", svg_file(), 0.01, Floor(name="Upper floor", bottom_m=3.0, top_m=6.0))
 
 
-@light_and_dark
-@sizes
+@every_look
 def test_no_violation_while_plans_are_shown_uploaded_and_aligned(
     chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
 ) -> None:

@@ -5,16 +5,15 @@ from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.site import Anchor, TagSettings
 from service.dashboard.place import Place
-from service.dashboard.test_accessibility import assert_no_violation, axe, light_and_dark, sizes
-from support.browser import Scheme, watched_page
+from service.dashboard.test_accessibility import assert_no_violation, axe
+from support.browser import Scheme, every_look, watched_page
 
 __all__ = ["axe"]  # a fixture
 
 pytestmark = pytest.mark.browser
 
 
-@light_and_dark
-@sizes
+@every_look
 def test_no_violation_while_a_site_is_set_up(
     chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:

@@ -12,11 +12,10 @@ from playwright.sync_api import Browser, Page, expect
 from dropanchor_service.estimation.columns import Frame, State
 from service.dashboard.place import Place
 from support.axe import axe_source, violations
-from support.browser import Scheme, watched_page
+from support.browser import Scheme, every_look, watched_page
 
 pytestmark = pytest.mark.browser
 
-sizes = pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
 light_and_dark = pytest.mark.parametrize("scheme", ["light", "dark"])
 NAMES = [*(state.name.lower() for state in State), "turned"]
 CROP = 24
@@ -140,8 +139,7 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(
         assert watched.errors == []
 
 
-@light_and_dark
-@sizes
+@every_look
 def test_no_violation_in_the_dialogs_and_on_the_wall(
     chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
 ) -> None:

@@ -8,7 +8,7 @@ from playwright.sync_api import Browser
 
 from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
 from support.axe import axe_source, violations
-from support.browser import Scheme, WatchedPage, watched_page
+from support.browser import Scheme, WatchedPage, every_look, watched_page
 
 pytestmark = pytest.mark.browser
 
@@ -43,8 +43,7 @@ def draw_a_crossing(page: WatchedPage) -> None:
     page.page.get_by_role("form", name="Zone", exact=True).get_by_role("alert").wait_for()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [(1280, 800), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
+@every_look
 def test_no_violation_in_the_lists_the_editor_and_without_a_connection(
     chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
 ) -> None:
