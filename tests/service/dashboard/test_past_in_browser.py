@@ -135,7 +135,7 @@ def test_the_map_follows_a_tag_through_the_past(chromium: Browser, past: tuple[P
         wait_for_past(page, 3)
         page.page.locator("[data-part='follow']").click()
         page.page.locator("[data-part='play']").click()
-        page.wait_for("dropanchor.tags()[0].x > 60")
+        page.wait_for("dropanchor.tags()[0]?.x > 60")
         page.page.locator("[data-part='play']").click()
         page.wait_for("!dropanchor.past().playing && dropanchor.drawing().still")
         box = page.page.locator("#map").bounding_box()
