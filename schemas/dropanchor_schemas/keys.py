@@ -84,6 +84,11 @@ def all_tags(site: str, leaf: str) -> str:
     return f"{_site_prefix(site)}/tag/*/{leaf}"
 
 
+def all_sites(leaf: str) -> str:
+    """Return the key expression of `leaf` of every tag of every site."""
+    return f"{PREFIX}/*/tag/*/{leaf}"
+
+
 def all_anchors(site: str) -> str:
     return f"{_site_prefix(site)}/anchor/*"
 
@@ -99,10 +104,21 @@ def everything(site: str) -> str:
 
 def tag_from_key(key: str) -> str:
     """Return the tag id of a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError if the key has another form."""
+    return id_from_chunk(_chunks(key)[4])
+
+
+def site_and_tag_from_key(key: str) -> tuple[str, str]:
+    """Return the site id and the tag id of such a key. Raises InvalidKeyError if the key has another form."""
+    chunks = _chunks(key)
+    return id_from_chunk(chunks[2]), id_from_chunk(chunks[4])
+
+
+def _chunks(key: str) -> list[str]:
+    """Return the chunks of a `…/tag/<tag>/<leaf>` key. Raises InvalidKeyError if the key has another form."""
     chunks = key.split("/")
     if len(chunks) != 6 or "/".join(chunks[:2]) != PREFIX or chunks[3] != "tag":
         raise InvalidKeyError(f"{key!r} is not {PREFIX}/<site>/tag/<tag>/<leaf>")
-    return id_from_chunk(chunks[4])
+    return chunks
 
 
 def _site_prefix(site: str) -> str:

@@ -41,7 +41,7 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of, expiries_of
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, TagTable
+from dropanchor_service.store import LatestPoses, Sites
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.events import ZenohEvents
@@ -81,11 +81,10 @@ class Service:
         self._progress = CompilationProgress()
         self.metrics = Metrics()
         self.clock = UtcClock()
-        self.tags = TagTable()
         self.latest = LatestPoses()
-        self._health = HealthTable()
-        self._pending_tags = PendingTags(settings.max_tags)
-        self.site = open_site(settings)
+        self.sites = Sites([(open_site(settings), settings.quota)])
+        only = self.sites[0]
+        self.site, self.tags = only.store, only.tags
         self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
         self._publishers = Publishers()
         self.answers = Answers(
@@ -94,12 +93,12 @@ class Service:
             self.latest,
             self.clock.now_ns,
             self._persistence.tracks,
-            self._pending_tags,
-            self._health,
+            only.pending_tags,
+            only.health,
             self._publishers,
         )
         self._zone_events = ZoneEvents(
-            settings, self.site, self.tags, self.latest, self._health, self.clock.now_ns, self.metrics
+            settings, self.site, self.tags, self.latest, only.health, self.clock.now_ns, self.metrics
         )
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
@@ -107,12 +106,10 @@ class Service:
         self._register_gauges()
 
     def _register_gauges(self) -> None:
-        self.metrics.register(HealthGauges(self.tags, self._health, self.clock.now_ns, self._publishers))
+        self.metrics.register(HealthGauges(self.sites, self.clock.now_ns, self._publishers))
         expiries = partial(expiries_of, self._certificate, self._credentials)
         self.metrics.register(OperationGauges(self.problems, self.impairments, self._settings.data_dir, expiries))
-        self.metrics.register(
-            FleetGauges(self.tags, self._pending_tags, self.latest, self.clock.now_ns, lambda: self._buffer.depth)
-        )
+        self.metrics.register(FleetGauges(self.sites, self.latest, self.clock.now_ns, lambda: self._buffer.depth))
 
     def __enter__(self) -> Self:
         with self._opened:
@@ -154,20 +151,18 @@ class Service:
             return create_engine(self._settings, self._progress)
 
     def _build_ingest(self, engine: Engine) -> None:
-        guarded = GuardedEngine(engine, self.site, self.tags, self.metrics)
+        guarded = GuardedEngine(engine, self.sites, self.metrics)
         self._ingest = Ingest(
             self._buffer,
-            Admission(self._settings, self.site, self.tags, self._pending_tags),
+            Admission(self.sites),
             guarded,
             self._publishers,
-            self.site,
-            self.tags,
+            self.sites,
             self.latest,
             self.metrics,
             self.clock,
             observers=self._persistence.observers,
             reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
-            health=self._health,
         )
         self._checkpoints = self._checkpointer(guarded)
         self._thread = IngestThread(
@@ -225,7 +220,7 @@ class Service:
         folder = self._settings.data_dir
         if folder is None or not engine.keeps_state:
             return None
-        state = ServiceState(self.site, self.tags, self.latest, engine, self._publishers)
+        state = ServiceState(self.sites, self.latest, engine, self._publishers)
         kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
         return CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
@@ -246,26 +241,23 @@ class Service:
         ]
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:
-        site = self.site.site.id
-        caches = ZenohCaches(session, site, self.tags, self.metrics, self.clock)
+        caches = ZenohCaches(session, self.sites, self.metrics, self.clock)
         catch_up = CatchUp(
             self._buffer,
-            expected=[samples_key(site, tag.name) for tag in self.tags.all()],
-            states_of=sequence_states(self.tags, self._publishers),
+            expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all()],
+            states_of=sequence_states(self.sites, self._publishers),
             ask=caches.ask,
             new_publisher_limit=caches.new_publisher_limit,
         )
         self._on_live = catch_up.on_live
         return ZenohIntake(
             session,
-            site,
+            self.sites,
             self._ingest,
             catch_up,
             caches,
-            self.tags,
             self.metrics,
             self.clock,
-            self._settings.max_tags,
         )
 
     def _receive(self, tag: str, payload: bytes, encoding: str) -> None:

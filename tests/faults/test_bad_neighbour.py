@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import Frame, ImuSample, RangeSample, encode_packed
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.estimation.fleet.engine import FleetEngine
@@ -75,7 +76,7 @@ def turns(messages: list[Message], tags: int) -> Iterator[float]:
     """Yield the processor time of each turn in s. Each turn fuses the messages of 0.1 s."""
     bench = IngestBench(engine=FleetEngine())
     for index in range(tags):
-        bench.ingest.announce(f"sim-{index + 1}")
+        bench.ingest.announce(samples_key("default", f"sim-{index + 1}"))
     together: dict[int, list[Message]] = defaultdict(list)
     for message in messages:
         together[(message.due_ns - T0_NS) // 100_000_000].append(message)
@@ -91,7 +92,7 @@ def feed(engine: Engine, messages: list[Message]) -> IngestBench:
     """Fuse all messages, with one turn for those that are due together. The good tags get the rows 0 to TAGS - 1."""
     bench = IngestBench(engine=engine)
     for index in range(TAGS):
-        bench.ingest.announce(f"sim-{index + 1}")
+        bench.ingest.announce(samples_key("default", f"sim-{index + 1}"))
     due_ns = messages[0].due_ns
     for message in messages:
         if message.due_ns != due_ns:

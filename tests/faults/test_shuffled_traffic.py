@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import (
     Frame,
     HeadingSample,
@@ -38,7 +39,7 @@ def deliver(engine: Engine, messages: Iterable[Message]) -> IngestBench:
     clock = ManualClock()
     bench = IngestBench(engine=engine, clock=clock)
     for index in range(TAGS):
-        bench.ingest.announce(f"sim-{index + 1}")
+        bench.ingest.announce(samples_key("default", f"sim-{index + 1}"))
     for message in messages:
         clock.t_ns = message.due_ns
         encoding = "application/json" if message.payload[:1] == b"{" else "application/vnd.dropanchor.samples"

@@ -22,7 +22,7 @@ from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.sources import load_settings
-from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, Sites, SiteStore
 
 
 @dataclass
@@ -72,30 +72,28 @@ class IngestBench:
         self.engine = TransparentEngine()
         self.clock = clock or UtcClock()
         self.metrics = Metrics()
-        self.tags = TagTable()
         self.latest = LatestPoses()
-        self.health = HealthTable()
-        self.pending_tags = PendingTags(settings.max_tags)
         self.site = SiteStore(settings.site, dict(settings.tags), folder)
+        self.sites = Sites([(self.site, settings.quota)])
+        only = self.sites[0]
+        self.tags, self.health, self.pending_tags = only.tags, only.health, only.pending_tags
         self.buffer = MessageBuffer(capacity)
-        self.guarded_engine = GuardedEngine(engine or self.engine, self.site, self.tags, self.metrics)
+        self.guarded_engine = GuardedEngine(engine or self.engine, self.sites, self.metrics)
         self.publishers = Publishers()
         self.ingest = Ingest(
             self.buffer,
-            Admission(settings, self.site, self.tags, self.pending_tags),
+            Admission(self.sites),
             self.guarded_engine,
             self.publishers,
-            self.site,
-            self.tags,
+            self.sites,
             self.latest,
             self.metrics,
             self.clock,
-            health=self.health,
         )
 
     def service_state(self) -> ServiceState:
         """Return what a checkpoint of this service holds."""
-        return ServiceState(self.site, self.tags, self.latest, self.guarded_engine, self.publishers)
+        return ServiceState(self.sites, self.latest, self.guarded_engine, self.publishers)
 
     def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
         """Append a message to the buffer. at_ns: when it arrived, UTC; 0: now."""

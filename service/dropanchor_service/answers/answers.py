@@ -181,9 +181,9 @@ class Answers:
 
     def rows(self, tags: Sequence[Tag] | None = None) -> Array:
         """Return the latest POSE rows of these tags, or of all tags. Tags without a pose are left out."""
-        if tags is None:
+        if tags is None and self.tags.has_every_row:
             return self.latest.since()[1]
-        return self.latest.of(np.array([tag.row for tag in tags], np.int64))
+        return self.latest.of(np.array([tag.row for tag in (self.tags.all() if tags is None else tags)], np.int64))
 
     def _hypotheses_of(self, row: int, state: str) -> list[Answer] | None:
         """Return the hypotheses of an ambiguous tag, None for another."""

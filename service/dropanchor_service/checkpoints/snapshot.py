@@ -1,25 +1,25 @@
 """Collect and restore the state that a service needs to continue after a restart."""
 
+from typing import Any
+
 import numpy as np
 
 from dropanchor_schemas.site import Anchor
-from dropanchor_service.checkpoints.files import Snapshot, layout_of
+from dropanchor_service.checkpoints.files import CheckpointError, Snapshot, layout_of
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.runtime.kernel_cache import sources_digest
-from dropanchor_service.store import LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, ServedSite, Sites
 from dropanchor_service.store.records import put
 
 
 class ServiceState:
     """The state of the service. Owned by the ingest thread while that runs."""
 
-    def __init__(
-        self, site: SiteStore, tags: TagTable, latest: LatestPoses, engine: GuardedEngine, publishers: Publishers
-    ) -> None:
-        self._site = site
-        self._tags = tags
+    def __init__(self, sites: Sites, latest: LatestPoses, engine: GuardedEngine, publishers: Publishers) -> None:
+        self._sites = sites
+        self._rows = sites.rows
         self._latest = latest
         self._engine = engine
         self._publishers = publishers
@@ -30,7 +30,7 @@ class ServiceState:
     @property
     def messages(self) -> int:
         """Number of messages so far. Only messages change the state."""
-        return int(self._tags.copy_counts()["messages"].sum())
+        return int(self._rows.copy_counts()["messages"].sum())
 
     def snapshot(self) -> Snapshot:
         """Return a copy of the state.
@@ -38,13 +38,25 @@ class ServiceState:
         The next call overwrites it: the memory is reused, because fresh pages from the operating system cost ten times
         as much as copying into them.
         """
-        arrays = {"counts": self._tags.copy_counts(), "publishers": self._publishers.columns}
+        arrays = {"counts": self._rows.copy_counts(), "publishers": self._publishers.columns}
         arrays["times"] = self._publishers.times
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
         arrays |= {f"engine.{name}": array for name, array in self._engine.state().items()}
-        anchors = [anchor.model_dump() for anchor in self._site.anchors_by_index()]
-        document = {"site": self._site.site.id, "anchors": anchors, "tags": [tag.name for tag in self._tags.all()]}
-        return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, document)
+        return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, self._document())
+
+    def _document(self) -> dict[str, Any]:
+        """Return the names in the order of rows and indices. With several sites, each has the place of its site."""
+        only, tags = self._sites.only, self._rows.all()
+        if only is not None:
+            anchors = [anchor.model_dump() for anchor in only.store.anchors_by_index()]
+            return {"site": only.id, "anchors": anchors, "tags": [tag.name for tag in tags]}
+        of_sites = [iter(site.store.anchors_by_index()) for site in self._sites]
+        places = self._engine.anchors.sites.tolist()
+        return {
+            "sites": [site.id for site in self._sites],
+            "anchors": [(place, next(of_sites[place]).model_dump()) for place in places],
+            "tags": [(tag.site, tag.name) for tag in tags],
+        }
 
     def keep_buffers_apart(self) -> None:
         """Use new memory for the next snapshot, so that it does not overwrite the last one."""
@@ -59,20 +71,47 @@ class ServiceState:
         return buffer[: len(array)]
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot of this layout, before the first message."""
-        self._site.restore_indices([Anchor.model_validate(anchor) for anchor in snapshot.document["anchors"]])
-        self._tags.restore(snapshot.document["tags"], snapshot.arrays["counts"])
+        """Restore a snapshot of this layout, before the first message.
+
+        Raises CheckpointError when it holds a site that is no longer served.
+        """
+        self._restore_names(snapshot.document)
+        self._rows.restore_counts(snapshot.arrays["counts"])
         self._publishers.columns = snapshot.arrays["publishers"]
         self._publishers.times = snapshot.arrays["times"]
         self._latest.restore(_part(snapshot, "latest"))
         self._forget_deleted()
         self._engine.restore(_part(snapshot, "engine"))
 
+    def _restore_names(self, document: dict[str, Any]) -> None:
+        """Give tags their rows and anchors their indices."""
+        sites, anchors, tags = self._sites_in(document), document["anchors"], document["tags"]
+        if self._sites.only is not None:
+            anchors, tags = [(0, anchor) for anchor in anchors], [(0, tag) for tag in tags]
+        of_sites: list[list[Anchor]] = [[] for _ in self._sites]
+        for place, anchor in anchors:
+            of_sites[sites[place].index].append(Anchor.model_validate(anchor))
+        for site in self._sites:
+            site.store.restore_indices(of_sites[site.index])
+        self._engine.anchors.restore([sites[place].index for place, _ in anchors])
+        for place, tag in tags:
+            sites[place].tags.register(tag)
+
+    def _sites_in(self, document: dict[str, Any]) -> list[ServedSite]:
+        """Return the sites of a document, in its order. Raises CheckpointError for one that is no longer served."""
+        if self._sites.only is not None:
+            return [self._sites.only]
+        found = [self._sites.find(site) for site in document["sites"]]
+        for site, name in zip(found, document["sites"], strict=True):
+            if site is None:
+                raise CheckpointError(f"it holds the site {name!r}, which is no longer served")
+        return [site for site in found if site is not None]
+
     def _forget_deleted(self) -> None:
         """Delete the tags that were deleted after this snapshot was made."""
-        for tag in self._tags.all():
-            if self._site.was_deleted_after(tag.name, tag.last_heard_ns or 0):
-                self._tags.delete(tag.row)
+        for tag in self._rows.all():
+            if self._sites[tag.site].store.was_deleted_after(tag.name, tag.last_heard_ns or 0):
+                self._rows.delete(tag.row)
                 self._latest.forget(tag.row)
 
 

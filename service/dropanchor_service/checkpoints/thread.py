@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 
-from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot
+from dropanchor_service.checkpoints.files import CheckpointError, CheckpointFolder, Snapshot
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
@@ -44,7 +44,11 @@ class CheckpointThread(Worker):
         if snapshot is None:
             _log.info("there is no usable checkpoint: all tags start afresh")
             return
-        self._state.restore(snapshot)
+        try:
+            self._state.restore(snapshot)
+        except CheckpointError as error:
+            _log.warning("the newest checkpoint is not used: %s; all tags start afresh", error)
+            return
         _log.info("going on from a checkpoint with %d tags", len(snapshot.document["tags"]))
 
     def start(self) -> None:

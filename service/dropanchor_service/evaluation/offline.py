@@ -18,7 +18,8 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.recording.reading import Turn
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.settings.quota import Quota
+from dropanchor_service.store import LatestPoses, Sites, SiteStore
 from dropanchor_service.store.site import SiteDocument
 
 SETTLE_NS = 1_000_000_000  # after this time no message is still waiting in a reorder buffer
@@ -41,22 +42,19 @@ class OfflineService:
     """The ingest and the engine of the service without a network. metrics: the same counters as live."""
 
     def __init__(self, settings: Settings, document: SiteDocument) -> None:
-        self.tags = TagTable()
         self.site = SiteStore(document.site, dict(document.tags))
+        sites = Sites([(self.site, Quota("accept", _MAX_TAGS, _MAX_TAGS))])
+        self.tags = sites[0].tags
         self.metrics = Metrics()
         self._clock = RecordedClock()
         self._buffer = MessageBuffer(_BUFFER_BYTES)
         self._poses: list[Array] = []
-        settings = settings.model_copy(
-            update={"unknown_tags": "accept", "max_tags": _MAX_TAGS, "unproven_tags": _MAX_TAGS}
-        )
         self._ingest = Ingest(
             self._buffer,
-            Admission(settings, self.site, self.tags, PendingTags(0)),
-            GuardedEngine(create_engine(settings), self.site, self.tags, self.metrics),
+            Admission(sites),
+            GuardedEngine(create_engine(settings), sites, self.metrics),
             Publishers(),
-            self.site,
-            self.tags,
+            sites,
             LatestPoses(),
             self.metrics,
             self._clock,

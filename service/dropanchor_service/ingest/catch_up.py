@@ -8,11 +8,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from threading import Lock
 
-from dropanchor_schemas.keys import tag_from_key
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.publishers import Publishers, SequenceState
 from dropanchor_service.ingest.suspended import Number, Suspended, in_order, number_of, size_of
-from dropanchor_service.store import TagTable
+from dropanchor_service.store import Sites
 
 MAX_BYTES = 64 * 2**20  # of suspended messages; beyond it all of them are released
 MAX_RETRIES = 10
@@ -231,11 +230,11 @@ class CatchUp:
         return len(released)
 
 
-def sequence_states(tags: TagTable, publishers: Publishers) -> StatesOf:
+def sequence_states(sites: Sites, publishers: Publishers) -> StatesOf:
     """Return a function that looks up the publishers of a tag by the tag's key."""
 
     def states_of(key: str) -> Mapping[int, SequenceState]:
-        tag = tags.find(tag_from_key(key))
+        tag = sites.tag_of(key)
         return {} if tag is None else publishers.sequence_states(tag.row)
 
     return states_of

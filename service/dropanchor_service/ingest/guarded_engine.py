@@ -1,4 +1,4 @@
-"""Run the engine so that it follows changes of the site, and so that a fault of one row harms no other row."""
+"""Run the engine so that it follows changes of the sites, and so that a fault of one row harms no other row."""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -18,10 +18,11 @@ from dropanchor_service.estimation.columns import (
     State,
     StateReason,
 )
+from dropanchor_service.ingest.anchors import AnchorTable
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
-from dropanchor_service.settings.engine_columns import anchor_columns, tag_columns
-from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_service.settings.engine_columns import tag_columns
+from dropanchor_service.store import ServedSite, Sites
 from dropanchor_service.store.records import enlarged
 
 FAULTS_BEFORE_QUARANTINE = 3
@@ -39,18 +40,17 @@ class _Faults(NamedTuple):
 
 
 class GuardedEngine:
-    """An engine that follows the site and isolates rows that make it fail. Owned by one thread."""
+    """An engine that follows the sites and isolates rows that make it fail. Owned by one thread.
 
-    def __init__(self, engine: Engine, site: SiteStore, tags: TagTable, metrics: Metrics) -> None:
+    The samples that it takes have the engine's index of an anchor, the poses that it gives the index within the site.
+    """
+
+    def __init__(self, engine: Engine, sites: Sites, metrics: Metrics) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._engine = engine
-        self._site = site
-        self._tags = tags
+        self._sites = sites
         self._metrics = metrics
-        self._version = 0
-        self._anchors = anchor_columns([])
-        self._numbers = np.zeros(0, np.int64)  # of the anchors, ascending; their indices are in _indices
-        self._indices = np.zeros(0, np.int32)
+        self.anchors = AnchorTable()
         self._configured: dict[int, _Configured] = {}
         self._settings = np.zeros(0, TAG_SETTINGS)  # by row
         self._has_configured = np.zeros(0, bool)  # by row
@@ -65,59 +65,56 @@ class GuardedEngine:
         """Return the engine's state, anchors and settings, to be copied; empty if the engine keeps no state."""
         if not isinstance(self._engine, Restorable):
             return {}
-        settings = self._settings[: len(self._tags)]
-        return {"anchors": self._anchors, "settings": settings} | self._engine.state()
+        settings = self._settings[: len(self._sites.rows)]
+        return {"anchors": self.anchors.places, "settings": settings} | self._engine.state()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Restore what `state` returned.
 
-        All rows start afresh if an anchor has moved since, and single rows if their settings have changed.
+        All rows of a site start afresh if one of its anchors has moved since, and single rows if their settings have
+        changed.
         """
         assert isinstance(self._engine, Restorable)
-        self.follow_site()
+        self.follow_sites()
         anchors, settings = state.pop("anchors"), state.pop("settings")
-        if (self._anchors[: len(anchors)] != anchors).any():
-            return
+        moved = set(self.anchors.sites[: len(anchors)][self.anchors.places[: len(anchors)] != anchors].tolist())
         self._engine.restore(state)
         self._settings = settings
         for row, known in enumerate(settings):
             current = self._current(row)
-            if tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes():
+            unchanged = tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes()
+            if unchanged and self._sites.of_row(row).index not in moved:
                 self._configured[row] = current
         self._has_configured = np.zeros(len(settings), bool)
         self._has_configured[list(self._configured)] = True
 
-    def follow_site(self) -> bool:
-        """Apply the changes of the site since the last call. Return whether there were any.
+    def follow_sites(self) -> list[ServedSite]:
+        """Apply the changes of the sites since the last call. Return the sites that have changed.
 
-        All rows start afresh if an anchor has moved, and single rows if their settings have changed.
+        All rows of a site start afresh if one of its anchors has moved, and single rows if their settings have changed.
         """
-        if self._version == self._site.version:
-            return False
-        self._version = self._site.version
-        anchors = anchor_columns(self._site.anchors_by_index())
-        moved = bool((anchors[: len(self._anchors)] != self._anchors).any())
-        self._anchors = anchors
-        self._engine.set_anchors(anchors)
-        indices = {anchor.number: self._site.anchor_index(anchor.number) for anchor in self._site.site.anchors}
-        known = sorted((number, index) for number, index in indices.items() if index is not None)
-        self._numbers = np.array([number for number, _ in known], np.int64)
-        self._indices = np.array([index for _, index in known], np.int32)
-        for row, configured in list(self._configured.items()):
-            current = self._current(row)
-            if moved or (configured != current and _differ(configured, current)):
-                self._configure(row)
-            else:
-                self._configured[row] = current
-        return True
+        changed = self._sites.take_changed()
+        moved = [self.anchors.follow(site) for site in changed]
+        if changed:
+            self._engine.set_anchors(self.anchors.places)
+        for site, has_moved in zip(changed, moved, strict=True):
+            self._follow_settings(site, restart=has_moved)
+        return changed
 
-    def anchor_indices(self, numbers: Array) -> Array:
-        """Return the engine's index for each anchor number, -1 for an anchor that the site does not have."""
-        if not len(self._numbers):
-            return np.full(len(numbers), -1, np.int32)
-        place = np.minimum(np.searchsorted(self._numbers, numbers), len(self._numbers) - 1)
-        indices: Array = np.where(self._numbers[place] == numbers, self._indices[place], np.int32(-1))
-        return indices
+    def _follow_settings(self, site: ServedSite, restart: bool) -> None:
+        """Apply the settings of the tags of a site. restart: start all of its rows afresh."""
+        for tag in site.tags.all():
+            configured, current = self._configured.get(tag.row), self._current(tag.row)
+            if configured is None:
+                continue
+            if restart or (configured != current and _differ(configured, current)):
+                self._configure(tag.row)
+            else:
+                self._configured[tag.row] = current
+
+    def anchor_indices(self, rows: Array, numbers: Array) -> Array:
+        """Return the engine's index for each anchor number that the tag of a row sent, -1 if its site lacks it."""
+        return self.anchors.indices(self._sites.rows.sites(rows), numbers)
 
     def any_quarantined(self, now_ns: int) -> bool:
         """Return whether any row is in quarantine."""
@@ -138,7 +135,10 @@ class GuardedEngine:
         """Yield the poses of all rows. A row that makes the engine fail starts afresh."""
         for row in self._new_rows(samples):
             self._configure(row)
-        yield from self._bisected(samples, now_ns)
+        for batch in self._bisected(samples, now_ns):
+            for column in (batch.poses, batch.innovations):
+                column["anchor"] = self.anchors.own_indices(column["anchor"])
+            yield batch
 
     def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
         rows = [column["row"] for column in samples.columns()]
@@ -167,7 +167,7 @@ class GuardedEngine:
 
     def _fault(self, row: int, samples: SampleBatch, error: Exception, now_ns: int) -> PoseBatch:
         self._metrics.faults.labels("estimator").inc()
-        self._log.exception(f"estimator of tag {self._tags.at(row).name}", error)
+        self._log.exception(f"estimator of tag {self._sites.rows.at(row).name}", error)
         times = self._faults.get(row, _Faults(0, 0)).times + 1
         quarantine = times % FAULTS_BEFORE_QUARANTINE == 0
         self._faults[row] = _Faults(times, now_ns + QUARANTINE_NS if quarantine else 0)
@@ -190,8 +190,9 @@ class GuardedEngine:
         self._settings[row] = settings
 
     def _current(self, row: int) -> _Configured:
-        """Return the settings that the site has now for this row."""
-        return _Configured(self._site.tag_settings(self._tags.at(row).name), self._site.site.declination_rad)
+        """Return the settings that its site has now for this row."""
+        store = self._sites.of_row(row).store
+        return _Configured(store.tag_settings(self._sites.rows.at(row).name), store.site.declination_rad)
 
 
 def _differ(before: _Configured, now: _Configured) -> bool:

@@ -5,12 +5,12 @@ from threading import Lock
 
 import numpy as np
 
-from dropanchor_schemas.keys import InvalidKeyError, tag_from_key
+from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_schemas.tag_health import HealthReport, decode_health
 from dropanchor_schemas.wire import Reason, Rejection
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.rejections import Rejections
-from dropanchor_service.store import HealthTable, Tag, TagTable
+from dropanchor_service.store import Sites, Tag
 
 MAX_WAITING = 5_000
 REPORTS_PER_TURN = 100  # about a millisecond of the ingest thread
@@ -27,10 +27,9 @@ class HealthIntake:
     A tag that reports too often loses its own reports, not those of others.
     """
 
-    def __init__(self, admission: Admission, tags: TagTable, health: HealthTable, rejections: Rejections) -> None:
+    def __init__(self, admission: Admission, sites: Sites, rejections: Rejections) -> None:
         self._admission = admission
-        self._tags = tags
-        self._health = health
+        self._sites = sites
         self._rejections = rejections
         self._lock = Lock()
         self._waiting: deque[Report] = deque()
@@ -76,18 +75,18 @@ class HealthIntake:
     def _store(self, tag: Tag, report: HealthReport, arrival_ns: int) -> None:
         self._rejections.count_rejected(Reason.HEALTH_ABSURD, np.full(len(report.absurd), tag.row))
         if report.values:
-            self._health.record(tag.row, report.values, arrival_ns)
+            self._sites[tag.site].health.record(tag.row, report.values, arrival_ns)
 
     def _admitted(self, key: str) -> Tag | Reason:
         try:
-            return self._admission.admit(tag_from_key(key))
+            return self._admission.admit(*self._sites.of_key(key))
         except InvalidKeyError:
             return Reason.KEY_INVALID
 
     def _count(self, reason: Reason, key: str, times: int = 1) -> None:
         """Count rejected reports, for their tag if it has a row."""
         try:
-            tag = self._tags.find(tag_from_key(key))
+            tag = self._sites.tag_of(key)
         except InvalidKeyError:
             tag = None
         if tag is None:

@@ -6,21 +6,21 @@ from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
-from dropanchor_service.store import TagTable
+from dropanchor_service.store import Rows
 
 
 class Rejections:
     """Counters of rejected messages and samples, and of faults. Owned by one thread."""
 
-    def __init__(self, tags: TagTable, metrics: Metrics) -> None:
+    def __init__(self, rows: Rows, metrics: Metrics) -> None:
         self._log = RareLog(logging.getLogger(__name__))
-        self._tags = tags
+        self._rows = rows
         self._metrics = metrics
 
     def count_rejected(self, reason: Reason, rows: Array) -> None:
         """Count a rejected message or sample for each entry of `rows`."""
         if len(rows):
-            self._tags.count_rejected(reason, rows)
+            self._rows.count_rejected(reason, rows)
             self._metrics.rejected.labels(reason).inc(len(rows))
 
     def count_refused(self, reason: Reason, key: str) -> None:

@@ -1,6 +1,6 @@
 """Turn messages of admitted tags into samples for an engine: decode, put in order, screen, map clocks."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
-from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_service.store import Sites
 from dropanchor_service.store.rings import rank_in_row
 
 REORDER_BYTES = 2**26
@@ -31,8 +31,7 @@ class SampleReader:
 
     def __init__(
         self,
-        site: SiteStore,
-        tags: TagTable,
+        sites: Sites,
         engine: GuardedEngine,
         rejections: Rejections,
         publishers: Publishers,
@@ -40,8 +39,8 @@ class SampleReader:
     ) -> None:
         self.window_ns = window_ns
         self._publishers = publishers
-        self._site = site
-        self._tags = tags
+        self._sites = sites
+        self._rows = sites.rows
         self._engine = engine
         self._rejections = rejections
         self._reorder = ReorderBuffer(REORDER_BYTES)
@@ -103,7 +102,7 @@ class SampleReader:
         Answers subtract it from the age of the poses of a replay. The times of samples do not depend on it.
         """
         replayed = decoded.forms["replay"][due] & (newest[due] >= 0)
-        self._tags.set_replay_lag(of_row[due], np.where(replayed, arrived[due] - newest[due], 0))
+        self._rows.set_replay_lag(of_row[due], np.where(replayed, arrived[due] - newest[due], 0))
 
     def _note_arrivals(
         self, decoded: Decoded, ranges: Array, due: Array, of_row: Array, arrived: Array, spans: tuple[Array, Array]
@@ -112,7 +111,7 @@ class SampleReader:
         oldest, newest = spans
         live = due[(newest[due] >= 0) & ~decoded.forms["replay"][due].astype(bool)]
         counts = np.bincount(ranges["message"], minlength=len(of_row))
-        self._tags.arrivals.record(of_row[live], arrived[live], oldest[live], newest[live], counts[live])
+        self._rows.arrivals.record(of_row[live], arrived[live], oldest[live], newest[live], counts[live])
 
     def _batch(
         self,
@@ -123,10 +122,9 @@ class SampleReader:
         arrived: Array,
         spans: tuple[Array, Array],
     ) -> SampleBatch:
-        self._bind_first_anchor(decoded)
         self._note_unknown_anchors(decoded, of_row, arrived)
         scalars = [
-            self._anchored(column, rejected) if kind.has_anchor else column
+            self._anchored(column, of_row, rejected) if kind.has_anchor else column
             for kind, column in zip(SCALARS, decoded.columns()[1:], strict=True)
         ]
         self._note_arrivals(decoded, scalars[0], due, of_row, arrived, spans)
@@ -137,27 +135,38 @@ class SampleReader:
             *(_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
         )
 
-    def _bind_first_anchor(self, decoded: Decoded) -> None:
-        """Make the first anchor that a tag ranges to the origin of a site without anchors."""
-        if self._site.site.anchors or len(decoded.ranges) == 0:
-            return
-        number = int(decoded.ranges["anchor"][0])
-        if self._site.bind_first(decoded.anchor_names.get(number, str(number))):
-            self._engine.follow_site()
-
     def _note_unknown_anchors(self, decoded: Decoded, of_row: Array, arrived: Array) -> None:
-        ranges = decoded.ranges[self._engine.anchor_indices(decoded.ranges["anchor"]) < 0]
-        messages, first = np.unique(ranges["message"], return_index=True)
-        for message, number in zip(messages.tolist(), ranges["anchor"][first].tolist(), strict=True):
-            name = decoded.anchor_names.get(number, str(number))
-            tag = self._tags.at(int(of_row[message]))
-            self._tags.unknown_anchors.record(tag.row, tag.name, number, name, int(arrived[message]))
+        """Record ranges to anchors that their sites do not have. A site without anchors gets the first one."""
+        unknown = decoded.ranges[self._indices(decoded.ranges, of_row) < 0]
+        if self._bind_first_anchors(unknown, decoded.anchor_names, of_row):
+            unknown = unknown[self._indices(unknown, of_row) < 0]
+        messages, first = np.unique(unknown["message"], return_index=True)
+        for message, number in zip(messages.tolist(), unknown["anchor"][first].tolist(), strict=True):
+            name, tag = decoded.anchor_names.get(number, str(number)), self._rows.at(int(of_row[message]))
+            anchors = self._sites[tag.site].tags.unknown_anchors
+            anchors.record(tag.row, tag.name, number, name, int(arrived[message]))
 
-    def _anchored(self, samples: Array, rejected: list[Rejected]) -> Array:
+    def _bind_first_anchors(self, ranges: Array, names: Mapping[int, str], of_row: Array) -> bool:
+        """Make the first anchor that a tag ranges to the origin of its site without anchors. Return whether there was one.
+
+        ranges: to unknown anchors. names: of anchors, by number.
+        """
+        of_site, first = np.unique(self._rows.sites(of_row[ranges["message"]]), return_index=True)
+        numbers = zip(of_site.tolist(), ranges["anchor"][first].tolist(), strict=True)
+        bound = [self._sites[site].store.bind_first(names.get(number, str(number))) for site, number in numbers]
+        if any(bound):
+            self._engine.follow_sites()
+        return any(bound)
+
+    def _indices(self, samples: Array, of_row: Array) -> Array:
+        """Return the engine's index of the anchor of each sample, -1 if the site of its tag lacks it."""
+        return self._engine.anchor_indices(of_row[samples["message"]], samples["anchor"])
+
+    def _anchored(self, samples: Array, of_row: Array, rejected: list[Rejected]) -> Array:
         """Return the samples of known anchors, with the engine's index of the anchor in `anchor`."""
         if not len(samples):
             return samples
-        indices = self._engine.anchor_indices(samples["anchor"])
+        indices = self._indices(samples, of_row)
         unknown = indices < 0
         kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, rejected)
         kept["anchor"] = indices[~unknown]

@@ -3,10 +3,11 @@
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 
-from dropanchor_schemas.keys import samples_key
+from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
@@ -20,7 +21,7 @@ from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.samples import SampleReader
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
-from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, Tag, TagTable
+from dropanchor_service.store import LatestPoses, Sites, Tag
 
 MESSAGES_PER_TURN = 1000
 
@@ -38,35 +39,33 @@ class Ingest:
         admission: Admission,
         engine: GuardedEngine,
         publishers: Publishers,
-        site: SiteStore,
-        tags: TagTable,
+        sites: Sites,
         latest: LatestPoses,
         metrics: Metrics,
         clock: UtcClock,
         observers: Observers = NO_OBSERVERS,
         reorder_ns: int = 250_000_000,
-        health: HealthTable | None = None,
     ) -> None:
-        self._rejections = Rejections(tags, metrics)
-        self.health = HealthIntake(admission, tags, health or HealthTable(), self._rejections)
-        self._reader = SampleReader(site, tags, engine, self._rejections, publishers, reorder_ns)
+        self._rejections = Rejections(sites.rows, metrics)
+        self.health = HealthIntake(admission, sites, self._rejections)
+        self._reader = SampleReader(sites, engine, self._rejections, publishers, reorder_ns)
         self._buffer = buffer
         self._admission = admission
-        self._site = site
+        self._sites = sites
         self._registered_tags = 0  # rows whose keys are registered with the buffer
         self._forgotten: frozenset[int] = frozenset()  # rows of deleted tags, whose keys are no longer registered
         self._engine = engine
         self._publishers = publishers
-        self._tags = tags
+        self._rows = sites.rows
         self._latest = latest
         self._metrics = metrics
         self._clock = clock
         self._observers = observers
         self._announced: deque[str] = deque(maxlen=1024)
 
-    def announce(self, name: str) -> None:
-        """Admit a tag that is online, in the next turn. Thread-safe."""
-        self._announced.append(name)
+    def announce(self, key: str) -> None:
+        """Admit the tag with this key, which is online, in the next turn. Thread-safe."""
+        self._announced.append(key)
 
     @property
     def has_pending(self) -> bool:
@@ -75,11 +74,10 @@ class Ingest:
 
     def turn(self, limit: int = MESSAGES_PER_TURN) -> int:
         """Process up to `limit` messages of registered tags. Return how many."""
-        if self._engine.follow_site():
-            self._admission.register_listed()
+        for site in self._engine.follow_sites():
+            self._admission.register_listed(site)
         self._admission.review()
-        while self._announced:
-            self._admission.admit(self._announced.popleft())
+        self._admit_announced()
         self.health.turn()
         kept = list(self._register_new_tags())
         fresh, unregistered = self._buffer.drain(limit, self._clock.now_ns())
@@ -90,27 +88,32 @@ class Ingest:
         if messages:
             self._notify(self._observers.messages, messages)
             self._metrics.messages.inc(len(messages))
-            self._tags.count_messages(np.array([message[0] for message in messages], np.int32), messages[-1][3])
+            self._rows.count_messages(np.array([message[0] for message in messages], np.int32), messages[-1][3])
         if messages or self.has_pending:
             self._fuse(messages)
         return len(fresh)
+
+    def _admit_announced(self) -> None:
+        while self._announced:
+            with suppress(InvalidKeyError):
+                self._admission.admit(*self._sites.of_key(self._announced.popleft()))
 
     def _register_new_tags(self) -> Iterator[Message]:
         """Register the keys of new tags with the buffer and prepare their rows. Yield the messages kept for them.
 
         From then on, their messages wait neither among those of unregistered tags nor for their estimator.
         """
-        for tag in self._tags.all()[self._registered_tags :] if len(self._tags) > self._registered_tags else ():
-            self._buffer.admit(self._key_of(tag.row), tag.row)
+        for tag in self._rows.all()[self._registered_tags :] if len(self._rows) > self._registered_tags else ():
+            self._buffer.admit(self._sites.samples_key(tag.row), tag.row)
             self._engine.prepare(tag.row)
             self._registered_tags = tag.row + 1
             yield from self._kept(tag)
 
     def _forget_deleted_tags(self) -> None:
         """Let the messages of deleted tags wait among those of unregistered ones."""
-        deleted = self._tags.deleted
+        deleted = self._rows.deleted
         for row in deleted - self._forgotten:
-            self._buffer.forget(self._key_of(row))
+            self._buffer.forget(self._sites.samples_key(row))
         self._forgotten = deleted
 
     def _split(self, fresh: list[Message]) -> tuple[list[Message], list[UnregisteredMessage]]:
@@ -118,11 +121,9 @@ class Ingest:
         if not self._forgotten:
             return fresh, []
         of_known = [message for message in fresh if message[0] not in self._forgotten]
-        of_deleted = [(self._key_of(message[0]), *message[1:]) for message in fresh if message[0] in self._forgotten]
+        key_of = self._sites.samples_key
+        of_deleted = [(key_of(message[0]), *message[1:]) for message in fresh if message[0] in self._forgotten]
         return of_known, of_deleted
-
-    def _key_of(self, row: int) -> str:
-        return samples_key(self._site.site.id, self._tags.at(row).name)
 
     def _admitted(self, unregistered: Sequence[UnregisteredMessage]) -> Iterator[Message]:
         for message in unregistered:
@@ -153,7 +154,7 @@ class Ingest:
     def _fuse_batch(self, samples: SampleBatch, now_ns: int) -> None:
         for kind, column in zip(KINDS, samples.columns(), strict=True):
             if len(column):
-                self._tags.count_samples(kind.name, column["row"])
+                self._rows.count_samples(kind.name, column["row"])
                 self._metrics.samples.labels(kind.name).inc(len(column))
         if not any(map(len, samples.columns())):
             return
@@ -178,7 +179,7 @@ class Ingest:
         for outcomes in (batch.poses, batch.innovations):
             self._publishers.to_utc(outcomes)
         self._latest.write(batch.poses, batch.hypotheses, batch.innovations)
-        for row in self._tags.deleted.intersection(batch.poses["row"].tolist()):
+        for row in self._rows.deleted.intersection(batch.poses["row"].tolist()):
             self._latest.forget(row)  # the samples were pending when the tag was deleted
         self._metrics.poses.inc(len(batch.poses))
         for reason, rows in batch.rejected.items():

@@ -9,7 +9,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from dropanchor_service.answers.care import REASONS, care_of
-from dropanchor_service.store import HealthTable, TagTable
+from dropanchor_service.store import Sites
 from dropanchor_service.store.clock_offsets import ClockOffsets
 
 _EXTREMES: tuple[tuple[str, str, Callable[[Sequence[float]], float], str], ...] = (
@@ -28,18 +28,15 @@ _EXTREMES: tuple[tuple[str, str, Callable[[Sequence[float]], float], str], ...] 
 class HealthGauges(Collector):
     """Gauges that are read from the store at every scrape."""
 
-    def __init__(
-        self, tags: TagTable, health: HealthTable, now_ns: Callable[[], int], clock_offsets: ClockOffsets
-    ) -> None:
-        self._tags = tags
-        self._health = health
+    def __init__(self, sites: Sites, now_ns: Callable[[], int], clock_offsets: ClockOffsets) -> None:
+        self._sites = sites
         self._now_ns = now_ns
         self._clock_offsets = clock_offsets
 
     def collect(self) -> Iterable[Metric]:
-        now_ns, tags = self._now_ns(), self._tags.all()
+        now_ns, tags = self._now_ns(), self._sites.rows.all()
         offsets = self._clock_offsets.clock_offsets(now_ns)
-        cares = (care_of(tag, self._health, now_ns, offsets.get(tag.row)) for tag in tags)
+        cares = (care_of(tag, self._sites[tag.site].health, now_ns, offsets.get(tag.row)) for tag in tags)
         reasons = Counter(care["reason"] for of_tag in cares for care in of_tag)
         needing = GaugeMetricFamily(
             "dropanchor_tags_needing_care", "Tags that need a person, by reason.", labels=["reason"]
@@ -52,7 +49,9 @@ class HealthGauges(Collector):
             "Largest offset between the clocks of a tag's motion and its ranges, either way; NaN if none is known.",
             max((abs(offset.offset_s) for offset in offsets.values()), default=math.nan),
         )
-        yield from self._extremes([record.values for tag in tags if (record := self._health.of(tag.row))])
+        yield from self._extremes(
+            [record.values for tag in tags if (record := self._sites[tag.site].health.of(tag.row))]
+        )
 
     def _extremes(self, values: Sequence[Mapping[str, Any]]) -> Iterable[Metric]:
         yield GaugeMetricFamily("dropanchor_tags_reporting_health", "Tags that have reported health.", len(values))

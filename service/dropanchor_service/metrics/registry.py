@@ -11,8 +11,8 @@ from prometheus_client.registry import Collector
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.answers.columns import STATES, aged_poses
 from dropanchor_service.store.latest_poses import LatestPoses
-from dropanchor_service.store.pending_tags import PendingTags
-from dropanchor_service.store.tags import KINDS, TagTable
+from dropanchor_service.store.rows import KINDS
+from dropanchor_service.store.sites import Sites
 
 _SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5)
 
@@ -80,35 +80,33 @@ class FleetGauges(Collector):
 
     def __init__(
         self,
-        tags: TagTable,
-        pending_tags: PendingTags,
+        sites: Sites,
         latest: LatestPoses,
         now_ns: Callable[[], int],
         queue_depth: Callable[[], int],
     ) -> None:
-        self._tags = tags
-        self._pending_tags = pending_tags
+        self._sites = sites
         self._latest = latest
         self._now_ns = now_ns
         self._queue_depth = queue_depth
 
     def collect(self) -> Iterable[Metric]:
         poses = self._latest.since()[1]
-        aged = aged_poses(poses, self._tags.age_s(poses, self._now_ns()))
+        aged = aged_poses(poses, self._sites.rows.age_s(poses, self._now_ns()))
         by_state = np.bincount(aged["state"], minlength=len(STATES))
         tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
         for state, count in zip(STATES, by_state, strict=True):
             tags.add_metric([state], count)
         yield tags
-        yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that are registered.", len(self._tags))
+        yield GaugeMetricFamily("dropanchor_tags_registered", "Tags that are registered.", len(self._sites.rows))
         yield GaugeMetricFamily(
             "dropanchor_newcomers",
             "Pending tags: they have sent messages but are not registered.",
-            len(self._pending_tags),
+            sum(len(site.pending_tags) for site in self._sites),
         )
         yield GaugeMetricFamily(
             "dropanchor_tags_online",
             "Tags that are online: by a liveliness token, an open WebSocket, or HTTP.",
-            self._tags.presence.count(),
+            sum(site.tags.presence.count() for site in self._sites),
         )
         yield GaugeMetricFamily("dropanchor_queue_messages", "Messages queued for the estimators.", self._queue_depth())

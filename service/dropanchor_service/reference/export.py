@@ -23,7 +23,7 @@ from dropanchor_service.reference import (
     states_page,
 )
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import HealthTable, LatestPoses, PendingTags, SiteStore, TagTable
+from dropanchor_service.store import HealthTable, LatestPoses, Sites, SiteStore
 from dropanchor_service.store.clock_offsets import NoClockOffsets
 from dropanchor_service.zone_events import ZoneEvents
 
@@ -65,12 +65,14 @@ def _is_current(path: Path, text: str) -> bool:
 
 def _registry(folder: Path) -> CollectorRegistry:
     """Return a registry with everything that a service with a data folder registers."""
-    metrics, tags, latest = Metrics(), TagTable(), LatestPoses()
+    metrics, latest = Metrics(), LatestPoses()
     settings = Settings(data_dir=folder)
     site = SiteStore(settings.site, {})
+    sites = Sites([(site, settings.quota)])
+    tags = sites[0].tags
     Persistence(settings, tags, site, lambda: 0, metrics)
-    metrics.register(FleetGauges(tags, PendingTags(0), latest, lambda: 0, lambda: 0))
-    metrics.register(HealthGauges(tags, HealthTable(), lambda: 0, NoClockOffsets()))
+    metrics.register(FleetGauges(sites, latest, lambda: 0, lambda: 0))
+    metrics.register(HealthGauges(sites, lambda: 0, NoClockOffsets()))
     metrics.register(OperationGauges(list, list, folder, lambda: {"http": datetime.fromtimestamp(0, UTC)}))
     ZoneEvents(Settings(), site, tags, latest, HealthTable(), lambda: 0, metrics)
     return metrics.registry

@@ -14,6 +14,7 @@ from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
+from dropanchor_service.settings.quota import Quota, UnknownTags
 
 
 def _is_endpoint(text: str) -> str:
@@ -242,7 +243,7 @@ class Settings(_Section):
     checkpoint_s: Annotated[float, Field(gt=0, le=3600)] = Field(
         default=0.5, description="Time between checkpoints: what a killed service has to fetch again."
     )
-    unknown_tags: Literal["accept", "quarantine", "refuse"] = Field(
+    unknown_tags: UnknownTags = Field(
         default="accept",
         description="What to do with a tag that is not listed here. In quarantine it waits, listed under newcomers, "
         "until somebody puts its settings.",
@@ -274,6 +275,11 @@ class Settings(_Section):
         default=TagSettings(), description="What every tag gets, unless its own table says otherwise."
     )
     paper: PaperSettings = PaperSettings()
+
+    @property
+    def quota(self) -> Quota:
+        """Which tags a site admits, unless its own table says otherwise."""
+        return Quota(self.unknown_tags, self.unproven_tags, self.max_tags)
 
     @property
     def listed_tags(self) -> dict[str, TagSettings]:

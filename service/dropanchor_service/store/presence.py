@@ -15,22 +15,40 @@ from dropanchor_service.store.records import enlarged
 HTTP_S = 30.0  # for which a message over HTTP makes its tag online
 
 
-class Presence:
-    """Thread-safe. Knows names, some of which have a row. clock: monotonic, s."""
+class OnlineUntil:
+    """By row of any site: when its tag goes offline unless another message arrives, s of the clock."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self._clock = clock
-        self._lock = RLock()
+        self.clock = clock
+        self.lock = RLock()
+        self.s = np.zeros(16)
+
+    def grow(self, rows: int) -> None:
+        """Make room for this many rows."""
+        if rows > len(self.s):
+            self.s = enlarged(self.s, 2 * rows)
+
+    def are_online(self, rows: Array) -> Array:
+        """Return whether the tag of each row is online."""
+        online: Array = self.s[rows] > self.clock()
+        return online
+
+
+class Presence:
+    """Thread-safe. Knows the names of one site, some of which have a row. clock: monotonic, s. until: of all sites."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, until: OnlineUntil | None = None) -> None:
+        self._until = until or OnlineUntil(clock)
+        self._clock = self._until.clock
+        self._lock = self._until.lock
         self._tokens: set[str] = set()
         self._connections: Counter[str] = Counter()
         self._rows: dict[str, int] = {}
-        self._until_s = np.zeros(16)  # by row: when the tag goes offline unless another message arrives
 
     def add_row(self, name: str, row: int) -> None:
         """Note that a name has got its row."""
         with self._lock:
-            if row >= len(self._until_s):
-                self._until_s = enlarged(self._until_s, 2 * row)
+            self._until.grow(row + 1)
             self._rows[name] = row
             self._update(name)
 
@@ -54,17 +72,16 @@ class Presence:
         with self._lock:
             row = self._rows.get(name)
             if row is not None:
-                self._until_s[row] = max(self._until_s[row], self._clock() + HTTP_S)
+                self._until.s[row] = max(self._until.s[row], self._clock() + HTTP_S)
 
     def is_online(self, name: str) -> bool:
         """Return whether a name is online."""
         row = self._rows.get(name)
-        return self._is_connected(name) if row is None else bool(self._until_s[row] > self._clock())
+        return self._is_connected(name) if row is None else bool(self._until.s[row] > self._clock())
 
     def are_online(self, rows: Array) -> Array:
         """Return whether the tag of each row is online."""
-        online: Array = self._until_s[rows] > self._clock()
-        return online
+        return self._until.are_online(rows)
 
     @property
     def tokens(self) -> int:
@@ -75,7 +92,8 @@ class Presence:
         """Return the number of names that are online, with or without a row."""
         with self._lock:
             without_row = sum(name not in self._rows for name in {*self._tokens, *self._connections})
-            return without_row + int(np.count_nonzero(self._until_s > self._clock()))
+            rows = np.fromiter(self._rows.values(), np.int64, len(self._rows))
+            return without_row + int(np.count_nonzero(self.are_online(rows)))
 
     def _count_connection(self, name: str, change: int) -> None:
         with self._lock:
@@ -89,4 +107,4 @@ class Presence:
     def _update(self, name: str) -> None:
         row = self._rows.get(name)
         if row is not None:
-            self._until_s[row] = math.inf if self._is_connected(name) else 0.0
+            self._until.s[row] = math.inf if self._is_connected(name) else 0.0

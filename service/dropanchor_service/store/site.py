@@ -1,7 +1,7 @@
 """The site, its anchors and its tag settings: configured, changed over REST, saved in a file."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -58,7 +58,12 @@ class SiteStore:
         self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
         self._index_anchors()
         self._groups = groups_of(self._document.tags, self.default_settings)
+        self._changed: Callable[[], None] = lambda: None
         self.version = 1
+
+    def on_change(self, changed: Callable[[], None]) -> None:
+        """Call this after every change, on the thread that makes it."""
+        self._changed = changed
 
     @property
     def site(self) -> Site:
@@ -94,6 +99,8 @@ class SiteStore:
         """Give these anchors of an earlier store, in order of their index, the same index here. Call this first."""
         self._anchors = {anchor.number: (index, anchor) for index, anchor in enumerate(anchors)}
         self._index_anchors()
+        self.version += 1
+        self._changed()
 
     def bind_first(self, anchor: str) -> bool:
         """Put `anchor` at the origin if the site has no anchor yet. Return whether it did."""
@@ -215,6 +222,7 @@ class SiteStore:
         self._groups = groups_of(document.tags, self.default_settings)
         self._index_anchors()
         self.version += 1
+        self._changed()
 
     def _index_anchors(self) -> None:
         for anchor in self.site.anchors:

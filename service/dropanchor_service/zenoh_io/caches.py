@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 import zenoh
 
-from dropanchor_schemas import keys
 from dropanchor_schemas.wire import payload_encoding
 from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
-from dropanchor_service.store import TagTable
+from dropanchor_service.store import Sites
 from dropanchor_service.zenoh_io.channel import drain
 from dropanchor_service.zenoh_io.silent_tags import SilentTags
 
@@ -49,23 +48,23 @@ class ZenohCaches:
     def __init__(
         self,
         session: zenoh.Session,
-        site: str,
-        tags: TagTable,
+        sites: Sites,
         metrics: Metrics,
         clock: UtcClock,
     ) -> None:
         self._rare = RareLog(_log)
         self._session = session
-        self._site = site
-        self._tags = tags
+        self._sites = sites
         self._metrics = metrics
         self._clock = clock
         self._later: deque[tuple[float, str, int]] = deque()  # queries to repeat: when, key, missing
-        self._returned: deque[tuple[float, str, int]] = deque()  # tags online again: when to look, name, last heard ns
-        self._silent_tags = SilentTags(tags)
+        self._returned: deque[tuple[float, str, int]] = deque()  # tags online again: when to look, key, last heard ns
+        self._silent_tags = SilentTags(sites.rows)
         self._next_check_s = 0.0
         self._tasks: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._newest_ns = max((tag.last_heard_ns or 0 for tag in tags.all()), default=0)  # before this process started
+        self._newest_ns = max(
+            (tag.last_heard_ns or 0 for tag in sites.rows.all()), default=0
+        )  # before this process started
         # No daemon: Zenoh's threads for callbacks inherit that, and one that outlives Python aborts the process.
         self._thread = threading.Thread(target=self._run, name="caches")
 
@@ -90,14 +89,14 @@ class ZenohCaches:
             self._later.append((time.monotonic() + RETRY_S, key, missing))
         self._tasks.put(self._ask_later if retries else partial(self._ask, key, missing))
 
-    def ask_if_silent(self, name: str) -> None:
+    def ask_if_silent(self, key: str) -> None:
         """Ask the caches of a tag that came online and sends nothing, for what it sent while it was away.
 
         Zenoh itself fetches what is missing before a live message. See also `_check_silent`.
         """
-        heard_ns = self._last_heard_ns(name)
+        heard_ns = self._last_heard_ns(key)
         if heard_ns:
-            self._tasks.put(partial(self._returned.append, (time.monotonic() + SILENT_S, name, heard_ns)))
+            self._tasks.put(partial(self._returned.append, (time.monotonic() + SILENT_S, key, heard_ns)))
 
     def _run(self) -> None:
         while True:
@@ -125,8 +124,8 @@ class ZenohCaches:
         After a heartbeat of the publisher, Zenoh fetches such messages itself, but not on keys with a verbatim chunk
         such as `@v1`; `test_heartbeats` shows both.
         """
-        for name in self._silent_tags.take(self._clock.now_ns(), CHECKED_TAGS):
-            key = keys.samples_key(self._site, name)
+        for row in self._silent_tags.take(self._clock.now_ns(), CHECKED_TAGS):
+            key = self._sites.samples_key(row)
             self._get(key, 1, zenoh.handlers.Callback(partial(self._on_newest, key)))
 
     def _on_newest(self, key: str, reply: Any) -> None:
@@ -140,21 +139,21 @@ class ZenohCaches:
             _, key, missing = self._later.popleft()
             self._ask(key, missing)
         while self._returned and self._returned[0][0] <= time.monotonic():
-            _, name, heard_ns = self._returned.popleft()
-            if self._last_heard_ns(name) == heard_ns:
-                self._catch_up.on_silent(keys.samples_key(self._site, name))
+            _, key, heard_ns = self._returned.popleft()
+            if self._last_heard_ns(key) == heard_ns:
+                self._catch_up.on_silent(key)
 
     def _ask_all(self) -> None:
         limit, asked_s = min(self._typical_limit(), self._limit(self._newest_ns)), time.monotonic()
         try:
-            replies = self._get(keys.all_tags(self._site, "samples"), limit, zenoh.handlers.FifoChannel(REPLIES))
+            replies = self._get(self._sites.all_tags("samples"), limit, zenoh.handlers.FifoChannel(REPLIES))
             for reply in drain(replies):
                 self._on_reply(reply)
         finally:
             self._finish(partial(self._catch_up.on_first_round_answer, limit), asked_s)
 
     def _ask(self, key: str, missing: int) -> None:
-        limit = MIN_MESSAGES + missing if missing else self._limit(self._last_heard_ns(keys.tag_from_key(key)))
+        limit = MIN_MESSAGES + missing if missing else self._limit(self._last_heard_ns(key))
         answered = partial(self._catch_up.on_answer, key, limit)
         done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
         try:
@@ -176,7 +175,7 @@ class ZenohCaches:
 
     def _typical_limit(self) -> int:
         """Return how many messages most tags have sent since the last process stopped, at their former rates."""
-        counts = self._tags.copy_counts()
+        counts = self._sites.rows.copy_counts()
         heard = counts[counts["messages"] > 0]
         if not len(heard):
             return MIN_MESSAGES
@@ -184,8 +183,8 @@ class ZenohCaches:
         rate = float(np.quantile(heard["messages"] / heard_s, RATE_QUANTILE))
         return MIN_MESSAGES // 5 + round(MARGIN * rate * self._silent_s(self._newest_ns))
 
-    def _last_heard_ns(self, name: str) -> int:
-        tag = self._tags.find(name)
+    def _last_heard_ns(self, key: str) -> int:
+        tag = self._sites.tag_of(key)
         return 0 if tag is None else tag.last_heard_ns or 0
 
     def _limit(self, last_heard_ns: int) -> int:
@@ -197,7 +196,7 @@ class ZenohCaches:
 
     def _on_reply(self, reply: Any) -> None:
         message = reply.ok
-        if message is not None:
+        if message is not None and self._sites.serves(str(message.key_expr)):
             now_ns = self._clock.now_ns()
             encoding = payload_encoding(str(message.encoding))
             self._catch_up.on_cached(str(message.key_expr), bytes(message.payload), encoding, now_ns)

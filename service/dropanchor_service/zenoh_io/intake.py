@@ -12,20 +12,21 @@ from typing import Any, Self
 import zenoh
 import zenoh.ext
 
-from dropanchor_schemas import keys
+from dropanchor_schemas.keys import InvalidKeyError, samples_key
 from dropanchor_schemas.wire import payload_encoding
 from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
-from dropanchor_service.store import TagTable
+from dropanchor_service.store import Sites
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.channel import drain
 
 CHANNEL_LENGTH = 2**14  # messages between Zenoh's receive thread and ours
 HEALTH_CHANNEL_LENGTH = 2**12  # reports; a flood of them loses the oldest and delays no samples
 HEALTH_GATHER_S = 0.1
+TOKENS_PER_TAG = 2  # liveliness tokens that a site may have, for each tag that it admits
 GATHER_S = 0.005  # how long to collect messages before processing them together
 
 
@@ -35,23 +36,19 @@ class ZenohIntake:
     def __init__(
         self,
         session: zenoh.Session,
-        site: str,
+        sites: Sites,
         ingest: Ingest,
         catch_up: CatchUp,
         caches: ZenohCaches,
-        tags: TagTable,
         metrics: Metrics,
         clock: UtcClock,
-        max_tags: int,
     ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._session = session
-        self._site = site
+        self._sites = sites
         self._ingest = ingest
-        self._tags = tags
         self._metrics = metrics
         self._clock = clock
-        self._max_tokens = 2 * max_tags
         self._catch_up = catch_up
         self._caches = caches
         self._declared: list[Any] = []
@@ -59,18 +56,18 @@ class ZenohIntake:
     def __enter__(self) -> Self:
         samples = zenoh.ext.declare_advanced_subscriber(
             self._session,
-            keys.all_tags(self._site, "samples"),
+            self._sites.all_tags("samples"),
             zenoh.handlers.FifoChannel(CHANNEL_LENGTH),
             recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
         )
         misses = samples.sample_miss_listener(zenoh.handlers.Callback(self._on_miss, indirect=False))
         tokens = self._session.liveliness().declare_subscriber(
-            keys.all_tags(self._site, "alive"),
+            self._sites.all_tags("alive"),
             zenoh.handlers.Callback(self._on_token, indirect=False),
             history=True,
         )
         health = self._session.declare_subscriber(
-            keys.all_tags(self._site, "health"), zenoh.handlers.RingChannel(HEALTH_CHANNEL_LENGTH)
+            self._sites.all_tags("health"), zenoh.handlers.RingChannel(HEALTH_CHANNEL_LENGTH)
         )
         self._declared = [misses, samples, tokens, health]
         self._threads = [
@@ -97,15 +94,17 @@ class ZenohIntake:
             self._receive(message)
 
     def _receive(self, message: zenoh.Sample) -> None:
-        now_ns = self._clock.now_ns()
+        now_ns, key = self._clock.now_ns(), str(message.key_expr)
         encoding = payload_encoding(str(message.encoding))
-        self._catch_up.on_live(str(message.key_expr), bytes(message.payload), encoding, now_ns)
+        if self._sites.serves(key):
+            self._catch_up.on_live(key, bytes(message.payload), encoding, now_ns)
 
     def _receive_health(self, reports: Any) -> None:
         """Pass on health until the subscriber is undeclared."""
         for report in drain(reports, HEALTH_GATHER_S):
-            encoding = payload_encoding(str(report.encoding)).partition(";")[0]
-            self._ingest.health.put(str(report.key_expr), bytes(report.payload), encoding, self._clock.now_ns())
+            encoding, key = payload_encoding(str(report.encoding)).partition(";")[0], str(report.key_expr)
+            if self._sites.serves(key):
+                self._ingest.health.put(key, bytes(report.payload), encoding, self._clock.now_ns())
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)
@@ -113,13 +112,14 @@ class ZenohIntake:
 
     def _on_token(self, message: zenoh.Sample) -> None:
         try:
-            name = keys.tag_from_key(str(message.key_expr))
-        except keys.InvalidKeyError:
+            site, name = self._sites.of_key(str(message.key_expr))
+        except InvalidKeyError:
             return
+        presence, key = site.tags.presence, samples_key(site.id, name)
         if message.kind == zenoh.SampleKind.DELETE:
-            self._tags.presence.set_token(name, False)
-        elif self._tags.presence.tokens < self._max_tokens:
-            self._tags.presence.set_token(name, True)
-            self._ingest.announce(name)
-            self._catch_up.on_alive(keys.samples_key(self._site, name))
-            self._caches.ask_if_silent(name)
+            presence.set_token(name, False)
+        elif presence.tokens < TOKENS_PER_TAG * site.quota.max_tags:
+            presence.set_token(name, True)
+            self._ingest.announce(key)
+            self._catch_up.on_alive(key)
+            self._caches.ask_if_silent(key)

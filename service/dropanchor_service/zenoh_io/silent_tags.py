@@ -2,31 +2,32 @@
 
 import numpy as np
 
-from dropanchor_service.store import TagTable
+from dropanchor_service.store import Rows
 from dropanchor_service.store.records import enlarged
 
 SILENT_NS = 1_000_000_000
 
 
 class SilentTags:
-    """Names each tag once per silence. What was heard before this object was created does not count."""
+    """Returns each tag once per silence. What was heard before this object was created does not count."""
 
-    def __init__(self, tags: TagTable) -> None:
-        self._tags = tags
-        # By row: the start of the last silence that was named.
-        self._known_ns = tags.copy_counts()["last_heard_ns"].copy()
+    def __init__(self, rows: Rows) -> None:
+        self._rows = rows
+        # By row: the start of the last silence that was returned.
+        self._known_ns = rows.copy_counts()["last_heard_ns"].copy()
 
-    def take(self, now_ns: int, limit: int) -> list[str]:
-        """Return the names of up to `limit` tags that have fallen silent, the longest silent first.
+    def take(self, now_ns: int, limit: int) -> list[int]:
+        """Return the rows of up to `limit` tags that have fallen silent, the longest silent first.
 
         now_ns: UTC.
         """
-        heard_ns = self._tags.copy_counts()["last_heard_ns"]
+        heard_ns = self._rows.copy_counts()["last_heard_ns"]
         if len(heard_ns) > len(self._known_ns):
             self._known_ns = enlarged(self._known_ns, 2 * len(heard_ns))
         new = (heard_ns != self._known_ns[: len(heard_ns)]) & (now_ns - heard_ns > SILENT_NS)
         rows = np.flatnonzero(new)
-        rows = rows[self._tags.presence.are_online(rows)]
+        rows = rows[self._rows.are_online(rows)]
         rows = rows[np.argsort(heard_ns[rows], kind="stable")][:limit]
         self._known_ns[rows] = heard_ns[rows]
-        return self._tags.names(rows.tolist())
+        found: list[int] = rows.tolist()
+        return found

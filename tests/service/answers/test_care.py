@@ -91,7 +91,7 @@ def test_a_spool_needs_care_when_it_grows_from_report_to_report() -> None:
 
 def test_a_tag_without_contact_needs_care_and_the_hint_says_whether_it_is_connected() -> None:
     fleet = Fleet()
-    fleet.tags.count_messages(np.array([fleet.tag("a").row]), NOW_NS)
+    fleet.tags.rows.count_messages(np.array([fleet.tag("a").row]), NOW_NS)
     assert fleet.care("a", NO_CONTACT_S - 1.0) == {}
     assert "check its power" in fleet.care("a", NO_CONTACT_S + 1.0)["no_contact"]
     fleet.tags.presence.set_token("a", True)

@@ -42,7 +42,7 @@ class CheckpointBench:
     def __init__(self, folder: Path) -> None:
         self.engine = RestorableEngine()
         self.bench = IngestBench(engine=self.engine, folder=folder)
-        self.bench.guarded_engine.follow_site()
+        self.bench.guarded_engine.follow_sites()
         state = self.bench.service_state()
         checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
         self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, period_s=0.01)

@@ -144,10 +144,10 @@ def test_used_samples_are_counted_by_kind_and_rejected_ones_by_reason(chromium: 
     drive(place)
     tags = place.bench.answers.tags
     row = tags.register("cart").row
-    tags.count_samples("range", np.full(1204, row))
-    tags.count_samples("imu", np.full(12040, row))
-    tags.count_rejected(Reason.LATE, np.full(3, row))
-    tags.count_rejected(Reason.RANGE_ABSURD, np.full(1, row))
+    tags.rows.count_samples("range", np.full(1204, row))
+    tags.rows.count_samples("imu", np.full(12040, row))
+    tags.rows.count_rejected(Reason.LATE, np.full(3, row))
+    tags.rows.count_rejected(Reason.RANGE_ABSURD, np.full(1, row))
     with watched_page(chromium, place.url) as page:
         select(page)
         used = page.page.locator("[data-part='samples'] li").all_inner_texts()

@@ -103,7 +103,7 @@ def test_every_text_about_measurements_is_from_the_catalogue(chromium: Browser) 
         place = Place(bench, f"http://127.0.0.1:{port}/")
         drive(place)
         tags = bench.answers.tags
-        tags.count_rejected(Reason.RANGE_ABSURD, np.full(3, tags.register("cart").row))
+        tags.rows.count_rejected(Reason.RANGE_ABSURD, np.full(3, tags.register("cart").row))
         page = open_marked(stack, chromium, place.url)
         select(page)
         assert unmarked(page.page, "cart", "17", "18", "default") == set()

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from dropanchor_schemas import TagSettings
+from dropanchor_schemas.keys import samples_key
 from dropanchor_service.ingest.buffer import UNREGISTERED_PER_TURN
 from service.ingest.messages import S, T, ranges
 from support.ingest import IngestBench
@@ -178,6 +179,6 @@ def test_messages_of_listed_tags_do_not_wait_among_those_of_unregistered_ones() 
 
 def test_listed_and_announced_tags_have_a_row_before_their_first_message(tmp_path: Path) -> None:
     bench = IngestBench(tmp_path, tags={"listed": {}})
-    bench.ingest.announce("alive")
+    bench.ingest.announce(samples_key("default", "alive"))
     bench.ingest.turn()
     assert [tag.name for tag in bench.tags.all()] == ["listed", "alive"]

@@ -5,13 +5,14 @@ import math
 from prometheus_client import CollectorRegistry
 
 from dropanchor_service.metrics.health import HealthGauges
-from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import NoClockOffsets
+from support.sites import make_sites
 
 
 def test_the_gauges_are_of_the_whole_fleet() -> None:
-    tags, health, registry = TagTable(), HealthTable(), CollectorRegistry()
-    registry.register(HealthGauges(tags, health, lambda: 0, NoClockOffsets()))
+    sites, registry = make_sites(), CollectorRegistry()
+    tags, health = sites[0].tags, sites[0].health
+    registry.register(HealthGauges(sites, lambda: 0, NoClockOffsets()))
     value = registry.get_sample_value
     assert math.isnan(value("dropanchor_battery_fraction_min") or 0.0)
     for name, values in (

@@ -6,8 +6,9 @@ from prometheus_client import generate_latest
 from dropanchor_schemas.wire import Frame, RangeSample, Reason
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.store import LatestPoses, PendingTags, TagTable
+from dropanchor_service.store import LatestPoses
 from support.ingest import IngestBench
+from support.sites import make_sites
 
 S = 1_000_000_000
 
@@ -33,17 +34,17 @@ def test_every_rejection_reason_is_exported_from_the_start_so_that_rates_work() 
 
 
 def test_tags_are_counted_by_their_aged_state_rather_than_the_stored_one() -> None:
-    tags, latest, metrics = TagTable(), LatestPoses(), Metrics()
+    sites, latest, metrics = make_sites(), LatestPoses(), Metrics()
+    site = sites[0]
     poses = np.zeros(3, POSE)
     poses["row"], poses["state"] = [0, 1, 2], State.TRACKING
     poses["t_ns"] = [100 * S, 97 * S, 50 * S]
     latest.write(poses, np.empty(0, HYPOTHESIS))
     for name in "abcd":
-        tags.register(name)
-    tags.presence.set_token("a", True)
-    pending_tags = PendingTags(10)
-    pending_tags.on_message("e", 100 * S)
-    metrics.register(FleetGauges(tags, pending_tags, latest, lambda: 100 * S, lambda: 5))
+        site.tags.register(name)
+    site.tags.presence.set_token("a", True)
+    site.pending_tags.on_message("e", 100 * S)
+    metrics.register(FleetGauges(sites, latest, lambda: 100 * S, lambda: 5))
     found = lines(metrics)
     states = {state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("tracking", "coasting", "lost")}
     assert states == {"tracking": 1, "coasting": 1, "lost": 1}

@@ -16,10 +16,10 @@ def test_a_name_keeps_its_row_and_rows_are_dense() -> None:
 def test_repeated_rows_are_counted_each_time() -> None:
     tags = TagTable()
     tags.register("a"), tags.register("b")
-    tags.count_messages(np.array([1, 1, 0]), now_ns=7)
-    tags.count_messages(np.array([1]), now_ns=9)
-    tags.count_samples("imu", np.array([1, 1, 1]))
-    tags.count_rejected(Reason.RANGE_NEGATIVE, np.array([0, 0]))
+    tags.rows.count_messages(np.array([1, 1, 0]), now_ns=7)
+    tags.rows.count_messages(np.array([1]), now_ns=9)
+    tags.rows.count_samples("imu", np.array([1, 1, 1]))
+    tags.rows.count_rejected(Reason.RANGE_NEGATIVE, np.array([0, 0]))
     tag = tags.at(1)
     assert (tag.messages, tag.first_heard_ns, tag.last_heard_ns) == (3, 7, 9)
     assert tag.samples == {"imu": 3}
@@ -37,10 +37,10 @@ def test_a_tag_that_never_sent_has_no_times_and_empty_counters() -> None:
 def test_counters_survive_the_growth_of_the_table() -> None:
     tags = TagTable()
     first = tags.register("first")
-    tags.count_samples("range", np.array([0]))
+    tags.rows.count_samples("range", np.array([0]))
     for number in range(100):
         tags.register(str(number))
-    tags.count_samples("range", np.array([0, 100]))
+    tags.rows.count_samples("range", np.array([0, 100]))
     assert first.samples == {"range": 2}
     assert tags.at(100).samples == {"range": 1}
 

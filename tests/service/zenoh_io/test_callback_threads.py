@@ -13,10 +13,10 @@ from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.settings.model import ZenohSettings
-from dropanchor_service.store import TagTable
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.link import ZenohLink
 from dropanchor_tag_client import TagClient
+from support.sites import make_sites
 from support.zenoh_router import connected_session, wait_until
 
 
@@ -46,7 +46,7 @@ def test_no_daemon_receives_what_caches_answer(router_endpoint: str) -> None:
     with connected_session(router_endpoint) as session, TagClient("a", connect=router_endpoint) as tag:
         tag.publish_range(1, 1.0)
         tag.flush()
-        caches = ZenohCaches(session, "default", TagTable(), Metrics(), UtcClock())
+        caches = ZenohCaches(session, make_sites(), Metrics(), UtcClock())
         catch_up = RecordingCatchUp(MessageBuffer(1000), [], lambda _: {}, caches.ask, 10)
         catch_up.daemons = []
         caches.start(catch_up)

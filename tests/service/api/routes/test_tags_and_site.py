@@ -16,9 +16,9 @@ def test_a_tag_shows_its_counts_of_messages_samples_and_rejections() -> None:
     bench = make_api_bench()
     tags = bench.answers.tags
     rows = np.array([tags.register("a").row])
-    tags.count_messages(rows, 5_000)
-    tags.count_samples("range", np.repeat(rows, 3))
-    tags.count_rejected(Reason.LATE, rows)
+    tags.rows.count_messages(rows, 5_000)
+    tags.rows.count_samples("range", np.repeat(rows, 3))
+    tags.rows.count_rejected(Reason.LATE, rows)
     tags.presence.set_token("a", True)
     tag = TagStatus.model_validate(ask(bench.app(), "GET", "/api/v1/tags/a").json())
     assert (tag.online, tag.first_heard_ns, tag.last_heard_ns, tag.messages) == (True, 5_000, 5_000, 1)

@@ -68,6 +68,6 @@ def test_a_tag_was_heard_at_times_that_people_can_read() -> None:
     bench.answers.tags.register("a")
     status = ask(bench.app(), "GET", "/api/v1/tags/a").json()
     assert (status["first_heard_utc"], status["last_heard_utc"]) == (None, None)
-    bench.answers.tags.count_messages(np.array([0]), T_NS)
+    bench.answers.tags.rows.count_messages(np.array([0]), T_NS)
     status = ask(bench.app(), "GET", "/api/v1/tags/a").json()
     assert (status["first_heard_utc"], status["last_heard_utc"]) == (T_UTC, T_UTC)

@@ -1,0 +1,187 @@
+"""The columns of all tags of all sites: a row for each tag, with its counters and what is known about its samples."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Lock
+
+import numpy as np
+
+from dropanchor_schemas import kinds
+from dropanchor_schemas.wire import Reason
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.arrivals import Arrivals
+from dropanchor_service.store.presence import OnlineUntil, Presence
+from dropanchor_service.store.records import enlarged
+
+KINDS = tuple(kind.name for kind in kinds.KINDS)
+REASONS = tuple(Reason)
+
+_COUNTS = np.dtype(
+    [
+        ("first_heard_ns", "i8"),  # 0: never
+        ("last_heard_ns", "i8"),
+        ("messages", "i8"),
+        ("samples", "i8", len(KINDS)),
+        ("rejected", "u4", len(REASONS)),
+    ]
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Tag:
+    """One tag. Its counters are columns of `rows`. site: index of its site. presence: of the tags of its site."""
+
+    name: str
+    row: int
+    site: int
+    rows: "Rows"
+    presence: Presence
+
+    @property
+    def online(self) -> bool:
+        return self.presence.is_online(self.name)
+
+    @property
+    def first_heard_ns(self) -> int | None:
+        return int(self.rows.counts(self.row)["first_heard_ns"]) or None
+
+    @property
+    def last_heard_ns(self) -> int | None:
+        return int(self.rows.counts(self.row)["last_heard_ns"]) or None
+
+    @property
+    def messages(self) -> int:
+        return int(self.rows.counts(self.row)["messages"])
+
+    @property
+    def samples(self) -> Counter[str]:
+        """The number of samples that reached the engine, by kind."""
+        return _named(KINDS, self.rows.counts(self.row)["samples"])
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """The number of messages and samples that were rejected, by reason."""
+        return _named(REASONS, self.rows.counts(self.row)["rejected"])
+
+
+class Rows:
+    """Rows are dense, follow the order of registration and are never reused.
+
+    Only the ingest thread writes the counters; any thread may read them.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._tags: list[Tag] = []
+        self._sites = np.zeros(16, np.int32)
+        self._counts = np.zeros(16, _COUNTS)
+        self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past
+        self._deleted: frozenset[int] = frozenset()
+        self.arrivals = Arrivals()
+        self.online_until = OnlineUntil()
+
+    def __len__(self) -> int:
+        return len(self._tags)
+
+    def add(self, site: int, name: str, presence: Presence) -> Tag:
+        """Return a new tag in the next row."""
+        with self._lock:
+            tag = Tag(name, len(self._tags), site, self, presence)
+            self._grow(tag.row + 1)
+            self._sites[tag.row] = site
+            presence.add_row(name, tag.row)
+            self._tags.append(tag)
+            return tag
+
+    def at(self, row: int) -> Tag:
+        """Return the tag of this row. Raises IndexError when no tag has it."""
+        return self._tags[row]
+
+    def all(self) -> list[Tag]:
+        """Return every tag, in the order of the rows."""
+        return self._tags[:]
+
+    def names(self, rows: Sequence[int]) -> list[str]:
+        tags = self._tags
+        return [tags[row].name for row in rows]
+
+    def sites(self, rows: Array) -> Array:
+        """Return the index of the site of each row."""
+        sites: Array = self._sites[rows]
+        return sites
+
+    def are_online(self, rows: Array) -> Array:
+        """Return whether the tag of each row is online."""
+        return self.online_until.are_online(rows)
+
+    @property
+    def deleted(self) -> frozenset[int]:
+        """The rows of the tags that were deleted and not registered again."""
+        return self._deleted
+
+    def delete(self, row: int) -> None:
+        """Clear the counters of a row, and note that its tag is deleted."""
+        with self._lock:
+            self._counts[row] = 0
+            self._deleted |= {row}
+
+    def undelete(self, row: int) -> None:
+        """Note that the tag of a row is registered again."""
+        with self._lock:
+            self._deleted -= {row}
+
+    def set_replay_lag(self, rows: Array, lag_ns: Array) -> None:
+        """Set how far the samples of replayed tags lie in the past, ns; 0 for live tags."""
+        self._replay_lag_ns[rows] = lag_ns
+
+    def age_s(self, poses: Array, now_ns: int) -> Array:
+        """Return the age of each POSE, s. The age of a replayed tag counts from the current time of its recording."""
+        age_s: Array = (now_ns - self._replay_lag_ns[poses["row"]] - poses["t_ns"]) * 1e-9
+        return age_s
+
+    def counts(self, row: int | Array) -> Array:
+        """Return the counters of one row, or of several."""
+        return self._counts[row]
+
+    def copy_counts(self) -> Array:
+        """Return a copy of all counters, one record per row."""
+        return self._counts[: len(self._tags)].copy()
+
+    def restore_counts(self, counts: Array) -> None:
+        """Load the counters of the rows that earlier rows had."""
+        self._counts[: len(counts)] = counts
+
+    def count_messages(self, rows: Array, now_ns: int) -> None:
+        """Count one message for each entry of `rows`, and note the time. A row may appear several times."""
+        first = self._counts["first_heard_ns"]
+        first[rows[first[rows] == 0]] = now_ns
+        self._counts["last_heard_ns"][rows] = now_ns
+        _count(self._counts["messages"], rows)
+
+    def count_samples(self, kind: str, rows: Array) -> None:
+        """Count one sample for each entry of `rows`. The entries of one message stand side by side."""
+        _count(self._counts["samples"][:, KINDS.index(kind)], rows)
+
+    def count_rejected(self, reason: Reason, rows: Array) -> None:
+        """Count one rejection for each entry of `rows`."""
+        _count(self._counts["rejected"][:, REASONS.index(reason)], rows)
+
+    def _grow(self, rows: int) -> None:
+        self.arrivals.grow(rows)
+        if rows > len(self._counts):
+            self._counts = enlarged(self._counts, 2 * len(self._counts))
+            self._replay_lag_ns = enlarged(self._replay_lag_ns, len(self._counts))
+            self._sites = enlarged(self._sites, len(self._counts))
+
+
+def _count(column: Array, rows: Array) -> None:
+    """Add one for every entry of `rows`. This is fast when equal entries stand side by side."""
+    if not len(rows):
+        return
+    ends = np.append(np.flatnonzero(rows[1:] != rows[:-1]), len(rows) - 1)
+    np.add.at(column, rows[ends].astype(np.intp), np.diff(ends, prepend=-1).astype(column.dtype))
+
+
+def _named(names: tuple[str, ...], counts: Array) -> Counter[str]:
+    return Counter({str(name): int(count) for name, count in zip(names, counts, strict=True) if count})

@@ -1,0 +1,107 @@
+"""The sites that a process serves: what each site has for itself, and the rows that their tags share."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from dropanchor_schemas import keys
+from dropanchor_schemas.keys import InvalidKeyError
+from dropanchor_service.settings.quota import Quota
+from dropanchor_service.store.health import HealthTable
+from dropanchor_service.store.pending_tags import MAX_BYTES, PendingTags
+from dropanchor_service.store.rows import Rows, Tag
+from dropanchor_service.store.site import SiteStore
+from dropanchor_service.store.tags import TagTable
+
+
+@dataclass(frozen=True)
+class ServedSite:
+    """What one site has for itself. index: of the site in this process. quota: which tags it admits, and how many."""
+
+    index: int
+    store: SiteStore
+    tags: TagTable
+    pending_tags: PendingTags
+    health: HealthTable
+    quota: Quota
+
+    @property
+    def id(self) -> str:
+        return self.store.site.id
+
+
+class Sites:
+    """All sites of a process, which are known at its start. `take_changed` is for one thread, the rest for any."""
+
+    def __init__(self, sites: Sequence[tuple[SiteStore, Quota]]) -> None:
+        self.rows = Rows()
+        buffered = max(MAX_BYTES // len(sites), MAX_BYTES // 256)
+        self._sites = [
+            ServedSite(
+                index,
+                store,
+                TagTable(self.rows, index),
+                PendingTags(quota.max_tags, buffered),
+                HealthTable(),
+                quota,
+            )
+            for index, (store, quota) in enumerate(sites)
+        ]
+        self._by_id = {site.id: site for site in self._sites}
+        self._chunks = {keys.chunk_from_id(site.id) for site in self._sites}
+        self._changed = deque(range(len(sites)))
+        for site in self._sites:
+            site.store.on_change(partial(self._changed.append, site.index))
+
+    def __len__(self) -> int:
+        return len(self._sites)
+
+    def __iter__(self) -> Iterator[ServedSite]:
+        return iter(self._sites)
+
+    def __getitem__(self, index: int) -> ServedSite:
+        return self._sites[index]
+
+    @property
+    def only(self) -> ServedSite | None:
+        """The site, if there is only one."""
+        return self._sites[0] if len(self._sites) == 1 else None
+
+    def find(self, site: str) -> ServedSite | None:
+        """Return the site with this id, or None."""
+        return self._by_id.get(site)
+
+    def of_row(self, row: int) -> ServedSite:
+        """Return the site of the tag in this row."""
+        return self._sites[self.rows.at(row).site]
+
+    def of_key(self, key: str) -> tuple[ServedSite, str]:
+        """Return the site and the name of the tag that a key names. Raises InvalidKeyError, also for other sites."""
+        name, tag = keys.site_and_tag_from_key(key)
+        site = self._by_id.get(name)
+        if site is None:
+            raise InvalidKeyError(f"{key!r} is of a site that is not served here")
+        return site, tag
+
+    def tag_of(self, key: str) -> Tag | None:
+        """Return the tag that a key names, None if it has no row. Raises InvalidKeyError, also for other sites."""
+        site, tag = self.of_key(key)
+        return site.tags.find(tag)
+
+    def all_tags(self, leaf: str) -> str:
+        """Return the key expression of `leaf` of every tag of these sites. Several sites also get keys of others."""
+        return keys.all_sites(leaf) if self.only is None else keys.all_tags(self.only.id, leaf)
+
+    def serves(self, key: str) -> bool:
+        """Return whether a key that `all_tags` matches is of one of these sites."""
+        return self.only is not None or key.split("/", 3)[2] in self._chunks
+
+    def samples_key(self, row: int) -> str:
+        """Return the key of the samples of the tag in this row."""
+        return keys.samples_key(self.of_row(row).id, self.rows.at(row).name)
+
+    def take_changed(self) -> list[ServedSite]:
+        """Return the sites that have changed since the last call; at first all of them."""
+        indices = [self._changed.popleft() for _ in range(len(self._changed))]
+        return [self._sites[index] for index in dict.fromkeys(indices)]
