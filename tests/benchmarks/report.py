@@ -14,6 +14,7 @@ SOURCES = {
     "pose-json": ("answers",),
     "rest": ("answers", "api"),
     "sessions": _WHOLE,
+    "sites": ("estimation/fleet", "ingest", "store"),
     "zones": ("zones",),
 }
 """What each table measures, below the package of the service."""

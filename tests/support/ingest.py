@@ -17,6 +17,7 @@ from dropanchor_service.estimation.columns import POSE, Array, Engine, PoseBatch
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
@@ -56,7 +57,8 @@ class TransparentEngine:
 class IngestBench:
     """The part of a service between Zenoh and the store.
 
-    engine: used in place of the `TransparentEngine` in `self.engine`. options: settings by key.
+    engine: used in place of the `TransparentEngine` in `self.engine`. sites: in place of the one of the settings;
+    `site` and `tags` are of the first one. options: settings by key.
     """
 
     def __init__(
@@ -65,6 +67,8 @@ class IngestBench:
         capacity: int = 10**8,
         engine: Engine | None = None,
         clock: UtcClock | None = None,
+        sites: Sites | None = None,
+        observers: Observers = NO_OBSERVERS,
         **options: Any,
     ) -> None:
         warm_up_ingest()
@@ -73,10 +77,9 @@ class IngestBench:
         self.clock = clock or UtcClock()
         self.metrics = Metrics()
         self.latest = LatestPoses()
-        self.site = SiteStore(settings.site, dict(settings.tags), folder)
-        self.sites = Sites([(self.site, settings.quota)])
-        only = self.sites[0]
-        self.tags, self.health, self.pending_tags = only.tags, only.health, only.pending_tags
+        self.sites = sites or Sites([(SiteStore(settings.site, dict(settings.tags), folder), settings.quota)])
+        first = self.sites[0]
+        self.site, self.tags, self.health, self.pending_tags = first.store, first.tags, first.health, first.pending_tags
         self.buffer = MessageBuffer(capacity)
         self.guarded_engine = GuardedEngine(engine or self.engine, self.sites, self.metrics)
         self.publishers = Publishers()
@@ -89,16 +92,19 @@ class IngestBench:
             self.latest,
             self.metrics,
             self.clock,
+            observers,
         )
 
     def service_state(self) -> ServiceState:
         """Return what a checkpoint of this service holds."""
         return ServiceState(self.sites, self.latest, self.guarded_engine, self.publishers)
 
-    def put(self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0) -> None:
+    def put(
+        self, tag: str, payload: bytes | Frame, encoding: str = ENCODING_PACKED, at_ns: int = 0, site: str = "default"
+    ) -> None:
         """Append a message to the buffer. at_ns: when it arrived, UTC; 0: now."""
         data = encode_packed(payload) if isinstance(payload, Frame) else payload
-        self.buffer.append(samples_key("default", tag), data, encoding, at_ns or self.clock.now_ns())
+        self.buffer.append(samples_key(site, tag), data, encoding, at_ns or self.clock.now_ns())
 
     def send(self, tag: str, *payloads: bytes | Frame) -> None:
         """Append messages of a tag and run one turn."""

@@ -147,7 +147,7 @@ class SampleReader:
             anchors.record(tag.row, tag.name, number, name, int(arrived[message]))
 
     def _bind_first_anchors(self, ranges: Array, names: Mapping[int, str], of_row: Array) -> bool:
-        """Make the first anchor that a tag ranges to the origin of its site without anchors. Return whether there was one.
+        """Make the first anchor that a tag ranges to the origin of its site. Return whether a site got one.
 
         ranges: to unknown anchors. names: of anchors, by number.
         """

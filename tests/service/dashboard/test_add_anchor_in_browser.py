@@ -20,7 +20,7 @@ def hear(place: Place, anchor: int) -> None:
     """Give the site a tag that hears an anchor."""
     place.move("cart", x=1.0, y=2.0)
     tag = place.bench.answers.tags.register("cart")
-    tags.unknown_anchors.record(tag.row, tag.name, anchor, str(anchor), time.time_ns())
+    place.bench.answers.tags.unknown_anchors.record(tag.row, tag.name, anchor, str(anchor), time.time_ns())
 
 
 def test_the_anchor_is_placed_at_the_centre_of_the_map_or_at_coordinates(chromium: Browser, place: Place) -> None:
