@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.site import Anchor, RemoteSettings, TagSettings
+from dropanchor_schemas.site import Anchor, Georeference, RemoteSettings, TagSettings
 from dropanchor_schemas.tag_health import Care, TagHealth
 
 
@@ -147,6 +147,23 @@ class NewcomerList(_Answer):
 
     t_ns: int = Field(description="UTC, ns: the time of the answer.")
     newcomers: list[Newcomer]
+
+
+class SiteSummary(_Answer):
+    """A site that the service serves."""
+
+    site: str = Field(description="Id of the site.")
+    name: str = Field(description="Display name; empty: none.")
+    georeference: Georeference | None
+    anchors: int = Field(description="Number of its anchors.")
+    tags: int = Field(description="Number of its tags.")
+    online: int = Field(description="Number of its tags that are online.")
+
+
+class SiteList(_Answer):
+    """All sites that the service serves."""
+
+    sites: list[SiteSummary]
 
 
 class AnchorList(_Answer):

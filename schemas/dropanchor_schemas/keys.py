@@ -89,6 +89,14 @@ def all_sites(leaf: str) -> str:
     return f"{PREFIX}/*/tag/*/{leaf}"
 
 
+def anchors_of_all_sites() -> str:
+    return f"{PREFIX}/*/anchor/*"
+
+
+def poses_of_all_sites() -> str:
+    return f"{PREFIX}/*/poses"
+
+
 def all_anchors(site: str) -> str:
     return f"{_site_prefix(site)}/anchor/*"
 

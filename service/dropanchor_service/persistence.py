@@ -7,6 +7,7 @@ from typing import Self
 
 from pydantic import ValidationError
 
+from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
@@ -18,7 +19,7 @@ from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_service.store import Sites, SiteStore, TagTable
 
 
 class Persistence:
@@ -118,6 +119,25 @@ def open_site(settings: Settings) -> SiteStore:
         return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
     except (OSError, ValidationError) as error:
         raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error
+
+
+def open_sites(settings: Settings) -> Sites:
+    """Return the sites, as the settings and the data folder have them. Raises SettingsError."""
+    if not settings.sites:
+        return Sites([(open_site(settings), settings.quota)])
+    return Sites([(_open(settings, name), site.quota(settings.quota)) for name, site in settings.sites.items()])
+
+
+def _open(settings: Settings, name: str) -> SiteStore:
+    """Return a site of `[sites]`. Its changes are in a folder of its own. Raises SettingsError."""
+    site, folder = settings.sites[name], settings.data_dir
+    own = {
+        "site": site.site.model_copy(update={"id": name}),
+        "tags": site.tags,
+        "tag_defaults": site.tag_defaults or settings.tag_defaults,
+        "data_dir": None if folder is None else folder / "sites" / chunk_from_id(name),
+    }
+    return open_site(settings.model_copy(update=own))
 
 
 def _open_omlox(settings: Settings) -> OmloxItems:

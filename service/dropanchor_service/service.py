@@ -15,10 +15,11 @@ from fastapi import FastAPI
 
 from dropanchor_schemas.keys import health_key, samples_key
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api import create_app
+from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
+from dropanchor_service.api.several_sites import create_app_of_sites
 from dropanchor_service.api.starting import CurrentApp, create_starting_app
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.snapshot import ServiceState
@@ -30,20 +31,22 @@ from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.observers import NO_OBSERVERS
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.persistence import Persistence, open_site
+from dropanchor_service.only_site import OnlySite
+from dropanchor_service.persistence import open_sites
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
-from dropanchor_service.security.credentials import authenticator_of, certificate_of, credentials_of, expiries_of
+from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import LatestPoses, Sites
+from dropanchor_service.settings.several_sites import refuse_for_several_sites
+from dropanchor_service.store import LatestPoses, ServedSite
 from dropanchor_service.zenoh_io.caches import ZenohCaches
-from dropanchor_service.zenoh_io.endpoints import endpoints_of
 from dropanchor_service.zenoh_io.events import ZenohEvents
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
 from dropanchor_service.zenoh_io.intake import ZenohIntake
@@ -51,7 +54,6 @@ from dropanchor_service.zenoh_io.link import ZenohLink
 from dropanchor_service.zenoh_io.publishers import ZenohPoses
 from dropanchor_service.zenoh_io.queryables import ZenohAnswers
 from dropanchor_service.zenoh_io.remote_settings import ZenohRemoteSettings
-from dropanchor_service.zone_events import ZoneEvents
 
 HTTP_STOP_S = 1.5
 
@@ -69,11 +71,11 @@ class Service:
 
     def __init__(self, settings: Settings, compiling: AbstractContextManager[None] | None = None) -> None:
         """compiling: entered while the kernels are compiled, so that a signal can interrupt that."""
+        refuse_for_several_sites(settings)
         self._settings = settings
         self._credentials = credentials_of(settings)
         refuse_exposure(settings, self._credentials)
         self._certificate = certificate_of(settings.http, self._credentials)
-        self._authenticator = authenticator_of(settings)
         self._compiling = compiling or nullcontext()
         self._stopping = Event()
         self._opened = ExitStack()
@@ -82,28 +84,34 @@ class Service:
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.latest = LatestPoses()
-        self.sites = Sites([(open_site(settings), settings.quota)])
-        only = self.sites[0]
-        self.site, self.tags = only.store, only.tags
-        self._persistence = Persistence(settings, self.tags, self.site, self.clock.now_ns, self.metrics)
+        self.sites = open_sites(settings)
+        self._only = self._only_site()
         self._publishers = Publishers()
-        self.answers = Answers(
-            self.site,
-            self.tags,
-            self.latest,
-            self.clock.now_ns,
-            self._persistence.tracks,
-            only.pending_tags,
-            only.health,
-            self._publishers,
-        )
-        self._zone_events = ZoneEvents(
-            settings, self.site, self.tags, self.latest, only.health, self.clock.now_ns, self.metrics
-        )
+        self.answers = AnswersOfSites([self._answers_of(site) for site in self.sites])
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self._register_gauges()
+
+    def _only_site(self) -> OnlySite | None:
+        """Return what only a service with one site has."""
+        if self.sites.only is None:
+            return None
+        return OnlySite(
+            self._settings, self._credentials, self.sites.only, self.latest, self.clock.now_ns, self.metrics
+        )
+
+    def _answers_of(self, site: ServedSite) -> Answers:
+        return Answers(
+            site.store,
+            site.tags,
+            self.latest,
+            self.clock.now_ns,
+            None if self._only is None else self._only.persistence.tracks,
+            site.pending_tags,
+            site.health,
+            self._publishers,
+        )
 
     def _register_gauges(self) -> None:
         self.metrics.register(HealthGauges(self.sites, self.clock.now_ns, self._publishers))
@@ -121,25 +129,30 @@ class Service:
             self._http.start()
             self._opened.callback(self._http.ask_to_stop)
             self._build_ingest(self._compiled_engine())
-            self._opened.enter_context(self._persistence)
+            if self._only is not None:
+                self._opened.enter_context(self._only.persistence)
             if self._checkpoints is not None:
                 self._checkpoints.load()
                 self._checkpoints.start()
                 self._opened.callback(self._write_last_checkpoint, self._checkpoints)
             self._thread.start()
             self._opened.callback(self._thread.stop)
-            self._opened.enter_context(self._zone_events)
+            if self._only is not None:
+                self._opened.enter_context(self._only.zone_events)
             self._opened.enter_context(self._link)
             self._app.app = self._full_app()
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
-        _log.info("ready at %s, site %s, engine %s", self.url, self.site.site.id, self._settings.engine)
+        _log.info("ready at %s, %s, engine %s", self.url, self._name(), self._settings.engine)
         if self._checkpoints is None:
             engine = f"not possible with the engine {self._settings.engine}"
             reason = "data_dir is not set" if self._settings.data_dir is None else engine
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
+
+    def _name(self) -> str:
+        return f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"
 
     def _compiled_engine(self) -> Engine:
         """Return the engine. Compile whatever the service will run, so that no sample waits for it."""
@@ -161,7 +174,7 @@ class Service:
             self.latest,
             self.metrics,
             self.clock,
-            observers=self._persistence.observers,
+            observers=NO_OBSERVERS if self._only is None else self._only.persistence.observers,
             reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
         )
         self._checkpoints = self._checkpointer(guarded)
@@ -195,8 +208,10 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        stored = [*self._persistence.problems(), *self._zone_events.problems()]
-        found = [*stored, self._checkpoints.problem if self._checkpoints else None]
+        found = [
+            *(self._only.problems() if self._only else []),
+            self._checkpoints.problem if self._checkpoints else None,
+        ]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -232,13 +247,15 @@ class Service:
 
     def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
-        return [
+        parts: list[AbstractContextManager[object]] = [
             self._intake(session),
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),
-            ZenohRemoteSettings(session, self.site, self.metrics),
-            ZenohEvents(session, self._zone_events.store, self.metrics),
+            ZenohRemoteSettings(session, self.sites, self.metrics),
         ]
+        if self._only is not None:
+            parts.append(ZenohEvents(session, self._only.zone_events.store, self.metrics))
+        return parts
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:
         caches = ZenohCaches(session, self.sites, self.metrics, self.clock)
@@ -262,12 +279,14 @@ class Service:
 
     def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
         """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
-        self.tags.presence.note_http_message(tag)
-        self._on_live(samples_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
+        site = self.sites[0]
+        site.tags.presence.note_http_message(tag)
+        self._on_live(samples_key(site.id, tag), payload, encoding, self.clock.now_ns())
 
     def _receive_health(self, tag: str, payload: bytes, encoding: str) -> None:
-        self.tags.presence.note_http_message(tag)
-        self._ingest.health.put(health_key(self.site.site.id, tag), payload, encoding, self.clock.now_ns())
+        site = self.sites[0]
+        site.tags.presence.note_http_message(tag)
+        self._ingest.health.put(health_key(site.id, tag), payload, encoding, self.clock.now_ns())
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         """Return the thread of the HTTP server. Until the service is ready, it serves the page with the progress."""
@@ -276,22 +295,21 @@ class Service:
         return HttpThread(build_server(self._app, self._stopping, certificate=self._certificate), bound)
 
     def _full_app(self) -> FastAPI:
-        return create_app(
+        def ready() -> tuple[bool, Sequence[str]]:
+            found = self.problems()
+            return not found, found
+
+        if self._only is not None and self.answers.only is not None:
+            return self._only.app(
+                self.answers.only, ready, self.impairments, self._stopping, self._receive, self._receive_health
+            )
+        http = self._settings.http
+        return create_app_of_sites(
             self.answers,
-            ready=lambda: (not (found := self.problems()), found),
+            ready=ready,
             impaired=self.impairments,
-            recorder=self._persistence.recorder,
-            events=self._zone_events.parts,
-            plans=self._persistence.plans,
             registry=self.metrics.registry,
-            stopping=self._stopping,
-            receive=self._receive,
-            receive_health=self._receive_health,
-            max_tags=self._settings.max_tags,
-            endpoints=endpoints_of(self._settings.zenoh, self._credentials),
-            credentials=self._credentials,
-            authenticator=self._authenticator,
-            rate_limiter=RateLimiter(self._settings.http.requests_per_s, self._settings.http.burst),
-            cors_origins=self._settings.http.cors_origins,
-            omlox=self._persistence.omlox,
+            max_tags={site.id: site.quota.max_tags for site in self.sites}.__getitem__,
+            rate_limiter=RateLimiter(http.requests_per_s, http.burst),
+            cors_origins=http.cors_origins,
         )

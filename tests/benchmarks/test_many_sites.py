@@ -93,11 +93,9 @@ def test_a_thousand_sites_cost_little_more_than_one_with_as_many_tags() -> None:
         f"| {fleet.start_s:.2f} | {1e6 * fleet.idle_s():.1f} |"
         for sites, fleet in ((1, one), (SITES, many))
     ]
-    head = "| sites × tags | µs per tag and second | s of the first turn | µs of a turn without messages |\n|---|---|---|---|"
-    report.record(
-        "sites",
-        "\n".join([head, *lines]) + f"\n\n{SITES:,} sites cost {ratio:.2f} times as much as one in the same run.",
-    )
+    names = "| sites × tags | µs per tag and second | s of the first turn | µs of a turn without messages |"
+    table = "\n".join([names, "|---|---|---|---|", *lines])
+    report.record("sites", f"{table}\n\n{SITES:,} sites cost {ratio:.2f} times as much as one in the same run.")
     fused = [fleet.bench.total(fleet.bench.metrics.poses) for fleet in (one, many)]
     assert fused[0] == fused[1] > 0.9 * TAGS * STEPS
     assert ratio <= LIMIT

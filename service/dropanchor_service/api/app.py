@@ -14,6 +14,7 @@ from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.answers.answers import Answers
+from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.api.http.access import OPEN_PATHS, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
@@ -38,13 +39,12 @@ from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
 from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
 from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES, plan_images_router
 from dropanchor_service.api.routes.plans import plans_router
-from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.remote_settings import remote_settings_router
 from dropanchor_service.api.routes.shares import shares_router
-from dropanchor_service.api.routes.site import site_router
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.sites import site_routers, sites_router
 from dropanchor_service.api.routes.stream import stream_router
-from dropanchor_service.api.routes.tags import tags_router
 from dropanchor_service.api.routes.track import track_router
 from dropanchor_service.api.routes.track_file import track_file_router
 from dropanchor_service.api.routes.tracks import tracks_router
@@ -58,6 +58,7 @@ from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.security.share_links import share_links_of
 
 PREFIX = "/api/v1"
+ALL_METHODS = ["DELETE", "GET", "HEAD", "PATCH", "POST", "PUT"]
 MAX_BODY_BYTES = 1_048_576
 DASHBOARD = Path(__file__).parent.parent / "dashboard"
 
@@ -94,19 +95,18 @@ def create_app(
     zones, events and destinations; None keeps them in memory and watches nothing. plans, omlox: floor plans, and what
     omlox clients have said; None keeps them in memory.
     """
-    plans = plans or PlanStore(None)
+    plans, sites = plans or PlanStore(None), AnswersOfSites([answers])
     events = events or EventParts.in_memory(answers.site.site.id)
-    app = _app_without_routes(authenticator, rate_limiter, cors_origins, answers.tags_in_group)
+    app = app_without_routes(authenticator, rate_limiter, cors_origins, answers.tags_in_group)
     for router in (
-        poses_router(answers),
-        tags_router(answers, max_tags),
+        *site_routers(SiteOfRequest(sites), lambda _: max_tags),
+        sites_router(sites, lambda _: max_tags),
         remote_settings_router(answers),
         track_router(answers),
         track_file_router(answers),
         tracks_router(answers),
         history_router(answers),
         stream_router(answers, stopping, lambda: (answers.site.version, plans.version)),
-        site_router(answers.site),
         access_router(),
         connect_router(answers.site, endpoints, credentials),
         ingest_router(receive, receive_health),
@@ -133,12 +133,13 @@ def create_app(
     return app
 
 
-def _app_without_routes(
+def app_without_routes(
     authenticator: Authenticator | None,
     rate_limiter: RateLimiter | None,
     cors_origins: Sequence[str],
     members: Members,
 ) -> FastAPI:
+    """Return an application with the middleware alone; see `create_app`. members: returns the tags of a group."""
     app = FastAPI(
         title="Dropanchor",
         version="1",

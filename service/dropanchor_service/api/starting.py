@@ -6,14 +6,12 @@ from pathlib import Path
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from dropanchor_service.api.app import DASHBOARD, PREFIX
+from dropanchor_service.api.app import ALL_METHODS, DASHBOARD, PREFIX
 from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import EscapedPath
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.health import health_router
-
-_METHODS = ["DELETE", "GET", "HEAD", "PATCH", "POST", "PUT"]
 
 
 class CurrentApp:
@@ -34,9 +32,9 @@ def create_starting_app(reason: Callable[[], str], dashboard: Path = DASHBOARD) 
     add_error_handlers(app)
     app.include_router(health_router(lambda: (False, [reason()]), list), prefix=PREFIX)
 
-    @app.api_route("/metrics", methods=_METHODS)
-    @app.api_route("/api/{path:path}", methods=_METHODS)
-    @app.api_route(f"{OMLOX_PREFIX}{{path:path}}", methods=_METHODS)
+    @app.api_route("/metrics", methods=ALL_METHODS)
+    @app.api_route("/api/{path:path}", methods=ALL_METHODS)
+    @app.api_route(f"{OMLOX_PREFIX}{{path:path}}", methods=ALL_METHODS)
     async def refuse() -> None:
         raise ProblemError(Kind.NOT_READY, reason())
 

@@ -9,12 +9,13 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_pattern
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
+from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
+from dropanchor_service.settings.sites import SiteSettings
 
 
 def _is_endpoint(text: str) -> str:
@@ -24,22 +25,12 @@ def _is_endpoint(text: str) -> str:
     return text
 
 
-def _is_tag_id(name: str) -> str:
-    try:
-        chunk_from_id(name)
-        refuse_pattern(name)
-    except InvalidKeyError as error:
-        raise ValueError(str(error)) from error
-    return name
-
-
 def _as_list(value: Any) -> Any:
     """Split text at commas, so that an environment variable can hold several endpoints."""
     return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
 
 
 Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_is_endpoint)], ...], BeforeValidator(_as_list)]
-TagId = Annotated[str, AfterValidator(_is_tag_id)]
 Parameters = TypeVar("Parameters", PaperParameters, AttitudeParameters)
 Port = Annotated[int, Field(ge=0, le=65535)]
 
@@ -182,7 +173,7 @@ class RecordingSettings(_Section):
     """What to record in `data_dir`/recordings, and for how long to keep it."""
 
     enabled: bool = Field(default=False, description="Record from the start; otherwise when REST asks for it.")
-    tags: tuple[TagId, ...] = Field(default=(), description="Record only these tags from the start; empty: all.")
+    tags: tuple[SettingsId, ...] = Field(default=(), description="Record only these tags from the start; empty: all.")
     pose_period_s: Annotated[float, Field(gt=0, le=3600)] = Field(
         default=0.2, description="Record at most one pose of a tag per period. All samples are recorded."
     )
@@ -254,7 +245,7 @@ class Settings(_Section):
         "with its second message.",
     )
     max_tags: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=20_000, description="Tags that may be admitted."
+        default=20_000, description="Tags that may be admitted. Of several sites, in each."
     )
     insecure: bool = Field(
         default=False, description="Listen on the network without credentials: anybody may then connect."
@@ -270,9 +261,12 @@ class Settings(_Section):
     email: EmailSettings = EmailSettings()
     mqtt: MqttSettings = MqttSettings()
     site: Site = Site()
-    tags: dict[TagId, TagSettings] = {}
+    tags: dict[SettingsId, TagSettings] = {}
     tag_defaults: TagSettings = Field(
         default=TagSettings(), description="What every tag gets, unless its own table says otherwise."
+    )
+    sites: dict[SettingsId, SiteSettings] = Field(
+        default={}, description="A site of several in one process, in place of `[site]` and `[tags]`."
     )
     paper: PaperSettings = PaperSettings()
 
@@ -290,4 +284,12 @@ class Settings(_Section):
     def _listed_tags_fit(self) -> "Settings":
         if len(self.tags) > self.max_tags:
             raise ValueError(f"max_tags is {self.max_tags}, but {len(self.tags)} tags are listed")
+        return self
+
+    @model_validator(mode="after")
+    def _sites_fit(self) -> "Settings":
+        if self.sites and {"site", "tags"} & self.model_fields_set:
+            raise ValueError("[site] and [tags] are of an only site: move them into the tables of [sites]")
+        for name, site in self.sites.items():
+            site.require_fit(name, self.quota)
         return self

@@ -1,4 +1,4 @@
-"""Publishes poses over Zenoh while somebody subscribes: each tag's pose on change, and one frame of all poses."""
+"""Publishes poses over Zenoh while somebody subscribes: each tag's pose on change, and one frame of a site's poses."""
 
 import time
 from types import TracebackType
@@ -7,7 +7,8 @@ from typing import Self
 import zenoh
 
 from dropanchor_schemas import keys
-from dropanchor_service.answers.answers import Answers, to_json
+from dropanchor_service.answers.answers import to_json
+from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
@@ -22,24 +23,18 @@ class ZenohPoses(PeriodicPublisher):
     and Zenoh drops those without a subscriber. One declared publisher per tag would stall the routing of a fleet.
     """
 
-    def __init__(self, session: zenoh.Session, answers: Answers, metrics: Metrics) -> None:
+    def __init__(self, session: zenoh.Session, sites: AnswersOfSites, metrics: Metrics) -> None:
         super().__init__("poses", PERIOD_S, metrics)
         self._session = session
-        self._answers = answers
-        self._site = answers.site.site.id
+        self._sites = sites
         self._tag_version = 0
         self._frame_version = 0
         self._frame_due_s = 0.0
 
     def __enter__(self) -> Self:
-        self._tag_publisher = self._session.declare_publisher(
-            keys.all_tags(self._site, "pose"), congestion_control=zenoh.CongestionControl.DROP
-        )
-        self._frame_publisher = self._session.declare_publisher(
-            keys.poses_key(self._site),
-            encoding=zenoh.Encoding.APPLICATION_JSON,
-            congestion_control=zenoh.CongestionControl.DROP,
-        )
+        tags, frames = self._keys()
+        self._tag_publisher = self._session.declare_publisher(tags)
+        self._frame_publisher = self._session.declare_publisher(frames)
         return super().__enter__()
 
     def __exit__(
@@ -49,6 +44,13 @@ class ZenohPoses(PeriodicPublisher):
         self._tag_publisher.undeclare()
         self._frame_publisher.undeclare()
 
+    def _keys(self) -> tuple[str, str]:
+        """Return the key expressions of the poses of tags and of frames."""
+        if self._sites.only is None:
+            return keys.all_sites("pose"), keys.poses_of_all_sites()
+        site = self._sites.only.site.site.id
+        return keys.all_tags(site, "pose"), keys.poses_key(site)
+
     def publish(self) -> None:
         """Put the poses of the tags that have changed, and the frame of all poses when it is due."""
         self._put_tags()
@@ -56,25 +58,31 @@ class ZenohPoses(PeriodicPublisher):
 
     def _put_tags(self) -> None:
         if not _has_subscribers(self._tag_publisher):
-            self._tag_version = self._answers.latest.version
+            self._tag_version = self._sites.latest.version
             return
-        self._tag_version, poses = self._answers.latest.since(self._tag_version)
-        for tag, pose in self._answers.pose_jsons(poses, self._answers.now_ns()):
-            self._session.put(
-                keys.pose_key(self._site, tag),
-                pose,
-                encoding=zenoh.Encoding.APPLICATION_JSON,
-                congestion_control=zenoh.CongestionControl.DROP,
-            )
+        self._tag_version, poses = self._sites.latest.since(self._tag_version)
+        for answers, of_site in self._sites.divided(poses):
+            for tag, pose in answers.pose_jsons(of_site, answers.now_ns()):
+                self._put(keys.pose_key(answers.site.site.id, tag), pose)
 
     def _put_frame(self) -> None:
         if time.monotonic() < self._frame_due_s or not _has_subscribers(self._frame_publisher):
             return
-        if self._answers.latest.version == self._frame_version:
+        if self._sites.latest.version == self._frame_version:
             return
         self._frame_due_s = time.monotonic() + FRAME_PERIOD_S
-        self._frame_version, poses = self._answers.latest.since()
-        self._frame_publisher.put(to_json(self._answers.frame_of(poses, self._answers.now_ns())))
+        self._frame_version, changed = self._sites.latest.since(self._frame_version)
+        for answers, _ in self._sites.divided(changed):
+            frame = answers.frame_of(answers.rows(), answers.now_ns())
+            self._put(keys.poses_key(answers.site.site.id), to_json(frame))
+
+    def _put(self, key: str, answer: bytes) -> None:
+        self._session.put(
+            key,
+            answer,
+            encoding=zenoh.Encoding.APPLICATION_JSON,
+            congestion_control=zenoh.CongestionControl.DROP,
+        )
 
 
 def _has_subscribers(publisher: zenoh.Publisher) -> bool:

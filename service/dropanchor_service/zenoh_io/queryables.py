@@ -13,6 +13,7 @@ import zenoh
 
 from dropanchor_schemas import keys
 from dropanchor_service.answers.answers import Answer, Answers, to_json
+from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.answers.pose_at_time import NoPoseThenError
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
@@ -31,25 +32,28 @@ class QueryError(Exception):
 class ZenohAnswers:
     """Answers queries while it is open, one after another, in a thread of Zenoh."""
 
-    def __init__(self, session: zenoh.Session, answers: Answers, service_id: str, metrics: Metrics) -> None:
+    def __init__(self, session: zenoh.Session, sites: AnswersOfSites, service_id: str, metrics: Metrics) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._session = session
-        self._answers = answers
-        self._site = answers.site.site.id
+        self._sites = sites
         self._service_id = service_id
         self._metrics = metrics
         self._declared: list[Any] = []
 
     def __enter__(self) -> Self:
-        for key, find in (
-            (keys.all_tags(self._site, "pose"), self.poses),
-            (keys.all_anchors(self._site), self.anchors),
-            (keys.all_tags(self._site, "settings"), self.settings),
-        ):
+        for key, find in zip(self._keys(), (self.poses, self.anchors, self.settings), strict=True):
             self._declared.append(self._session.declare_queryable(key, self._answering(find)))
-        alive = keys.service_alive_key(self._site, self._service_id)
-        self._declared.append(self._session.liveliness().declare_token(alive))
+        for answers in self._sites:
+            alive = keys.service_alive_key(answers.site.site.id, self._service_id)
+            self._declared.append(self._session.liveliness().declare_token(alive))
         return self
+
+    def _keys(self) -> tuple[str, str, str]:
+        """Return the key expressions of poses, anchors and settings."""
+        if self._sites.only is None:
+            return keys.all_sites("pose"), keys.anchors_of_all_sites(), keys.all_sites("settings")
+        site = self._sites.only.site.site.id
+        return keys.all_tags(site, "pose"), keys.all_anchors(site), keys.all_tags(site, "settings")
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -64,63 +68,35 @@ class ZenohAnswers:
         """
         at_ns = _time_of(parameters)
         name = _single_tag(str(key_expr))
-        tags = self._answers.tags
-        if name is not None:
-            tag = tags.find(name)
-            pose = self._pose(name, at_ns)
-            if pose is None:
-                raise QueryError(f"tag {name!r} is unknown" if tag is None else f"tag {name!r} has no pose yet")
-            yield keys.pose_key(self._site, name), to_json(pose)
-            return
-        matching = [tag for tag in tags.all() if key_expr.includes(keys.pose_key(self._site, tag.name))]
-        if at_ns is None:
-            found = self._answers.pose_jsons(self._answers.rows(matching), self._answers.now_ns())
-        else:
-            found = ((pose["tag"], to_json(pose)) for pose in self._poses_at(matching, at_ns))
-        yield from ((keys.pose_key(self._site, tag_name), text) for tag_name, text in found)
-
-    def _pose(self, name: str, at_ns: int | None) -> Answer | None:
-        try:
-            if at_ns is not None:
-                return self._answers.pose_at(name, at_ns)
-        except NoPoseThenError as error:
-            raise QueryError(f"tag {name!r}: {error}") from error
-        tag = self._answers.tags.find(name)
-        return None if tag is None else self._answers.pose_of(tag)
-
-    def _poses_at(self, tags: Sequence[Tag], at_ns: int) -> Iterator[Answer]:
-        """Yield the poses at that time, of the tags that have one.
-
-        The history on disk is read only for a few tags, because other queries wait meanwhile.
-        """
-        for tag in tags:
-            with suppress(NoPoseThenError):
-                pose = self._answers.pose_at(tag.name, at_ns, from_disk=len(tags) <= MAX_TAGS_FROM_DISK)
-                if pose is not None:
-                    yield pose
+        for answers in self._sites.matching(str(key_expr)):
+            site = answers.site.site.id
+            of_site = _poses(answers, key_expr, at_ns) if name is None else [(name, _pose(answers, name, at_ns))]
+            yield from ((keys.pose_key(site, tag), text) for tag, text in of_site)
 
     def anchors(self, key_expr: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
-        """Yield the anchors that match. Raises QueryError when the key names one anchor that the site lacks."""
+        """Yield the anchors that match. Raises QueryError when the key names one anchor that its site lacks."""
         _refuse_parameters(parameters)
-        site = self._answers.site.site
-        found = [
-            (key, to_json(anchor.model_dump() | {"site": site.model_dump(exclude={"anchors"})}))
-            for key, anchor in ((keys.anchor_key(site.id, anchor.id), anchor) for anchor in site.anchors)
-            if key_expr.includes(key)
-        ]
-        if not found and "*" not in str(key_expr):
-            raise QueryError(f"anchor {str(key_expr).rpartition('/')[2]!r} is unknown")
-        yield from found
+        for answers in self._sites.matching(str(key_expr)):
+            site = answers.site.site
+            found = [
+                (key, to_json(anchor.model_dump() | {"site": site.model_dump(exclude={"anchors"})}))
+                for key, anchor in ((keys.anchor_key(site.id, anchor.id), anchor) for anchor in site.anchors)
+                if key_expr.includes(key)
+            ]
+            if not found and "*" not in str(key_expr):
+                raise QueryError(f"anchor {str(key_expr).rpartition('/')[2]!r} is unknown")
+            yield from found
 
     def settings(self, key_expr: zenoh.KeyExpr, parameters: str) -> Iterator[Reply]:
         """Yield what the programs of all tags that match should apply. A tag of which nothing is known is one."""
         _refuse_parameters(parameters)
         name = _single_tag(str(key_expr))
-        names = list(self._answers.site.document.remote) if name is None else [name]
-        for one in names:
-            key = keys.settings_key(self._site, one)
-            if key_expr.includes(key):
-                yield key, to_json(self._answers.site.remote_settings(one).model_dump())
+        for answers in self._sites.matching(str(key_expr)):
+            names = list(answers.site.document.remote) if name is None else [name]
+            for one in names:
+                key = keys.settings_key(answers.site.site.id, one)
+                if key_expr.includes(key):
+                    yield key, to_json(answers.site.remote_settings(one).model_dump())
 
     def _answering(self, find: Callable[[zenoh.KeyExpr, str], Iterator[Reply]]) -> Callable[[zenoh.Query], None]:
         def answer(query: zenoh.Query) -> None:
@@ -136,6 +112,40 @@ class ZenohAnswers:
                     query.reply_err(to_json({"error": "internal error"}), encoding=zenoh.Encoding.APPLICATION_JSON)
 
         return answer
+
+
+def _poses(answers: Answers, key_expr: zenoh.KeyExpr, at_ns: int | None) -> Iterator[tuple[str, bytes]]:
+    """Yield tag and pose of all tags of a site that match."""
+    site = answers.site.site.id
+    matching = [tag for tag in answers.tags.all() if key_expr.includes(keys.pose_key(site, tag.name))]
+    if at_ns is None:
+        yield from answers.pose_jsons(answers.rows(matching), answers.now_ns())
+    else:
+        yield from ((pose["tag"], to_json(pose)) for pose in _poses_at(answers, matching, at_ns))
+
+
+def _pose(answers: Answers, name: str, at_ns: int | None) -> bytes:
+    """Return the pose of a tag. Raises QueryError when it has none."""
+    tag = answers.tags.find(name)
+    try:
+        pose = answers.pose_at(name, at_ns) if at_ns is not None else None if tag is None else answers.pose_of(tag)
+    except NoPoseThenError as error:
+        raise QueryError(f"tag {name!r}: {error}") from error
+    if pose is None:
+        raise QueryError(f"tag {name!r} is unknown" if tag is None else f"tag {name!r} has no pose yet")
+    return to_json(pose)
+
+
+def _poses_at(answers: Answers, tags: Sequence[Tag], at_ns: int) -> Iterator[Answer]:
+    """Yield the poses at that time, of the tags that have one.
+
+    The history on disk is read only for a few tags, because other queries wait meanwhile.
+    """
+    for tag in tags:
+        with suppress(NoPoseThenError):
+            pose = answers.pose_at(tag.name, at_ns, from_disk=len(tags) <= MAX_TAGS_FROM_DISK)
+            if pose is not None:
+                yield pose
 
 
 def _single_tag(key: str) -> str | None:

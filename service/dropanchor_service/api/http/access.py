@@ -3,6 +3,7 @@
 import asyncio
 import ipaddress
 import math
+import re
 from collections.abc import Mapping
 
 from starlette.requests import HTTPConnection, Request
@@ -27,7 +28,7 @@ INGEST = "/api/v1/ingest/"
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
-_SITE = "/api/v1/site"
+_SITE = re.compile(r"/api/v1/(sites/[^/]+/)?site")
 _SHARES = "/api/v1/shares"
 _DESTINATIONS = "/api/v1/destinations/"
 _HOW_TO_AUTHENTICATE = (
@@ -159,7 +160,7 @@ def required_scope(method: str, path: str) -> AccessScope:
         return AccessScope.ADMIN
     if method in ("GET", "HEAD", "OPTIONS"):
         return AccessScope.READ
-    is_admin = method == "DELETE" or path == _SITE or path.startswith(_DESTINATIONS)
+    is_admin = method == "DELETE" or _SITE.fullmatch(path) is not None or path.startswith(_DESTINATIONS)
     return AccessScope.ADMIN if is_admin else AccessScope.WRITE
 
 

@@ -28,6 +28,8 @@ class Kind(Enum):
     UNAUTHENTICATED = (401, "The request has no valid credentials")
     FORBIDDEN = (403, "The credentials do not allow this request")
     NOT_FOUND = (404, "There is no resource at this path")
+    UNKNOWN_SITE = (404, "The site is unknown")
+    SEVERAL_SITES = (404, "The service has several sites")
     UNKNOWN_TAG = (404, "The tag is unknown")
     NO_POSE_YET = (404, "The tag has no pose yet")
     NO_POSE_THEN = (404, "The tag has no pose at that time")

@@ -140,6 +140,18 @@ SITE: dict[str, Any] = {
     "georeference": {"lat": 52.5123, "lon": 13.4123, "rotation_rad": 0.0},
     "anchors": [ANCHOR],
 }
+SITE_LIST: dict[str, Any] = {
+    "sites": [
+        {
+            "site": "default",
+            "name": "Yard",
+            "georeference": SITE["georeference"],
+            "anchors": 1,
+            "tags": 10,
+            "online": 9,
+        }
+    ]
+}
 TRACK: dict[str, Any] = {
     "tag": "tag-1",
     "from_ns": 1_799_996_400_000_000_000,

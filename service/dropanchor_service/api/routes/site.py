@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import AnchorList
@@ -18,20 +18,20 @@ from dropanchor_service.api.routes.parameters import (
     resource_response,
     saving,
 )
-from dropanchor_service.store.site import SiteStore
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 _BAD_CHANGE = (Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED)
 
 
-def site_router(store: SiteStore) -> APIRouter:
+def site_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
-    _add_site_routes(router, store)
-    _add_anchor_routes(router, store)
-    _add_anchor_change_routes(router, store)
+    _add_site_routes(router, site_of)
+    _add_anchor_routes(router, site_of)
+    _add_anchor_change_routes(router, site_of)
     return router
 
 
-def _add_site_routes(router: APIRouter, store: SiteStore) -> None:
+def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/site",
         operation_id="get_site",
@@ -39,8 +39,8 @@ def _add_site_routes(router: APIRouter, store: SiteStore) -> None:
         response_model=Site,
         responses=example_response(examples.SITE) | problems(Kind.INVALID_REQUEST),
     )
-    async def get_site() -> Response:
-        return json_response(store.site.model_dump())
+    async def get_site(request: Request) -> Response:
+        return json_response(site_of(request).site.site.model_dump())
 
     @router.put(
         "/site",
@@ -49,16 +49,16 @@ def _add_site_routes(router: APIRouter, store: SiteStore) -> None:
         response_model=Site,
         responses=example_response(examples.SITE) | problems(Kind.SITE_ID_FIXED, *_BAD_CHANGE),
     )
-    def put_site(site: Annotated[Site, Body(examples=[examples.SITE])]) -> Response:
+    def put_site(body: Annotated[Site, Body(examples=[examples.SITE])], request: Request) -> Response:
         with saving():
             try:
-                store.set_site(site)
+                site_of(request).site.set_site(body)
             except ValueError as error:
                 raise ProblemError(Kind.SITE_ID_FIXED, str(error)) from error
-        return json_response(site.model_dump())
+        return json_response(body.model_dump())
 
 
-def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
+def _add_anchor_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/anchors",
         operation_id="list_anchors",
@@ -66,8 +66,9 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
         response_model=AnchorList,
         responses=example_response({"anchors": [examples.ANCHOR]}) | problems(Kind.INVALID_REQUEST),
     )
-    async def list_anchors() -> Response:
-        return json_response({"anchors": [anchor.model_dump() for anchor in store.site.anchors]})
+    async def list_anchors(request: Request) -> Response:
+        anchors = site_of(request).site.site.anchors
+        return json_response({"anchors": [anchor.model_dump() for anchor in anchors]})
 
     @router.get(
         "/anchors/{anchor}",
@@ -77,14 +78,14 @@ def _add_anchor_routes(router: APIRouter, store: SiteStore) -> None:
         response_model=Anchor,
         responses=example_response(examples.ANCHOR) | problems(Kind.UNKNOWN_ANCHOR, Kind.INVALID_REQUEST),
     )
-    async def get_anchor(anchor: AnchorId) -> Response:
-        known = store.anchor(anchor)
+    async def get_anchor(anchor: AnchorId, request: Request) -> Response:
+        known = site_of(request).site.anchor(anchor)
         if known is None:
             raise _unknown(anchor)
         return resource_response(known)
 
 
-def _add_anchor_change_routes(router: APIRouter, store: SiteStore) -> None:
+def _add_anchor_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.put(
         "/anchors/{anchor}",
         operation_id="put_anchor",
@@ -94,12 +95,15 @@ def _add_anchor_change_routes(router: APIRouter, store: SiteStore) -> None:
         | problems(Kind.ANCHOR_ID_DIFFERS, Kind.CHANGED_MEANWHILE, *_BAD_CHANGE),
     )
     def put_anchor(
-        anchor: AnchorId, body: Annotated[Anchor, Body(examples=[examples.ANCHOR])], allows: Conditions
+        anchor: AnchorId,
+        body: Annotated[Anchor, Body(examples=[examples.ANCHOR])],
+        allows: Conditions,
+        request: Request,
     ) -> Response:
         if body.id != anchor:
             raise ProblemError(Kind.ANCHOR_ID_DIFFERS, f"The id is {anchor!r} in the path and {body.id!r} in the body.")
         with saving():
-            store.set_anchor(body, allows)
+            site_of(request).site.set_anchor(body, allows)
         return resource_response(body)
 
     @router.delete(
@@ -109,10 +113,10 @@ def _add_anchor_change_routes(router: APIRouter, store: SiteStore) -> None:
         status_code=204,
         responses=problems(Kind.UNKNOWN_ANCHOR, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
-    def delete_anchor(anchor: AnchorId, allows: Conditions) -> Response:
+    def delete_anchor(anchor: AnchorId, allows: Conditions, request: Request) -> Response:
         with saving():
             try:
-                store.remove_anchor(anchor, allows)
+                site_of(request).site.remove_anchor(anchor, allows)
             except KeyError as error:
                 raise _unknown(anchor) from error
         return Response(status_code=204)

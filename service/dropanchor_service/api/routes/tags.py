@@ -1,9 +1,9 @@
 """The routes for tags: what they have sent, and their settings."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query
+from fastapi import APIRouter, Body, Query, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import NewcomerList, TagList, TimedTagStatus
@@ -25,6 +25,7 @@ from dropanchor_service.api.routes.parameters import (
     resource_response,
     saving,
 )
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.preconditions import Precondition
 from dropanchor_service.store.tags import KINDS, REASONS, Tag
@@ -32,18 +33,23 @@ from dropanchor_service.store.tags import KINDS, REASONS, Tag
 _REASON_NAMES = [reason.value for reason in REASONS]
 
 
-def tags_router(answers: Answers, max_tags: int) -> APIRouter:
-    listing, router = APIRouter(tags=["tags"]), APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_list_route(listing, answers)
-    _add_newcomers_route(router, answers)
-    _add_status_route(router, answers)
-    _add_settings_routes(router, answers, max_tags)
-    _add_delete_route(router, answers)
-    listing.include_router(router)
-    return listing
+def tags_router(site_of: SiteOfRequest) -> APIRouter:
+    router = APIRouter(tags=["tags"])
+    _add_list_route(router, site_of)
+    return router
 
 
-def _add_list_route(router: APIRouter, answers: Answers) -> None:
+def tag_router(site_of: SiteOfRequest, max_tags: Callable[[str], int]) -> APIRouter:
+    """max_tags: returns how many tags a site admits."""
+    router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
+    _add_newcomers_route(router, site_of)
+    _add_status_route(router, site_of)
+    _add_settings_routes(router, site_of, max_tags)
+    _add_delete_route(router, site_of)
+    return router
+
+
+def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/tags",
         operation_id="list_tags",
@@ -51,7 +57,8 @@ def _add_list_route(router: APIRouter, answers: Answers) -> None:
         response_model=TagList,
         responses=example_response(examples.TAG_LIST) | problems(Kind.INVALID_REQUEST),
     )
-    def list_tags(query: Annotated[TagFilter, Query()]) -> Response:
+    def list_tags(query: Annotated[TagFilter, Query()], request: Request) -> Response:
+        answers = site_of(request)
         now_ns = answers.now_ns()
         offsets = answers.clock_offsets.clock_offsets(now_ns)
         wanted = set(query.tags)
@@ -59,7 +66,7 @@ def _add_list_route(router: APIRouter, answers: Answers) -> None:
         return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, tags, offsets, now_ns))})
 
 
-def _add_newcomers_route(router: APIRouter, answers: Answers) -> None:
+def _add_newcomers_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/newcomers",
         operation_id="list_newcomers",
@@ -70,11 +77,12 @@ def _add_newcomers_route(router: APIRouter, answers: Answers) -> None:
         response_model=NewcomerList,
         responses=example_response(examples.NEWCOMER_LIST) | problems(Kind.INVALID_REQUEST),
     )
-    def list_newcomers() -> Response:
+    def list_newcomers(request: Request) -> Response:
+        answers = site_of(request)
         return json_response({"t_ns": answers.now_ns(), "newcomers": _newcomers(answers)})
 
 
-def _add_status_route(router: APIRouter, answers: Answers) -> None:
+def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/tags/{tag}",
         operation_id="get_tag",
@@ -82,13 +90,14 @@ def _add_status_route(router: APIRouter, answers: Answers) -> None:
         response_model=TimedTagStatus,
         responses=example_response(_timed(examples.TAG)) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
-    async def get_tag(tag: TagId) -> Response:
+    async def get_tag(tag: TagId, request: Request) -> Response:
+        answers = site_of(request)
         known, now_ns = known_tag(answers, tag), answers.now_ns()
         offset = answers.clock_offsets.clock_offset(known.row, now_ns)
         return json_response(_timed(next(_statuses(answers, [known], {known.row: offset}, now_ns))))
 
 
-def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> None:
+def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest, max_tags: Callable[[str], int]) -> None:
     @router.get(
         "/tags/{tag}/settings",
         operation_id="get_tag_settings",
@@ -96,7 +105,8 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
         response_model=TagSettings,
         responses=example_response(examples.TAG_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
-    async def get_tag_settings(tag: TagId) -> Response:
+    async def get_tag_settings(tag: TagId, request: Request) -> Response:
+        answers = site_of(request)
         return resource_response(answers.site.tag_settings(known_tag(answers, tag).name))
 
     @router.put(
@@ -111,13 +121,17 @@ def _add_settings_routes(router: APIRouter, answers: Answers, max_tags: int) -> 
         | problems(Kind.TAGS_FULL, Kind.CHANGED_MEANWHILE, Kind.BODY_TOO_LARGE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
     def put_tag_settings(
-        tag: TagId, settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])], allows: Conditions
+        tag: TagId,
+        settings: Annotated[TagSettings, Body(examples=[examples.TAG_SETTINGS])],
+        allows: Conditions,
+        request: Request,
     ) -> Response:
-        register_tag(answers, tag, settings, max_tags, allows)
+        answers = site_of(request)
+        register_tag(answers, tag, settings, max_tags(answers.site.site.id), allows)
         return resource_response(answers.site.tag_settings(tag))
 
 
-def _add_delete_route(router: APIRouter, answers: Answers) -> None:
+def _add_delete_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.delete(
         "/tags/{tag}",
         operation_id="delete_tag",
@@ -127,7 +141,8 @@ def _add_delete_route(router: APIRouter, answers: Answers) -> None:
         status_code=204,
         responses=problems(Kind.UNKNOWN_TAG, Kind.CHANGED_MEANWHILE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
-    def delete_tag(tag: TagId, allows: Conditions) -> Response:
+    def delete_tag(tag: TagId, allows: Conditions, request: Request) -> Response:
+        answers = site_of(request)
         known = known_tag(answers, tag)
         with saving():
             answers.site.remove_tag(known.name, answers.now_ns(), allows)

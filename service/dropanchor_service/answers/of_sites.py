@@ -1,0 +1,53 @@
+"""The answers of every site that a process serves."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from dropanchor_schemas import keys
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.store.records import take
+
+
+class AnswersOfSites:
+    """The answers of each site. only: those of the only site, None when there are several.
+
+    answers: in the order of the sites' indices. Their poses are in one `LatestPoses`.
+    """
+
+    def __init__(self, answers: Sequence[Answers]) -> None:
+        self._answers = answers
+        self._by_id = {one.site.site.id: one for one in answers}
+        self._by_chunk = {keys.chunk_from_id(site): one for site, one in self._by_id.items()}
+        self.only = answers[0] if len(answers) == 1 else None
+        self.latest = answers[0].latest
+
+    def __len__(self) -> int:
+        return len(self._answers)
+
+    def __iter__(self) -> Iterator[Answers]:
+        return iter(self._answers)
+
+    def find(self, site: str) -> Answers | None:
+        """Return the answers of the site with this id, or None."""
+        return self._by_id.get(site)
+
+    def matching(self, key_expr: str) -> Sequence[Answers]:
+        """Return those of the sites that a key expression may name: one, none, or all for a pattern."""
+        chunk = key_expr.split("/")[2]
+        if "*" in chunk or "$" in chunk:
+            return self._answers
+        found = self._by_chunk.get(chunk)
+        return [] if found is None else [found]
+
+    def divided(self, poses: Array) -> Iterator[tuple[Answers, Array]]:
+        """Yield POSE of rows of several sites by site, with the answers of the site."""
+        if self.only is not None:
+            yield self.only, poses
+            return
+        of_site = self._answers[0].tags.rows.sites(poses["row"])
+        order = np.argsort(of_site, kind="stable")
+        sites, begins = np.unique(of_site[order], return_index=True)
+        for site, rows in zip(sites.tolist(), np.split(order, begins[1:]), strict=False):
+            yield self._answers[site], take(poses, rows)
