@@ -1,0 +1,109 @@
+"""One service serves several sites: over Zenoh and REST, through a kill, and beside sites that it does not serve."""
+
+import json
+import signal
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from dropanchor_schemas import keys
+from dropanchor_schemas.wire import Frame
+from dropanchor_tag_client import TagClient
+from support.service import Running, running_service, straight_north
+from support.zenoh_router import connected_session, wait_until
+
+RANGES, BEFORE = 60, 40
+SETTINGS = """
+[history]
+enabled = false
+[sites.north.site]
+anchors = [{ id = "7" }]
+[sites.north.tags.cart]
+start = { x = 10.0, y = -20.0, heading_rad = 1.5707963 }
+[sites.south.site]
+anchors = [{ id = "6" }, { id = "7", x = 100.0, y = 50.0 }]
+[sites.south.tags.cart]
+start = { x = 110.0, y = 30.0, heading_rad = 1.5707963 }
+"""
+
+
+def publish(client: TagClient, frame: Frame, part: slice) -> None:
+    for imu, heading, distance in zip(frame.imu[part], frame.headings[part], frame.ranges[part], strict=True):
+        client.publish_imu(imu.acc, imu.gyro, imu.mag, t_ns=imu.t_ns)
+        client.publish_heading(heading.heading_rad, t_ns=heading.t_ns, std_rad=heading.std_rad)
+        client.publish_range("7", distance.range_m, t_ns=distance.t_ns, std_m=distance.std_m)
+    client.flush()
+
+
+def wait_for_ranges(service: Running, count: int) -> None:
+    def ranges(site: str) -> int:
+        return int(service.get(f"/api/v1/sites/{site}/tags/cart")["samples"].get("range", 0))
+
+    wait_until(lambda: [ranges(site) for site in ("north", "south")] == [count, count])
+
+
+def place(pose: dict[str, Any]) -> tuple[float, float]:
+    return pose["x"], pose["y"]
+
+
+def ask(session: zenoh.Session, key: str) -> dict[str, Any]:
+    replies = [reply.ok for reply in session.get(key, timeout=5.0)]
+    return {str(reply.key_expr): json.loads(reply.payload.to_string()) for reply in replies if reply is not None}
+
+
+def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
+    tmp_path: Path, router_endpoint: str
+) -> None:
+    config = tmp_path / "sites.toml"
+    config.write_text(SETTINGS)
+    options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", router_endpoint)
+    frame = straight_north(RANGES)
+    with ExitStack() as opened:
+        session = opened.enter_context(connected_session(router_endpoint))
+        clients = [
+            opened.enter_context(TagClient("cart", site=site, connect=router_endpoint))
+            for site in ("north", "south", "west")
+        ]
+        frames: list[str] = []
+        with running_service(*options) as service:
+            opened.enter_context(
+                session.declare_subscriber(f"{keys.PREFIX}/*/poses", lambda put: frames.append(str(put.key_expr)))
+            )
+            for client in clients:
+                publish(client, frame, slice(BEFORE))
+            wait_for_ranges(service, BEFORE)
+            _check_answers(service, session)
+            wait_until(lambda: {keys.poses_key("north"), keys.poses_key("south")} == set(frames))
+            now_s = time.monotonic()
+            wait_until(lambda: time.monotonic() - service.metric("dropanchor_checkpoint_age_seconds") > now_s + 0.1)
+            service.stop(signal.SIGKILL)
+        for client in clients:
+            publish(client, frame, slice(BEFORE, None))
+        with running_service(*options) as service:
+            assert any("going on from a checkpoint with 2 tags" in line for line in service.log)
+            wait_for_ranges(service, RANGES)
+            _check_answers(service, session)
+            assert service.stop() == 0
+
+
+def _check_answers(service: Running, session: zenoh.Session) -> None:
+    """Check that both sites have the same track, 100 m and 50 m apart, by REST and by Zenoh."""
+    poses = {site: service.get(f"/api/v1/sites/{site}/tags/cart/pose") for site in ("north", "south")}
+    x, y = place(poses["north"])
+    assert place(poses["south"]) == pytest.approx((x + 100.0, y + 50.0), abs=1e-4)
+    assert [pose["anchor"] for pose in poses.values()] == ["7", "7"]
+    replies = ask(session, f"{keys.PREFIX}/*/tag/*/pose")
+    assert replies.keys() == {keys.pose_key(site, "cart") for site in poses}
+    for site, pose in poses.items():
+        assert place(replies[keys.pose_key(site, "cart")]) == pytest.approx(place(pose), abs=1e-4)
+    assert ask(session, keys.pose_key("south", "cart")).keys() == {keys.pose_key("south", "cart")}
+    assert ask(session, keys.pose_key("west", "cart")) == {}
+    assert ask(session, keys.anchor_key("south", "7"))[keys.anchor_key("south", "7")]["x"] == 100.0
+    sites = service.get("/api/v1/sites")["sites"]
+    assert [(site["site"], site["tags"], site["online"]) for site in sites] == [("north", 1, 1), ("south", 1, 1)]
+    assert service.ask("GET", "/api/v1/poses").status_code == 404
+    assert service.metric('dropanchor_rejected_total{reason="key_invalid"}') == 0

@@ -1,0 +1,108 @@
+"""Each site has its routes below /sites; the routes without a site are those of the only one."""
+
+import numpy as np
+from fastapi import FastAPI
+from prometheus_client import CollectorRegistry
+
+from dropanchor_schemas import Anchor
+from dropanchor_schemas.answers import SiteList
+from dropanchor_service.answers.answers import Answers
+from dropanchor_service.answers.of_sites import AnswersOfSites
+from dropanchor_service.api.http.access import required_scope
+from dropanchor_service.api.several_sites import create_app_of_sites
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
+from dropanchor_service.security.identity import Scope
+from dropanchor_service.store import LatestPoses, Sites
+from support.api import ask, kind_of, make_api_bench
+from support.sites import make_sites
+
+T = 1_800_000_000_000_000_000
+
+
+def app_of(sites: Sites) -> FastAPI:
+    """Return the application of these sites. The tag "cart" of each site stands at x = 1, 2, …"""
+    latest = LatestPoses()
+    poses = np.zeros(len(sites), POSE)
+    for site in sites:
+        site.store.set_anchor(Anchor(id="7"))
+        poses[site.index]["row"] = site.tags.register("cart").row
+        poses[site.index]["x"] = site.index + 1
+    poses["t_ns"], poses["state"], poses["anchor"] = T, State.TRACKING, 0
+    latest.write(poses, np.empty(0, HYPOTHESIS))
+    return create_app_of_sites(
+        AnswersOfSites([Answers(site.store, site.tags, latest, now_ns=lambda: T) for site in sites]),
+        ready=lambda: (True, []),
+        impaired=list,
+        registry=CollectorRegistry(),
+        max_tags=lambda site: 1 if site == "full" else 10,
+    )
+
+
+def test_poses_tags_and_anchors_are_those_of_the_site_in_the_path() -> None:
+    sites = make_sites("north", "Lager Süd")
+    app = app_of(sites)
+    sites[1].store.set_anchor(Anchor(id="9"))
+    for path, x, anchors in (("north", 1.0, ["7"]), ("Lager%20S%C3%BCd", 2.0, ["7", "9"])):
+        base = f"/api/v1/sites/{path}"
+        assert [pose["x"] for pose in ask(app, "GET", f"{base}/poses").json()["poses"]] == [x]
+        assert ask(app, "GET", f"{base}/tags/cart/pose").json()["x"] == x
+        assert ask(app, "GET", f"{base}/tags/cart/explain").json()["pose"]["x"] == x
+        assert [tag["tag"] for tag in ask(app, "GET", f"{base}/tags").json()["tags"]] == ["cart"]
+        assert [anchor["id"] for anchor in ask(app, "GET", f"{base}/anchors").json()["anchors"]] == anchors
+    assert ask(app, "GET", "/api/v1/sites/north/site").json()["id"] == "north"
+
+
+def test_a_change_in_one_site_leaves_the_other_as_it_was() -> None:
+    sites = make_sites("a", "full")
+    app = app_of(sites)
+    assert ask(app, "PUT", "/api/v1/sites/a/anchors/7", json={"id": "7", "x": 4.0}).status_code == 200
+    assert ask(app, "PUT", "/api/v1/sites/a/tags/lift/settings", json={"height_m": 2.0}).status_code == 200
+    assert kind_of(ask(app, "PUT", "/api/v1/sites/full/tags/lift/settings", json={})) == "tags-full"
+    assert ask(app, "DELETE", "/api/v1/sites/a/tags/cart").status_code == 204
+    assert [[anchor.x for anchor in site.store.site.anchors] for site in sites] == [[4.0], [0.0]]
+    assert [[tag.name for tag in site.tags.listed()] for site in sites] == [["lift"], ["cart"]]
+    assert ask(app, "GET", "/api/v1/sites/a/poses").json()["poses"] == []
+    assert len(ask(app, "GET", "/api/v1/sites/full/poses").json()["poses"]) == 1
+
+
+def test_all_sites_are_listed_with_how_many_tags_they_have() -> None:
+    sites = make_sites("a", "b")
+    app = app_of(sites)
+    sites[1].tags.presence.set_token("cart", True)
+    sites[1].tags.register("lift")
+    listed = SiteList.model_validate(ask(app, "GET", "/api/v1/sites").json()).sites
+    assert [(site.site, site.anchors, site.tags, site.online) for site in listed] == [("a", 1, 1, 0), ("b", 1, 2, 1)]
+
+
+def test_with_several_sites_a_path_without_one_is_refused_with_a_sentence() -> None:
+    app = app_of(make_sites("a", "b"))
+    for method, path in (
+        ("GET", "/api/v1/poses"),
+        ("GET", "/api/v1/stream"),
+        ("POST", "/api/v1/ingest/samples"),
+        ("PUT", "/api/v1/zones/1"),
+        ("GET", "/"),
+    ):
+        refused = ask(app, method, path)
+        assert kind_of(refused) == "several-sites"
+        assert refused.json()["detail"].startswith(f"{path} is for one site so far, and this service has 2.")
+    assert kind_of(ask(app, "GET", "/api/v1/sites/c/poses")) == "unknown-site"
+    assert ask(app, "GET", "/api/v1/health/live").status_code == 200
+
+
+def test_an_only_site_has_both_paths() -> None:
+    bench = make_api_bench()
+    bench.answers.tags.register("a")
+    app = bench.app()
+    for path in ("tags", "anchors", "site", "newcomers"):
+        with_site = ask(app, "GET", f"/api/v1/sites/default/{path}").json()
+        assert with_site == ask(app, "GET", f"/api/v1/{path}").json()
+    assert kind_of(ask(app, "GET", "/api/v1/sites/other/tags")) == "unknown-site"
+
+
+def test_the_same_changes_need_the_same_scope_with_and_without_a_site_in_the_path() -> None:
+    for prefix in ("/api/v1", "/api/v1/sites/a"):
+        assert required_scope("PUT", f"{prefix}/site") is Scope.ADMIN
+        assert required_scope("PUT", f"{prefix}/anchors/1") is Scope.WRITE
+        assert required_scope("DELETE", f"{prefix}/tags/a") is Scope.ADMIN
+        assert required_scope("GET", f"{prefix}/poses") is Scope.READ
