@@ -98,6 +98,8 @@ class DemoSetup:
 @contextmanager
 def _demo_setup(arguments: argparse.Namespace) -> Iterator[DemoSetup]:
     settings = settings_of(arguments)
+    if settings.sites:
+        raise SettingsError("the demo has one site: leave out [sites], or use dropanchor serve")
     if settings.paper == PaperSettings():
         settings = settings.model_copy(update={"paper": PaperSettings(preset="tuned")})
     if arguments.recording is None:

@@ -14,6 +14,8 @@ from dropanchor_service.store.rows import Rows, Tag
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 
+LEAST_PENDING_BYTES = 2**16  # for the messages of pending tags of a site, however many sites there are
+
 
 @dataclass(frozen=True)
 class ServedSite:
@@ -36,20 +38,21 @@ class Sites:
 
     def __init__(self, sites: Sequence[tuple[SiteStore, Quota]]) -> None:
         self.rows = Rows()
-        buffered = max(MAX_BYTES // len(sites), MAX_BYTES // 256)
+        paths = ["/api/v1"] if len(sites) == 1 else [f"/api/v1/sites/{_chunk(store)}" for store, _ in sites]
+        pending_bytes = max(MAX_BYTES // len(sites), LEAST_PENDING_BYTES)
         self._sites = [
             ServedSite(
                 index,
                 store,
-                TagTable(self.rows, index),
-                PendingTags(quota.max_tags, buffered),
+                TagTable(self.rows, index, paths[index]),
+                PendingTags(quota.max_tags, pending_bytes),
                 HealthTable(),
                 quota,
             )
             for index, (store, quota) in enumerate(sites)
         ]
         self._by_id = {site.id: site for site in self._sites}
-        self._chunks = {keys.chunk_from_id(site.id) for site in self._sites}
+        self._chunks = {_chunk(site.store) for site in self._sites}
         self._changed = deque(range(len(sites)))
         for site in self._sites:
             site.store.on_change(partial(self._changed.append, site.index))
@@ -105,3 +108,7 @@ class Sites:
         """Return the sites that have changed since the last call; at first all of them."""
         indices = [self._changed.popleft() for _ in range(len(self._changed))]
         return [self._sites[index] for index in dict.fromkeys(indices)]
+
+
+def _chunk(store: SiteStore) -> str:
+    return keys.chunk_from_id(store.site.id)

@@ -14,17 +14,17 @@ __all__ = ["KINDS", "REASONS", "Rows", "Tag", "TagTable"]
 class TagTable:
     """Maps the names of the tags of one site to rows, which the tables of several sites share.
 
-    site: index of the site. rows: where the tags get their rows; None: rows of its own.
+    site: index of the site. rows: where the tags get their rows; None: rows of its own. path: where REST has the site.
     """
 
-    def __init__(self, rows: Rows | None = None, site: int = 0) -> None:
+    def __init__(self, rows: Rows | None = None, site: int = 0, path: str = "/api/v1") -> None:
         self._lock = Lock()
         self._site = site
         self._by_name: dict[str, Tag] = {}
         self.rows = Rows() if rows is None else rows
         self.arrivals = self.rows.arrivals
         self.presence = Presence(until=self.rows.online_until)
-        self.unknown_anchors = UnknownAnchors()
+        self.unknown_anchors = UnknownAnchors(path)
 
     def __len__(self) -> int:
         return len(self._by_name)

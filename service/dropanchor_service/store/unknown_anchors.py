@@ -19,9 +19,13 @@ class _Sighting(NamedTuple):
 
 
 class UnknownAnchors:
-    """Keeps at most one anchor per tag. The ingest thread writes; any thread reads."""
+    """Keeps at most one anchor per tag. The ingest thread writes; any thread reads.
 
-    def __init__(self) -> None:
+    path: where REST has the site.
+    """
+
+    def __init__(self, path: str = "/api/v1") -> None:
+        self._path = path
         self._by_row: dict[int, _Sighting] = {}
         self._logged: set[int] = set()
 
@@ -57,9 +61,10 @@ class UnknownAnchors:
             return
         _log.warning(
             "tag %s hears anchor %s, which this site does not have: these ranges are not used. If the anchor belongs "
-            "to the site, add it with PUT /api/v1/anchors/%s. Otherwise set the right anchor in the tag",
+            "to the site, add it with PUT %s/anchors/%s. Otherwise set the right anchor in the tag",
             tag,
             name,
+            self._path,
             chunk_from_id(name),
         )
 

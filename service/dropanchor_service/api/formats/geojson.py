@@ -36,7 +36,7 @@ def require_georeference(answers: Answers, form: str) -> None:
     if answers.site.site.georeference is None:
         raise ProblemError(
             Kind.NOT_GEOREFERENCED,
-            f"{form} holds only WGS 84 coordinates. Set `georeference` with PUT /api/v1/site, or request "
+            f"{form} holds only WGS 84 coordinates. Set `georeference` of the site, or request "
             "application/json for poses in the site frame.",
         )
 
