@@ -39,10 +39,11 @@ demo: install
 	@exec $(BIN)/dropanchor demo $(DEMO)
 
 chromium:
-	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
-		echo '== installing chromium for the browser tests'; \
-		apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || { \
-		echo 'The browser tests need Chromium: install the package chromium and run make test again.' >&2; exit 1; }
+	@command -v chromium-headless-shell >/dev/null || { \
+		echo '== installing chromium-headless-shell for the browser tests'; \
+		apt-get update -qq && apt-get install -y -qq chromium-headless-shell >/dev/null; } || \
+		command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
+		echo 'The browser tests need Chromium: install chromium-headless-shell or chromium and run make test again.' >&2; exit 1; }
 
 mosquitto:
 	@command -v mosquitto >/dev/null || test -x /usr/sbin/mosquitto || { \
