@@ -14,9 +14,7 @@ import zenoh
 from fastapi import FastAPI
 
 from dropanchor_schemas.keys import health_key, samples_key
-from dropanchor_service.answers.answers import Answers
-from dropanchor_service.answers.of_sites import AnswersOfSites
-from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.answers.of_sites import answers_of_sites
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
 from dropanchor_service.api.several_sites import create_app_of_sites
@@ -45,7 +43,7 @@ from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.several_sites import refuse_for_several_sites
-from dropanchor_service.store import LatestPoses, ServedSite
+from dropanchor_service.store import LatestPoses
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.events import ZenohEvents
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
@@ -85,33 +83,15 @@ class Service:
         self.clock = UtcClock()
         self.latest = LatestPoses()
         self.sites = open_sites(settings)
-        self._only = self._only_site()
+        only, now_ns = self.sites.only, self.clock.now_ns
+        self._only = OnlySite(settings, self._credentials, only, self.latest, now_ns, self.metrics) if only else None
         self._publishers = Publishers()
-        self.answers = AnswersOfSites([self._answers_of(site) for site in self.sites])
+        tracks = self._only.persistence.tracks if self._only else None
+        self.answers = answers_of_sites(self.sites, self.latest, now_ns, tracks, self._publishers)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self._register_gauges()
-
-    def _only_site(self) -> OnlySite | None:
-        """Return what only a service with one site has."""
-        if self.sites.only is None:
-            return None
-        return OnlySite(
-            self._settings, self._credentials, self.sites.only, self.latest, self.clock.now_ns, self.metrics
-        )
-
-    def _answers_of(self, site: ServedSite) -> Answers:
-        return Answers(
-            site.store,
-            site.tags,
-            self.latest,
-            self.clock.now_ns,
-            None if self._only is None else self._only.persistence.tracks,
-            site.pending_tags,
-            site.health,
-            self._publishers,
-        )
 
     def _register_gauges(self) -> None:
         self.metrics.register(HealthGauges(self.sites, self.clock.now_ns, self._publishers))
@@ -296,20 +276,17 @@ class Service:
 
     def _full_app(self) -> FastAPI:
         def ready() -> tuple[bool, Sequence[str]]:
-            found = self.problems()
-            return not found, found
+            return not (found := self.problems()), found
 
         if self._only is not None and self.answers.only is not None:
             return self._only.app(
                 self.answers.only, ready, self.impairments, self._stopping, self._receive, self._receive_health
             )
-        http = self._settings.http
         return create_app_of_sites(
             self.answers,
             ready=ready,
             impaired=self.impairments,
             registry=self.metrics.registry,
-            max_tags={site.id: site.quota.max_tags for site in self.sites}.__getitem__,
-            rate_limiter=RateLimiter(http.requests_per_s, http.burst),
-            cors_origins=http.cors_origins,
+            max_tags=self.sites.max_tags,
+            settings=self._settings.http,
         )

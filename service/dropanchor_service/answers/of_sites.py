@@ -1,12 +1,15 @@
 """The answers of every site that a process serves."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from dropanchor_schemas import keys
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.store import LatestPoses, Sites
+from dropanchor_service.store.clock_offsets import ClockOffsets
 from dropanchor_service.store.records import take
 
 
@@ -51,3 +54,19 @@ class AnswersOfSites:
         sites, begins = np.unique(of_site[order], return_index=True)
         for site, rows in zip(sites.tolist(), np.split(order, begins[1:]), strict=False):
             yield self._answers[site], take(poses, rows)
+
+
+def answers_of_sites(
+    sites: Sites,
+    latest: LatestPoses,
+    now_ns: Callable[[], int],
+    tracks: Tracks | None,
+    clock_offsets: ClockOffsets,
+) -> AnswersOfSites:
+    """Return the answers of these sites; see `Answers`. tracks: of the only site."""
+    return AnswersOfSites(
+        [
+            Answers(site.store, site.tags, latest, now_ns, tracks, site.pending_tags, site.health, clock_offsets)
+            for site in sites
+        ]
+    )

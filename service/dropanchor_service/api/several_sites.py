@@ -1,6 +1,6 @@
 """Build the application of a service with several sites, which has fewer routes so far."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from fastapi import FastAPI, Request
 from prometheus_client import CollectorRegistry
@@ -11,6 +11,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.sites import sites_router
+from dropanchor_service.settings.model import HttpSettings
 
 
 def create_app_of_sites(
@@ -20,11 +21,11 @@ def create_app_of_sites(
     impaired: Impaired,
     registry: CollectorRegistry,
     max_tags: Callable[[str], int],
-    rate_limiter: RateLimiter | None = None,
-    cors_origins: Sequence[str] = (),
+    settings: HttpSettings,
 ) -> FastAPI:
     """Return the application; see `create_app`. max_tags: returns how many tags a site admits."""
-    app = app_without_routes(None, rate_limiter, cors_origins, lambda _: [])
+    limiter = RateLimiter(settings.requests_per_s, settings.burst)
+    app = app_without_routes(None, limiter, settings.cors_origins, lambda _: [])
     app.include_router(sites_router(sites, max_tags), prefix=PREFIX)
     app.include_router(health_router(ready, impaired), prefix=PREFIX)
     app.include_router(metrics_router(registry))

@@ -75,6 +75,10 @@ class Sites:
         """Return the site with this id, or None."""
         return self._by_id.get(site)
 
+    def max_tags(self, site: str) -> int:
+        """Return how many tags the site with this id admits. Raises KeyError."""
+        return self._by_id[site].quota.max_tags
+
     def of_row(self, row: int) -> ServedSite:
         """Return the site of the tag in this row."""
         return self._sites[self.rows.at(row).site]

@@ -12,6 +12,7 @@ from dropanchor_service.api.http.access import required_scope
 from dropanchor_service.api.several_sites import create_app_of_sites
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.security.identity import Scope
+from dropanchor_service.settings.model import HttpSettings
 from dropanchor_service.store import LatestPoses, Sites
 from support.api import ask, kind_of, make_api_bench
 from support.sites import make_sites
@@ -35,6 +36,7 @@ def app_of(sites: Sites) -> FastAPI:
         impaired=list,
         registry=CollectorRegistry(),
         max_tags=lambda site: 1 if site == "full" else 10,
+        settings=HttpSettings(),
     )
 
 
