@@ -134,7 +134,7 @@ def _open(settings: Settings, name: str) -> SiteStore:
     own = {
         "site": site.site.model_copy(update={"id": name}),
         "tags": site.tags,
-        "tag_defaults": site.tag_defaults or settings.tag_defaults,
+        "tag_defaults": site.tag_defaults.over(settings.tag_defaults),
         "data_dir": None if folder is None else folder / "sites" / chunk_from_id(name),
     }
     return open_site(settings.model_copy(update=own))

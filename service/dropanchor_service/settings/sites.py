@@ -23,7 +23,7 @@ class SiteSettings(BaseModel):
     )
     site: Site = Field(default=Site(), description="The frame and the anchors of this site, without `id`.")
     tags: dict[SettingsId, TagSettings] = Field(default={}, description="A tag of this site.")
-    tag_defaults: TagSettings | None = Field(default=None, description="What every tag of this site gets.")
+    tag_defaults: TagSettings = Field(default=TagSettings(), description="What every tag of this site gets.")
 
     def require_fit(self, name: str, default: Quota) -> None:
         """Raise ValueError if the table contradicts its name or its quota. default: the quota at the top level."""

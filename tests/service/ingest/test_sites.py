@@ -1,5 +1,7 @@
 """Several sites share the ingest: each has its own names, anchors, quotas and counters."""
 
+import pytest
+
 from dropanchor_schemas import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.answers.answers import Answers
@@ -50,13 +52,16 @@ def test_tags_of_one_name_and_anchors_of_one_number_are_different_ones_in_two_si
     assert used == [[1], [2], [3]]
 
 
-def test_an_anchor_of_another_site_is_unknown() -> None:
+def test_an_anchor_of_another_site_is_unknown_and_the_log_says_where_to_add_it(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     bench = two_sites()
     send(bench, "a", "cart", 3, 1.0)
     a, b = bench.sites
     assert bench.rejected() == {"anchor_unknown": 1}
     assert a.tags.unknown_anchors.of(0, T) == (3, "3")
     assert b.tags.unknown_anchors.of(0, T) is None
+    assert "PUT /api/v1/sites/a/anchors/3." in caplog.text
 
 
 def test_each_site_without_anchors_gets_the_first_one_that_its_tags_range_to() -> None:

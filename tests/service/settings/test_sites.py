@@ -14,6 +14,7 @@ FILE = """
 unproven_tags = 7
 [tag_defaults]
 height_m = 1.0
+range_scale = 1.1
 [sites.north.site]
 name = "North yard"
 anchors = [{ id = "1" }]
@@ -41,6 +42,7 @@ def test_each_site_gets_its_table_and_the_top_level_for_the_rest(tmp_path: Path)
     north, south, last = sites
     assert (north.store.site.name, north.quota) == ("North yard", Quota("accept", 7, 20_000))
     assert (north.store.tag_settings("cart").mount_angle_rad, north.store.tag_settings("cart").height_m) == (0.5, 1.0)
+    assert south.store.tag_settings("any").range_scale == 1.1
     assert (south.store.tag_settings("any").height_m, south.quota) == (2.0, Quota("refuse", 7, 3))
     for site in (south, last):
         site.store.set_anchor(Anchor(id="7"))
