@@ -68,21 +68,22 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
             opened.enter_context(TagClient("cart", site=site, connect=router_endpoint))
             for site in ("north", "south", "west")
         ]
-        frames: list[str] = []
+        received: list[str] = []
         with running_service(*options) as service:
-            opened.enter_context(
-                session.declare_subscriber(f"{keys.PREFIX}/*/poses", lambda put: frames.append(str(put.key_expr)))
-            )
+            for wanted in (keys.poses_key("south"), keys.all_tags("north", "pose")):
+                opened.enter_context(session.declare_subscriber(wanted, lambda put: received.append(str(put.key_expr))))
             for client in clients:
                 publish(client, frame, slice(BEFORE))
             wait_for_ranges(service, BEFORE)
             _check_answers(service, session)
-            wait_until(lambda: {keys.poses_key("north"), keys.poses_key("south")} == set(frames))
+            publish(clients[0], frame, slice(BEFORE, BEFORE + 10))
+            publish(clients[1], frame, slice(BEFORE, BEFORE + 10))
+            wait_until(lambda: {keys.poses_key("south"), keys.pose_key("north", "cart")} == set(received))
             now_s = time.monotonic()
             wait_until(lambda: time.monotonic() - service.metric("dropanchor_checkpoint_age_seconds") > now_s + 0.1)
             service.stop(signal.SIGKILL)
         for client in clients:
-            publish(client, frame, slice(BEFORE, None))
+            publish(client, frame, slice(BEFORE + 10, None))
         with running_service(*options) as service:
             assert any("going on from a checkpoint with 2 tags" in line for line in service.log)
             wait_for_ranges(service, RANGES)

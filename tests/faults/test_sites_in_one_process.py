@@ -141,7 +141,7 @@ def test_after_a_restart_the_bits_go_on_and_only_a_site_whose_anchor_has_moved_s
     first, second = [m for m in messages if m.due_ns < middle_ns], [m for m in messages if m.due_ns >= middle_ns]
     before = Run(north(), south()).feed(first)
     snapshot = before.bench.service_state().snapshot()
-    after, moved = Run(south(), north()), Run(north(), south())
+    after, moved = Run(south(), (SiteStore(Site(id="west"), {}), Quota()), north()), Run(north(), south())
     move_anchor(moved)
     for run in (after, moved):
         run.bench.service_state().restore(deepcopy(snapshot))

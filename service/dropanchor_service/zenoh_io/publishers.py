@@ -21,12 +21,16 @@ class ZenohPoses(PeriodicPublisher):
 
     One publisher on `…/tag/*/pose` shows whether anybody subscribes to any tag. Each put then uses the key of its tag,
     and Zenoh drops those without a subscriber. One declared publisher per tag would stall the routing of a fleet.
+
+    With several sites, that publisher is for all of them. When somebody subscribes, each site gets publishers of its
+    own, which show whether anybody wants its poses.
     """
 
     def __init__(self, session: zenoh.Session, sites: AnswersOfSites, metrics: Metrics) -> None:
         super().__init__("poses", PERIOD_S, metrics)
         self._session = session
         self._sites = sites
+        self._of_site: dict[str, zenoh.Publisher] = {}  # by key expression
         self._tag_version = 0
         self._frame_version = 0
         self._frame_due_s = 0.0
@@ -41,8 +45,8 @@ class ZenohPoses(PeriodicPublisher):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         super().__exit__(kind, error, traceback)
-        self._tag_publisher.undeclare()
-        self._frame_publisher.undeclare()
+        for publisher in (self._tag_publisher, self._frame_publisher, *self._of_site.values()):
+            publisher.undeclare()
 
     def _keys(self) -> tuple[str, str]:
         """Return the key expressions of the poses of tags and of frames."""
@@ -62,8 +66,10 @@ class ZenohPoses(PeriodicPublisher):
             return
         self._tag_version, poses = self._sites.latest.since(self._tag_version)
         for answers, of_site in self._sites.divided(poses):
-            for tag, pose in answers.pose_jsons(of_site, answers.now_ns()):
-                self._put(keys.pose_key(answers.site.site.id, tag), pose)
+            site = answers.site.site.id
+            if self._is_wanted(keys.all_tags(site, "pose")):
+                for tag, pose in answers.pose_jsons(of_site, answers.now_ns()):
+                    self._put(keys.pose_key(site, tag), pose)
 
     def _put_frame(self) -> None:
         if time.monotonic() < self._frame_due_s or not _has_subscribers(self._frame_publisher):
@@ -73,8 +79,17 @@ class ZenohPoses(PeriodicPublisher):
         self._frame_due_s = time.monotonic() + FRAME_PERIOD_S
         self._frame_version, changed = self._sites.latest.since(self._frame_version)
         for answers, _ in self._sites.divided(changed):
-            frame = answers.frame_of(answers.rows(), answers.now_ns())
-            self._put(keys.poses_key(answers.site.site.id), to_json(frame))
+            key = keys.poses_key(answers.site.site.id)
+            if self._is_wanted(key):
+                self._put(key, to_json(answers.frame_of(answers.rows(), answers.now_ns())))
+
+    def _is_wanted(self, key_expr: str) -> bool:
+        """Return whether anybody subscribes to these keys of one site. With an only site, that is known already."""
+        if self._sites.only is not None:
+            return True
+        if key_expr not in self._of_site:
+            self._of_site[key_expr] = self._session.declare_publisher(key_expr)
+        return _has_subscribers(self._of_site[key_expr])
 
     def _put(self, key: str, answer: bytes) -> None:
         self._session.put(
