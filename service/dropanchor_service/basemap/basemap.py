@@ -1,0 +1,33 @@
+"""The base map as the interface shows it: what the page has to know, and the tiles."""
+
+import logging
+from pathlib import Path
+
+from dropanchor_schemas.basemap import Basemap, BasemapTiles
+from dropanchor_service.basemap.attribution import credits_in
+from dropanchor_service.basemap.file import TileFile
+
+_log = logging.getLogger(__name__)
+
+
+class ServedBasemap:
+    """The tiles of a file, and their description."""
+
+    def __init__(self, path: Path, attribution: str | None) -> None:
+        """attribution: instead of that in the file. Raises OSError and UnusableFileError."""
+        self.file = TileFile(path)
+        text = self.file.metadata.get("attribution") if attribution is None else attribution
+        self.description = Basemap(
+            tiles=BasemapTiles(
+                version=self.file.version,
+                media_type=self.file.media_type,
+                min_zoom=self.file.min_zoom,
+                max_zoom=self.file.max_zoom,
+                attribution=credits_in(text) if isinstance(text, str) else [],
+            )
+        )
+        if not text:
+            _log.warning(
+                "basemap.tiles: %s does not say who made the map. Most licences demand it: set basemap.attribution",
+                path,
+            )

@@ -1,0 +1,57 @@
+/** Which tiles a view needs: one zoom level that suits its scale, and coarser tiles where those are not there (yet). */
+
+import { edgeOf, mercatorAt, tilesIn } from "./mercator.js";
+
+/** @typedef {import("./mercator.js").TileId} TileId */
+/** @typedef {import("./tiles.js").Entry} Entry */
+/** @typedef {{min_zoom: number, max_zoom: number}} Zooms */
+
+const MOST_TILES = 64;
+/** Where even the coarsest tiles would be smaller than this, the map would be a patch. */
+const LEAST_PX = 24;
+
+/** Return the tiles for a part of the site, the nearest to its middle first; none where they would be too many or too small.
+ * @param {import("./mercator.js").Affine} affine @param {import("../map/view.js").Bounds} bounds
+ * @param {number} scale pixels per metre @param {number} tile_px for which tiles are made @param {Zooms} zooms @returns {TileId[]} */
+export function tilesFor(affine, bounds, scale, tile_px, { min_zoom, max_zoom }) {
+  const edge_px = edgeOf(affine) * scale;
+  const suited = Math.round(Math.log2(edge_px / tile_px));
+  for (let z = Math.max(min_zoom, Math.min(max_zoom, suited)); z >= min_zoom && edge_px / 2 ** z >= LEAST_PX; z--) {
+    const found = tilesIn(affine, bounds, z, MOST_TILES);
+    if (found) return sorted(found, affine, bounds);
+  }
+  return [];
+}
+
+/** @param {TileId[]} tiles @param {import("./mercator.js").Affine} affine @param {import("../map/view.js").Bounds} bounds */
+function sorted(tiles, affine, { left, right, bottom, top }) {
+  const [mx, my] = mercatorAt(affine, (left + right) / 2, (bottom + top) / 2);
+  const far = (/** @type {TileId} */ { z, x, y }) => Math.hypot(x + 0.5 - mx * 2 ** z, y + 0.5 - my * 2 ** z);
+  return tiles.sort((one, other) => far(one) - far(other));
+}
+
+/**
+ * Return the tiles that can be drawn instead of the wanted ones, the coarsest first, and those to request. A coarser tile
+ * stands in for one that is on its way, and for an image that the map does not have.
+ * @param {TileId[]} wanted @param {(tile: TileId) => Entry | null} find @param {number} min_zoom @param {boolean} isVector
+ * @returns {{drawn: TileId[], requested: TileId[]}}
+ */
+export function standIns(wanted, find, min_zoom, isVector) {
+  /** @type {Map<string, TileId>} */
+  const drawn = new Map();
+  const requested = [];
+  for (const one of wanted) {
+    let asks = true;
+    for (let tile = one; tile.z >= min_zoom; tile = parentOf(tile)) {
+      const state = find(tile)?.state ?? "unknown";
+      if (state === "ready") drawn.set(`${tile.z}/${tile.x}/${tile.y}`, tile);
+      if (state === "unknown" && asks) requested.push(tile);
+      if (state === "ready" || (state === "missing" && isVector)) break;
+      asks &&= state === "missing";
+    }
+  }
+  return { drawn: [...drawn.values()].sort((one, other) => one.z - other.z), requested };
+}
+
+/** @param {TileId} tile @returns {TileId} */
+const parentOf = ({ z, x, y }) => ({ z: z - 1, x: Math.floor(x / 2), y: Math.floor(y / 2) });
