@@ -4,9 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-TileMediaType = Literal[
-    "image/png", "image/jpeg", "image/webp", "image/avif", "application/vnd.mapbox-vector-tile"
-]
+TileMediaType = Literal["image/png", "image/jpeg", "image/webp", "image/avif", "application/vnd.mapbox-vector-tile"]
 Zoom = Annotated[int, Field(ge=0, le=255)]
 
 
@@ -24,6 +22,10 @@ class BasemapTiles(BaseModel):
     media_type: TileMediaType
     min_zoom: Zoom
     max_zoom: Zoom
+    west: float = Field(description="Edge of the part of the world that it shows, degrees.")
+    south: float
+    east: float
+    north: float
     attribution: list[Credit] = Field(
         description="Who made the map, in the order of the text. Whoever shows the map has to show this."
     )

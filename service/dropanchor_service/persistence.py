@@ -150,5 +150,7 @@ def _open_basemap(settings: Settings, site: SiteStore) -> ServedBasemap | None:
     except UnusableFileError as error:
         raise SettingsError(f"basemap.tiles: {error}") from error
     if site.site.georeference is None:
-        _log.warning("basemap.tiles: the site has no latitude and longitude, so the page shows no base map until it has")
+        _log.warning(
+            "basemap.tiles: the site has no latitude and longitude, so the page shows no base map until it has"
+        )
     return basemap

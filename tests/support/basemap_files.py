@@ -24,14 +24,17 @@ def basemap_file(
     tile_type: TileType = TileType.PNG,
     compression: Compression = Compression.NONE,
     metadata: Mapping[str, Any] | None = None,
+    bounds: tuple[float, float, float, float] = (-180, -90, 180, 90),
 ) -> Path:
-    """Write a PMTiles file. compression: the tiles are stored like this if it is GZIP, else the header only says so."""
+    """Write a PMTiles file. compression: NONE or GZIP, of the tiles. bounds: west, south, east and north."""
     with write(str(path)) as writer:
         for z, x, y in sorted(tiles, key=lambda tile: zxy_to_tileid(*tile)):
             content = tiles[z, x, y]
             stored = gzip.compress(content, mtime=0) if compression is Compression.GZIP else content
             writer.write_tile(zxy_to_tileid(z, x, y), stored)
-        header = {"tile_type": tile_type, "tile_compression": compression}
+        header: dict[str, Any] = {"tile_type": tile_type, "tile_compression": compression}
+        names = ("min_lon_e7", "min_lat_e7", "max_lon_e7", "max_lat_e7")
+        header |= {name: round(1e7 * value) for name, value in zip(names, bounds, strict=True)}
         writer.finalize(header, {"attribution": OSM} if metadata is None else dict(metadata))
     return path
 
@@ -44,7 +47,7 @@ def image_tile(colour: Colour, kind: str = "PNG", size: int = 256) -> bytes:
 
 
 def vector_tile(layers: Mapping[str, Sequence[tuple[str, Line]]], key: str = "kind", extent: int = 4096) -> bytes:
-    """Return a vector tile whose layers hold features: a kind and a line. A line that ends where it began is a polygon."""
+    """Return a vector tile. layers: of each the features, a kind and a line; a closed one is a polygon."""
     return b"".join(_field(3, _layer(name, features, key, extent)) for name, features in layers.items())
 
 

@@ -16,17 +16,23 @@ class ServedBasemap:
     def __init__(self, path: Path, attribution: str | None) -> None:
         """attribution: instead of that in the file. Raises OSError and UnusableFileError."""
         self.file = TileFile(path)
-        text = self.file.metadata.get("attribution") if attribution is None else attribution
+        written = self.file.metadata.get("attribution")
+        found = credits_in(written if attribution is None and isinstance(written, str) else attribution or "")
+        west, south, east, north = self.file.bounds
         self.description = Basemap(
             tiles=BasemapTiles(
                 version=self.file.version,
                 media_type=self.file.media_type,
                 min_zoom=self.file.min_zoom,
                 max_zoom=self.file.max_zoom,
-                attribution=credits_in(text) if isinstance(text, str) else [],
+                west=west,
+                south=south,
+                east=east,
+                north=north,
+                attribution=found,
             )
         )
-        if not text:
+        if attribution is None and not found:
             _log.warning(
                 "basemap.tiles: %s does not say who made the map. Most licences demand it: set basemap.attribution",
                 path,

@@ -28,6 +28,8 @@ from pmtiles.tile import (
     zxy_to_tileid,
 )
 
+from dropanchor_schemas.basemap import TileMediaType
+
 MAX_TILE_BYTES = 4 * 2**20
 MAX_METADATA_BYTES = 8 * 2**20
 MAX_DIRECTORY_BYTES = 2**20
@@ -35,9 +37,10 @@ DIRECTORIES_KEPT = 8
 
 _HEADER_BYTES = 127
 _MAX_DEPTH = 4
+_MAX_ZOOM = 31
 _GZIP = 31
 _BEYOND_64_BITS = re.compile(rb"[\x80-\xff]{10}")
-_MEDIA_TYPES = {
+_MEDIA_TYPES: dict[TileType, TileMediaType] = {
     TileType.PNG: "image/png",
     TileType.JPEG: "image/jpeg",
     TileType.WEBP: "image/webp",
@@ -59,7 +62,7 @@ class TileFile:
 
     def __init__(self, path: Path) -> None:
         """Open the file. Raises OSError, and UnusableFileError with one sentence."""
-        self._file = path.open("rb")
+        self._file = path.open("rb", buffering=0)
         self._lock = Lock()
         self._directory = lru_cache(DIRECTORIES_KEPT)(self._read_directory)
         try:
@@ -72,6 +75,7 @@ class TileFile:
             raise UnusableFileError(f"{path} {error}") from error
         self.media_type = _MEDIA_TYPES[self._header["tile_type"]]
         self.min_zoom, self.max_zoom = self._header["min_zoom"], self._header["max_zoom"]
+        self.bounds = _bounds(self._header)
 
     def close(self) -> None:
         """Close the file. Later reads raise UnreadableTileError."""
@@ -140,6 +144,8 @@ def _header(content: bytes) -> HeaderDict:
         raise UnusableFileError("is not a PMTiles file of version 3; `pmtiles convert` makes one") from error
     except ValueError as error:
         raise UnusableFileError(f"has a header that says what PMTiles version 3 does not know: {error}") from error
+    if not header["min_zoom"] <= header["max_zoom"] <= _MAX_ZOOM:
+        raise UnusableFileError(f"has the zoom levels {header['min_zoom']} to {header['max_zoom']}, which cannot be")
     tile_type, tiles, inner = header["tile_type"], header["tile_compression"], header["internal_compression"]
     if tile_type not in _MEDIA_TYPES:
         kinds = ", ".join(kind.name for kind in _MEDIA_TYPES)
@@ -148,6 +154,14 @@ def _header(content: bytes) -> HeaderDict:
         unreadable = tiles if inner is Compression.GZIP else inner
         raise UnusableFileError(f"has the compression {unreadable.name}; only GZIP can be read, and tiles with NONE")
     return header
+
+
+def _bounds(header: HeaderDict) -> tuple[float, float, float, float]:
+    """Return west, south, east and north, degrees: those of the world where the header makes no sense."""
+    west, south = header["min_lon_e7"] / 1e7, header["min_lat_e7"] / 1e7
+    east, north = header["max_lon_e7"] / 1e7, header["max_lat_e7"] / 1e7
+    makes_sense = -180 <= west < east <= 180 and -90 <= south < north <= 90
+    return (west, south, east, north) if makes_sense else (-180.0, -90.0, 180.0, 90.0)
 
 
 def _inflated(stored: bytes, limit: int) -> bytes:

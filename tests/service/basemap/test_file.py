@@ -1,12 +1,19 @@
 """PMTiles files are read tile by tile; what is no such file, or damaged, is refused with one sentence."""
 
 import gzip
+import random
 from pathlib import Path
 
 import pytest
 from pmtiles.tile import Compression, Entry, TileType, deserialize_header, serialize_directory, serialize_header
 
-from dropanchor_service.basemap.file import MAX_DIRECTORY_BYTES, MAX_TILE_BYTES, TileFile, UnreadableTileError, UnusableFileError
+from dropanchor_service.basemap.file import (
+    MAX_DIRECTORY_BYTES,
+    MAX_TILE_BYTES,
+    TileFile,
+    UnreadableTileError,
+    UnusableFileError,
+)
 from support.basemap_files import basemap_file, image_tile
 
 RED = image_tile((255, 0, 0))
@@ -29,7 +36,9 @@ def sentence_of(path: Path) -> str:
 
 @pytest.mark.parametrize("compression", [Compression.NONE, Compression.GZIP])
 def test_tiles_come_as_they_were_written_and_others_are_none(tmp_path: Path, compression: Compression) -> None:
-    tiles = {(z, x, y): f"tile {z} {x} {y}".encode() for z in range(8) for x in range(2**z) for y in range(2**z) if x != y}
+    tiles = {
+        (z, x, y): f"tile {z} {x} {y}".encode() for z in range(8) for x in range(2**z) for y in range(2**z) if x != y
+    }
     file = TileFile(basemap_file(tmp_path / "map.pmtiles", tiles, compression=compression))
     assert (file.media_type, file.min_zoom, file.max_zoom) == ("image/png", 1, 7)
     assert {tile: file.tile(*tile) for tile in tiles} == tiles
@@ -41,11 +50,29 @@ def test_tiles_come_as_they_were_written_and_others_are_none(tmp_path: Path, com
 
 
 def test_a_file_with_leaf_directories_is_read(tmp_path: Path) -> None:
-    tiles = {(9, x, y): f"{x * y % 9973}-{x}".encode() * (1 + (x * 7 + y) % 5) for x in range(150) for y in range(150)}
+    made = random.Random(1)
+    tiles = {(9, x, y): made.randbytes(made.randint(4, 400)) for x in range(150) for y in range(150)}
     path = basemap_file(tmp_path / "map.pmtiles", tiles)
     assert deserialize_header(path.read_bytes()[:HEADER_BYTES])["leaf_directory_length"] > 0
     file = TileFile(path)
     assert {tile: file.tile(*tile) for tile in list(tiles)[::97]} == {tile: tiles[tile] for tile in list(tiles)[::97]}
+    file.close()
+
+
+@pytest.mark.parametrize(
+    ("written", "bounds"),
+    [
+        ((13.3, 52.4, 13.5, 52.6), (13.3, 52.4, 13.5, 52.6)),
+        ((13.5, 52.4, 13.3, 52.6), (-180, -90, 180, 90)),
+        ((0, 0, 0, 0), (-180, -90, 180, 90)),
+        ((-200, 0, 10, 10), (-180, -90, 180, 90)),
+    ],
+)
+def test_bounds_that_make_no_sense_are_those_of_the_world(
+    tmp_path: Path, written: tuple[float, float, float, float], bounds: tuple[float, float, float, float]
+) -> None:
+    file = TileFile(basemap_file(tmp_path / "map.pmtiles", {(0, 0, 0): RED}, bounds=written))
+    assert file.bounds == bounds
     file.close()
 
 
@@ -60,7 +87,13 @@ def test_another_file_has_another_version(tmp_path: Path) -> None:
 
 def test_what_cannot_be_a_base_map_is_refused_with_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "map.pmtiles"
-    for content in (b"", b"PM\x02\x00" + b"\0" * 200, b"PMTiles\x02" + b"\0" * 200, b"\xff" * 200, b"SQLite format 3\0" * 20):
+    for content in (
+        b"",
+        b"PM\x02\x00" + b"\0" * 200,
+        b"PMTiles\x02" + b"\0" * 200,
+        b"\xff" * 200,
+        b"SQLite format 3\0" * 20,
+    ):
         path.write_bytes(content)
         assert sentence_of(path) == f"{path} is not a PMTiles file of version 3; `pmtiles convert` makes one"
 
@@ -74,7 +107,9 @@ def test_what_cannot_be_a_base_map_is_refused_with_one_sentence(tmp_path: Path) 
     assert refused(tile_compression=Compression.BROTLI) == f"has the compression BROTLI; {only}"
     assert refused(tile_compression=Compression.UNKNOWN) == f"has the compression UNKNOWN; {only}"
     assert refused(internal_compression=Compression.ZSTD) == f"has the compression ZSTD; {only}"
-    assert refused(root_offset=2**63) .startswith("cannot be read: ")
+    assert refused(min_zoom=3, max_zoom=2) == "has the zoom levels 3 to 2, which cannot be"
+    assert refused(max_zoom=32) == "has the zoom levels 0 to 32, which cannot be"
+    assert refused(root_offset=2**63).startswith("cannot be read: ")
     assert refused(metadata_offset=10**9) == "is not complete: it ends too early"
     assert refused(metadata_offset=0) == "is damaged: its gzip data cannot be read"
     assert refused(root_length=2**60) == f"has a directory of {2**60} bytes; at most {MAX_DIRECTORY_BYTES} can be read"

@@ -18,6 +18,10 @@ _EXAMPLE = {
         "media_type": "application/vnd.mapbox-vector-tile",
         "min_zoom": 10,
         "max_zoom": 15,
+        "west": 13.3,
+        "south": 52.4,
+        "east": 13.5,
+        "north": 52.6,
         "attribution": [
             {"text": "© ", "link": None},
             {"text": "OpenStreetMap", "link": "https://www.openstreetmap.org/copyright"},

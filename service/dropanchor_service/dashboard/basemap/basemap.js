@@ -7,7 +7,7 @@ import { Painter } from "./painter.js";
 import { Tiles } from "./tiles.js";
 
 /** @typedef {{text: string, link: string | null}} Credit */
-/** @typedef {{version: string, media_type: string, min_zoom: number, max_zoom: number, attribution: Credit[]}} Description */
+/** @typedef {import("./painter.js").Description & {attribution: Credit[]}} Description */
 
 const OFF = "off";
 
@@ -26,9 +26,9 @@ export class Basemap {
     this.button = button;
     this.attribution = attribution;
     this.painter = new Painter(this.tiles, () => map.redraw());
-    map.drawGround = ({ ctx, view, palette }) => {
+    map.underlays.unshift(({ ctx, view, palette }) => {
       if (this.#isShown && this.#description && this.#origin) this.painter.draw(ctx, view, palette, this.#description, this.#origin);
-    };
+    });
     this.tiles.addEventListener("change", () => map.redraw());
     button.addEventListener("click", () => {
       writeAddress({ basemap: this.#isOn ? OFF : null });

@@ -4,20 +4,17 @@ import { edgeOf, mercatorAt, tilesIn } from "./mercator.js";
 
 /** @typedef {import("./mercator.js").TileId} TileId */
 /** @typedef {import("./tiles.js").Entry} Entry */
-/** @typedef {{min_zoom: number, max_zoom: number}} Zooms */
+/** @typedef {import("./mercator.js").World & {min_zoom: number, max_zoom: number}} Extent of a map */
 
 const MOST_TILES = 64;
-/** Where even the coarsest tiles would be smaller than this, the map would be a patch. */
-const LEAST_PX = 24;
 
-/** Return the tiles for a part of the site, the nearest to its middle first; none where they would be too many or too small.
+/** Return the tiles for a part of the site, the nearest to its middle first; none where they would be too many.
  * @param {import("./mercator.js").Affine} affine @param {import("../map/view.js").Bounds} bounds
- * @param {number} scale pixels per metre @param {number} tile_px for which tiles are made @param {Zooms} zooms @returns {TileId[]} */
-export function tilesFor(affine, bounds, scale, tile_px, { min_zoom, max_zoom }) {
-  const edge_px = edgeOf(affine) * scale;
-  const suited = Math.round(Math.log2(edge_px / tile_px));
-  for (let z = Math.max(min_zoom, Math.min(max_zoom, suited)); z >= min_zoom && edge_px / 2 ** z >= LEAST_PX; z--) {
-    const found = tilesIn(affine, bounds, z, MOST_TILES);
+ * @param {number} scale pixels per metre @param {number} tile_px for which tiles are made @param {Extent} extent @returns {TileId[]} */
+export function tilesFor(affine, bounds, scale, tile_px, extent) {
+  const suited = Math.round(Math.log2((edgeOf(affine) * scale) / tile_px));
+  for (let z = Math.max(extent.min_zoom, Math.min(extent.max_zoom, suited)); z >= extent.min_zoom; z--) {
+    const found = tilesIn(affine, bounds, extent, z, MOST_TILES);
     if (found) return sorted(found, affine, bounds);
   }
   return [];

@@ -10,6 +10,7 @@ import { siteOfLatLon } from "../plan/geodesy.js";
 /** @typedef {import("../plan/geodesy.js").Georeference} Georeference */
 /** @typedef {import("../map/view.js").Bounds} Bounds */
 /** @typedef {{z: number, x: number, y: number}} TileId */
+/** @typedef {{west: number, south: number, east: number, north: number}} World the part of the world that a map shows, degrees */
 /**
  * @typedef {object} Affine x = at.x + a · (mx − at.mx) + c · (my − at.my), y = at.y + b · (mx − at.mx) + d · (my − at.my)
  * @property {{x: number, y: number, mx: number, my: number}} at
@@ -67,22 +68,33 @@ export function siteAt({ at, a, b, c, d }, mx, my) {
 /** Return the length of an edge of the tile at zoom 0 on the ground here, m. @param {Affine} affine */
 export const edgeOf = ({ a, b }) => Math.hypot(a, b);
 
-/** Return the tiles at a zoom level that reach into a part of the site; null: there are more than `most`.
- * @param {Affine} affine @param {Bounds} bounds @param {number} z @param {number} most @returns {TileId[] | null} */
-export function tilesIn(affine, bounds, z, most) {
+/** Return the tiles of a map at a zoom level that reach into a part of the site; null: there are more than `most`.
+ * @param {Affine} affine @param {Bounds} bounds @param {World} world @param {number} z @param {number} most @returns {TileId[] | null} */
+export function tilesIn(affine, bounds, world, z, most) {
   const { left, right, bottom, top } = bounds;
   const corners = [[left, bottom], [left, top], [right, bottom], [right, top]].map(([x, y]) => mercatorAt(affine, x, y));
   const size = 2 ** z;
+  const limits = mercatorBounds(world);
   const [columns, lines] = [0, 1].map((axis) => {
-    const values = corners.map((corner) => corner[axis] * size);
-    return [Math.floor(Math.min(...values)), Math.floor(Math.max(...values))];
+    const values = corners.map((corner) => corner[axis]);
+    const [first, last] = [Math.max(limits[axis][0], Math.min(...values)), Math.min(limits[axis][1], Math.max(...values))];
+    return { first: Math.floor(first * size), last: Math.ceil(last * size) - 1 };
   });
-  if ((columns[1] - columns[0] + 1) * (lines[1] - lines[0] + 1) > 4 * most) return null;
+  if (Math.max(0, columns.last - columns.first + 1) * Math.max(0, lines.last - lines.first + 1) > 4 * most) return null;
   const found = [];
-  for (let y = Math.max(0, lines[0]); y <= Math.min(size - 1, lines[1]); y++) {
-    for (let x = columns[0]; x <= columns[1]; x++) if (reaches(affine, { z, x, y }, bounds)) found.push({ z, x, y });
+  for (let y = lines.first; y <= lines.last; y++) {
+    for (let x = columns.first; x <= columns.last; x++) if (reaches(affine, { z, x, y }, bounds)) found.push({ z, x, y });
   }
   return found.length > most ? null : found;
+}
+
+/** Return the least and the largest Mercator coordinate of a map, first from west to east, then from north to south. A map of
+ * all longitudes has no end: the number of a column repeats around the Earth. @param {World} world */
+function mercatorBounds({ west, south, east, north }) {
+  const [[left, top], [right, bottom]] = [
+    mercatorOf({ lat: Math.min(MAX_LAT, north), lon: west }), mercatorOf({ lat: Math.max(-MAX_LAT, south), lon: east }),
+  ];
+  return [right - left >= 1 ? [-Infinity, Infinity] : [left, right], [top, bottom]];
 }
 
 /** @param {Affine} affine @param {TileId} tile @param {Bounds} bounds */

@@ -8,7 +8,7 @@ import { VECTOR } from "./tiles.js";
 
 /** @typedef {import("../map/view.js").View} View @typedef {import("../map/palette.js").Palette} Palette */
 /** @typedef {import("./mercator.js").Affine} Affine @typedef {import("./mercator.js").TileId} TileId */
-/** @typedef {{media_type: string, min_zoom: number, max_zoom: number}} Description */
+/** @typedef {{media_type: string} & import("./coverage.js").Extent} Description */
 
 /** Share of the view beyond each of its edges. */
 const MARGIN = 0.25;

@@ -25,8 +25,6 @@ export class LiveMap extends EventTarget {
   /** @type {readonly import("./draw_site.js").Anchor[]} */
   anchors = [];
   hovered = -1;
-  /** Draw what lies below the grid. */
-  drawGround = (/** @type {import("./scene.js").Scene} */ _scene) => {};
   /** Draw on the grid, below everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
   underlays = [];
   /** Draw over everything else. @type {((scene: import("./scene.js").Scene) => void)[]} */
@@ -232,7 +230,6 @@ export class LiveMap extends EventTarget {
     };
     this.#ctx.setTransform(this.#pixelRatio, 0, 0, this.#pixelRatio, 0, 0);
     this.#ctx.clearRect(0, 0, view.width, view.height);
-    this.drawGround(scene);
     drawGrid(this.#ctx, view, palette);
     for (const draw of this.underlays) draw(scene);
     const centre = this.anchors.find((anchor) => anchor.id === fleet.value.anchor[scene.selected]) ?? this.anchors[0];
