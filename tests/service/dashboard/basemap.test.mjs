@@ -100,11 +100,9 @@ test("a view of very many tiles takes coarser ones, and the nearest comes first"
 });
 
 test("a coarser tile stands in for one on its way, and for an image that is missing", () => {
-  const image = /** @type {any} */ ({});
   const entries = new Map(/** @type {[string, any][]} */ ([["3/4/2", "loading"], ["3/5/2", "missing"], ["2/2/1", "ready"], ["3/6/2", "failed"], ["1/1/0", "ready"]]));
   const find = (/** @type {import("../../../service/dropanchor_service/dashboard/basemap/mercator.js").TileId} */ { z, x, y }) => {
-    const state = entries.get(`${z}/${x}/${y}`);
-    return state ? { state, content: state === "ready" ? image : null } : null;
+    return entries.get(`${z}/${x}/${y}`) ?? null;
   };
   const of = (/** @type {number[]} */ columns, isVector = false) =>
     standIns(columns.map((x) => ({ z: 3, x, y: 2 })), find, 1, isVector);

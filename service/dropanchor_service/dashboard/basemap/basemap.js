@@ -4,6 +4,7 @@ import { addressValues, writeAddress } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
 import { isLimited } from "../data/shared.js";
 import { Painter } from "./painter.js";
+import { PaintingThread } from "./thread.js";
 import { Tiles } from "./tiles.js";
 
 /** @typedef {{text: string, link: string | null}} Credit */
@@ -12,7 +13,8 @@ import { Tiles } from "./tiles.js";
 const OFF = "off";
 
 export class Basemap {
-  tiles = new Tiles();
+  thread = new PaintingThread();
+  tiles = new Tiles(this.thread);
   /** @type {Description | null} */
   #description = null;
   /** @type {import("../plan/geodesy.js").Georeference | null} */
@@ -25,7 +27,7 @@ export class Basemap {
     this.map = map;
     this.button = button;
     this.attribution = attribution;
-    this.painter = new Painter(this.tiles, () => map.redraw());
+    this.painter = new Painter(this.thread, this.tiles, () => map.redraw());
     map.underlays.unshift(({ ctx, view, palette }) => {
       if (this.#isShown && this.#description && this.#origin) this.painter.draw(ctx, view, palette, this.#description, this.#origin);
     });
@@ -46,7 +48,7 @@ export class Basemap {
 
   /** For tests and the console. */
   get stats() {
-    return { ...this.painter.stats, shown: this.#isShown, still: this.tiles.still };
+    return { ...this.painter.stats, shown: this.#isShown, still: this.tiles.still && this.painter.still };
   }
 
   get #isShown() {

@@ -3,7 +3,7 @@
 import { edgeOf, mercatorAt, tilesIn } from "./mercator.js";
 
 /** @typedef {import("./mercator.js").TileId} TileId */
-/** @typedef {import("./tiles.js").Entry} Entry */
+/** @typedef {import("./tiles.js").State} State */
 /** @typedef {import("./mercator.js").World & {min_zoom: number, max_zoom: number}} Extent of a map */
 
 const MOST_TILES = 64;
@@ -30,7 +30,7 @@ function sorted(tiles, affine, { left, right, bottom, top }) {
 /**
  * Return the tiles that can be drawn instead of the wanted ones, the coarsest first, and those to request. A coarser tile
  * stands in for one that is on its way, and for an image that the map does not have.
- * @param {TileId[]} wanted @param {(tile: TileId) => Entry | null} find @param {number} min_zoom @param {boolean} isVector
+ * @param {TileId[]} wanted @param {(tile: TileId) => State | null} find @param {number} min_zoom @param {boolean} isVector
  * @returns {{drawn: TileId[], requested: TileId[]}}
  */
 export function standIns(wanted, find, min_zoom, isVector) {
@@ -40,7 +40,7 @@ export function standIns(wanted, find, min_zoom, isVector) {
   for (const one of wanted) {
     let asks = true;
     for (let tile = one; tile.z >= min_zoom; tile = parentOf(tile)) {
-      const state = find(tile)?.state ?? "unknown";
+      const state = find(tile) ?? "unknown";
       if (state === "ready") drawn.set(`${tile.z}/${tile.x}/${tile.y}`, tile);
       if (state === "unknown" && asks) requested.push(tile);
       if (state === "ready" || (state === "missing" && isVector)) break;

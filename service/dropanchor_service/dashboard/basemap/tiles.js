@@ -1,15 +1,11 @@
-/** The tiles of the base map, ready to be drawn. They come from the service when they are wanted. */
+/** The tiles of the base map: they come from the service when they are wanted, and go to the thread that paints them. */
 
 import { request } from "../data/access.js";
 import { api } from "../data/connection.js";
-import { styleOf } from "./style.js";
-import { featuresOf, trace } from "./vector_tile.js";
 
 /** @typedef {import("./mercator.js").TileId} TileId */
-/** @typedef {ImageBitmap | Map<string, Path2D>} Content an image, or for each style of `style.js` its lines, with the tile from 0 to 1 */
-/** @typedef {{state: "loading" | "failed" | "missing", content: null} | {state: "ready", content: Content}} Entry */
+/** @typedef {"loading" | "failed" | "missing" | "ready"} State */
 
-export const VECTOR = "application/vnd.mapbox-vector-tile";
 const LOADS = 4;
 const KEPT = 160;
 const RETRY_MS = 10_000;
@@ -19,14 +15,21 @@ const NO_CONTENT = 204;
 export class Tiles extends EventTarget {
   /** Grows with every change. */
   version = 0;
-  /** The last used ones come last. @type {Map<string, Entry>} */
-  #entries = new Map();
+  /** By key; the last used ones come last. @type {Map<string, State>} */
+  #states = new Map();
   #loading = 0;
   #media_type = "";
 
+  /** @param {import("./thread.js").PaintingThread} thread */
+  constructor(thread) {
+    super();
+    this.thread = thread;
+  }
+
   /** Forget all tiles. @param {string} media_type of the tiles from now on */
   reset(media_type) {
-    this.#entries = new Map();
+    for (const key of this.#states.keys()) this.thread.forget(key);
+    this.#states = new Map();
     this.#media_type = media_type;
     this.#changed();
   }
@@ -39,11 +42,11 @@ export class Tiles extends EventTarget {
   /** Return what is known of a tile. @param {TileId} tile */
   find(tile) {
     const key = keyOf(tile);
-    const entry = this.#entries.get(key);
-    if (!entry) return null;
-    this.#entries.delete(key);
-    this.#entries.set(key, entry);
-    return entry;
+    const state = this.#states.get(key);
+    if (!state) return null;
+    this.#states.delete(key);
+    this.#states.set(key, state);
+    return state;
   }
 
   /** Request those of these tiles that are unknown, the first ones first, a few at a time: "change" asks for the next.
@@ -51,26 +54,37 @@ export class Tiles extends EventTarget {
   want(tiles) {
     for (const tile of tiles) {
       if (this.#loading >= LOADS) return;
-      if (!this.#entries.has(keyOf(tile))) this.#load(tile);
+      if (!this.#states.has(keyOf(tile))) this.#load(keyOf(tile));
     }
   }
 
-  /** @param {TileId} tile */
-  async #load(tile) {
-    const [entries, key] = [this.#entries, keyOf(tile)];
-    entries.set(key, { state: "loading", content: null });
+  /** @param {string} key */
+  async #load(key) {
+    const states = this.#states;
+    states.set(key, "loading");
     this.#loading++;
-    try {
-      const response = await request(api(`basemap/${key}`), { cache: "default" });
-      const content = response.status === NO_CONTENT ? null : await contentOf(response, this.#media_type);
-      entries.set(key, content ? { state: "ready", content } : { state: "missing", content: null });
-    } catch {
-      entries.set(key, { state: "failed", content: null }); // the connection of the page says what is wrong
-      setTimeout(() => entries.delete(key) && this.#changed(), RETRY_MS);
-    }
+    const state = await this.#requested(key).catch(() => "failed"); // the connection of the page says what is wrong
     this.#loading--;
-    for (const oldest of [...entries.keys()].slice(0, Math.max(0, entries.size - KEPT))) entries.delete(oldest);
+    if (states === this.#states) this.#note(key, /** @type {State} */ (state));
+    else this.thread.forget(key);
     this.#changed();
+  }
+
+  /** @param {string} key @returns {Promise<State>} */
+  async #requested(key) {
+    const response = await request(api(`basemap/${key}`), { cache: "default" });
+    if (response.status === NO_CONTENT) return "missing";
+    return (await this.thread.read(key, this.#media_type, await response.arrayBuffer())) ? "ready" : "failed";
+  }
+
+  /** @param {string} key @param {State} state */
+  #note(key, state) {
+    this.#states.set(key, state);
+    if (state === "failed") setTimeout(() => this.#states.delete(key) && this.#changed(), RETRY_MS);
+    for (const oldest of [...this.#states.keys()].slice(0, Math.max(0, this.#states.size - KEPT))) {
+      this.#states.delete(oldest);
+      this.thread.forget(oldest);
+    }
   }
 
   #changed() {
@@ -80,24 +94,4 @@ export class Tiles extends EventTarget {
 }
 
 /** Return the path of a tile in the interface. The number of a column repeats around the Earth. @param {TileId} tile */
-const keyOf = ({ z, x, y }) => `${z}/${((x % 2 ** z) + 2 ** z) % 2 ** z}/${y}`;
-
-/** @param {Response} response @param {string} media_type @returns {Promise<Content>} */
-async function contentOf(response, media_type) {
-  if (media_type !== VECTOR) return createImageBitmap(await response.blob());
-  return pathsOf(new Uint8Array(await response.arrayBuffer()));
-}
-
-/** @param {Uint8Array} content */
-function pathsOf(content) {
-  /** @type {Map<string, Path2D>} */
-  const paths = new Map();
-  for (const feature of featuresOf(content)) {
-    const style = styleOf(feature.layer, feature.kind, feature.type);
-    if (!style) continue;
-    let path = paths.get(style);
-    if (!path) paths.set(style, (path = new Path2D()));
-    trace(path, feature);
-  }
-  return paths;
-}
+export const keyOf = ({ z, x, y }) => `${z}/${((x % 2 ** z) + 2 ** z) % 2 ** z}/${y}`;
