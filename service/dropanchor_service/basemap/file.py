@@ -70,6 +70,9 @@ class TileFile:
             self._directory(self._header["root_offset"], self._header["root_length"])
             self.metadata = self._read_metadata()
             self.version = _version(path, os.fstat(self._file.fileno()))
+        except OSError:
+            self.close()
+            raise
         except (UnreadableTileError, UnusableFileError) as error:
             self.close()
             raise UnusableFileError(f"{path} {error}") from error
@@ -171,8 +174,8 @@ def _inflated(stored: bytes, limit: int) -> bytes:
         content = inflater.decompress(stored, limit)
     except zlib.error as error:
         raise UnreadableTileError("is damaged: its gzip data cannot be read") from error
-    if not inflater.eof:
-        raise UnreadableTileError(f"is damaged, or holds more than {limit} bytes in one piece")
+    if not inflater.eof or inflater.unused_data:
+        raise UnreadableTileError(f"is damaged, or has a piece of more than {limit} bytes")
     return content
 
 

@@ -171,3 +171,27 @@ def test_hostile_directories_are_refused(tmp_path: Path) -> None:
             file.close()
         else:
             assert words in sentence_of(path)
+
+
+def test_whatever_bytes_are_damaged_the_file_is_read_or_refused(tmp_path: Path) -> None:
+    tiles = {(2, x, y): f"{x} {y}".encode() for x in range(4) for y in range(4)}
+    path = basemap_file(tmp_path / "map.pmtiles", tiles, compression=Compression.GZIP)
+    whole, chance = path.read_bytes(), random.Random(7)
+    outcomes = set()
+    for _ in range(400):
+        content = bytearray(whole)
+        for _ in range(chance.randint(1, 3)):
+            content[chance.randrange(min(len(content), 400))] = chance.randrange(256)
+        path.write_bytes(content[: chance.choice((len(content), len(content), chance.randrange(len(content))))])
+        try:
+            file = TileFile(path)
+        except UnusableFileError:
+            outcomes.add("refused")
+            continue
+        for tile in tiles:
+            try:
+                outcomes.add("read" if file.tile(*tile) == tiles[tile] else "another")
+            except UnreadableTileError:
+                outcomes.add("unreadable")
+        file.close()
+    assert {"refused", "read", "unreadable"} <= outcomes
