@@ -7,26 +7,20 @@ from playwright.sync_api import Browser, expect
 from pmtiles.tile import TileType
 
 from service.dashboard.basemap_place import basemap_place, tile_at
-from service.dashboard.test_accessibility import axe
 from support.axe import violations
 from support.basemap_files import basemap_file, vector_tile
-from support.browser import LOOKS, Scheme, watched_page
-
-__all__ = ["axe"]  # a fixture
+from support.browser import watched_page
 
 pytestmark = pytest.mark.browser
 
 
-@pytest.mark.parametrize(("size", "scheme"), [LOOKS[0], LOOKS[-1]], ids=["desk light", "phone dark"])
-def test_no_violation_while_a_base_map_is_shown_and_hidden(
-    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
-) -> None:
+def test_no_violation_while_a_base_map_is_shown_and_hidden(chromium: Browser, axe: str, tmp_path: Path) -> None:
     tile, _ = tile_at(15, 0, 0)
     roads = [("major_road", [(0, 0), (4096, 4096)]), ("minor_road", [(0, 4096), (4096, 0)])]
     path = basemap_file(tmp_path / "map.pmtiles", {tile: vector_tile({"roads": roads})}, TileType.MVT)
     with (
         basemap_place(path) as place,
-        watched_page(chromium, f"{place.url}?lang=de", scheme, size, reduced_motion="reduce") as page,
+        watched_page(chromium, f"{place.url}?lang=de", reduced_motion="reduce") as page,
     ):
         place.move("cart", x=20.0, y=10.0)
         page.wait_for("dropanchor.basemap().tiles > 0 && dropanchor.tags().length === 1")
