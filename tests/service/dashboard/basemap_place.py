@@ -3,7 +3,6 @@
 import cmath
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from pymap3d.enu import enu2geodetic
@@ -12,7 +11,6 @@ from pyproj import Transformer
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.basemap.basemap import ServedBasemap
-from dropanchor_service.security.identity import Authenticator
 from service.dashboard.place import Place, live_api_bench
 from support.basemap_files import Tile
 from support.http_server import running_server
@@ -23,22 +21,12 @@ _HALF_M = 20_037_508.342789244
 _TO_MERCATOR = Transformer.from_crs("EPSG:4326", "EPSG:3857", always_xy=True)
 
 
-@dataclass
-class BasemapPlace(Place):
-    """A served page with a base map."""
-
-    basemap: ServedBasemap
-
-
 @contextmanager
-def basemap_place(
-    path: Path, attribution: str | None = None, site: Site = SITE, authenticator: Authenticator | None = None
-) -> Iterator[BasemapPlace]:
+def basemap_place(path: Path, attribution: str | None = None) -> Iterator[Place]:
     """Serve a page until the block ends."""
-    bench, basemap = live_api_bench(site), ServedBasemap(path, attribution)
-    app = bench.app(DASHBOARD, basemap=basemap, authenticator=authenticator)
-    with running_server(app, bench.stopping) as port:
-        yield BasemapPlace(bench, f"http://127.0.0.1:{port}/", basemap)
+    bench, basemap = live_api_bench(SITE), ServedBasemap(path, attribution)
+    with running_server(bench.app(DASHBOARD, basemap=basemap), bench.stopping) as port:
+        yield Place(bench, f"http://127.0.0.1:{port}/")
     basemap.file.close()
 
 

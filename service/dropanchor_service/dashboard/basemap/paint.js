@@ -12,12 +12,13 @@ import { STYLES, widthOf } from "./style.js";
  * @property {number} scale pixels of the style sheet per metre @property {number} ratio pixels of the canvas for one of these
  * @property {import("./mercator.js").Affine} affine
  * @property {{tile: TileId, key: string}[]} tiles the coarsest first
- * @property {Record<string, string>} colours those of the style sheet for base maps
+ * @property {Record<string, string>} colours those of the style sheet for the map and base maps
  * @property {boolean} isDark
  */
 
-/** Images are made for light pages: on a dark one they are dimmed. */
-const DARK_OPACITY = 0.6;
+/** Images are faded, so that tags stand out, and more so on a dark page, since most images are light. */
+const OPACITY = 0.7;
+const DARK_OPACITY = 0.5;
 /** Share of a tile by which its ground reaches beyond it, so that no gap shows between two. */
 const OVERLAP = 0.002;
 
@@ -35,13 +36,15 @@ export function paint(canvas, painting, find) {
 
 /** @param {OffscreenCanvasRenderingContext2D} ctx @param {Painting} painting @param {{tile: TileId, content?: Content}[]} tiles */
 function paintImages(ctx, painting, tiles) {
-  ctx.globalAlpha = painting.isDark ? DARK_OPACITY : 1;
+  ctx.fillStyle = painting.colours.map;
   for (const { tile, content } of tiles) {
     if (!(content instanceof ImageBitmap)) continue;
-    const edge_px = place(ctx, painting, tile);
-    ctx.drawImage(content, 0, 0, 1 + 0.5 / edge_px, 1 + 0.5 / edge_px); // no gap between two turned tiles
+    const edge = 1 + 0.5 / place(ctx, painting, tile); // no gap between two turned tiles
+    ctx.fillRect(0, 0, edge, edge);
+    ctx.globalAlpha = painting.isDark ? DARK_OPACITY : OPACITY;
+    ctx.drawImage(content, 0, 0, edge, edge);
+    ctx.globalAlpha = 1;
   }
-  ctx.globalAlpha = 1;
 }
 
 /** @param {OffscreenCanvasRenderingContext2D} ctx @param {Painting} painting @param {{tile: TileId, content?: Content}[]} tiles */
