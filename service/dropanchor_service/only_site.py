@@ -1,4 +1,4 @@
-"""What works for one site only, so far: history, recordings, floor plans, zones, events, and the routes about them."""
+"""What works for one site only, so far: history, recordings, plans, base map, zones, events, and the routes about them."""
 
 from collections.abc import Callable, Sequence
 from threading import Event
@@ -75,4 +75,5 @@ class OnlySite:
             rate_limiter=RateLimiter(settings.http.requests_per_s, settings.http.burst),
             cors_origins=settings.http.cors_origins,
             omlox=self.persistence.omlox,
+            basemap=self.persistence.basemap,
         )

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
+from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
@@ -260,6 +261,7 @@ class Settings(_Section):
     delivery: DeliverySettings = DeliverySettings()
     email: EmailSettings = EmailSettings()
     mqtt: MqttSettings = MqttSettings()
+    basemap: BasemapSettings = BasemapSettings()
     site: Site = Site()
     tags: dict[SettingsId, TagSettings] = {}
     tag_defaults: TagSettings = Field(

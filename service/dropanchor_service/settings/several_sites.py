@@ -27,6 +27,8 @@ def _of_one(settings: Settings) -> Iterator[tuple[str, str]]:
         yield "history", "set history.enabled = false"
     if settings.recording.enabled:
         yield "recording", "set recording.enabled = false"
+    if settings.basemap.tiles is not None:
+        yield "basemap", "leave out basemap.tiles"
     for section in _OF_EVENTS:
         if section in settings.model_fields_set:
             yield section, f"leave out [{section}]"
