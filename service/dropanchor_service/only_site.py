@@ -1,4 +1,4 @@
-"""What works for one site only, so far: history, recordings, plans, base map, zones, events, and the routes about them."""
+"""What works for one site only, so far: history, recordings, plans, base map, zones, events and their routes."""
 
 from collections.abc import Callable, Sequence
 from threading import Event
