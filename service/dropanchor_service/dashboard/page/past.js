@@ -7,8 +7,9 @@ import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
 import { RecentTrack } from "../data/recent.js";
-import { Replay, tracksUrl } from "../data/replay.js";
-import { Track, frameAt } from "../data/tracks.js";
+import { Replay } from "../data/replay.js";
+import { readTracks } from "../data/track_reader.js";
+import { frameAt } from "../data/tracks.js";
 import { TRAIL_S } from "../data/trails.js";
 import { t } from "../i18n/language.js";
 
@@ -65,8 +66,8 @@ export class Past {
     if (!this.#hasHistory) return;
     const end_ms = Date.now();
     const zero_ms = performance.now() - end_ms;
-    const { tracks } = await getJson(tracksUrl(end_ms - TRAIL_S * 1000, end_ms, TRAIL_POINTS)).catch(() => ({ tracks: [] }));
-    for (const track of tracks) trails.prepend(new Track(track), zero_ms);
+    const tracks = await readTracks(end_ms - TRAIL_S * 1000, end_ms, TRAIL_POINTS).catch(() => null);
+    for (const track of tracks ?? []) trails.prepend(track, zero_ms);
     if (!fleet.past) map.redraw();
   }
 
@@ -134,8 +135,7 @@ export class Past {
 
   /** Return the track of the period that is shown, or the recent one. @param {string | null} tag */
   #trackOf(tag) {
-    const period = this.replay.figures.get(tag ?? "");
-    return this.active ? period && new Track(period) : this.#recent.of(tag);
+    return this.active ? this.replay.figures.get(tag) : this.#recent.of(tag);
   }
 
   #readAddress() {

@@ -4,7 +4,7 @@ import { request } from "../data/access.js";
 import { api } from "../data/connection.js";
 import { UNKNOWN, age, count, distance, speed } from "../data/format.js";
 import { t } from "../i18n/language.js";
-import { nanoseconds } from "../data/replay.js";
+import { nanoseconds } from "../data/track_reader.js";
 import { isSi } from "../data/units.js";
 
 export class PastFigures {
@@ -28,16 +28,16 @@ export class PastFigures {
   }
 
   update() {
-    const track = this.replay.figures.get(this.choice.selected ?? "");
-    this.box.hidden = !track;
+    const figure = this.replay.figures.get(this.choice.selected)?.figure;
+    this.box.hidden = !figure;
     this.#part("answer").textContent = "";
-    if (!track) return;
+    if (!figure) return;
     const texts = {
-      distance: distance(track.distance_m, 4),
-      tracked: age(track.tracked_s),
-      mean: speed(track.mean_speed_mps),
-      max: speed(track.max_speed_mps),
-      poses: count(track.poses),
+      distance: distance(figure.distance_m, 4),
+      tracked: age(figure.tracked_s),
+      mean: speed(figure.mean_speed_mps),
+      max: speed(figure.max_speed_mps),
+      poses: count(figure.poses),
     };
     for (const [name, text] of Object.entries(texts)) this.#part(name).textContent = text || UNKNOWN;
   }
