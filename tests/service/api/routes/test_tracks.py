@@ -73,7 +73,7 @@ def test_too_much_a_missing_history_and_a_damaged_one_are_different_problems(
     bench = driven(tmp_path)
     assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tracks")) == "no-history"
     monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
-    monkeypatch.setattr("dropanchor_service.history.overview.MAX_BYTES", -1)
+    monkeypatch.setattr("dropanchor_service.history.covering.MAX_BYTES", -1)
     refused = ask(bench.app(), "GET", "/api/v1/tracks")
     assert (kind_of(refused), "name the tags" in refused.text) == ("invalid-request", True)
     for file in tmp_path.glob("history.sqlite*"):
