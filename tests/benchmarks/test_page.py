@@ -59,9 +59,9 @@ def test_the_cost_of_ten_thousand_moving_tags_on_the_page(tmp_path: Path) -> Non
     head = "| tags | ms per frame | p99 of tasks ms | longest task ms | frames/s | seconds of past per second |"
     report.record(
         "page",
-        f"The processor time of the page's main thread in {MEASURED_S} s while all tags move: all of it by the frames of "
-        f"the map, and its longest tasks; headless Chromium without a graphics card.\n\n{head}\n|---|---|---|---|---|---|\n"
-        + "\n".join(lines),
+        f"The processor time of the page's main thread in {MEASURED_S} s while all tags move: all of it by the frames "
+        "of the map, and its longest tasks; headless Chromium without a graphics card."
+        f"\n\n{head}\n|---|---|---|---|---|---|\n" + "\n".join(lines),
     )
 
 

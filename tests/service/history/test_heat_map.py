@@ -24,9 +24,7 @@ def days(made: Array) -> Array:
     return made
 
 
-def heat_map(
-    path: Path, from_s: float, to_s: float, tags: list[str] | None = None, cell_m: float = 0.5
-) -> HeatMap:
+def heat_map(path: Path, from_s: float, to_s: float, tags: list[str] | None = None, cell_m: float = 0.5) -> HeatMap:
     return TrackReader(path).heat_map(tags, START_NS + round(from_s * SECOND), START_NS + round(to_s * SECOND), cell_m)
 
 
@@ -81,7 +79,11 @@ def test_every_level_gives_the_time_of_the_poses(path: Path) -> None:
     summarise(writer)
     writer.close()
     with sqlite3.connect(path) as file:
-        assert file.execute("SELECT level, count(*) > 0 FROM heat GROUP BY level").fetchall() == [(0, 1), (1, 1), (2, 1)]
+        assert file.execute("SELECT level, count(*) > 0 FROM heat GROUP BY level").fetchall() == [
+            (0, 1),
+            (1, 1),
+            (2, 1),
+        ]
     file.close()
     found = heat_map(path, 100.5, 2.05 * DAY_S)
     assert (found.tags, found.cell_m) == (2, 0.5)

@@ -62,8 +62,7 @@ def heat_map_router(answers: Answers) -> APIRouter:
         summary="Get for how long tags were where",
         description=_DESCRIPTION,
         response_model=HeatMap,
-        responses=example_response(_EXAMPLE)
-        | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
+        responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
     def get_heat_map(query: Annotated[HeatMapQuery, Query()]) -> Response:
         from_ns, to_ns = limits_of(query, answers.now_ns())

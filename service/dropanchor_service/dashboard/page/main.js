@@ -196,6 +196,7 @@ Object.defineProperty(window, "dropanchor", {
     zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
     draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },
     plans: () => plans.store.plans.map((plan) => ({ id: plan.id, placement: plan.placement, isReady: plans.images.isReady(plan.image) })),
+    screen: (/** @type {number} */ x, /** @type {number} */ y) => [map.view.screenX(x), map.view.screenY(y)],
     drawing: () => ({ ...map.stats, still: map.still }),
     anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),
     tags: () => fleet.names.map((tag, row) => ({

@@ -3,6 +3,7 @@
 import { momentIn, momentValues } from "./address.js";
 import { writeAddress } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
+import { HeatPanel } from "../panel/heat_panel.js";
 import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
@@ -46,6 +47,7 @@ export class Past {
     this.page = page;
     this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
+    this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
     page.map.trackOf = (tag) => this.#trackOf(tag);
     page.byId("history").addEventListener("click", () => (this.active ? this.leave() : this.enter()));
     this.bar.addEventListener("leave", () => this.leave());
@@ -88,6 +90,7 @@ export class Past {
   leave() {
     if (!this.active) return;
     this.replay.close();
+    this.heat.hide();
     this.#become(false);
     this.#writeAddress();
     this.page.connection.retry(); // the service sends all poses again

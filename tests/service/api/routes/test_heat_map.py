@@ -54,7 +54,9 @@ def test_tags_groups_a_period_and_the_size_of_a_cell_can_be_chosen(bench: ApiBen
     assert heat_map(bench, "from=0&to=1").cells.seconds == []
 
 
-@pytest.mark.parametrize("query", ["cell_m=0.4", "cell_m=2000", "from=2&to=1", "from=0", "points=3", "tags=", "cell_m=nan"])
+@pytest.mark.parametrize(
+    "query", ["cell_m=0.4", "cell_m=2000", "from=2&to=1", "from=0", "points=3", "tags=", "cell_m=nan"]
+)
 def test_invalid_parameters_are_refused(bench: ApiBench, query: str) -> None:
     assert kind_of(ask(bench.app(), "GET", f"/api/v1/heat-map?{query}")) == "invalid-request"
 
