@@ -34,8 +34,7 @@ CATEGORIES = ["disabled-by-default-devtools.timeline", "__metadata"]
 
 @dataclass(frozen=True)
 class Frames:
-    """What the main thread of the page did: its tasks in ms of its own time, the drawings of the map, and the seconds of
-    past that it showed."""
+    """What the main thread of the page did: the time of its tasks in ms, the drawings of the map, the past in s."""
 
     tasks_ms: list[float]
     drawings: int

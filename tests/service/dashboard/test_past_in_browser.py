@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from playwright.sync_api import Browser, expect
 
@@ -158,6 +159,9 @@ def test_figures_and_the_file_of_a_tag(chromium: Browser, past: tuple[Place, int
             figures.locator("[data-format='csv']").click()
         assert download.value.suggested_filename == "first.csv"
         assert len(download.value.path().read_text().splitlines()) == 60 * MINUTES + 2
+        with page.page.expect_download() as download:
+            figures.locator("[data-format='parquet']").click()
+        assert pq.read_metadata(download.value.path()).num_rows == 60 * MINUTES + 1
         assert page.errors == []
 
 

@@ -1,11 +1,13 @@
 /** What the selected tag did in the shown period, and its track as a file. */
 
-import { request } from "../data/access.js";
+import { RefusedError, request } from "../data/access.js";
 import { api } from "../data/connection.js";
 import { UNKNOWN, age, count, distance, speed } from "../data/format.js";
 import { t } from "../i18n/language.js";
 import { nanoseconds } from "../data/track_reader.js";
 import { isSi } from "../data/units.js";
+
+const GEOREFERENCED = ["geojson", "gpx"];
 
 export class PastFigures {
   /** @param {HTMLElement} box @param {import("../data/replay.js").Replay} replay @param {import("../page/choice.js").Choice} choice */
@@ -23,7 +25,7 @@ export class PastFigures {
 
   /** Whether the site has a georeference, without which there are no latitudes and longitudes. @param {boolean} is */
   set georeferenced(is) {
-    for (const button of this.box.querySelectorAll("button")) button.disabled = !is && button.dataset.format !== "csv";
+    for (const button of this.box.querySelectorAll("button")) button.disabled = !is && GEOREFERENCED.includes(button.dataset.format ?? "");
     this.#part("no-georeference").hidden = is;
   }
 
@@ -56,8 +58,9 @@ export class PastFigures {
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
       this.#part("answer").textContent = t("figures.saved", { file: `${tag}.${format}` });
-    } catch {
-      this.#part("answer").textContent = t("figures.failed");
+    } catch (error) {
+      const lacks = format === "parquet" && error instanceof RefusedError;
+      this.#part("answer").textContent = t(lacks ? "figures.no_parquet" : "figures.failed");
     }
   }
 

@@ -93,6 +93,7 @@ export default {
   "figures.preparing": "Die Datei wird vorbereitet …",
   "figures.saved": "{file} gespeichert.",
   "figures.failed": "Die Datei ließ sich nicht laden. Versuchen Sie es erneut.",
+  "figures.no_parquet": "Dieser Dienst kann kein Parquet schreiben. Installieren Sie dort dropanchor-service[parquet].",
   "figures.si": "Dateien haben SI-Einheiten: m und m/s.",
   "figures.no_georeference": "GeoJSON und GPX brauchen Breite und Länge: Legen Sie zuerst die Georeferenz des Standorts fest.",
   "plots.title": "Messungen",

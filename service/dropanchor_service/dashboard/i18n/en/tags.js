@@ -93,6 +93,7 @@ export default {
   "figures.preparing": "Preparing the file …",
   "figures.saved": "Saved {file}.",
   "figures.failed": "The file could not be loaded. Try again.",
+  "figures.no_parquet": "This service cannot write Parquet. Install dropanchor-service[parquet] there.",
   "figures.si": "Files are in SI units: m and m/s.",
   "figures.no_georeference": "GeoJSON and GPX need latitude and longitude: set the site's georeference first.",
   "plots.title": "Measurements",
