@@ -53,6 +53,7 @@ const plans = new Plans(map, roster, choice, connection, setup);
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
+table.isElsewhere = (row) => map.isElsewhere(row);
 const measure = new Measure(map, byId("measure"), byId("measured"));
 map.pressed = (px, py) => measure.press(px, py) || zones.press(px, py);
 const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });

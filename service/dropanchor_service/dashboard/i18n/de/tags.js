@@ -28,6 +28,7 @@ export default {
   "care.needs": "Zu prüfen",
   "care.what": "Tags, um die sich jemand kümmern sollte. Klicken zeigt nur diese.",
   "care.list": "Was dieses Tag braucht",
+  "table.elsewhere": "{tag}, auf einem anderen Stockwerk",
   "table.how": "Tags. Pfeiltasten bewegen, Enter wählt aus.",
   "table.tag": "Tag",
   "table.state": "Zustand",
