@@ -7,12 +7,12 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 DISTRIBUTIONS := -e schemas -e tag_client -e 'service[evaluation,foxglove,mqtt,parquet,ros2]'
 PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service
-PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
+PARALLEL := -n 4 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
 
 RESULTS := service/docs/results
 
-.PHONY: help demo test check bench results install chromium mosquitto clean
+.PHONY: help demo test check bench results install kernels chromium mosquitto clean
 .DEFAULT_GOAL := help
 
 help:
@@ -38,11 +38,15 @@ $(STAMP): $(PYPROJECTS)
 demo: install
 	@exec $(BIN)/dropanchor demo $(DEMO)
 
+kernels: install
+	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
+
 chromium:
-	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
-		echo '== installing chromium for the browser tests'; \
-		apt-get update -qq && apt-get install -y -qq chromium >/dev/null; } || { \
-		echo 'The browser tests need Chromium: install the package chromium and run make test again.' >&2; exit 1; }
+	@command -v chromium-headless-shell >/dev/null || { \
+		echo '== installing chromium-headless-shell for the browser tests'; \
+		apt-get update -qq && apt-get install -y -qq chromium-headless-shell >/dev/null; } || \
+		command -v chromium >/dev/null || command -v chromium-browser >/dev/null || { \
+		echo 'The browser tests need Chromium: install chromium-headless-shell or chromium and run make test again.' >&2; exit 1; }
 
 mosquitto:
 	@command -v mosquitto >/dev/null || test -x /usr/sbin/mosquitto || { \

@@ -7,6 +7,7 @@ PAGE = PAGES / "performance.md"
 _WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
 SOURCES = {
     "capacity": _WHOLE,
+    "delivery": ("delivery",),
     "engines": ("estimation",),
     "idle": _WHOLE,
     "overload": _WHOLE,

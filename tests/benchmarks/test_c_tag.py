@@ -14,6 +14,8 @@ from support.relay import running_relay
 from support.zenoh_pico import zenoh_pico
 from support.zenoh_router import free_port, running_router, wait_until
 
+pytestmark = pytest.mark.benchmark
+
 PAGE = PAGES / "tags.md"
 EXAMPLES = ROOT / "tag_client/c/examples"
 MEASURED_S = 20.0

@@ -4,8 +4,12 @@ import json
 import statistics
 from collections.abc import Callable
 
+import pytest
+
 from support.commands import python
 from support.zenoh_router import free_endpoint, running_router
+
+pytestmark = pytest.mark.benchmark
 
 IMPORT = """
 import time

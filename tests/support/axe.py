@@ -1,5 +1,6 @@
 """The accessibility checker axe-core. It is downloaded from npm once per run and never stored in the repository."""
 
+import fcntl
 import shutil
 import subprocess
 import tarfile
@@ -8,11 +9,26 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page
 
+from support.browser import every_look
+
 _PACKAGE = "axe-core@4.10.3"
 
 
 def axe_source(folder: Path) -> str:
-    """Download the script into a folder and return its text. Skip the test where npm or its registry is missing."""
+    """Return the text of the script, and keep it in the folder. One process downloads it while the others wait.
+
+    Skip the test where npm or its registry is missing.
+    """
+    folder.mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        script = folder / "axe.min.js"
+        if not script.is_file():
+            script.write_bytes(_downloaded(folder))
+        return script.read_text()
+
+
+def _downloaded(folder: Path) -> bytes:
     npm = shutil.which("npm")
     if npm is None:
         pytest.skip("npm is not installed: the accessibility tests fetch axe-core with it")
@@ -27,15 +43,15 @@ def axe_source(folder: Path) -> str:
     with tarfile.open(packed[0]) as archive:
         script = archive.extractfile("package/axe.min.js")
         assert script is not None
-        return script.read().decode()
+        return script.read()
 
 
 def violations(page: Page, axe: str) -> list[str]:
-    """Return the violations that axe-core finds on a page, each with its rule, element and reason."""
+    """Return the violations that axe-core finds in every look of a page, each with its rule, element and reason."""
     page.evaluate(axe)
-    found = page.evaluate("axe.run(document, { resultTypes: ['violations'] })")
     return [
-        f"{rule['id']}: {node['target']} {node['failureSummary']}"
-        for rule in found["violations"]
+        f"{look}: {rule['id']}: {node['target']} {node['failureSummary']}"
+        for look in every_look(page)
+        for rule in page.evaluate("axe.run(document, { resultTypes: ['violations'] })")["violations"]
         for node in rule["nodes"]
     ]

@@ -10,20 +10,35 @@ from typing import Any, Literal
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
+_EXECUTABLES = ("chromium-headless-shell", "chromium", "chromium-browser")
 _ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 Scheme = Literal["light", "dark"]
 
-LOOKS = [((1280, 800), "light"), ((1280, 800), "dark"), ((820, 1180), "light"), ((390, 844), "dark")]
-every_look = pytest.mark.parametrize(
-    ("size", "scheme"), LOOKS, ids=lambda value: value if isinstance(value, str) else f"{value[0]}x{value[1]}"
-)
-"""Every size and both colour schemes. The other two pairs would cost minutes."""
+LOOKS: list[tuple[tuple[int, int], Scheme]] = [
+    ((1280, 800), "light"),
+    ((1280, 800), "dark"),
+    ((820, 1180), "light"),
+    ((390, 844), "dark"),
+]
+"""Every size, and both colour schemes."""
+
+
+def every_look(page: Page) -> Iterator[str]:
+    """Show a loaded page in every look, then in the first one again. Yield the name of each, such as `390x844-dark`."""
+    for (width, height), scheme in [*LOOKS, LOOKS[0]]:
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme)
+        page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        yield f"{width}x{height}-{scheme}"
 
 
 @contextmanager
 def running_chromium() -> Iterator[Browser]:
-    """Run Debian's Chromium, driven by Playwright. An event loop runs in this thread until the block ends."""
-    executable = shutil.which("chromium") or shutil.which("chromium-browser")
+    """Run Debian's Chromium, driven by Playwright. An event loop runs in this thread until the block ends.
+
+    Chromium without the code of its windows comes first: the tests take a sixth less time with it.
+    """
+    executable = next(filter(None, map(shutil.which, _EXECUTABLES)), None)
     if executable is None:
         pytest.skip("Chromium is not installed: the browser tests need it")
     with sync_playwright() as playwright:

@@ -39,3 +39,8 @@ def compile_once() -> None:
     with (folder / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
+
+
+if __name__ == "__main__":
+    use_cache_of_these_sources()
+    compile_once()

@@ -8,7 +8,6 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page
 
-from support.browser import Scheme
 
 PHONE = (390, 844)
 SENSORS = """
@@ -142,9 +141,9 @@ class TagPage:
 
 
 @contextmanager
-def tag_page(browser: Browser, url: str, *scripts: str, scheme: Scheme = "light", **options: Any) -> Iterator[TagPage]:
+def tag_page(browser: Browser, url: str, *scripts: str, **options: Any) -> Iterator[TagPage]:
     """Open the page on a phone's screen. scripts: run in it before its own."""
-    context = browser.new_context(viewport={"width": PHONE[0], "height": PHONE[1]}, color_scheme=scheme, **options)
+    context = browser.new_context(viewport={"width": PHONE[0], "height": PHONE[1]}, **options)
     for script in (SENSORS, *scripts):
         context.add_init_script(f"{{ {script} }}")
     opened = TagPage(context.new_page())

@@ -7,6 +7,7 @@ from playwright.sync_api import Browser
 
 from dropanchor_service.api.app import DASHBOARD
 from service.dashboard.place import Place, live_api_bench
+from support.axe import axe_source
 from support.browser import running_chromium
 from support.http_server import running_server
 
@@ -22,3 +23,9 @@ def place() -> Iterator[Place]:
     bench = live_api_bench()
     with running_server(bench.app(DASHBOARD, endpoints=("tcp/127.0.0.1:19747",)), bench.stopping) as port:
         yield Place(bench, f"http://127.0.0.1:{port}/")
+
+
+@pytest.fixture(scope="session")
+def axe(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> str:
+    base = tmp_path_factory.getbasetemp()
+    return axe_source((base if worker_id == "master" else base.parent) / "axe")  # the workers share the parent

@@ -9,16 +9,11 @@ from playwright.sync_api import Browser
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_api_bench
-from support.axe import axe_source, violations
-from support.browser import Scheme, WatchedPage, every_look, watched_page
+from support.axe import violations
+from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return axe_source(tmp_path_factory.mktemp("axe"))
 
 
 def show_every_state(place: Place) -> None:
@@ -31,24 +26,22 @@ def assert_no_violation(page: WatchedPage, axe: str) -> None:
     assert violations(page.page, axe) == []
 
 
-@every_look
 def test_no_violation_without_a_tag(
-    chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
+    chromium: Browser, place: Place, axe: str
 ) -> None:
-    with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.page.locator("#empty").wait_for(state="visible")
         assert_no_violation(page, axe)
 
 
-@every_look
 def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_selected(
-    chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
+    chromium: Browser, place: Place, axe: str
 ) -> None:
-    with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         show_every_state(place)
         page.page.locator("tr[data-tag='lost']").wait_for()
         assert_no_violation(page, axe)
-        for state in ("ambiguous", "lost", "degraded", "tracking"):
+        for state in ("ambiguous", "tracking"):
             show_every_state(place)
             page.page.locator(f"tr[data-tag='{state}']").click()
             assert_no_violation(page, axe)
@@ -57,16 +50,15 @@ def test_no_violation_with_tags_in_every_state_fresh_and_old_listed_hidden_and_s
         assert_no_violation(page, axe)
 
 
-@every_look
 def test_no_violation_after_the_connection_is_lost(
-    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int]
+    chromium: Browser, axe: str
 ) -> None:
     bench = live_api_bench()
     with ExitStack() as pages:
         with running_server(bench.app(DASHBOARD), bench.stopping) as port:
             place = Place(bench, f"http://127.0.0.1:{port}/")
             page = pages.enter_context(
-                watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce")
+                watched_page(chromium, place.url, reduced_motion="reduce")
             )
             show_every_state(place)
             page.page.locator("tr[data-tag='tracking']").click()

@@ -8,19 +8,14 @@ from playwright.sync_api import Browser
 from dropanchor_schemas.zones import LostRule, TooCloseRule
 from service.dashboard.alert_place import alert_place, happen, put_mail
 from service.dashboard.zone_place import ZonePlace, served
-from support.axe import axe_source, violations
-from support.browser import Scheme, every_look, watched_page
+from support.axe import violations
+from support.browser import every_look, watched_page
 
 pytestmark = pytest.mark.browser
 
 WIDER_THAN_ITS_PLACE = """() => [...document.querySelectorAll("#alerts *")]
     .filter((one) => one.checkVisibility() && one.getBoundingClientRect().right > innerWidth + 1)
     .map((one) => one.outerHTML)"""
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return axe_source(tmp_path_factory.mktemp("axe"))
 
 
 def busy_place() -> ZonePlace:
@@ -37,20 +32,20 @@ def busy_place() -> ZonePlace:
     return place
 
 
-@every_look
 def test_no_violation_in_the_lists_and_the_forms(
-    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
+    chromium: Browser, axe: str, tmp_path: Path
 ) -> None:
     place = busy_place()
     with (
         served(place),
-        watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page,
+        watched_page(chromium, place.url, reduced_motion="reduce") as page,
     ):
 
         def check(view: str) -> None:
             page.page.screenshot(path=tmp_path / f"{view}.png")
             assert violations(page.page, axe) == [], view
-            assert page.page.evaluate(WIDER_THAN_ITS_PLACE) == [], view
+            for look in every_look(page.page):
+                assert page.page.evaluate(WIDER_THAN_ITS_PLACE) == [], (view, look)
 
         page.wait_for("dropanchor.events() && dropanchor.destinations().length === 2")
         page.page.locator("#alerts summary").click()

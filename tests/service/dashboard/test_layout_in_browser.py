@@ -1,6 +1,7 @@
 """Every text on the page is readable on every size of screen."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,14 +11,12 @@ from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import State
 from service.dashboard.place import Place, live_api_bench
-from support.browser import Scheme, WatchedPage, watched_page
+from support.browser import WatchedPage, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
 
 SIZES = [(390, 844), (820, 1180), (900, 800), (1024, 768), (1280, 800), (1440, 900)]
-every_size = pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
-light_and_dark = pytest.mark.parametrize("scheme", ["light", "dark"])
 
 CUT_OFF = """() => [...document.querySelectorAll("th, tbody td, tbody .name, #detail dd")]
     .filter((cell) => cell.checkVisibility() && !cell.classList.contains("c-online"))
@@ -38,40 +37,49 @@ BOXES = """() => {
 }"""
 
 
-@every_size
-@light_and_dark
-def test_no_number_is_cut_off(chromium: Browser, place: Place, size: tuple[int, int], scheme: Scheme) -> None:
+def every_size(page: WatchedPage) -> Iterator[str]:
+    """Show a page in every size, one after another. Yield the name of each."""
+    for width, height in SIZES:
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        yield f"{width}x{height}"
+
+
+def test_no_number_is_cut_off(chromium: Browser, place: Place) -> None:
     place.move("a", x=-13.45, y=-56.78, speed=-10.31, sigma_pos=0.25, cov=np.eye(3), range=45.67, heading=2.0)
     place.move("b", x=-123.45, y=-9876.5, speed=-0.31, sigma_pos=123.4, cov=np.eye(3) * 1e4)
     place.move("c", x=-54321.0, y=98765.4, speed=12.5, sigma_pos=1234.5, state=State.DEGRADED)
     place.move("d", x=1.0, y=1.0, state=State.AMBIGUOUS)
     place.move("e", state=State.INITIALISING, x=np.nan, y=np.nan)
-    with watched_page(chromium, place.url, scheme=scheme, size=size) as page:
+    with watched_page(chromium, place.url) as page:
         page.page.locator("tr[data-tag='e']").wait_for()
-        for column in ("x", "age"):  # the arrow of the sort direction needs space as well
-            if page.page.locator(f"th.c-{column}").is_visible():
-                page.page.locator(f"th.c-{column} button").click()
-            assert page.page.evaluate(CUT_OFF) == []
+        for size in every_size(page):
+            for column in ("x", "age"):  # the arrow of the sort direction needs space as well
+                if page.page.locator(f"th.c-{column}").is_visible():
+                    page.page.locator(f"th.c-{column} button").click()
+                assert page.page.evaluate(CUT_OFF) == [], size
         page.page.locator("tr[data-tag='a'] td.c-x").click()
         page.page.locator("#detail").wait_for()
-        assert page.page.evaluate(CUT_OFF) == []
+        for size in every_size(page):
+            assert page.page.evaluate(CUT_OFF) == [], size
 
 
-@every_size
-def test_names_that_differ_at_the_end_look_different(chromium: Browser, place: Place, size: tuple[int, int]) -> None:
+def test_names_that_differ_at_the_end_look_different(chromium: Browser, place: Place) -> None:
     names = [f"warehouse-north-hall-forklift-{i}-of-the-early-shift-{i}" for i in (1, 2, 11)] + ["WWWWWWWWWWWW" * 4]
     place.move(*names, x=np.arange(4.0), y=1.0)
-    with watched_page(chromium, place.url, size=size) as page:
+    with watched_page(chromium, place.url) as page:
         page.page.locator(f"tr[data-tag='{names[2]}']").wait_for()
-        assert page.page.evaluate(CUT_OFF) == []
         cells = page.page.locator("tbody tr:visible td.c-tag")
-        assert len(set(cells.all_inner_texts())) == len(names)
+        for size in every_size(page):
+            assert page.page.evaluate(CUT_OFF) == [], size
+            assert len(set(cells.all_inner_texts())) == len(names), size
         assert {cell.get_attribute("title") for cell in cells.all()} == set(names)
         assert {cell.get_attribute("aria-label") for cell in cells.all()} == set(names)
         cells.first.click()
         title = page.page.locator("#detail h2")
-        assert title.inner_text() in names
-        assert title.evaluate("title => title.scrollWidth <= title.clientWidth")
+        for size in every_size(page):
+            assert title.inner_text() in names
+            assert title.evaluate("title => title.scrollWidth <= title.clientWidth"), size
 
 
 def overlap(a: list[float], b: list[float]) -> bool:
@@ -91,27 +99,26 @@ def misplaced(page: WatchedPage) -> list[list[float]]:
     ]
 
 
-@every_size
-def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(
-    chromium: Browser, place: Place, size: tuple[int, int]
-) -> None:
+def test_show_all_keeps_every_tag_and_label_clear_of_the_edges_and_the_buttons(chromium: Browser, place: Place) -> None:
     corners = [(-9.0, -6.0), (9.0, -6.0), (9.0, 6.0), (-9.0, 6.0), (9.0, 0.0), (0.0, 6.0)]
     x, y = zip(*corners, strict=True)
     names = [f"forklift-{i}" for i in range(len(corners))]
     place.move(*names, x=x, y=y)
-    with watched_page(chromium, place.url, size=size, reduced_motion="reduce") as page:
-        page.wait_for_map(len(corners))
-        page.page.locator("#zoom-in").click()
-        page.page.locator("#zoom-in").click()
-        page.page.locator("#fit").click()
-        page.wait_for_map(len(corners))
-        assert len(page.page.evaluate("dropanchor.drawing().labels")) >= 4
-        assert misplaced(page) == []
-        for step in range(1, 20):  # also while the tags spread
-            wider = [at * (1 + step / 40) for at in x]
-            place.move(*names, x=wider, y=y)
-            page.wait_for(f"dropanchor.tags()[1].x === Math.fround({wider[1]}) && dropanchor.drawing().still")
-            assert misplaced(page) == []
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
+        for size in every_size(page):
+            place.move(*names, x=x, y=y)
+            page.wait_for_map(len(corners))
+            page.page.locator("#zoom-in").click()
+            page.page.locator("#zoom-in").click()
+            page.page.locator("#fit").click()
+            page.wait_for_map(len(corners))
+            assert len(page.page.evaluate("dropanchor.drawing().labels")) >= 4, size
+            assert misplaced(page) == [], size
+            for step in range(1, 20, 2):  # also while the tags spread
+                wider = [at * (1 + step / 40) for at in x]
+                place.move(*names, x=wider, y=y)
+                page.wait_for(f"dropanchor.tags()[1].x === Math.fround({wider[1]}) && dropanchor.drawing().still")
+                assert misplaced(page) == [], size
 
 
 def test_the_label_of_a_selected_tag_at_the_edge_stays_on_the_map(chromium: Browser, place: Place) -> None:

@@ -17,8 +17,8 @@ from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import Frame, State
 from dropanchor_service.history.tracks import Retention
 from service.dashboard.place import Place, live_api_bench
-from support.axe import axe_source, violations
-from support.browser import Scheme, WatchedPage, every_look, watched_page
+from support.axe import violations
+from support.browser import WatchedPage, every_look, watched_page
 from support.http_server import running_server
 
 pytestmark = pytest.mark.browser
@@ -188,7 +188,7 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
     with watched_page(chromium, place.url) as page:
         page.wait_for_map(3)
         page.page.locator("#history").click()
-        page.page.locator("#past").wait_for()
+        wait_for_past(page, 3)
         page.page.locator("[data-part='to']").fill("2020-01-02T00:00:00")
         page.page.locator("[data-part='from']").fill("2020-01-01T00:00:00")
         page.page.locator(".period button:not([data-part])").click()
@@ -261,25 +261,20 @@ def test_a_heat_map_shows_where_tags_were_and_how_much_is_left_out(chromium: Bro
         assert page.errors == []
 
 
-@every_look
 def test_the_past_is_accessible_and_nothing_is_cut_off(
-    chromium: Browser, past: tuple[Place, int], axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
+    chromium: Browser, past: tuple[Place, int], axe: str, tmp_path: Path
 ) -> None:
     place, end_ns = past
     link = link_to(place, end_ns, 155, tag="second", heat="1")
-    with watched_page(chromium, link, scheme=scheme, size=size, reduced_motion="reduce") as page:
+    with watched_page(chromium, link, reduced_motion="reduce") as page:
         wait_for_past(page, 3)
         expect(page.page.locator("#heat [data-part='note']")).to_contain_text("Most:")
-        page.page.screenshot(path=tmp_path / f"past-{size[0]}-{scheme}.png")
         assert violations(page.page, axe) == []
-        script = (
-            "[...document.querySelectorAll('.past *, #past-figures *, #heat *')].filter((e) => e.checkVisibility() "
-        )
-        script += "&& e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML)"
-        assert page.page.evaluate(script) == []
+        cut = "[...document.querySelectorAll('.past *, #past-figures *, #heat *')].filter((e) => e.checkVisibility() "
+        cut += "&& e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML)"
+        site = "((site) => site.scrollWidth <= site.clientWidth)(document.getElementById('site'))"
+        for look in every_look(page.page):
+            page.page.screenshot(path=tmp_path / f"past-{look}.png")
+            assert page.page.evaluate(cut) == [], look
+            assert page.page.evaluate(site), look
         assert page.errors == []
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return axe_source(tmp_path_factory.mktemp("axe"))

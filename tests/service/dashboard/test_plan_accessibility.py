@@ -8,13 +8,10 @@ from playwright.sync_api import Browser, expect
 from dropanchor_schemas.plans import ControlPoint, Floor
 from dropanchor_schemas.site import TagSettings
 from service.dashboard.plan_place import PlanPlace, plan_place
-from service.dashboard.test_accessibility import axe
 from service.dashboard.test_plans_in_browser import edit, file, open_panel
 from support.axe import violations
-from support.browser import Scheme, WatchedPage, every_look, watched_page
+from support.browser import WatchedPage, watched_page
 from support.plan_files import svg_file
-
-__all__ = ["axe"]  # a fixture
 
 pytestmark = pytest.mark.browser
 
@@ -39,13 +36,12 @@ def hall(place: PlanPlace) -> None:
     place.put("upper", svg_file(), 0.01, Floor(name="Upper floor", bottom_m=3.0, top_m=6.0))
 
 
-@every_look
 def test_no_violation_while_plans_are_shown_uploaded_and_aligned(
-    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
+    chromium: Browser, axe: str, tmp_path: Path
 ) -> None:
     with plan_place() as place:
         hall(place)
-        with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+        with watched_page(chromium, place.url, reduced_motion="reduce") as page:
 
             def check(view: str) -> None:
                 page.page.screenshot(path=tmp_path / f"{view}.png")

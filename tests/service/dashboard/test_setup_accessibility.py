@@ -5,21 +5,18 @@ from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.site import Anchor, TagSettings
 from service.dashboard.place import Place
-from service.dashboard.test_accessibility import assert_no_violation, axe
-from support.browser import Scheme, every_look, watched_page
-
-__all__ = ["axe"]  # a fixture
+from service.dashboard.test_accessibility import assert_no_violation
+from support.browser import watched_page
 
 pytestmark = pytest.mark.browser
 
 
-@every_look
 def test_no_violation_while_a_site_is_set_up(
-    chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
+    chromium: Browser, place: Place, axe: str
 ) -> None:
     place.bench.answers.site.set_tag("cart", TagSettings(name="Forklift 1", group="forklifts", colour="#d97a0a"))
     place.move("cart", x=1.0, y=1.0)
-    with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.page.get_by_role("button", name="Set up anchors").click()
         with page.page.expect_response(lambda response: "/anchors/17" in response.url):
             page.page.get_by_role("button", name="17: ").click()

@@ -11,8 +11,8 @@ from playwright.sync_api import Browser, Page, expect
 
 from dropanchor_service.estimation.columns import Frame, State
 from service.dashboard.place import Place
-from support.axe import axe_source, violations
-from support.browser import Scheme, every_look, watched_page
+from support.axe import violations
+from support.browser import Scheme, watched_page
 
 pytestmark = pytest.mark.browser
 
@@ -27,11 +27,6 @@ COLOURS = """(names) => {
     const style = getComputedStyle(document.documentElement);
     return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }"""
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return axe_source(tmp_path_factory.mktemp("axe"))
 
 
 def show_every_state(place: Place) -> None:
@@ -139,12 +134,11 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(
         assert watched.errors == []
 
 
-@every_look
 def test_no_violation_in_the_dialogs_and_on_the_wall(
-    chromium: Browser, place: Place, axe: str, scheme: Scheme, size: tuple[int, int]
+    chromium: Browser, place: Place, axe: str
 ) -> None:
     show_every_state(place)
-    with watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce") as page:
+    with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.page.get_by_role("button", name="Display").click()
         assert violations(page.page, axe) == []
         page.page.get_by_role("button", name="Keyboard").click()

@@ -7,15 +7,10 @@ import pytest
 from playwright.sync_api import Browser
 
 from service.dashboard.zone_place import ZonePlace, disc, served, square, zone_place
-from support.axe import axe_source, violations
-from support.browser import Scheme, WatchedPage, every_look, watched_page
+from support.axe import violations
+from support.browser import WatchedPage, watched_page
 
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture(scope="module")
-def axe(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return axe_source(tmp_path_factory.mktemp("axe"))
 
 
 def busy_yard() -> ZonePlace:
@@ -43,15 +38,14 @@ def draw_a_crossing(page: WatchedPage) -> None:
     page.page.get_by_role("form", name="Zone", exact=True).get_by_role("alert").wait_for()
 
 
-@every_look
 def test_no_violation_in_the_lists_the_editor_and_without_a_connection(
-    chromium: Browser, axe: str, scheme: Scheme, size: tuple[int, int], tmp_path: Path
+    chromium: Browser, axe: str, tmp_path: Path
 ) -> None:
     place = busy_yard()
     with ExitStack() as pages:
         with served(place):
             page = pages.enter_context(
-                watched_page(chromium, place.url, scheme=scheme, size=size, reduced_motion="reduce")
+                watched_page(chromium, place.url, reduced_motion="reduce")
             )
 
             def check(view: str) -> None:

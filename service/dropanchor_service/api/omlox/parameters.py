@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Annotated, Any, Literal
-from uuid import UUID
+from uuid import UUID, uuid4
 
 from fastapi import Depends, Path, Request
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -103,6 +103,22 @@ ProviderId = Annotated[str, Depends(_provider_id)]
 TrackableId = Annotated[UUID, Path(alias="trackable_id")]
 ZoneId = Annotated[UUID, Path(alias="zone_id")]
 FenceId = Annotated[UUID, Path(alias="fence_id")]
+
+
+def id_of_new(identifier: UUID | None) -> UUID:
+    """Return the id that a client chose for a new object, or a random one. The id of zeros is no choice."""
+    return identifier if identifier is not None and identifier.int else uuid4()
+
+
+def require_id(expected: UUID | str, stated: UUID | str | None) -> None:
+    """Raise ProblemError if a body states another id than the path. The id of zeros states none."""
+    if stated not in (None, expected, UUID(int=0)):
+        raise ProblemError(Kind.ID_DIFFERS, f"The id is {expected} in the path and {stated} in the body.")
+
+
+def exists_already(name: str, identifier: UUID | str) -> ProblemError:
+    """Return the problem of creating an object with an id that another one has."""
+    return ProblemError(Kind.EXISTS_ALREADY, f"There is a {name} with the id {identifier}: change it with PUT.")
 
 
 def one(found: Answer, query: PlaceQuery, as_feature: Callable[[Answer], Answer]) -> Response:

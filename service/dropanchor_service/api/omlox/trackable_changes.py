@@ -8,6 +8,7 @@ from dropanchor_service.api.omlox.assets import Asset
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.models import Trackable
 from dropanchor_service.api.omlox.own_properties import without_own
+from dropanchor_service.api.omlox.parameters import exists_already, require_id
 from dropanchor_service.api.routes.parameters import saving
 from dropanchor_service.api.routes.tags import register_tag
 from dropanchor_service.store.items import FullError, Item, NamedItems
@@ -18,15 +19,15 @@ def add(hub: Hub, trackable: Trackable) -> Asset:
     """Save a new trackable. Raises ProblemError."""
     assert trackable.id is not None
     if hub.assets.find(trackable.id) is not None:
-        raise ProblemError(Kind.EXISTS_ALREADY, f"There is a trackable with the id {trackable.id}: change it with PUT.")
+        raise exists_already("trackable", trackable.id)
     return _save(hub, trackable)
 
 
 def change(hub: Hub, asset: Asset, trackable: Trackable) -> Asset:
     """Save a trackable in place of another one. Raises ProblemError."""
     identifier = asset.trackable.id
-    if trackable.id is not None and trackable.id.int and trackable.id != identifier:
-        raise ProblemError(Kind.ID_DIFFERS, f"The id is {identifier} in the path and {trackable.id} in the body.")
+    assert identifier is not None
+    require_id(identifier, trackable.id)
     if asset.own_tag is None:
         return _save(hub, trackable.model_copy(update={"id": identifier}))
     tag = asset.own_tag

@@ -5,7 +5,7 @@ import { newId } from "../zones/editor.js";
 import { t } from "../i18n/language.js";
 import { refusal } from "../i18n/said.js";
 
-/** @typedef {import("./items.js").Item} Item */
+/** @typedef {import("../data/items.js").Item} Item */
 
 /** Event: "change". "saved" when something was saved or deleted. */
 export class ItemEditor extends EventTarget {
@@ -17,7 +17,7 @@ export class ItemEditor extends EventTarget {
   conflict = false;
   #etag = /** @type {string | null} */ (null);
 
-  /** @param {import("./items.js").Items} items @param {() => readonly Item[]} known */
+  /** @param {import("../data/items.js").Items} items @param {() => readonly Item[]} known */
   constructor(items, known) {
     super();
     this.items = items;

@@ -2,7 +2,7 @@
 
 import { readMeasure, writeMeasure } from "../data/units.js";
 
-/** @typedef {import("./items.js").Item} Item @typedef {HTMLInputElement | HTMLTextAreaElement} Field */
+/** @typedef {import("../data/items.js").Item} Item @typedef {HTMLInputElement | HTMLTextAreaElement} Field */
 
 export class ItemForm {
   /** What is shown, so that what is being typed is not overwritten. @type {Item | null} */

@@ -3,7 +3,7 @@
 import { age, distance, percent, speedLimit } from "../data/format.js";
 import { has, t } from "../i18n/language.js";
 
-/** @typedef {import("./items.js").Item} Item */
+/** @typedef {import("../data/items.js").Item} Item */
 /** @typedef {{destination: Item, has_secret: boolean, pending: number, oldest_ns: number | null, dead: number, problem: string | null}} DestinationState */
 
 /** Return where events go, such as `e-mail to shift@example.com`. @param {Item} destination */

@@ -56,8 +56,8 @@ export class ZoneEditor extends EventTarget {
   /** Edit a zone as it is now. @param {string} id */
   async open(id) {
     try {
-      const { zone, etag } = await this.store.read(id);
-      this.zone = zone;
+      const { item, etag } = await this.store.items.read(id);
+      this.zone = /** @type {Zone} */ (/** @type {unknown} */ (item));
       this.#etag = etag;
       this.drawing = false;
       this.#say("");
@@ -100,7 +100,7 @@ export class ZoneEditor extends EventTarget {
     const done = await this.#attempt(async () => {
       const zone = /** @type {Zone} */ (this.zone);
       if (this.#etag === null) id = await this.#create(zone);
-      else await this.store.save(zone, this.#etag);
+      else await this.store.items.save(zone, this.#etag);
     });
     return done ? id : null;
   }
@@ -109,7 +109,7 @@ export class ZoneEditor extends EventTarget {
   async #create(zone) {
     const id = newId(zone.name, this.store.zones);
     try {
-      await this.store.save({ ...zone, id }, null);
+      await this.store.items.save({ ...zone, id }, null);
       return id;
     } catch (error) {
       if (!(error instanceof ChangedMeanwhileError)) throw error;
@@ -121,13 +121,14 @@ export class ZoneEditor extends EventTarget {
 
   async remove() {
     const { id } = /** @type {Zone} */ (this.zone);
-    return this.#attempt(() => this.store.remove(id, this.#etag ?? ""));
+    return this.#attempt(() => this.store.items.remove(id, this.#etag ?? ""));
   }
 
   /** @param {() => Promise<void>} send */
   async #attempt(send) {
     try {
       await send();
+      await this.store.refresh();
       this.close();
       return true;
     } catch (error) {

@@ -58,7 +58,7 @@ export class ZoneForm {
     put(this.#part("how"), isCircle ? circleHelp(this.editor.drawing) : polygonHelp(shape.points.length, this.editor.drawing));
     this.#part("radius").hidden = !isCircle;
     this.#part("corner").hidden = isCircle;
-    this.#part("delete").hidden = this.editor.isNew || !this.editor.store.mayDelete;
+    this.#part("delete").hidden = this.editor.isNew || !this.editor.store.isAdmin;
     for (const name of /** @type {const} */ (["enter", "exit"])) this.#field(name).checked = zone[name];
     for (const name of /** @type {const} */ (["tags", "groups"])) this.#fill(name, zone[name].join(", "));
     for (const name of /** @type {const} */ (["name", "colour", "dwell_s", "delay_s"])) this.#fill(name, String(zone[name] ?? ""));

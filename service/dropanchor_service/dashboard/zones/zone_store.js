@@ -1,7 +1,7 @@
 /** The zones of the service, and how many tags are in each. */
 
-import { request, sendChange } from "../data/access.js";
-import { api, getJson } from "../data/connection.js";
+import { Items } from "../data/items.js";
+import { Refreshed } from "../data/refreshed.js";
 
 /** @typedef {{type: "polygon", points: [number, number][]} | {type: "circle", x: number, y: number, radius_m: number}} Shape */
 /**
@@ -19,71 +19,21 @@ import { api, getJson } from "../data/connection.js";
  * @property {string[]} groups
  */
 
-const PERIOD_MS = 3000;
-
-/** @param {string} id */
-const pathOf = (id) => api(`zones/${encodeURIComponent(id)}`);
-
 /** Event: "change". */
-export class ZoneStore extends EventTarget {
+export class ZoneStore extends Refreshed {
+  items = new Items("zones", (answer) => answer);
   /** @type {Zone[]} */
   zones = [];
   /** Tags inside, by zone. @type {Map<string, number>} */
   inside = new Map();
-  /** @type {"none" | "read" | "write" | "admin"} */
-  scope = "none";
-  #timer = 0;
 
-  get mayWrite() {
-    return this.scope === "write" || this.scope === "admin";
+  get paths() {
+    return ["zones", "zone-occupancy"];
   }
 
-  get mayDelete() {
-    return this.scope === "admin";
-  }
-
-  /** Request everything now and every few seconds, until `stop`. */
-  async start() {
-    this.stop();
-    this.scope = await getJson(api("access")).then(({ scope }) => scope, () => "none");
-    await this.#repeat();
-  }
-
-  stop() {
-    clearTimeout(this.#timer);
-    this.#timer = 0;
-  }
-
-  async #repeat() {
-    clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.#repeat(), PERIOD_MS);
-    await this.refresh();
-  }
-
-  /** Request everything now. A failure leaves what was known: the page's connection says what is wrong. */
-  async refresh() {
-    const paths = ["zones", "zone-occupancy"];
-    const [zones, occupancy] = await Promise.all(paths.map((path) => getJson(api(path)).catch(() => null)));
+  /** @param {any[]} answers */
+  take([zones, occupancy]) {
     if (zones) this.zones = zones.zones;
     if (occupancy) this.inside = new Map(occupancy.zones.map((/** @type {{zone: string, tags: number}} */ { zone, tags }) => [zone, tags]));
-    this.dispatchEvent(new Event("change"));
-  }
-
-  /** @param {string} id @returns {Promise<{zone: Zone, etag: string}>} */
-  async read(id) {
-    const response = await request(pathOf(id), {});
-    return { zone: await response.json(), etag: response.headers.get("etag") ?? "" };
-  }
-
-  /** Save a zone. Throws as sendChange does. @param {Zone} zone @param {string | null} etag of the present one; null: it is new */
-  async save(zone, etag) {
-    await sendChange(pathOf(zone.id), "PUT", zone, etag === null ? { "if-none-match": "*" } : { "if-match": etag });
-    await this.refresh();
-  }
-
-  /** Delete a zone. Throws as sendChange does. @param {string} id @param {string} etag */
-  async remove(id, etag) {
-    await sendChange(pathOf(id), "DELETE", null, { "if-match": etag });
-    await this.refresh();
   }
 }

@@ -1,12 +1,12 @@
 """The routes for fences, which are the zones of this service."""
 
+from collections.abc import Sequence
 from typing import Annotated
-from uuid import uuid4
 
 from fastapi import APIRouter, Body, Query
 from starlette.responses import Response
 
-from dropanchor_service.api.http.errors import Kind, ProblemError
+from dropanchor_service.api.http.errors import Kind
 from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.models import (
@@ -26,8 +26,11 @@ from dropanchor_service.api.omlox.parameters import (
     PlaceQuery,
     SpatialQuery,
     errors,
+    exists_already,
+    id_of_new,
     many,
     one,
+    require_id,
 )
 from dropanchor_service.api.omlox.projection import projection_of
 from dropanchor_service.api.routes.parameters import json_response
@@ -57,6 +60,13 @@ def fences_router(hub: Hub) -> APIRouter:
     _add_routes_for_places_inside(router, hub)
     _add_routes_for_objects_inside(router, hub)
     return router
+
+
+def fences_around(tags: Sequence[Tag], hub: Hub, query: SpatialQuery) -> Response:
+    """Return the fences in which one of these tags is."""
+    zones = hub.inside.zones_of(tags, query.spatial_query, hub.fences.all())
+    projection = projection_of(hub.answers.site.site, None)
+    return json_response([hub.fences.answer(zone, projection) for zone in zones])
 
 
 def _add_list_routes(router: APIRouter, hub: Hub) -> None:
@@ -90,9 +100,9 @@ def _add_create_route(router: APIRouter, hub: Hub) -> None:
         fence: Annotated[Fence, Body(examples=[EXAMPLE])],
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
     ) -> Response:
-        identifier = fence.id if fence.id is not None and fence.id.int else uuid4()
+        identifier = id_of_new(fence.id)
         if any(hub.fences.id_of(zone.id) == identifier for zone in hub.fences.all()):
-            raise ProblemError(Kind.EXISTS_ALREADY, f"There is a fence with the id {identifier}: change it with PUT.")
+            raise exists_already("fence", identifier)
         zone = hub.fences.save(str(identifier), fence, None)
         projection = projection_of(hub.answers.site.site, fence.crs)
         return json_response(hub.fences.answer(zone, projection), status=201)
@@ -151,8 +161,7 @@ def _add_change_route(router: APIRouter, hub: Hub) -> None:
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
     ) -> Response:
         present = hub.fences.find(fence_id)
-        if fence.id is not None and fence.id.int and fence.id != fence_id:
-            raise ProblemError(Kind.ID_DIFFERS, f"The id is {fence_id} in the path and {fence.id} in the body.")
+        require_id(fence_id, fence.id)
         hub.fences.save(present.id, fence, present)
         return Response(status_code=204)
 

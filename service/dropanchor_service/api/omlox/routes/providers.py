@@ -7,7 +7,7 @@ from starlette.responses import Response
 
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.api.http.errors import Kind, ProblemError
-from dropanchor_service.api.omlox.geojson import fence_feature, location_feature
+from dropanchor_service.api.omlox.geojson import location_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.models import (
     Feature,
@@ -18,8 +18,18 @@ from dropanchor_service.api.omlox.models import (
     Trackable,
 )
 from dropanchor_service.api.omlox.own_properties import without_own
-from dropanchor_service.api.omlox.parameters import LENIENT, PlaceQuery, ProviderId, SpatialQuery, errors, many, one
-from dropanchor_service.api.omlox.projection import projection_of
+from dropanchor_service.api.omlox.parameters import (
+    LENIENT,
+    PlaceQuery,
+    ProviderId,
+    SpatialQuery,
+    errors,
+    exists_already,
+    many,
+    one,
+    require_id,
+)
+from dropanchor_service.api.omlox.routes.fences import fences_around
 from dropanchor_service.api.omlox.trackable_changes import forget, name_tag, save
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import json_response, saving
@@ -84,7 +94,7 @@ def _add_create_route(router: APIRouter, hub: Hub) -> None:
     def create_provider(provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]) -> Response:
         known = hub.answers.tags.find(provider.id)
         if known is not None and not hub.answers.tags.is_deleted(known.row):
-            raise ProblemError(Kind.EXISTS_ALREADY, f"There is a tag {provider.id!r}: change it with PUT.")
+            raise exists_already("tag", provider.id)
         return json_response(hub.providers([_saved(hub, provider)])[0], status=201)
 
 
@@ -132,10 +142,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         provider_id: ProviderId, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]
     ) -> Response:
         known_tag(hub.answers, provider_id)
-        if provider.id != provider_id:
-            raise ProblemError(
-                Kind.ID_DIFFERS, f"The id is {provider_id!r} in the path and {provider.id!r} in the body."
-            )
+        require_id(provider_id, provider.id)
         _saved(hub, provider)
         return Response(status_code=204)
 
@@ -194,10 +201,7 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
     )
     def list_fences(provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        tag = known_tag(hub.answers, provider_id)
-        zones = hub.inside.zones_of([tag], query.spatial_query, hub.fences.all())
-        projection = projection_of(hub.answers.site.site, None)
-        return many([hub.fences.answer(zone, projection) for zone in zones], PlaceQuery(), fence_feature)
+        return fences_around([known_tag(hub.answers, provider_id)], hub, query)
 
 
 def _saved(hub: Hub, provider: LocationProvider) -> Tag:

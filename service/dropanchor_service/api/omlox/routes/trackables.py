@@ -1,14 +1,13 @@
 """The routes for trackables."""
 
 from typing import Annotated
-from uuid import uuid4
 
 from fastapi import APIRouter, Body, Query
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.assets import Asset
-from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
+from dropanchor_service.api.omlox.geojson import location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.models import (
     Feature,
@@ -26,11 +25,12 @@ from dropanchor_service.api.omlox.parameters import (
     SpatialQuery,
     TrackableId,
     errors,
+    id_of_new,
     many,
     one,
 )
 from dropanchor_service.api.omlox.places import best_of
-from dropanchor_service.api.omlox.projection import projection_of
+from dropanchor_service.api.omlox.routes.fences import fences_around
 from dropanchor_service.api.omlox.trackable_changes import add, change, remove
 from dropanchor_service.api.routes.parameters import json_response
 
@@ -100,8 +100,8 @@ def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
         trackable: Annotated[Trackable, Body(examples=[EXAMPLE])],
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
     ) -> Response:
-        identifier = trackable.id if trackable.id is not None and trackable.id.int else uuid4()
-        return json_response(hub.trackables([add(hub, trackable.model_copy(update={"id": identifier}))])[0], status=201)
+        named = trackable.model_copy(update={"id": id_of_new(trackable.id)})
+        return json_response(hub.trackables([add(hub, named)])[0], status=201)
 
     @router.delete(
         "",
@@ -220,7 +220,4 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
     )
     def list_fences(trackable_id: TrackableId, query: Annotated[SpatialQuery, Query()]) -> Response:
-        tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
-        zones = hub.inside.zones_of(tags, query.spatial_query, hub.fences.all())
-        projection = projection_of(hub.answers.site.site, None)
-        return many([hub.fences.answer(zone, projection) for zone in zones], PlaceQuery(), fence_feature)
+        return fences_around(hub.assets.tags_of(found(hub, trackable_id).trackable), hub, query)

@@ -1,12 +1,12 @@
-/** Named items of the interface, such as destinations and rules: read, saved and deleted with ETags. */
+/** Named items of the interface, such as zones and rules: read, saved and deleted with ETags. */
 
-import { request, sendChange } from "../data/access.js";
-import { api } from "../data/connection.js";
+import { request, sendChange } from "./access.js";
+import { api } from "./connection.js";
 
 /** @typedef {Record<string, any> & {id: string}} Item as in the interface */
 
 export class Items {
-  /** @param {"destinations" | "event-rules"} collection @param {(answer: any) => Item} itemOf takes the item from an answer */
+  /** @param {"destinations" | "event-rules" | "zones"} collection @param {(answer: any) => Item} itemOf takes the item from an answer */
   constructor(collection, itemOf) {
     this.collection = collection;
     this.itemOf = itemOf;
