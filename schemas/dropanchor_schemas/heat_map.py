@@ -22,7 +22,7 @@ class HeatMap(_Answer):
     to_ns: int = Field(description="UTC, ns: end of the period, inclusive.")
     tags: int = Field(description="How many of the selected tags have stored poses in the period.")
     cell_m: float = Field(
-        description="Side of a cell. Larger than requested where tags were in very many cells of a day."
+        description="Side of a cell. Larger than requested where there would be more than 20,000 cells."
     )
     placed_s: float = Field(description="The sum of the seconds of all cells.")
     left_out_s: float = Field(

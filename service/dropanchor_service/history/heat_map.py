@@ -12,9 +12,10 @@ from dropanchor_service.history.bulk_reading import summaries_of_poses
 from dropanchor_service.history.covering import Cover, Window
 from dropanchor_service.history.heat_cells import NO_HEAT, SIZES, SMALLEST_M, Heat, heat_in, heat_of_each, joined
 from dropanchor_service.history.summary_table import DAY
+from dropanchor_service.store.records import take
 
 MAX_SQUARES = 20_000
-_MAX_AREA = 2**22  # squares of an area that are counted in one array; a larger area is mostly empty
+_MAX_AREA = 2**22  # squares, also empty ones
 
 
 @dataclass(frozen=True)
@@ -59,34 +60,49 @@ def _parts(
 
 
 def heat_map_of(heat: Heat, cell_m: float) -> HeatMap:
-    """Return squares of at least `cell_m`: larger where the cells are larger, or for at most `MAX_SQUARES` of them."""
-    size = max(_size(cell_m), int(heat.cells["size"].max(initial=0)))
+    """Return squares of at least `cell_m`: larger ones where there would be more than `MAX_SQUARES`, or a wide area."""
+    size = min(SIZES - 1, max(0, math.ceil(math.log2(cell_m / SMALLEST_M))))
     while True:
-        x, y, seconds = _squares(heat.cells, size)
-        if len(seconds) <= MAX_SQUARES:
-            break
+        area = _Area(heat.cells, size)
+        if area.width * area.height <= _MAX_AREA:
+            total = area.seconds(heat.cells)
+            squares = np.flatnonzero(total)
+            if len(squares) <= MAX_SQUARES:
+                break
         size += 1
-    side = SMALLEST_M * 2**size
-    left_out_s = float(heat.heads["left_out_s"].sum())
-    return HeatMap(len(heat.heads), side, (x + 0.5) * side, (y + 0.5) * side, seconds, left_out_s)
+    side, left_out_s = SMALLEST_M * 2**size, float(heat.heads["left_out_s"].sum())
+    column, line = np.divmod(squares, area.height)
+    x, y = (column + area.left + 0.5) * side, (line + area.bottom + 0.5) * side
+    return HeatMap(len(heat.heads), side, x, y, total.ravel()[squares], left_out_s)
 
 
-def _size(cell_m: float) -> int:
-    return min(SIZES - 1, max(0, math.ceil(math.log2(cell_m / SMALLEST_M))))
+class _Area:
+    """The squares of one size around some CELLs. Whole cells of every size fit into it."""
 
+    def __init__(self, cells: Array, size: int) -> None:
+        self._size = size
+        largest = max(size, int(cells["size"].max(initial=0)))
+        self.left, self.width = self._span(cells, "x", largest)
+        self.bottom, self.height = self._span(cells, "y", largest)
 
-def _squares(cells: Array, size: int) -> tuple[Array, Array, Array]:
-    """Return column, line and seconds of each square of this size that holds any time."""
-    if len(cells) == 0:
-        return np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0)
-    shift = (size - cells["size"]).astype(np.int32)
-    column, line = cells["x"].astype(np.int32) >> shift, cells["y"].astype(np.int32) >> shift
-    left, bottom = int(column.min()), int(line.min())
-    height = int(line.max()) - bottom + 1
-    place = (column - left).astype(np.int64) * height + (line - bottom)
-    if (int(column.max()) - left + 1) * height <= _MAX_AREA:
-        total = np.bincount(place, cells["seconds"])
-        squares = np.flatnonzero(total)
-        return squares // height + left, squares % height + bottom, total[squares]
-    squares, square_of = np.unique(place, return_inverse=True)
-    return squares // height + left, squares % height + bottom, np.bincount(square_of, cells["seconds"])
+    def _span(self, cells: Array, axis: str, largest: int) -> tuple[int, int]:
+        """Return the number of the first square on this axis, and how many there are."""
+        if len(cells) == 0:
+            return 0, 0
+        numbers = cells[axis].astype(np.int32) >> (largest - cells["size"]).astype(np.int32)
+        first, last = int(numbers.min()), int(numbers.max())
+        return first << (largest - self._size), (last - first + 1) << (largest - self._size)
+
+    def seconds(self, cells: Array) -> Array:
+        """Return the time in each square. That of a cell which is larger than a square is spread over its squares."""
+        total = np.zeros((self.width, self.height))
+        for size in np.unique(cells["size"]).tolist():
+            some = take(cells, cells["size"] == size)
+            split = 2 ** max(0, size - self._size)
+            merge = max(0, self._size - size)
+            column = (some["x"].astype(np.int32) >> merge) - self.left // split
+            line = (some["y"].astype(np.int32) >> merge) - self.bottom // split
+            shape = self.width // split, self.height // split
+            each = np.bincount(column * shape[1] + line, some["seconds"], shape[0] * shape[1]).reshape(shape)
+            total += np.repeat(np.repeat(each, split, 0), split, 1) / split**2
+        return total

@@ -18,7 +18,7 @@ from dropanchor_service.history.summaries import SUMMARY, in_order, summary_per_
 FINE, COARSE, DAY = LEVELS = 0, 1, 2
 SLOTS = (12, 180, 8640)  # slots in a stretch of each level
 LENGTHS_NS = tuple(slots * SLOT_NS for slots in SLOTS)
-MAX_CELLS = (64, 256, 1024)  # of a tag in a stretch of each level
+MAX_CELLS = (256, 384, 1024)  # of a tag in a stretch of each level
 
 SCHEMA = """
 CREATE TABLE summaries (

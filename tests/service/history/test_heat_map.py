@@ -9,7 +9,7 @@ import pytest
 from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.history.covering import TooMuchError
 from dropanchor_service.history.heat_cells import CELL, HEAD, Heat, merged
-from dropanchor_service.history.heat_map import HeatMap
+from dropanchor_service.history.heat_map import HeatMap, heat_map_of
 from dropanchor_service.history.summary_table import DAY, LENGTHS_NS
 from dropanchor_service.history.track_file import TrackReader, TrackWriter
 from service.history.test_overview import HOUR, SECOND, drive, store, summarise
@@ -130,13 +130,22 @@ def test_a_heat_map_has_at_most_so_many_cells(path: Path, monkeypatch: pytest.Mo
     assert (len(found.seconds), found.cell_m, found.seconds.sum()) == (7, 16.0, 100)
 
 
-def test_a_wide_area_is_counted_like_a_small_one(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_squares_of_a_wide_area_are_larger(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("dropanchor_service.history.heat_map._MAX_AREA", 16)
     store(path, a=days(drive(np.arange(0.0, 101.0), speed=-1.0))).close()
-    small = heat_map(path, 0, 100)
-    monkeypatch.setattr("dropanchor_service.history.heat_map._MAX_AREA", 0)
-    wide = heat_map(path, 0, 100)
-    for name in ("x", "y", "seconds"):
-        assert getattr(small, name).tolist() == getattr(wide, name).tolist()
+    found = heat_map(path, 0, 100)
+    assert (found.cell_m, len(found.seconds), found.seconds.sum()) == (8.0, 14, 100)
+
+
+def test_time_in_a_larger_cell_is_spread_evenly_and_leaves_the_others_sharp() -> None:
+    cells = np.zeros(3, CELL)
+    cells["size"], cells["x"], cells["y"], cells["seconds"] = [0, 3, 1], [5, -1, 2], [-3, 0, -1], [7.0, 64.0, 4.0]
+    found = heat_map_of(Heat(np.zeros(1, HEAD), cells), 0.5)
+    assert (found.cell_m, len(found.seconds), found.seconds.sum()) == (0.5, 1 + 64 + 4, 75)
+    assert seconds_at(found, 2.75, -1.25) == 7
+    assert [seconds_at(found, x, y) for x, y in ((-0.25, 0.25), (-3.75, 3.75), (2.25, -0.25), (2.75, -0.75))] == [1] * 4
+    merged_into_one = heat_map_of(Heat(np.zeros(1, HEAD), cells), 16.0)
+    assert sorted(merged_into_one.seconds.tolist()) == [11, 64]
 
 
 def test_a_place_beyond_all_cells_is_left_out(path: Path) -> None:
