@@ -11,4 +11,6 @@ pytestmark = pytest.mark.benchmark
 
 
 def test_the_delivery_of_a_storm(tmp_path: Path) -> None:
-    report.record("delivery", f"{TAGS:,} tags enter a zone at once: {check_storm(TAGS, tmp_path)} (of the receivers, too).")
+    report.record(
+        "delivery", f"{TAGS:,} tags enter a zone at once: {check_storm(TAGS, tmp_path)} (of the receivers, too)."
+    )

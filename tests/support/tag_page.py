@@ -8,7 +8,6 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page
 
-
 PHONE = (390, 844)
 SENSORS = """
     const step_ms = 1000 / 60;

@@ -32,9 +32,7 @@ def busy_place() -> ZonePlace:
     return place
 
 
-def test_no_violation_in_the_lists_and_the_forms(
-    chromium: Browser, axe: str, tmp_path: Path
-) -> None:
+def test_no_violation_in_the_lists_and_the_forms(chromium: Browser, axe: str, tmp_path: Path) -> None:
     place = busy_place()
     with (
         served(place),

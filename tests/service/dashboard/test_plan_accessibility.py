@@ -36,9 +36,7 @@ def hall(place: PlanPlace) -> None:
     place.put("upper", svg_file(), 0.01, Floor(name="Upper floor", bottom_m=3.0, top_m=6.0))
 
 
-def test_no_violation_while_plans_are_shown_uploaded_and_aligned(
-    chromium: Browser, axe: str, tmp_path: Path
-) -> None:
+def test_no_violation_while_plans_are_shown_uploaded_and_aligned(chromium: Browser, axe: str, tmp_path: Path) -> None:
     with plan_place() as place:
         hall(place)
         with watched_page(chromium, place.url, reduced_motion="reduce") as page:

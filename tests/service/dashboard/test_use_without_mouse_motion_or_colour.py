@@ -134,9 +134,7 @@ def test_a_question_mark_shows_the_keys_and_keys_go_where_one_types(
         assert watched.errors == []
 
 
-def test_no_violation_in_the_dialogs_and_on_the_wall(
-    chromium: Browser, place: Place, axe: str
-) -> None:
+def test_no_violation_in_the_dialogs_and_on_the_wall(chromium: Browser, place: Place, axe: str) -> None:
     show_every_state(place)
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.page.get_by_role("button", name="Display").click()

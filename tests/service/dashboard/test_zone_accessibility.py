@@ -44,9 +44,7 @@ def test_no_violation_in_the_lists_the_editor_and_without_a_connection(
     place = busy_yard()
     with ExitStack() as pages:
         with served(place):
-            page = pages.enter_context(
-                watched_page(chromium, place.url, reduced_motion="reduce")
-            )
+            page = pages.enter_context(watched_page(chromium, place.url, reduced_motion="reduce"))
 
             def check(view: str) -> None:
                 page.page.screenshot(path=tmp_path / f"{view}.png")
