@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from dropanchor_schemas.site import Site
 from dropanchor_service.answers.track_pages import TrackPage
 from dropanchor_service.api.formats.track import COVARIANCES
-from dropanchor_service.estimation.columns import Array
 
 GROUP_ROWS = 20_000
 FRAME = (
@@ -117,5 +117,5 @@ def _table(pages: Sequence[TrackPage], schema: pa.Schema) -> pa.Table:
     return pa.Table.from_arrays(arrays, schema=schema)
 
 
-def _numbers(covariance: Any) -> Array:
+def _numbers(covariance: Any) -> NDArray[np.float64]:
     return np.full((3, 3), np.nan) if covariance is None else np.array(covariance)
