@@ -87,7 +87,7 @@ def write_past(folder: Path, tags: int, end_ns: int) -> None:
     writer.close()
 
 
-def circles(tags: int, second: int, t_ns: int) -> Array:
+def circles(tags: int, second: float, t_ns: int) -> Array:
     random = np.random.default_rng(1)
     phase = second / 20 + random.uniform(0, 2 * np.pi, tags)
     made = np.zeros(tags, POSE)
@@ -99,12 +99,13 @@ def circles(tags: int, second: int, t_ns: int) -> Array:
 
 
 def live(chromium: Browser, place: Place, tags: int) -> Frames:
-    random = np.random.default_rng(1)
     names = [f"tag-{number}" for number in range(tags)]
+    begun_s = time.monotonic()
     with watched_page(chromium, place.url) as page:
 
         def move() -> None:
-            place.move(*names, x=random.normal(0, 20, tags), y=random.normal(0, 20, tags))
+            made = circles(tags, time.monotonic() - begun_s, 0)
+            place.move(*names, x=made["x"], y=made["y"], speed=made["speed"])
             page.page.wait_for_timeout(100)
 
         for _ in range(20):
