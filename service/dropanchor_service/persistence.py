@@ -1,5 +1,6 @@
-"""What the service keeps on disk: site, floor plans, history, recordings and more, as the settings enable them."""
+"""What the service has on disk: site, floor plans, history, recordings and more, as the settings enable them."""
 
+import logging
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -8,6 +9,8 @@ from typing import Self
 from pydantic import ValidationError
 
 from dropanchor_service.api.omlox.items import OmloxItems
+from dropanchor_service.basemap.basemap import ServedBasemap
+from dropanchor_service.basemap.file import UnusableFileError
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
@@ -20,12 +23,14 @@ from dropanchor_service.settings.model import HistorySettings, RecordingSettings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import SiteStore, TagTable
 
+_log = logging.getLogger(__name__)
+
 
 class Persistence:
-    """Floor plans, what omlox clients have stored, and the history (`tracks`) and recorder, both None when disabled.
+    """Floor plans, what omlox clients have stored, and the history (`tracks`), the recorder and the base map.
 
-    History and recorder write while this context is open. Creating it raises SettingsError when a file that people have
-    filled cannot be read.
+    The last three are None when disabled. History and recorder write while this context is open. Creating it raises
+    SettingsError when a file that people have filled cannot be read.
     """
 
     def __init__(
@@ -37,6 +42,7 @@ class Persistence:
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         self.omlox = _open_omlox(settings)
+        self.basemap = _open_basemap(settings, site)
         folder = settings.data_dir
         if folder is None:
             return
@@ -53,6 +59,8 @@ class Persistence:
         metrics.register(RecordingMetrics(self.recorder))
 
     def __enter__(self) -> Self:
+        if self.basemap is not None:
+            self._opened.callback(self.basemap.file.close)
         for writer in (self.tracks, self.recorder):
             if writer is not None:
                 self._opened.enter_context(writer)
@@ -128,3 +136,21 @@ def _open_omlox(settings: Settings) -> OmloxItems:
         raise SettingsError(
             f"data_dir: the objects of omlox clients in {settings.data_dir} cannot be read: {error}"
         ) from error
+
+
+def _open_basemap(settings: Settings, site: SiteStore) -> ServedBasemap | None:
+    """Return the base map; None without one. Raises SettingsError."""
+    path = settings.basemap.tiles
+    if path is None:
+        return None
+    try:
+        basemap = ServedBasemap(path, settings.basemap.attribution)
+    except OSError as error:
+        raise SettingsError(f"basemap.tiles: {path} cannot be read: {error.strerror}") from error
+    except UnusableFileError as error:
+        raise SettingsError(f"basemap.tiles: {error}") from error
+    if site.site.georeference is None:
+        _log.warning(
+            "basemap.tiles: the site has no latitude and longitude, so the page shows no base map until it has"
+        )
+    return basemap

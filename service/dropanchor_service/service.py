@@ -302,4 +302,5 @@ class Service:
             rate_limiter=RateLimiter(self._settings.http.requests_per_s, self._settings.http.burst),
             cors_origins=self._settings.http.cors_origins,
             omlox=self._persistence.omlox,
+            basemap=self._persistence.basemap,
         )

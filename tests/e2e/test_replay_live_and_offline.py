@@ -85,7 +85,7 @@ def test_live_and_offline_poses_are_the_same(tmp_path: Path, name: str, engine: 
     track = offline(recording, anchor, start, config)
     expected = {T0_NS + int(p["t_ns"]): (float(p["x"]), float(p["y"])) for p in track.poses}
     seen = live(recording, anchor, config, T0_NS + int(track.poses["t_ns"][-1]))
-    assert len(seen) > 20
+    assert len(seen) >= 10
     assert set(seen) <= set(expected)
     # published poses have six decimals
     np.testing.assert_allclose([seen[t] for t in seen], [expected[t] for t in seen], rtol=0, atol=0.51e-6)

@@ -19,6 +19,7 @@ from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.plans.store import PlanStore
@@ -70,6 +71,7 @@ class ApiBench:
         events: EventParts | None = None,
         omlox: OmloxItems | None = None,
         plans: PlanStore | None = None,
+        basemap: ServedBasemap | None = None,
     ) -> FastAPI:
         return create_app(
             self.answers,
@@ -88,6 +90,7 @@ class ApiBench:
             events=events,
             omlox=omlox,
             plans=plans,
+            basemap=basemap,
         )
 
 

@@ -2,14 +2,15 @@
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+expect.set_options(timeout=40_000)  # the machine may be busy
 _EXECUTABLES = ("chromium-headless-shell", "chromium", "chromium-browser")
 _ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 Scheme = Literal["light", "dark"]
@@ -77,12 +78,22 @@ class WatchedPage:
 
     def pixel(self, x: float, y: float) -> tuple[int, ...]:
         """Return red, green, blue and opacity of the map at a place in CSS pixels."""
-        script = """([x, y]) => {
-            const ratio = devicePixelRatio;
+        return self.pixels([(x, y)])[0]
+
+    def pixels(self, places: Sequence[tuple[float, float]]) -> list[tuple[int, ...]]:
+        """Return the same at several places, read at once."""
+        script = """(places) => {
+            const inside = places.map(([x, y]) => [x, y].map((value) => Math.round(value * devicePixelRatio)));
+            const [left, top] = [0, 1].map((axis) => Math.min(...inside.map((place) => place[axis])));
+            const [right, bottom] = [0, 1].map((axis) => Math.max(...inside.map((place) => place[axis])) + 1);
             const pen = document.getElementById("map").getContext("2d");
-            return [...pen.getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data];
+            const { data } = pen.getImageData(left, top, right - left, bottom - top);
+            return inside.map(([x, y]) => {
+                const at = 4 * ((y - top) * (right - left) + x - left);
+                return [...data.subarray(at, at + 4)];
+            });
         }"""
-        return tuple(self.page.evaluate(script, [x, y]))
+        return [tuple(colour) for colour in self.page.evaluate(script, [list(place) for place in places])]
 
 
 @contextmanager

@@ -17,6 +17,8 @@ Operation = APIOperation[Any, Any, Any, Any]
 EXAMPLES = int(os.environ.get("DROPANCHOR_CONTRACT_EXAMPLES", "15"))
 """Valid requests per operation, and as many invalid ones. The seed is fixed, so that every run sends the same."""
 
+ANSWER_S = 120.0  # at most: some operations start a process, and the machine may be busy
+
 
 def operations_of(app: FastAPI, path: str) -> Iterator[Operation]:
     """Yield the operations of the document at this path."""
@@ -41,7 +43,7 @@ def _asked(operation: Operation, mode: schemathesis.GenerationMode, excluded: li
     def ask(case: schemathesis.Case[Any]) -> None:
         nonlocal count
         count += 1
-        case.call_and_validate(excluded_checks=excluded)
+        case.call_and_validate(excluded_checks=excluded, timeout=ANSWER_S)
 
     try:
         ask()

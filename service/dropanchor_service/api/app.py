@@ -25,6 +25,7 @@ from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import add_omlox
 from dropanchor_service.api.routes.access import access_router
+from dropanchor_service.api.routes.basemap import basemap_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.destinations import destinations_router
@@ -51,6 +52,7 @@ from dropanchor_service.api.routes.track_file import track_file_router
 from dropanchor_service.api.routes.tracks import tracks_router
 from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
 from dropanchor_service.api.routes.zones import zones_router
+from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
@@ -83,6 +85,7 @@ def create_app(
     events: EventParts | None = None,
     omlox: OmloxItems | None = None,
     plans: PlanStore | None = None,
+    basemap: ServedBasemap | None = None,
 ) -> FastAPI:
     """Return the application with all routes and middleware.
 
@@ -93,7 +96,7 @@ def create_app(
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
     no limit. cors_origins: of other web pages that may use the interface. events:
     zones, events and destinations; None keeps them in memory and watches nothing. plans, omlox: floor plans, and what
-    omlox clients have said; None keeps them in memory.
+    omlox clients have said; None keeps them in memory. basemap: None when there is none.
     """
     plans = plans or PlanStore(None)
     events = events or EventParts.in_memory(answers.site.site.id)
@@ -118,6 +121,7 @@ def create_app(
         recordings_router(recorder),
         plans_router(plans),
         plan_images_router(plans, answers.site),
+        basemap_router(basemap),
         zones_router(events.items),
         zone_occupancy_router(events),
         events_router(events.store, stopping),
@@ -200,6 +204,7 @@ _TAGS = [
     {"name": "tags", "description": "What the tags have sent, and their settings."},
     {"name": "site", "description": "The site frame, its georeference, and the anchors."},
     {"name": "plans", "description": "Floor plans below the tags on the map, and their images."},
+    {"name": "basemap", "description": "A map of the surroundings behind a site with latitude and longitude."},
     {"name": "zones", "description": "Areas of the site, and the rules that make events."},
     {"name": "events", "description": "What has happened, as CloudEvents."},
     {"name": "destinations", "description": "Who gets events by webhook, e-mail or MQTT."},

@@ -13,6 +13,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id, refuse_patte
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
+from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 
 
@@ -268,6 +269,7 @@ class Settings(_Section):
     delivery: DeliverySettings = DeliverySettings()
     email: EmailSettings = EmailSettings()
     mqtt: MqttSettings = MqttSettings()
+    basemap: BasemapSettings = BasemapSettings()
     site: Site = Site()
     tags: dict[TagId, TagSettings] = {}
     tag_defaults: TagSettings = Field(

@@ -12,15 +12,18 @@ from schemathesis.specs.openapi.checks import negative_data_rejection, positive_
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.wire import ENCODING_PACKED
+from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.history.tracks import Retention
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from support.api import make_api_bench
+from support.basemap_files import basemap_file, image_tile
 from support.contract import Operation, assert_follows_the_document, operations_of
 
 BEYOND_THE_SCHEMA = {
     "delete_anchor": [positive_data_acceptance],
     "delete_tag": [positive_data_acceptance],
+    "get_basemap_tile": [positive_data_acceptance],
     "get_track": [positive_data_acceptance],
     "get_heat_map": [positive_data_acceptance],
     "get_tracks": [positive_data_acceptance],
@@ -47,10 +50,10 @@ BEYOND_THE_SCHEMA = {
     "ingest_samples": [positive_data_acceptance],
     "ingest_sensor_logger": [positive_data_acceptance, negative_data_rejection],
 }
-"""Rules that a schema cannot express: `from` and `to` are at most 31 days apart; each anchor is listed once; without
-credentials a request names the tag; a message holds a sample or a value; `If-Match` is the current tag of a resource;
-edges do not cross; an image is one, and was uploaded; a URL is public and a secret long; share links need access
-control. And that Sensor Logger's 499 is a refusal."""
+"""Rules that a schema cannot express: a tile lies within its zoom level; `from` and `to` are at most 31 days apart;
+each anchor is listed once; without credentials a request names the tag; a message holds a sample or a value; `If-Match`
+is the current tag of a resource; edges do not cross; an image is one, and was uploaded; a URL is public and a secret
+long; share links need access control. And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(str.isprintable)
@@ -77,7 +80,8 @@ def operations() -> Iterator[Operation]:
     bench.recorder.record_messages([(0, b"payload", ENCODING_PACKED, bench.now_ns)])
     bench.recorder.writer.flush()
     bench.stopping.set()  # a stream ends after its first event
-    yield from operations_of(bench.app(), "/api/v1/openapi.json")
+    basemap = ServedBasemap(basemap_file(folder / "map.pmtiles", {(0, 0, 0): image_tile((0, 0, 0))}), None)
+    yield from operations_of(bench.app(basemap=basemap), "/api/v1/openapi.json")
 
 
 OPERATIONS = {operation.definition.raw["operationId"]: operation for operation in operations()}

@@ -2,7 +2,10 @@
 
 import { STATES } from "../data/states.js";
 
-const NAMES = /** @type {const} */ (["map", "grid", "grid-strong", "ink", "ink-2", "ink-3", "ring", "accent", "anchor"]);
+const NAMES = /** @type {const} */ ([
+  "map", "grid", "grid-strong", "ink", "ink-2", "ink-3", "ring", "accent", "anchor",
+  "base-land", "base-green", "base-water", "base-building", "base-road", "base-line",
+]);
 
 /** @typedef {Record<typeof NAMES[number], string> & {state: string[], font: string}} Palette */
 

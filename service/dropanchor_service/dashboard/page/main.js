@@ -1,6 +1,7 @@
 /** Connect the parts: the stream fills the fleet; map, table and panel show it. */
 
 import { Alerts } from "../alerts/alerts.js";
+import { Basemap } from "../basemap/basemap.js";
 import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
@@ -50,6 +51,7 @@ const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId(
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const setup = new Setup(map, fleet, roster, choice, connection);
 const plans = new Plans(map, roster, choice, connection, setup);
+const basemap = new Basemap(map, connection, byId("basemap"), byId("attribution"));
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
@@ -198,6 +200,7 @@ Object.defineProperty(window, "dropanchor", {
     draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },
     plans: () => plans.store.plans.map((plan) => ({ id: plan.id, placement: plan.placement, isReady: plans.images.isReady(plan.image) })),
     screen: (/** @type {number} */ x, /** @type {number} */ y) => [map.view.screenX(x), map.view.screenY(y)],
+    basemap: () => basemap.stats,
     drawing: () => ({ ...map.stats, still: map.still }),
     anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),
     tags: () => fleet.names.map((tag, row) => ({

@@ -64,6 +64,7 @@ def test_a_link_reads_everything_like_a_reader_and_changes_nothing(shared: Share
     assert link["expires_ns"] - link["made_ns"] == 7 * DAY_S * 10**9
     assert shared.seen("poses", secret) == ["a", "b", "c d"]
     assert shared.ask("GET", "access", secret).json() == {"scope": "read"}
+    assert shared.ask("GET", "basemap", secret).json() == {"tiles": None}
     for method, path in (("PUT", "tags/a/settings"), ("DELETE", "tags/a"), ("POST", "shares"), ("GET", "shares")):
         assert kind_of(shared.ask(method, path, secret, json={} if method != "GET" else None)) == "forbidden"
 
@@ -90,6 +91,9 @@ def test_a_link_of_a_tag_or_a_group_shows_these_tags_however_one_asks(
         "recordings",
         "newcomers",
         "tag-groups",
+        "plans",
+        "basemap",
+        "basemap/0/0/0",
         "../../metrics",
     ):
         assert shared.ask("GET", path, secret).status_code == 403, path

@@ -80,6 +80,8 @@ export default {
   "map.zoom_out": "Verkleinern",
   "map.zoom_in_key": "Vergrößern (+)",
   "map.zoom_out_key": "Verkleinern (−)",
+  "basemap.title": "Hintergrundkarte",
+  "basemap.what": "Hintergrundkarte zeigen oder verbergen",
   "map.fit": "Alle Tags zeigen",
   "map.fit_key": "Alle Tags zeigen (0)",
   "map.crowd": "Mehr als 5.000 Tags sind im Bild. Dunklere Quadrate enthalten mehr Tags; Orange steht für zweifelhafte Posen. Vergrößern Sie, um einzelne Tags zu sehen.",

@@ -80,6 +80,8 @@ export default {
   "map.zoom_out": "Zoom out",
   "map.zoom_in_key": "Zoom in (+)",
   "map.zoom_out_key": "Zoom out (−)",
+  "basemap.title": "Base map",
+  "basemap.what": "Show or hide the base map",
   "map.fit": "Show all tags",
   "map.fit_key": "Show all tags (0)",
   "map.crowd": "More than 5,000 tags are in view. Darker squares hold more tags; orange marks doubtful poses. Zoom in to see each tag.",

@@ -1,0 +1,1 @@
+"""The base map: tiles of a PMTiles file, shown behind a site with latitude and longitude."""

@@ -1,0 +1,29 @@
+"""A running service shows the base map that its settings name."""
+
+from pathlib import Path
+
+from support.basemap_files import basemap_file, image_tile
+from support.commands import python
+from support.service import running_service, settings_file
+from support.zenoh_router import free_endpoint
+
+
+def test_a_service_serves_the_tiles_of_its_file(tmp_path: Path) -> None:
+    tile = image_tile((10, 20, 30))
+    path = basemap_file(tmp_path / "yard.pmtiles", {(1, 1, 0): tile})
+    settings = settings_file(tmp_path, [], "")
+    settings.write_text(f'{settings.read_text()}\n[basemap]\ntiles = "{path}"\nattribution = "Land survey"\n')
+    with running_service("--config", str(settings)) as service:
+        assert service.get("/api/v1/basemap")["tiles"]["attribution"] == [{"text": "Land survey", "link": None}]
+        assert service.ask("GET", "/api/v1/basemap/1/1/0").content == tile
+        assert service.ask("GET", "/api/v1/basemap/1/0/0").status_code == 204
+        assert service.stop() == 0
+
+
+def test_a_missing_file_stops_the_start_with_a_sentence(tmp_path: Path) -> None:
+    settings = tmp_path / "site.toml"
+    settings.write_text(f'[basemap]\ntiles = "{tmp_path}/none.pmtiles"\n')
+    serve = ("-m", "dropanchor_service", "serve", "--config", str(settings), "--port", "0")
+    ended = python(*serve, "--zenoh-listen", free_endpoint())
+    assert ended.returncode == 2
+    assert f"basemap.tiles: {tmp_path}/none.pmtiles cannot be read: No such file or directory" in ended.stderr
