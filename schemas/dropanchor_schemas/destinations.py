@@ -1,6 +1,7 @@
 """Models of destinations: who gets which events, how, and what became of them."""
 
 import re
+from enum import StrEnum
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
@@ -31,6 +32,13 @@ Address = Annotated[
     str, Field(max_length=254, json_schema_extra={"pattern": ADDRESS}), AfterValidator(_require_address)
 ]
 Topic = Annotated[str, Field(max_length=512, json_schema_extra={"pattern": TOPIC}), AfterValidator(_require_topic)]
+
+
+class Language(StrEnum):
+    """The language of mails."""
+
+    ENGLISH = "en"
+    GERMAN = "de"
 
 
 class _Destination(BaseModel):
@@ -68,6 +76,7 @@ class EmailDestination(_Destination):
     digest_s: Annotated[Number, Field(ge=0, le=600)] = Field(
         default=60.0, description="Least time between two mails. A mail has all events that happened meanwhile."
     )
+    language: Language = Field(default=Language.ENGLISH, description="The language of the mails: `en` or `de`.")
 
 
 class MqttDestination(_Destination):

@@ -91,3 +91,23 @@ except ValueError as error:
         0,
         "MQTT needs the extra `mqtt`: pip install 'dropanchor-service[mqtt]'\n",
     ), ended.stderr
+
+
+def test_a_service_without_the_extra_parquet_exports_otherwise_and_says_how_to_install_it() -> None:
+    check = """
+import tempfile
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from service.api.routes.test_track import driven
+from support.api import ask
+with tempfile.TemporaryDirectory() as folder:
+    app = driven(Path(folder)).app()
+    for form in ("csv", "parquet"):
+        answer = ask(app, "GET", f"/api/v1/tags/a/track/file?format={form}")
+        print(answer.status_code, answer.json()["detail"] if form == "parquet" else "")
+"""
+    ended = python("-c", without("pyarrow") + check, str(Path(__file__).parents[1]))
+    assert (ended.returncode, ended.stdout) == (
+        0,
+        "200 \n409 Parquet needs the extra `parquet`: pip install 'dropanchor-service[parquet]'\n",
+    ), ended.stderr

@@ -33,6 +33,7 @@ from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import events_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
+from dropanchor_service.api.routes.heat_map import heat_map_router
 from dropanchor_service.api.routes.history import history_router
 from dropanchor_service.api.routes.ingest import ingest_router
 from dropanchor_service.api.routes.ingest_health import ingest_health_router
@@ -108,6 +109,7 @@ def create_app(
         track_router(answers),
         track_file_router(answers),
         tracks_router(answers),
+        heat_map_router(answers),
         history_router(answers),
         stream_router(answers, stopping, lambda: (answers.site.version, plans.version)),
         access_router(),

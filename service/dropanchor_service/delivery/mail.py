@@ -15,6 +15,7 @@ from dropanchor_schemas.destinations import EmailDestination
 from dropanchor_schemas.events import Event
 from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
 from dropanchor_service.delivery.sentences import NameOf, kind, link, place_and_time, sentence, site_of
+from dropanchor_service.delivery.words import WORDS, Words
 from dropanchor_service.settings.events import EmailSettings
 
 MAX_EVENTS = 10_000  # in one mail, which is then about 1 MB
@@ -39,7 +40,9 @@ class MailChannel:
         return Portion(MAX_EVENTS, is_mixed=True, pause_s=self.destination.digest_s)
 
     async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
-        outcome = await self._send(mail_of(events, self.settings.sender, self.destination.to, self.page, self.name_of))
+        words = WORDS[self.destination.language]
+        mail = mail_of(events, self.settings.sender, self.destination.to, self.page, self.name_of, words)
+        outcome = await self._send(mail)
         return [outcome] * len(events)
 
     async def _send(self, mail: EmailMessage) -> Outcome:
@@ -84,42 +87,48 @@ async def open_mail(
     yield MailChannel(destination, settings, tls, timeout_s, page, name_of)
 
 
-def mail_of(events: Sequence[bytes], sender: str, to: Sequence[str], page: str | None, name_of: NameOf) -> EmailMessage:
+def mail_of(
+    events: Sequence[bytes], sender: str, to: Sequence[str], page: str | None, name_of: NameOf, words: Words
+) -> EmailMessage:
     """Return the mail about these events. The same events make the same `Message-ID`, so that doubles are known."""
     parsed = [Event.model_validate_json(event) for event in events]
     ids = hashlib.sha256(" ".join(event.id for event in parsed).encode()).hexdigest()[:32]
     mail = EmailMessage()
-    mail["Subject"] = _subject(parsed, name_of)
+    mail["Subject"] = _subject(parsed, name_of, words)
     mail["From"] = sender
     mail["To"] = ", ".join(to)
     mail["Date"] = formatdate()
     mail["Message-ID"] = f"<{ids}@{sender.rpartition('@')[2]}>"
     mail["Auto-Submitted"] = "auto-generated"
-    mail.set_content(_text(parsed, page, name_of))
+    mail.set_content(_text(parsed, page, name_of, words))
     return mail
 
 
-def _subject(events: Sequence[Event], name_of: NameOf) -> str:
-    more = f", and {len(events) - 1:,} more events" if len(events) > 1 else ""
-    return f"[{site_of(events[0])}] {sentence(events[0], name_of)}{more}"
+def _subject(events: Sequence[Event], name_of: NameOf, words: Words) -> str:
+    more = ", " + words.more.format(count=words.number(len(events) - 1, 0)) if len(events) > 1 else ""
+    return f"[{site_of(events[0])}] {sentence(events[0], name_of, words)}{more}"
 
 
-def _text(events: Sequence[Event], page: str | None, name_of: NameOf) -> str:
+def _text(events: Sequence[Event], page: str | None, name_of: NameOf, words: Words) -> str:
     linked = page if len(events) <= LINKED else None
-    parts = [_summary(events)] if len(events) > LINKED else []
-    parts += [_paragraph(event, linked, name_of) for event in events]
+    parts = [_summary(events, words)] if len(events) > LINKED else []
+    parts += [_paragraph(event, linked, name_of, words) for event in events]
     if page is not None and linked is None:
-        parts.append(f"The page: {page}")
+        parts.append(f"{words.page} {page}")
     return "\n\n".join(parts) + "\n"
 
 
-def _summary(events: Sequence[Event]) -> str:
-    counted = [f"{count:,} x {text}" for text, count in Counter(map(kind, events)).most_common()]
-    return "\n".join([f"{len(events):,} events:", *counted])
+def _summary(events: Sequence[Event], words: Words) -> str:
+    counts = Counter(kind(event, words) for event in events).most_common()
+    counted = [f"{words.number(count, 0)} x {text}" for text, count in counts]
+    return "\n".join([words.events.format(count=words.number(len(events), 0)), *counted])
 
 
-def _paragraph(event: Event, page: str | None, name_of: NameOf) -> str:
-    lines = [f"{sentence(event, name_of)}.", f"{place_and_time(event)}; event {int(event.sequence)}"]
+def _paragraph(event: Event, page: str | None, name_of: NameOf, words: Words) -> str:
+    lines = [
+        f"{sentence(event, name_of, words)}.",
+        f"{place_and_time(event, words)}; {words.event} {int(event.sequence)}",
+    ]
     return "\n".join([*lines, link(page, event)] if page is not None else lines)
 
 

@@ -1,10 +1,11 @@
 """Events as sentences for people."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from datetime import UTC, datetime
 from urllib.parse import urlencode
 
 from dropanchor_schemas.events import Event, EventData, EventType
+from dropanchor_service.delivery.words import Words
 from dropanchor_service.events.store import rfc3339
 
 SOURCE_PREFIX = "urn:dropanchor:site:"
@@ -13,52 +14,29 @@ NameOf = Callable[[str], str]
 
 _AROUND_NS = 300_000_000_000  # of the past that a link shows, before and after the event
 
-_SENTENCES: Mapping[EventType, Callable[[str, str, EventData], str]] = {
-    EventType.ZONE_ENTER: lambda tag, place, _: f"{tag} entered {place}",
-    EventType.ZONE_EXIT: lambda tag, place, _: f"{tag} left {place}",
-    EventType.ZONE_DWELL: lambda tag, place, data: f"{tag} has been in {place} for {_lasted(data)}",
-    EventType.ZONE_SPEED: lambda tag, place, data: f"{tag} is too fast in {place}: {_number(data.speed_mps)} m/s",
-    EventType.TAGS_TOO_CLOSE: lambda tag, _, data: (
-        f"{tag} and {data.other_tag} are too close: {_number(data.distance_m)} m"
-    ),
-    EventType.TAG_BATTERY_LOW: lambda tag, _, data: f"The battery of {tag} is low: {_percent(data.battery_fraction)}",
-    EventType.TAG_LOST: lambda tag, _, data: f"{tag} has been lost for {_lasted(data)}",
-    EventType.TAG_AMBIGUOUS: lambda tag, _, data: f"{tag} has been ambiguous for {_lasted(data)}",
-    EventType.DESTINATION_TEST: lambda tag, _place, _data: f"This is a test of the destination {tag}",
-}
-_KINDS: Mapping[EventType, str] = {
-    EventType.ZONE_ENTER: "entered",
-    EventType.ZONE_EXIT: "left",
-    EventType.ZONE_DWELL: "too long in",
-    EventType.ZONE_SPEED: "too fast in",
-    EventType.TAGS_TOO_CLOSE: "too close:",
-    EventType.TAG_BATTERY_LOW: "battery low:",
-    EventType.TAG_LOST: "lost:",
-    EventType.TAG_AMBIGUOUS: "ambiguous:",
-    EventType.DESTINATION_TEST: "test of",
-}
 
-
-def sentence(event: Event, name_of: NameOf) -> str:
+def sentence(event: Event, name_of: NameOf, words: Words) -> str:
     """Return what happened in one line, such as `Cart 3 (cart-3) entered Loading dock`."""
     data = event.data
-    if data.other_tag is not None:
-        data = data.model_copy(update={"other_tag": name_of(data.other_tag)})
-    return " ".join(_SENTENCES[event.type](name_of(event.subject), _place(data), data).split())
+    other = "" if data.other_tag is None else name_of(data.other_tag)
+    values = {"tag": name_of(event.subject), "other": other, "place": _place(data)}
+    number, lasted = _number(event, words), _lasted(data, words)
+    return " ".join(words.sentences[event.type].format(**values, number=number, lasted=lasted).split())
 
 
-def kind(event: Event) -> str:
+def kind(event: Event, words: Words) -> str:
     """Return what events of several tags have in common, such as `entered Loading dock`."""
-    return " ".join(f"{_KINDS[event.type]} {_place(event.data)}".split())
+    return " ".join(words.kinds[event.type].format(place=_place(event.data)).split())
 
 
-def place_and_time(event: Event) -> str:
-    """Return where, how surely and when it happened, such as `at x 3.2 m, y 1.7 m; …`."""
+def place_and_time(event: Event, words: Words) -> str:
+    """Return when, where and how surely it happened, such as `…; x 3.2 m, y 1.7 m; probability 0.99`."""
     data = event.data
-    where = [] if data.x is None else [f"x {_number(data.x)} m, y {_number(data.y)} m"]
-    sure = [] if data.probability is None else [f"probability {int(data.probability * 100) / 100:.2f}"]
-    when = datetime.fromtimestamp(data.t_ns / 1e9, UTC).astimezone()
-    return "; ".join([f"{when:%Y-%m-%d %H:%M:%S %Z}", *where, *sure])
+    place = [_metres(value, words) for value in (data.x, data.y)]
+    where = [] if data.x is None else [f"x {place[0]}, y {place[1]}"]
+    floor = None if data.probability is None else int(data.probability * 100) / 100
+    sure = [] if floor is None else [f"{words.probability} {words.number(floor, 2)}"]
+    return "; ".join([words.time(datetime.fromtimestamp(data.t_ns / 1e9, UTC).astimezone()), *where, *sure])
 
 
 def site_of(event: Event) -> str:
@@ -78,16 +56,22 @@ def _place(data: EventData) -> str:
     return data.name or data.zone or data.rule or ""
 
 
-def _number(value: float | None) -> str:
-    return "?" if value is None else f"{value:.1f}"
+def _metres(value: float | None, words: Words) -> str:
+    return "?" if value is None else f"{words.number(value, 1)} m"
 
 
-def _percent(value: float | None) -> str:
-    return "?" if value is None else f"{value * 100:.0f} %"
+def _number(event: Event, words: Words) -> str:
+    """Return the speed in m/s, the distance in m or the charge in percent that the event is about."""
+    data = event.data
+    charge = None if data.battery_fraction is None else data.battery_fraction * 100
+    if event.type == EventType.TAG_BATTERY_LOW:
+        return "?" if charge is None else words.number(charge, 0)
+    value = data.speed_mps if event.type == EventType.ZONE_SPEED else data.distance_m
+    return "?" if value is None else words.number(value, 1)
 
 
-def _lasted(data: EventData) -> str:
+def _lasted(data: EventData, words: Words) -> str:
     seconds = (data.t_ns - data.since_ns) // 1_000_000_000
     if seconds < 120:
         return f"{seconds} s"
-    return f"{seconds // 60} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+    return f"{seconds // 60} min" if seconds < 7200 else f"{words.number(seconds / 3600, 1)} h"

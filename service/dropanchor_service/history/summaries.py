@@ -132,7 +132,7 @@ def _since_previous(summaries: Array) -> tuple[Array, Array, Array]:
     """Return Between, distance [m] and tracked time [s] from the end of the previous SUMMARY of the tag to each."""
     end, start = summaries["last"][:-1], summaries["first"][1:]
     elapsed_ns = start["t_ns"] - end["t_ns"]
-    known = ~_begins(summaries["tag"])[1:] & (elapsed_ns <= GAP_NS) & _placed(end) & _placed(start)
+    known = ~_begins(summaries["tag"])[1:] & (elapsed_ns <= GAP_NS) & is_placed(end) & is_placed(start)
     tracked = known & _tracked(end) & _tracked(start)
     between = np.where(tracked, Between.TRACKING, np.where(known, Between.DOUBTFUL, Between.UNKNOWN))
     with np.errstate(invalid="ignore"):
@@ -152,7 +152,7 @@ def _tracked(points: Array) -> Array:
     return tracked
 
 
-def _placed(points: Array) -> Array:
+def is_placed(points: Array) -> Array:
     """Return whether the position of each POINT is a place of the map."""
     placed: Array = np.isin(points["state"], _PLACED) & np.isfinite(points["x"])
     return placed

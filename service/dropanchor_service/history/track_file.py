@@ -12,12 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.history.heat_cells import NO_HEAT
+from dropanchor_service.history.heat_map import HeatMap, heat_map_of, read_heat_map
 from dropanchor_service.history.overview import EMPTY, Overview, read_overview
 from dropanchor_service.history.records import NO_POSES, SLOT_NS, StoredPoses, records_of, stored_poses
+from dropanchor_service.history.summary_table import HEAT_SCHEMA, SummaryTable
 from dropanchor_service.history.summary_table import SCHEMA as SUMMARY_SCHEMA
-from dropanchor_service.history.summary_table import SummaryTable
 
-VERSION = 2  # 1: without summaries
+VERSION = 3  # 1: without summaries, 2: without heat
 MAX_ROWS = 512  # per statement: sqlite3 releases the interpreter's lock in each one and must win it back
 BUSY_S = 5.0
 
@@ -30,9 +32,10 @@ CREATE TABLE poses (
     PRIMARY KEY (slot, tag, t_ns)
 ) WITHOUT ROWID;
 {SUMMARY_SCHEMA}
+{HEAT_SCHEMA}
 PRAGMA user_version = {VERSION};
 """
-_UPGRADE = f"{SUMMARY_SCHEMA} PRAGMA user_version = {VERSION};"
+_UPGRADES = {1: f"{SUMMARY_SCHEMA} {HEAT_SCHEMA}", 2: HEAT_SCHEMA}  # from each version
 _FORWARD = """
 SELECT t_ns, pose FROM slots CROSS JOIN poses USING (slot)
 WHERE slots.slot BETWEEN ? AND ? AND tag = ? AND t_ns BETWEEN ? AND ? ORDER BY slots.slot, t_ns LIMIT ?
@@ -120,7 +123,7 @@ class TrackWriter:
     def _prepare(self) -> None:
         version = self._connection.execute("PRAGMA user_version").fetchone()[0]
         tables = self._connection.execute("SELECT count(*) FROM sqlite_schema").fetchone()[0]
-        if version not in (0, 1, VERSION) or (version == 0 and tables):
+        if version not in (0, *_UPGRADES, VERSION) or (version == 0 and tables):
             raise TrackFileError(
                 f"the file has schema version {version}, but this service needs {VERSION}: move the file away"
             )
@@ -129,8 +132,9 @@ class TrackWriter:
         self._connection.execute("PRAGMA journal_size_limit = 67108864")
         if version == 0:
             self._connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")
-        elif version == 1:
-            self._connection.executescript(f"BEGIN; {_UPGRADE} COMMIT;")
+        elif version in _UPGRADES:
+            upgrade = f"{_UPGRADES[version]} PRAGMA user_version = {VERSION};"
+            self._connection.executescript(f"BEGIN; {upgrade} COMMIT;")
 
     def _insert(self, slots: list[int], tags: list[int], times: list[int], blobs: list[bytes]) -> None:
         flat = [value for row in zip(slots, tags, times, blobs, strict=True) for value in row]
@@ -186,6 +190,24 @@ class TrackReader:
         with self._connected() as connection:
             connection.execute("BEGIN")  # one state of the file for all statements
             return read_overview(connection, tags, from_ns, to_ns, max_points)
+
+    def heat_map(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, cell_m: float) -> HeatMap:
+        """Return where these tags, or all, were, in squares of at least `cell_m`.
+
+        Raises sqlite3.Error and TooMuchError.
+        """
+        if not self._path.exists():
+            return heat_map_of(NO_HEAT, cell_m)
+        with self._connected() as connection:
+            connection.execute("BEGIN")
+            return read_heat_map(connection, tags, from_ns, to_ns, cell_m)
+
+    def tags(self) -> list[str]:
+        """Return all tags of which the file ever held a pose. Raises sqlite3.Error."""
+        if not self._path.exists():
+            return []
+        with self._connected() as connection:
+            return [name for (name,) in connection.execute("SELECT name FROM tags")]
 
     def span(self) -> tuple[int, int] | None:
         """Return the time that the stored poses cover, ns; None without poses. Raises sqlite3.Error."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.history.damaged_file import damaged_files, is_damage, move_aside
+from dropanchor_service.history.heat_map import HeatMap
 from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.records import StoredPoses
 from dropanchor_service.history.track_file import TrackReader, TrackWriter
@@ -87,6 +88,17 @@ class Tracks:
         Raises sqlite3.Error and TooMuchError.
         """
         return self._reader.overview(tags, from_ns, to_ns, max_points)
+
+    def heat_map(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, cell_m: float) -> HeatMap:
+        """Return where these tags, or all, were, in squares of at least `cell_m`.
+
+        Raises sqlite3.Error and TooMuchError.
+        """
+        return self._reader.heat_map(tags, from_ns, to_ns, cell_m)
+
+    def tags(self) -> list[str]:
+        """Return all tags of which poses were ever stored. Raises sqlite3.Error."""
+        return self._reader.tags()
 
     def span(self) -> tuple[int, int] | None:
         """Return the time that the stored poses cover, ns; None without poses. Raises sqlite3.Error."""

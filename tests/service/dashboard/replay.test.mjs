@@ -3,52 +3,64 @@ import { test } from "node:test";
 
 import { hashWith } from "../../../service/dropanchor_service/dashboard/data/address.js";
 import { momentIn, momentValues } from "../../../service/dropanchor_service/dashboard/page/address.js";
-import { Track, frameAt, poseAt } from "../../../service/dropanchor_service/dashboard/data/tracks.js";
+import { packed } from "../../../service/dropanchor_service/dashboard/data/packed_tracks.js";
+import { pieceLength } from "../../../service/dropanchor_service/dashboard/data/replay.js";
+import { Tracks, frameAt } from "../../../service/dropanchor_service/dashboard/data/tracks.js";
 import { drawTrack } from "../../../service/dropanchor_service/dashboard/map/draw_track.js";
 import { trailOf } from "../../../service/dropanchor_service/dashboard/data/past_trails.js";
 import { Trails } from "../../../service/dropanchor_service/dashboard/data/trails.js";
 
 /** @param {Record<string, any[]>} columns @returns {any} points one second apart from 0 s, at x = 0, 1, 2 … */
-function track(columns = {}, length = 4) {
+function points(columns = {}, length = 4) {
   const column = (/** @type {(i: number) => any} */ value) => Array.from({ length }, (_, i) => value(i));
-  return new Track({ tag: "a", points: {
+  return {
     t_ns: column((i) => i * 1e9), state: column(() => "tracking"), frame: column(() => "site"), x: column((i) => i),
     y: column(() => 5), heading_rad: column(() => 0), speed_mps: column(() => 1), sigma_pos_m: column(() => 0.2),
-    semi_major_m: column((i) => 1 + i),    semi_minor_m: column(() => 1), angle_rad: column(() => 0),
+    semi_major_m: column((i) => 1 + i), semi_minor_m: column(() => 1), angle_rad: column(() => 0),
     since_previous: column((i) => (i === 0 ? "unknown" : "tracking")), ...columns,
-  } });
+  };
+}
+
+/** @param {any[]} tracks points of the tags a, b … */
+const tracks = (...tracks) => new Tracks(packed(/** @type {any} */ (tracks.map((each, i) => ({ tag: "abc"[i], points: each })))));
+const track = (columns = {}) => /** @type {any} */ (tracks(points(columns)).get("a"));
+
+/** Return the pose of the tag a at a time. @param {any} columns @param {number} time_ms @returns {any} */
+function poseAt(columns, time_ms) {
+  const frame = frameAt(tracks(points(columns)), time_ms);
+  return Object.fromEntries(Object.entries(frame).map(([name, values]) => [name, values[0]]));
 }
 
 test("between two points of a known way the tag is between them, with the larger ellipse and no age", () => {
-  const pose = poseAt(track(), 1500);
+  const pose = poseAt({}, 1500);
   assert.deepEqual([pose.x, pose.y, pose.semi_major_m, pose.age_s, pose.state], [1.5, 5, 3, 0, "tracking"]);
 });
 
 test("before its first point a tag is not in the frame", () => {
-  assert.deepEqual(frameAt([track()], -1).tags, []);
-  assert.deepEqual(frameAt([track()], 0).tags, ["a"]);
+  assert.deepEqual(frameAt(tracks(points()), -1).tags, []);
+  assert.deepEqual(frameAt(tracks(points()), 0).tags, ["a"]);
 });
 
 test("where the way is unknown the tag stays at its last point and grows old", () => {
-  const broken = track({ since_previous: ["unknown", "tracking", "unknown", "tracking"] });
+  const broken = { since_previous: ["unknown", "tracking", "unknown", "tracking"] };
   const pose = poseAt(broken, 1750);
   assert.deepEqual([pose.x, pose.age_s], [1, 0.75]);
-  assert.deepEqual([poseAt(track(), 63_000).x, poseAt(track(), 63_000).age_s], [3, 60]);
+  assert.deepEqual([poseAt({}, 63_000).x, poseAt({}, 63_000).age_s], [3, 60]);
 });
 
 test("thinned points that are far apart are not joined by a straight line", () => {
-  const sparse = track({ t_ns: [0, 60e9, 120e9, 180e9] });
+  const sparse = { t_ns: [0, 60e9, 120e9, 180e9] };
   assert.deepEqual([poseAt(sparse, 30_000).x, poseAt(sparse, 30_000).age_s], [0, 30]);
 });
 
 test("a heading turns the short way round", () => {
-  const pose = poseAt(track({ heading_rad: [3.0, -3.0, 0, 0] }), 500);
+  const pose = poseAt({ heading_rad: [3.0, -3.0, 0, 0] }, 500);
   assert.ok(Math.abs(Math.cos(pose.heading_rad) + 1) < 1e-9);
 });
 
 test("a pose in a frame of the tag's own has no place on the map, but keeps its state", () => {
-  const frame = frameAt([track({ frame: ["relative", "relative", "site", "site"] })], 500);
-  assert.deepEqual([frame.x[0], frame.y[0], frame.frame[0], frame.state[0]], [null, null, "relative", "tracking"]);
+  const pose = poseAt({ frame: ["relative", "relative", "site", "site"] }, 500);
+  assert.deepEqual([pose.x, pose.y, pose.frame, pose.state], [NaN, NaN, "relative", "tracking"]);
 });
 
 test("a past trail breaks where the way is unknown and is doubtful where poses were", () => {
@@ -56,6 +68,17 @@ test("a past trail breaks where the way is unknown and is doubtful where poses w
   assert.deepEqual(trail.x, [NaN, 0, 1, NaN, 2, 3]);
   assert.deepEqual(trail.trusted, [0, 0, 0, 0, 0, 1]);
   assert.deepEqual(trail.time.slice(-2), [99_000, 100_000]);
+});
+
+test("each tag of many has its own points, and one without any is in no frame", () => {
+  const three = tracks(points({}, 2), points({}, 0), points({ x: [7, 8, 9, null] }));
+  assert.deepEqual([...three].map(({ tag, time }) => [tag, time.length]), [["a", 2], ["b", 0], ["c", 4]]);
+  const frame = frameAt(three, 2500);
+  assert.deepEqual([frame.tags, [...frame.x], [...frame.age_s]], [["a", "c"], [1, 9], [1.5, 0]]);
+});
+
+test("a piece of very many tags is so short that the service reads it pose by pose", () => {
+  assert.deepEqual([1, 200, 1000, 10_000, 100_000].map((tags) => pieceLength(tags) / 1000), [600, 500, 100, 10, 10]);
 });
 
 test("stored points come before the live ones of a trail", () => {

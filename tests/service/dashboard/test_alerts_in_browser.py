@@ -38,6 +38,8 @@ def test_an_e_mail_is_made_tested_edited_and_deleted(chromium: Browser) -> None:
         expect(form.get_by_label("Name")).to_be_focused()
         form.get_by_label("Name").fill("Early shift")
         form.get_by_label("Addresses").fill("shift@example.com, lead@example.com")
+        expect(form.get_by_label("Mails in")).to_have_value("en")
+        form.get_by_label("Mails in").select_option("Deutsch")
         form.get_by_label("Too long in a zone").check()
         form.get_by_label("Zones").fill("yard")
         form.get_by_role("button", name="Save destination").click()
@@ -48,7 +50,7 @@ def test_an_e_mail_is_made_tested_edited_and_deleted(chromium: Browser) -> None:
         assert (made.types, made.zones, made.digest_s) == (["dropanchor.zone.dwell"], ["yard"], 60.0)
         alerts.get_by_role("button", name="Test early-shift").click()
         expect(alerts).to_contain_text("The test event was delivered: the mail server answered")
-        assert "This is a test of the destination early-shift" in server.mails[0]["Subject"]
+        assert "Dies ist ein Test des Ziels early-shift" in server.mails[0]["Subject"]
         alerts.get_by_role("button", name="Edit early-shift").click()
         expect(form.get_by_label("Name")).to_be_hidden()
         expect(form.get_by_label("Addresses")).to_have_value("shift@example.com, lead@example.com")

@@ -14,6 +14,14 @@ from support.plan_files import image_file
 
 pytestmark = pytest.mark.browser
 
+INK_3 = """() => {
+    const probe = document.createElement("i");
+    probe.style.color = "var(--ink-3)";
+    document.body.append(probe);
+    const { color } = getComputedStyle(probe);
+    probe.remove();
+    return color;
+}"""
 GROUND, UPPER = Floor(name="Ground", bottom_m=-1.0, top_m=3.0), Floor(name="Upper", bottom_m=3.0, top_m=6.0)
 
 
@@ -51,12 +59,15 @@ def test_a_chosen_floor_shows_its_plans_and_makes_the_tags_of_others_faint(chrom
         page.wait_for(f"{ready} === 'ground,site'")
         page.page.get_by_role("combobox", name="Floor", exact=True).select_option("Upper")
         page.wait_for(f"{ready} === 'ground,upper,site'")
+        low = page.page.get_by_role("gridcell", name="low, on another floor", exact=True)
+        expect(low).to_have_css("color", page.page.evaluate(INK_3))
         page.page.locator("tr[data-tag='unset']").click()
         page.wait_for("dropanchor.drawing().visible === 2 && dropanchor.drawing().elsewhere === 1")
         page.page.reload()
         expect(page.page.get_by_role("combobox", name="Floor", exact=True)).to_have_value("Upper")
         place.bench.answers.site.set_tag("low", TagSettings(height_m=4.0))
         page.wait_for("dropanchor.drawing().visible === 3 && dropanchor.drawing().elsewhere === 0")
+        expect(low).to_have_count(0)
         assert page.errors == []
 
 

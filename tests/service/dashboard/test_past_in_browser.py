@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 from playwright.sync_api import Browser, expect
 
@@ -158,6 +159,9 @@ def test_figures_and_the_file_of_a_tag(chromium: Browser, past: tuple[Place, int
             figures.locator("[data-format='csv']").click()
         assert download.value.suggested_filename == "first.csv"
         assert len(download.value.path().read_text().splitlines()) == 60 * MINUTES + 2
+        with page.page.expect_download() as download:
+            figures.locator("[data-format='parquet']").click()
+        assert pq.read_metadata(download.value.path()).num_rows == 60 * MINUTES + 1
         assert page.errors == []
 
 
@@ -187,7 +191,7 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
         wait_for_past(page, 3)
         page.page.locator("[data-part='to']").fill("2020-01-02T00:00:00")
         page.page.locator("[data-part='from']").fill("2020-01-01T00:00:00")
-        page.page.locator(".period button").click()
+        page.page.locator(".period button:not([data-part])").click()
         wait_for_past(page, 0)
         problem = page.page.locator(".past [data-part='problem']")
         expect(problem).to_have_text("No poses are stored in this period.")
@@ -196,11 +200,11 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
         ]
         page.page.locator("[data-part='from']").fill(local[1])
         page.page.locator("[data-part='to']").fill(local[0])
-        page.page.locator(".period button").click()
+        page.page.locator(".period button:not([data-part])").click()
         expect(problem).to_contain_text("end must come after the start")
         page.page.locator("[data-part='from']").fill(local[0])
         page.page.locator("[data-part='to']").fill(local[1])
-        page.page.locator(".period button").click()
+        page.page.locator(".period button:not([data-part])").click()
         wait_for_past(page, 3)
         expect(problem).to_have_text("")
         assert page.errors == []
@@ -230,17 +234,47 @@ def test_the_trail_of_a_tag_begins_before_the_page_was_opened(chromium: Browser,
             assert (xs[0], xs[-1]) == (-19.0, 0.0)
 
 
+def test_a_heat_map_shows_where_tags_were_and_how_much_is_left_out(chromium: Browser, past: tuple[Place, int]) -> None:
+    place, end_ns = past
+    with watched_page(chromium, link_to(place, end_ns, 299), reduced_motion="reduce") as page:
+        wait_for_past(page, 3)
+        page.wait_for("dropanchor.drawing().still")
+        button, legend = page.page.locator("[data-part='heat']"), page.page.locator("#heat")
+        expect(legend).to_be_hidden()
+        x, y = page.page.evaluate("dropanchor.screen(100.5, 0.5)")
+        button.focus()
+        page.page.keyboard.press("Enter")
+        expect(button).to_have_attribute("aria-pressed", "true")
+        expect(legend.locator("h2")).to_have_text("Heat map: all tags")
+        expect(legend.locator("[data-part='unit']")).to_have_text("Time in each square of 1 m")
+        expect(legend.locator("[data-part='note']")).to_contain_text("Left out: 34 % of the time")  # turned, ambiguous
+        page.wait_for("dropanchor.drawing().still")
+        assert page.pixel(x, y) == pytest.approx((0, 32, 77, 217), abs=3)  # the darkest: each cell held a tag for 1 s
+        page.page.locator("#table tbody tr[data-tag='first']").click()
+        expect(legend.locator("h2")).to_have_text("Heat map: first")
+        expect(legend.locator("[data-part='note']")).not_to_contain_text("Left out")
+        expect(legend.locator("[data-part='high']")).to_have_text("1.0 s")
+        assert "heat=1" in page.page.url
+        page.page.locator("[data-part='leave']").click()
+        expect(legend).to_be_hidden()
+        page.wait_for("!location.hash.includes('heat')")
+        assert page.errors == []
+
+
 def test_the_past_is_accessible_and_nothing_is_cut_off(
     chromium: Browser, past: tuple[Place, int], axe: str, tmp_path: Path
 ) -> None:
     place, end_ns = past
-    link = link_to(place, end_ns, 155, tag="second")
+    link = link_to(place, end_ns, 155, tag="second", heat="1")
     with watched_page(chromium, link, reduced_motion="reduce") as page:
         wait_for_past(page, 3)
+        expect(page.page.locator("#heat [data-part='note']")).to_contain_text("Most:")
         assert violations(page.page, axe) == []
-        script = "[...document.querySelectorAll('.past *, #past-figures *')].filter((e) => e.checkVisibility() "
-        script += "&& e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML)"
+        cut = "[...document.querySelectorAll('.past *, #past-figures *, #heat *')].filter((e) => e.checkVisibility() "
+        cut += "&& e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML)"
+        site = "((site) => site.scrollWidth <= site.clientWidth)(document.getElementById('site'))"
         for look in every_look(page.page):
             page.page.screenshot(path=tmp_path / f"past-{look}.png")
-            assert page.page.evaluate(script) == [], look
+            assert page.page.evaluate(cut) == [], look
+            assert page.page.evaluate(site), look
         assert page.errors == []

@@ -4,13 +4,16 @@ import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
-from dropanchor_schemas.destinations import EmailDestination
+from dropanchor_schemas.destinations import EmailDestination, Language
+from dropanchor_schemas.events import EventType
 from dropanchor_service.delivery import queue
+from dropanchor_service.delivery.words import WORDS
 from dropanchor_service.settings.events import EmailSettings
 from support.certificate import self_signed
 from support.delivery import DeliveryBench
@@ -33,9 +36,12 @@ def bench_of(server: MailServer, tls: str = "none", **settings: Any) -> Delivery
 
 @contextmanager
 def delivering(
-    bench: DeliveryBench, digest_s: float = 0.0, to: tuple[str, ...] = ("shift@example.com",)
+    bench: DeliveryBench,
+    digest_s: float = 0.0,
+    to: tuple[str, ...] = ("shift@example.com",),
+    language: Language = Language.ENGLISH,
 ) -> Iterator[None]:
-    bench.put(EmailDestination(type="email", id="mes", to=list(to), digest_s=digest_s))
+    bench.put(EmailDestination(type="email", id="mes", to=list(to), digest_s=digest_s, language=language))
     with bench.thread:
         yield
 
@@ -62,6 +68,36 @@ def test_a_mail_says_who_did_what_where_and_when_and_links_to_the_moment() -> No
     assert where.endswith("x 3.2 m, y 1.7 m; probability 0.99; event 1")
     assert link.startswith("https://yard.example.com/#from=20")
     assert link.endswith("&tag=cart-3")
+
+
+def test_a_mail_is_in_the_language_of_its_destination() -> None:
+    server = MailServer()
+    bench = bench_of(server)
+    with running_mail_server(server), delivering(bench, digest_s=1.0, language=Language.GERMAN):
+        bench.happen("cart-3")
+        wait_until(lambda: len(server.mails) == 1)
+        bench.happen(*(f"cart-{number}" for number in range(30)))
+        wait_until(lambda: bench.counts() == (0, 0))
+    first, digest = server.mails
+    assert first["Subject"] == "[yard] cart-3 ist jetzt in Loading dock"
+    said, where = first.get_content().splitlines()[:2]
+    assert said == "cart-3 ist jetzt in Loading dock."
+    assert where.endswith("x 3,2 m, y 1,7 m; Wahrscheinlichkeit 0,99; Ereignis 1")
+    assert digest["Subject"] == "[yard] cart-0 ist jetzt in Loading dock, und 29 weitere Ereignisse"
+    assert digest.get_content().splitlines()[:2] == ["30 Ereignisse:", "30 x jetzt in Loading dock"]
+
+
+@pytest.mark.parametrize("language", Language)
+@pytest.mark.parametrize("event_type", EventType)
+def test_every_language_has_words_for_every_event_with_the_same_values(
+    language: Language, event_type: EventType
+) -> None:
+    def values_of(text: str) -> set[str]:
+        return {name for _, name, _, _ in Formatter().parse(text) if name}
+
+    english, words = WORDS[Language.ENGLISH], WORDS[language]
+    assert values_of(words.sentences[event_type]) == values_of(english.sentences[event_type])
+    assert values_of(words.kinds[event_type]) == values_of(english.kinds[event_type])
 
 
 def test_events_that_happen_within_the_pause_become_one_mail() -> None:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame, State
-from dropanchor_service.history.overview import Overview, OverviewError, TooMuchError
+from dropanchor_service.history.covering import TooMuchError, UnfinishedSummaryError
+from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.summaries import Between
 from dropanchor_service.history.summary_table import LENGTHS_NS
 from dropanchor_service.history.track_file import TrackReader, TrackWriter
@@ -192,8 +193,8 @@ def test_only_the_named_tags_are_read(path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_long_period_without_summaries_is_refused_with_a_reason(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     writer = TrackWriter(path)
     writer.insert(drive(np.arange(0.0, HOUR, 10.0)), ["a"] * 360, [None] * 360)
-    monkeypatch.setattr("dropanchor_service.history.overview.MAX_TAG_SLOTS", 100)
-    with pytest.raises(OverviewError, match="still being made"):
+    monkeypatch.setattr("dropanchor_service.history.covering.MAX_TAG_SLOTS", 100)
+    with pytest.raises(UnfinishedSummaryError, match="still being made"):
         overview(path, 0, HOUR)
     writer.close()
     again = TrackWriter(path)
@@ -204,7 +205,7 @@ def test_a_long_period_without_summaries_is_refused_with_a_reason(path: Path, mo
 
 def test_a_period_with_too_many_summaries_is_refused_with_a_reason(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store(path, a=drive(np.arange(0.0, 200 * HOUR, 60.0))).close()
-    monkeypatch.setattr("dropanchor_service.history.overview.MAX_BYTES", 10_000)
+    monkeypatch.setattr("dropanchor_service.history.covering.MAX_BYTES", 10_000)
     with pytest.raises(TooMuchError, match="name the tags"):
         overview(path, 0, 200 * HOUR)
     assert figures(overview(path, 0, 20 * HOUR), "a")["poses"] == 1201
@@ -213,7 +214,7 @@ def test_a_period_with_too_many_summaries_is_refused_with_a_reason(path: Path, m
 def test_a_file_without_summaries_gets_them(path: Path) -> None:
     TrackWriter(path).close()
     old = sqlite3.connect(path)
-    old.executescript("DROP TABLE summaries; PRAGMA user_version = 1;")
+    old.executescript("DROP TABLE summaries; DROP TABLE heat; PRAGMA user_version = 1;")
     old.close()
     store(path, a=drive(np.arange(0.0, HOUR, 10.0))).close()
     assert figures(overview(path, 0, HOUR), "a")["poses"] == 360

@@ -21,7 +21,7 @@ GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX"}
 GAP_NS = 10_000_000_000  # a longer gap starts a new segment of a GPX track
 
 _PLACED = ("tracking", "coasting", "degraded")
-_COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
+COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
 
 Head = Mapping[str, Any]
 """The members of `Track` except its poses."""
@@ -80,10 +80,10 @@ def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: AR
         text = io.StringIO(newline="")
         writer = csv.writer(text)
         if number == 0:
-            writer.writerow([*names, *_COVARIANCES])
+            writer.writerow([*names, *COVARIANCES])
         for pose in page.rows():
             cov = pose["covariance"]
-            variances = ["" if cov is None else cov[i][j] for i, j in _COVARIANCES.values()]
+            variances = ["" if cov is None else cov[i][j] for i, j in COVARIANCES.values()]
             writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *variances])
         yield text.getvalue().encode()
 

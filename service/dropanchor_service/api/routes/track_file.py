@@ -1,7 +1,7 @@
 """The route that exports the whole track of a tag over a period as a file."""
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
@@ -9,25 +9,31 @@ from fastapi import APIRouter, Query
 from pydantic import Field
 from starlette.responses import StreamingResponse
 
+from dropanchor_schemas.site import Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.track_pages import TrackPage, track_page
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
-from dropanchor_service.api.http.errors import Kind, problems
+from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
 
 PAGE = 5000
+PARQUET = "parquet"
+MEDIA_TYPES = track_formats.MEDIA_TYPES | {PARQUET: "application/vnd.apache.parquet"}
 
 _DESCRIPTION = """\
 Every stored pose of a tag over a period, in one file. GeoJSON and GPX need a georeferenced site. GPX holds only poses
-in the frame of the site that are `tracking`, `coasting` or `degraded`, and gives the state in `type`."""
+in the frame of the site that are `tracking`, `coasting` or `degraded`, and gives the state in `type`. Parquet needs the
+extra `parquet` of the service; its schema holds the units and the frame."""
 
 
 class FileQuery(Period):
     """The period to export, and the format of the file."""
 
-    format: Literal["csv", "geojson", "gpx", "json"] = Field(default="csv", description="The format of the file.")
+    format: Literal["csv", "geojson", "gpx", "json", "parquet"] = Field(
+        default="csv", description="The format of the file."
+    )
 
 
 def track_file_router(answers: Answers) -> APIRouter:
@@ -41,23 +47,38 @@ def track_file_router(answers: Answers) -> APIRouter:
         response_class=StreamingResponse,
         responses=_offers()
         | problems(
-            *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_GEOREFERENCED),
+            *(Kind.UNKNOWN_TAG, Kind.NO_HISTORY, Kind.NOT_GEOREFERENCED, Kind.NOT_INSTALLED),
             *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
         ),
     )
     def export_track(tag: TagId, query: Annotated[FileQuery, Query()]) -> StreamingResponse:
         if query.format in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[query.format])
+        to_parquet = _parquet() if query.format == PARQUET else None
         from_ns, to_ns = limits_of(query, answers.now_ns())
         head = {"tag": tag, "from_ns": from_ns, "to_ns": to_ns, "next": None}
         pages = _pages(answers, tag, from_ns, to_ns)
+        if to_parquet is None:
+            content = track_formats.stream(pages, head, query.format)
+        else:
+            content = to_parquet(pages, tag, answers.site.site)
         return StreamingResponse(
-            track_formats.stream(pages, head, query.format),
-            media_type=track_formats.MEDIA_TYPES[query.format],
+            content,
+            media_type=MEDIA_TYPES[query.format],
             headers={"cache-control": "no-store", "content-disposition": _attachment(f"{tag}.{query.format}")},
         )
 
     return router
+
+
+def _parquet() -> Callable[[Iterable[TrackPage], str, Site], Iterator[bytes]]:
+    """Return what writes Parquet. Raises ProblemError without the extra."""
+    try:
+        from dropanchor_service.api.formats.parquet import stream
+    except ModuleNotFoundError as error:
+        detail = "Parquet needs the extra `parquet`: pip install 'dropanchor-service[parquet]'"
+        raise ProblemError(Kind.NOT_INSTALLED, detail) from error
+    return stream
 
 
 def _pages(answers: Answers, tag: str, from_ns: int, to_ns: int) -> Iterator[TrackPage]:
@@ -84,5 +105,4 @@ def _attachment(name: str) -> str:
 
 
 def _offers() -> dict[int | str, dict[str, Any]]:
-    media_types = track_formats.MEDIA_TYPES.values()
-    return {200: {"content": {media_type: {"schema": {"type": "string"}} for media_type in media_types}}}
+    return {200: {"content": {media_type: {"schema": {"type": "string"}} for media_type in MEDIA_TYPES.values()}}}

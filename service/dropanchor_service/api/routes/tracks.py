@@ -14,7 +14,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
-from dropanchor_service.history.overview import TooMuchError
+from dropanchor_service.history.covering import TooMuchError
 
 _DESCRIPTION = """\
 The distance, the tracked time and the speeds of each tag over a period, and a few of its stored poses: the first, the

@@ -1,6 +1,7 @@
 /** Connect alerts: who is told about events, and the rules that make them. */
 
-import { t } from "../i18n/language.js";
+import { listLanguages } from "../i18n/document.js";
+import { language, t } from "../i18n/language.js";
 import { confirmed } from "../setup/confirm.js";
 import { AlertStore } from "./alert_store.js";
 import { DestinationList } from "./destination_list.js";
@@ -12,7 +13,7 @@ import { stuckIn } from "./words.js";
 const COMMON = { enabled: true, types: [], zones: [], tags: [] };
 /** @type {Record<string, Record<string, any>>} */
 const NEW_DESTINATIONS = {
-  email: { ...COMMON, type: "email", to: [], digest_s: 60 },
+  email: { ...COMMON, type: "email", to: [], digest_s: 60, language },
   webhook: { ...COMMON, type: "webhook", url: "", secret: null },
   mqtt: { ...COMMON, type: "mqtt", topic: "dropanchor/{site}/{tag}/event" },
 };
@@ -49,6 +50,7 @@ export class Alerts {
 
   #addForms() {
     const { store } = this;
+    listLanguages(/** @type {HTMLSelectElement} */ (this.#part("language")));
     new ItemForm(/** @type {HTMLFormElement} */ (this.#part("destination-form")), this.destinationEditor, {
       title: ({ id, type }, isNew) => (isNew ? t(`alerts.new_${type}`) : t("destination.title", { id })),
       mayDelete: () => store.isAdmin,

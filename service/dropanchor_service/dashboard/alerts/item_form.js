@@ -2,7 +2,7 @@
 
 import { readMeasure, writeMeasure } from "../data/units.js";
 
-/** @typedef {import("../data/items.js").Item} Item @typedef {HTMLInputElement | HTMLTextAreaElement} Field */
+/** @typedef {import("../data/items.js").Item} Item @typedef {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} Field */
 
 export class ItemForm {
   /** What is shown, so that what is being typed is not overwritten. @type {Item | null} */
@@ -49,7 +49,7 @@ export class ItemForm {
   }
 
   #fields() {
-    return /** @type {Field[]} */ ([...this.form.querySelectorAll("input, textarea")]);
+    return /** @type {Field[]} */ ([...this.form.querySelectorAll("input, select, textarea")]);
   }
 
   #values() {

@@ -7,9 +7,13 @@ const STORAGE_KEY = "dropanchor.key";
 
 export class KeyRequiredError extends Error {}
 
+/** The service cannot do this as it is. */
+export class RefusedError extends Error {}
+
 /** The service answers, but is still starting. The message says what it does. */
 export class StartingError extends Error {}
 
+const CONFLICT = 409;
 const UNAVAILABLE = 503;
 const CHANGED_MEANWHILE = 412;
 const NOT_READY = "urn:dropanchor:problem:not-ready";
@@ -23,8 +27,8 @@ const keyOf = () => shareToken ?? sessionStorage.getItem(STORAGE_KEY);
 export const storeKey = (key) => sessionStorage.setItem(STORAGE_KEY, key);
 
 /**
- * Return a successful response. Throws KeyRequiredError without a valid key, StartingError while the service starts, and
- * Error for any other failure.
+ * Return a successful response. Throws KeyRequiredError without a valid key, StartingError while the service starts,
+ * RefusedError when it cannot do this as it is, and Error for any other failure.
  * @param {URL} url @param {RequestInit} options @returns {Promise<Response>}
  */
 export async function request(url, options) {
@@ -34,6 +38,7 @@ export async function request(url, options) {
     const problem = await response.json();
     if (problem.type === NOT_READY) throw new StartingError(problem.detail);
   }
+  if (response.status === CONFLICT) throw new RefusedError(`${url.pathname} is refused`);
   if (!response.ok) throw new Error(`${url.pathname} returned status ${response.status}`);
   return response;
 }

@@ -1,17 +1,18 @@
 /** The trails of the last seconds before a time in the past. They look like live trails to the map. */
 
+import { TRACKING, UNKNOWN } from "./packed_tracks.js";
+import { NO_TRACKS } from "./tracks.js";
 import { TRAIL_S } from "./trails.js";
 
 /** @typedef {import("./tracks.js").Track} Track */
 
 export class PastTrails {
-  /** @type {Map<string, Track>} */
-  #tracks = new Map();
+  #tracks = NO_TRACKS;
   #time_ms = 0;
 
-  /** @param {readonly Track[]} tracks @param {number} time_ms in the past */
+  /** @param {import("./tracks.js").Tracks} tracks @param {number} time_ms in the past */
   show(tracks, time_ms) {
-    this.#tracks = new Map(tracks.map((track) => [track.tag, track]));
+    this.#tracks = tracks;
     this.#time_ms = time_ms;
   }
 
@@ -30,11 +31,11 @@ export function trailOf(track, time_ms, now_ms) {
     x.push(px);
     y.push(track.y[i]);
     time.push(now_ms - (time_ms - track.time[i]));
-    trusted.push(track.points.since_previous[i] === "tracking" ? 1 : 0);
+    trusted.push(track.since[i] === TRACKING ? 1 : 0);
   };
   const last = track.before(time_ms);
   for (let i = track.before(time_ms - TRAIL_S * 1000) + 1; i <= last; i++) {
-    if (track.points.since_previous[i] === "unknown") add(i, NaN);
+    if (track.since[i] === UNKNOWN) add(i, NaN);
     add(i, track.x[i]);
   }
   return { x, y, time, trusted, length: x.length, at: (/** @type {number} */ i) => i };

@@ -1,15 +1,13 @@
 /** The stored track of the selected tag over the last minutes, requested anew from time to time. */
 
-import { getJson } from "./connection.js";
-import { tracksUrl } from "./replay.js";
-import { Track } from "./tracks.js";
+import { readTracks } from "./track_reader.js";
 
 const RECENT_MS = 600_000;
 const POINTS = 300;
 const REQUEST_MS = 10_000;
 
 export class RecentTrack extends EventTarget {
-  /** @type {Track | null} */
+  /** @type {import("./tracks.js").Track | null} */
   #track = null;
   /** @type {string | null} */
   #tag = null;
@@ -26,9 +24,9 @@ export class RecentTrack extends EventTarget {
     if (tag !== this.#tag) this.#track = null;
     [this.#tag, this.#requestedAt] = [tag, performance.now()];
     if (tag === null) return;
-    const found = await getJson(tracksUrl(end_ms - RECENT_MS, end_ms, POINTS, tag)).catch(() => null);
+    const found = await readTracks(end_ms - RECENT_MS, end_ms, POINTS, { tag }).catch(() => null);
     if (tag !== this.#tag) return;
-    this.#track = found?.tracks.length ? new Track(found.tracks[0]) : null;
+    this.#track = found?.get(tag) ?? null;
     this.dispatchEvent(new Event("change"));
   }
 }

@@ -1,18 +1,19 @@
 /** A period of the past, and a clock that runs through it. Tracks are loaded piece by piece, ahead of the clock. */
 
-import { api, getJson } from "./connection.js";
-import { Track } from "./tracks.js";
+import { NO_TRACKS } from "./tracks.js";
+import { readTracks } from "./track_reader.js";
 import { t } from "../i18n/language.js";
 
 export const SPEEDS = [0.5, 1, 2, 5, 10, 20, 50];
-const PIECE_POINTS = 60_000;
-/** Each piece begins so much earlier, so that trails and tags that were silent for a moment are in it. */
-const BEFORE_MS = 60_000;
-const [SHORTEST_MS, LONGEST_MS] = [60_000, 1_800_000];
+/** Tags times seconds of a piece, and of the time before it. The service reads twice as many pose by pose. */
+const PIECE_POSES = 100_000;
+const [SHORTEST_MS, LONGEST_MS] = [10_000, 600_000];
+/** Each piece begins up to so much earlier, so that trails and tags that were silent for a moment are in it. */
+const MOST_BEFORE_MS = 60_000;
 /** A piece is requested when the clock is so much of a piece before it. */
 const AHEAD = 0.5;
 
-/** @typedef {{from_ms: number, to_ms: number, tracks: Track[]}} Piece */
+/** @typedef {{from_ms: number, to_ms: number, tracks: import("./tracks.js").Tracks}} Piece */
 
 /**
  * Events: "time" (the time or what is known at it has changed), "period" (another period, or its figures have arrived),
@@ -28,8 +29,8 @@ export class Replay extends EventTarget {
   /** Whether the figures of the period have arrived. */
   isLoaded = false;
   #speed = 1;
-  /** Figures and thinned points of every tag over the whole period. @type {Map<string, import("./tracks.js").TagTrack>} */
-  figures = new Map();
+  /** Figures and thinned points of every tag over the whole period. */
+  figures = NO_TRACKS;
   /** @type {Piece[]} */
   #pieces = [];
   #asked = new AbortController();
@@ -51,7 +52,7 @@ export class Replay extends EventTarget {
     this.dispatchEvent(new Event("period"));
     const found = await this.#request(from_ms, to_ms, 300);
     if (!found) return;
-    this.figures = new Map(found.map((track) => [track.tag, track]));
+    this.figures = found;
     this.isLoaded = true;
     this.dispatchEvent(new Event("period"));
     await this.seek(this.time_ms);
@@ -61,7 +62,7 @@ export class Replay extends EventTarget {
     this.#asked.abort();
     this.#asked = new AbortController();
     this.#pieces = [];
-    this.figures = new Map();
+    this.figures = NO_TRACKS;
     this.playing = this.loading = this.isLoaded = false;
   }
 
@@ -89,12 +90,11 @@ export class Replay extends EventTarget {
 
   /** Return the tracks around the current time; none while they are loading. */
   get tracks() {
-    return this.#pieceAt(this.time_ms)?.tracks ?? [];
+    return this.#pieceAt(this.time_ms)?.tracks ?? NO_TRACKS;
   }
 
   get #pieceLength() {
-    const length = (PIECE_POINTS / Math.max(1, this.figures.size)) * 1000;
-    return Math.min(LONGEST_MS, Math.max(SHORTEST_MS, Math.floor(length / 1000) * 1000));
+    return pieceLength(this.figures.size);
   }
 
   /** @param {number} time_ms */
@@ -110,10 +110,14 @@ export class Replay extends EventTarget {
     if (time_ms > this.to_ms || this.#pieceAt(time_ms)) return;
     const length = this.#pieceLength;
     const from_ms = Math.floor(time_ms / length) * length;
-    const waiting = this.#waiting.get(from_ms) ?? this.#loadPiece(from_ms, from_ms + length);
-    this.#waiting.set(from_ms, waiting);
     this.#isLoading(!this.#pieceAt(this.time_ms));
-    await waiting;
+    if (!this.#waiting.has(from_ms)) this.#waiting.set(from_ms, this.#loadAndTell(from_ms, from_ms + length));
+    await this.#waiting.get(from_ms);
+  }
+
+  /** @param {number} from_ms @param {number} to_ms */
+  async #loadAndTell(from_ms, to_ms) {
+    await this.#loadPiece(from_ms, to_ms);
     this.#waiting.delete(from_ms);
     this.#isLoading(!this.#pieceAt(this.time_ms) && this.problem === "");
     this.dispatchEvent(new Event("time"));
@@ -121,11 +125,11 @@ export class Replay extends EventTarget {
 
   /** @param {number} from_ms @param {number} to_ms */
   async #loadPiece(from_ms, to_ms) {
-    const points = Math.min(5000, Math.ceil((to_ms - from_ms + BEFORE_MS) / 1000) + 2);
-    const found = await this.#request(from_ms - BEFORE_MS, to_ms, points);
+    const start_ms = from_ms - Math.min(MOST_BEFORE_MS, to_ms - from_ms);
+    const found = await this.#request(start_ms, to_ms, Math.ceil((to_ms - start_ms) / 1000) + 2);
     if (!found) return;
     const near = this.#pieces.filter((piece) => Math.abs(piece.from_ms - from_ms) <= 2 * (to_ms - from_ms));
-    this.#pieces = [...near, { from_ms, to_ms, tracks: found.map((track) => new Track(track)) }];
+    this.#pieces = [...near, { from_ms, to_ms, tracks: found }];
   }
 
   /** @param {boolean} loading */
@@ -135,11 +139,11 @@ export class Replay extends EventTarget {
     this.dispatchEvent(new Event("state"));
   }
 
-  /** @param {number} from_ms @param {number} to_ms @param {number} points @returns {Promise<import("./tracks.js").TagTrack[] | null>} */
+  /** @param {number} from_ms @param {number} to_ms @param {number} points @returns {Promise<import("./tracks.js").Tracks | null>} */
   async #request(from_ms, to_ms, points) {
     const { signal } = this.#asked;
     try {
-      const { tracks } = await getJson(tracksUrl(from_ms, to_ms, points));
+      const tracks = await readTracks(from_ms, to_ms, points, { signal });
       if (signal.aborted) return null;
       this.problem = "";
       return tracks;
@@ -153,15 +157,8 @@ export class Replay extends EventTarget {
   }
 }
 
-/** Return the URL of the thinned tracks over a period. @param {number} from_ms @param {number} to_ms @param {number} points of each tag
- * @param {string} [tag] only of this one */
-export function tracksUrl(from_ms, to_ms, points, tag) {
-  const url = api("tracks");
-  url.search = new URLSearchParams({
-    from: nanoseconds(from_ms), to: nanoseconds(to_ms), max_points: String(points), ...(tag === undefined ? {} : { tags: tag }),
-  }).toString();
-  return url;
+/** Return the length of a piece in ms. @param {number} tags */
+export function pieceLength(tags) {
+  const seconds = Math.floor(PIECE_POSES / Math.max(1, tags));
+  return Math.min(LONGEST_MS, Math.max(SHORTEST_MS, seconds * 1000));
 }
-
-/** @param {number} time_ms */
-export const nanoseconds = (time_ms) => `${Math.max(0, Math.round(time_ms))}000000`;

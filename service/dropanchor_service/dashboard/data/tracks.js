@@ -1,119 +1,139 @@
-/** Stored tracks, as the service thins them, and the pose of a tag at a time between its points. */
+/** Stored tracks, as the service thins them, and the pose of every tag at a time between their points. */
 
-/**
- * @typedef {object} Points columns of equal length, as in the contract
- * @property {number[]} t_ns
- * @property {string[]} state
- * @property {string[]} frame
- * @property {(number | null)[]} x
- * @property {(number | null)[]} y
- * @property {(number | null)[]} heading_rad
- * @property {(number | null)[]} speed_mps
- * @property {(number | null)[]} sigma_pos_m
- * @property {(number | null)[]} semi_major_m
- * @property {(number | null)[]} semi_minor_m
- * @property {(number | null)[]} angle_rad
- * @property {("tracking" | "doubtful" | "unknown")[]} since_previous
- *
- * @typedef {object} TagTrack as in the contract
- * @property {string} tag
- * @property {number} poses
- * @property {number} tracked_s
- * @property {number} distance_m
- * @property {number | null} mean_speed_mps
- * @property {number | null} max_speed_mps
- * @property {Points} points
- */
+import { NUMBERS, UNKNOWN, packed } from "./packed_tracks.js";
+
+/** @typedef {import("./packed_tracks.js").Packed} Packed */
 
 /** Points further apart are not joined: what the tag did in between is not known well enough. */
 const JOIN_MS = 10_000;
 
-/** One tag's points with times in ms. A place in a frame of the tag's own is no place of the map: it is unknown here. */
+/** The tracks of many tags. */
+export class Tracks {
+  /** Made when a tag is looked up. @type {Map<string, number> | null} */
+  #rows = null;
+
+  /** @param {Packed} all */
+  constructor(all) {
+    this.all = all;
+  }
+
+  get size() {
+    return this.all.tags.length;
+  }
+
+  *[Symbol.iterator]() {
+    for (let row = 0; row < this.size; row++) yield new Track(this.all, row);
+  }
+
+  /** @param {string | null} tag */
+  get(tag) {
+    if (tag !== null) this.#rows ??= new Map(this.all.tags.map((name, row) => [name, row]));
+    const row = this.#rows?.get(tag ?? "");
+    return row === undefined ? null : new Track(this.all, row);
+  }
+}
+
+export const NO_TRACKS = new Tracks(packed([]));
+
+/** One tag's points. */
 export class Track {
-  /** @param {TagTrack} track */
-  constructor({ tag, points }) {
-    const onMap = points.frame.map((frame) => frame !== "relative");
-    this.tag = tag;
-    this.points = points;
-    this.time = Float64Array.from(points.t_ns, (t_ns) => t_ns / 1e6);
-    this.x = Float64Array.from(points.x, (x, i) => (onMap[i] ? (x ?? NaN) : NaN));
-    this.y = Float64Array.from(points.y, (y, i) => (onMap[i] ? (y ?? NaN) : NaN));
+  /** @param {Packed} all @param {number} row of the tag */
+  constructor(all, row) {
+    const part = /** @template {Float32Array | Float64Array | Uint8Array} T */ (/** @type {T} */ column) =>
+      /** @type {T} */ (column.subarray(all.starts[row], all.starts[row + 1]));
+    this.tag = all.tags[row];
+    this.time = part(all.time);
+    this.x = part(all.number.x);
+    this.y = part(all.number.y);
+    /** What is known since the previous point: TRACKING, DOUBTFUL or UNKNOWN. */
+    this.since = part(all.since);
+    /** Figures over the whole time; NaN: unknown. */
+    this.figure = {
+      poses: all.figure.poses[row], tracked_s: all.figure.tracked_s[row], distance_m: all.figure.distance_m[row],
+      mean_speed_mps: all.figure.mean_speed_mps[row], max_speed_mps: all.figure.max_speed_mps[row],
+    };
   }
 
   /** Return the index of the last point at or before a time; −1: none. @param {number} time_ms */
   before(time_ms) {
-    let [low, high] = [0, this.time.length];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.time[middle] <= time_ms) low = middle + 1;
-      else high = middle;
-    }
-    return low - 1;
+    return before(this.time, 0, this.time.length, time_ms);
   }
+}
 
-  /** Return how far a time lies between a point and the next, 0 to 1, if the tag was known all the way; else null.
-   * @param {number} i @param {number} time_ms */
-  shareAfter(i, time_ms) {
-    const length = this.time[i + 1] - this.time[i];
-    if (!(length <= JOIN_MS) || this.points.since_previous[i + 1] === "unknown") return null;
-    return (time_ms - this.time[i]) / length;
+/** Return the index of the last of these times at or before one; `start` − 1: none. @param {Float64Array} times in order
+ * @param {number} start @param {number} end @param {number} time_ms */
+function before(times, start, end, time_ms) {
+  let [low, high] = [start, end];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time_ms) low = middle + 1;
+    else high = middle;
   }
+  return low - 1;
 }
 
 /**
- * Return what the stream would have sent at a time in the past: the pose of every tag that had one by then.
- * @param {readonly Track[]} tracks @param {number} time_ms
+ * Return what the stream would have sent at a time in the past: the pose of every tag that had one by then. It is between
+ * two points if the tag was known all the way, else the last point with its age. What is not stored is left out.
+ * @param {Tracks} tracks @param {number} time_ms
  * @returns {import("./fleet.js").Frame}
  */
-export function frameAt(tracks, time_ms) {
-  const poses = tracks.flatMap((track) => poseAt(track, time_ms) ?? []);
-  /** @type {Record<string, any[]>} */
-  const columns = {};
-  for (const name of FIELDS) columns[name] = poses.map((pose) => pose[name]);
-  return { t_ns: time_ms * 1e6, tags: poses.map(({ tag }) => tag), ...columns };
+export function frameAt({ all }, time_ms) {
+  /** @type {string[]} */
+  const tags = [];
+  const [points, shares] = [new Int32Array(all.tags.length), new Float64Array(all.tags.length)];
+  for (let row = 0; row < all.tags.length; row++) {
+    const [start, end] = [all.starts[row], all.starts[row + 1]];
+    const last = before(all.time, start, end, time_ms);
+    if (last < start) continue;
+    points[tags.length] = last;
+    shares[tags.length] = shareAfter(all, last, end, time_ms);
+    tags.push(all.tags[row]);
+  }
+  return { t_ns: time_ms * 1e6, tags, ...columnsAt(all, points.subarray(0, tags.length), shares, time_ms) };
 }
 
-const FIELDS = [
-  "state", "frame", "x", "y", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad", "age_s",
-  ...["reason", "hint", "anchor", "hypotheses", "yaw_rate_radps", "p_mode", "range_m", "sigma_obs_m", "online"], // not stored: unknown
-];
-
-/** Return the pose at a time: between two points if the tag was known all the way, else the last point with its age.
- * @param {Track} track @param {number} time_ms @returns {Record<string, any> | null} null: none yet */
-export function poseAt(track, time_ms) {
-  const i = track.before(time_ms);
-  if (i < 0) return null;
-  const { points } = track;
-  const share = track.shareAfter(i, time_ms) ?? 0;
-  const wider = share > 0 && (points.semi_major_m[i + 1] ?? 0) > (points.semi_major_m[i] ?? 0) ? i + 1 : i;
-  const isKnown = share > 0 || time_ms === track.time[i];
-  return {
-    tag: track.tag,
-    state: points.state[i],
-    frame: points.frame[i],
-    x: mixed(track.x, i, share),
-    y: mixed(track.y, i, share),
-    heading_rad: turned(points.heading_rad[i], points.heading_rad[i + 1], share),
-    speed_mps: mixed(points.speed_mps, i, share),
-    sigma_pos_m: points.sigma_pos_m[wider],
-    semi_major_m: points.semi_major_m[wider],
-    semi_minor_m: points.semi_minor_m[wider],
-    angle_rad: points.angle_rad[wider],
-    age_s: isKnown ? 0 : (time_ms - track.time[i]) / 1000,
-  };
+/** @param {Packed} all @param {Int32Array} points the last point of each tag @param {Float64Array} shares how far it is to the next, 0 to 1
+ * @param {number} time_ms */
+function columnsAt(all, points, shares, time_ms) {
+  const { x, y, heading_rad, speed_mps, sigma_pos_m, semi_major_m, semi_minor_m, angle_rad } = all.number;
+  const to = /** @type {Record<string, Float32Array>} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(points.length)])));
+  const [state, frame, age_s] = [new Array(points.length), new Array(points.length), new Float64Array(points.length)];
+  for (let at = 0; at < points.length; at++) {
+    const [i, share] = [points[at], shares[at]];
+    const wider = share > 0 && semi_major_m[i + 1] > semi_major_m[i] ? i + 1 : i;
+    to.x[at] = mixed(x, i, share);
+    to.y[at] = mixed(y, i, share);
+    to.heading_rad[at] = turned(heading_rad[i], heading_rad[i + 1], share);
+    to.speed_mps[at] = mixed(speed_mps, i, share);
+    to.sigma_pos_m[at] = sigma_pos_m[wider];
+    to.semi_major_m[at] = semi_major_m[wider];
+    to.semi_minor_m[at] = semi_minor_m[wider];
+    to.angle_rad[at] = angle_rad[wider];
+    state[at] = all.states[all.state[i]];
+    frame[at] = all.turned[i] ? "relative" : "site";
+    age_s[at] = share > 0 ? 0 : (time_ms - all.time[i]) / 1000;
+  }
+  return { ...to, state, frame, age_s };
 }
 
-/** @param {ArrayLike<number | null>} values @param {number} i @param {number} share */
+/** Return how far a time lies between a point and the next, 0 to 1; 0 if the tag was not known all the way.
+ * @param {Packed} all @param {number} i @param {number} end of the tag's points @param {number} time_ms */
+function shareAfter(all, i, end, time_ms) {
+  if (i + 1 >= end || all.since[i + 1] === UNKNOWN) return 0;
+  const length = all.time[i + 1] - all.time[i];
+  return length <= JOIN_MS ? (time_ms - all.time[i]) / length : 0;
+}
+
+/** @param {Float32Array} values @param {number} i @param {number} share */
 function mixed(values, i, share) {
   const [from, to] = [values[i], values[i + 1]];
-  if (from === null || Number.isNaN(from)) return null;
-  return share > 0 && to !== null ? from + share * (to - from) : from;
+  return share > 0 && !Number.isNaN(to) ? from + share * (to - from) : from;
 }
 
-/** Return a direction between two, the short way round. @param {number | null} from @param {number | null} to
- * @param {number} share */
+/** Return a direction between two, the short way round. @param {number} from @param {number} to @param {number} share */
 function turned(from, to, share) {
-  if (from === null || share === 0 || to === null) return from;
+  if (share === 0 || Number.isNaN(to)) return from;
   const turn = Math.atan2(Math.sin(to - from), Math.cos(to - from));
   return from + share * turn;
 }

@@ -1,5 +1,6 @@
 /** The positions of each tag in the last seconds: a ring buffer per tag, without poses whose position is unknown. */
 
+import { TRACKING, UNKNOWN } from "./packed_tracks.js";
 import { STATES } from "./states.js";
 
 export const TRAIL_S = 30;
@@ -75,8 +76,8 @@ export class Trails {
     const trail = new Trail();
     for (let i = 0; i < track.time.length && zero_ms + track.time[i] < end_ms; i++) {
       const time_ms = zero_ms + track.time[i];
-      if (trail.length > 0 && track.points.since_previous[i] === "unknown") trail.add(NaN, NaN, false, time_ms);
-      trail.add(track.x[i], track.y[i], track.points.since_previous[i] === "tracking", time_ms);
+      if (trail.length > 0 && track.since[i] === UNKNOWN) trail.add(NaN, NaN, false, time_ms);
+      trail.add(track.x[i], track.y[i], track.since[i] === TRACKING, time_ms);
     }
     for (let i = 0; i < (noted?.length ?? 0); i++) {
       const at = /** @type {Trail} */ (noted).at(i);

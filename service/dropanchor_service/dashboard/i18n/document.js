@@ -1,7 +1,7 @@
 /** Put the messages of the language into a document. Its elements name the messages in `data-i18n…` attributes. */
 
 import { installUnits } from "../data/units.js";
-import { language, t } from "./language.js";
+import { LANGUAGES, language, t } from "./language.js";
 
 const ATTRIBUTES = { i18nLabel: "aria-label", i18nTitle: "title", i18nPlaceholder: "placeholder", i18nAlt: "alt" };
 const NAMES = Object.keys(ATTRIBUTES).map((name) => `[data-${name.replace("i18n", "i18n-").toLowerCase()}]`);
@@ -17,6 +17,12 @@ export function translate(page) {
       if (key !== undefined) element.setAttribute(attribute, t(key));
     }
   }
+}
+
+/** List the languages, each in its own name, and choose that of the page. @param {HTMLSelectElement} list */
+export function listLanguages(list) {
+  list.replaceChildren(...Object.entries(LANGUAGES).map(([code, name]) => new Option(name, code, false, code === language)));
+  for (const option of list.options) option.lang = option.value;
 }
 
 /** Write a message around the children of an element: `{0}` is the first of them. Children that the message does not

@@ -3,7 +3,8 @@
 import { writeAddress } from "../data/address.js";
 import { chosen, remember } from "../data/display.js";
 import { UNITS, unitNames } from "../data/units.js";
-import { LANGUAGES, language } from "../i18n/language.js";
+import { listLanguages } from "../i18n/document.js";
+import { language } from "../i18n/language.js";
 
 /** Write the choices that this browser remembers into the address, so that a copied link keeps them. */
 export function showChoices() {
@@ -14,8 +15,7 @@ export function showChoices() {
 
 /** Offer the languages in a list. @param {HTMLSelectElement} list */
 export function installLanguages(list) {
-  list.replaceChildren(...Object.entries(LANGUAGES).map(([code, name]) => new Option(name, code, false, code === language)));
-  for (const option of list.options) option.lang = option.value;
+  listLanguages(list);
   list.addEventListener("change", () => choose("lang", list.value));
 }
 

@@ -55,6 +55,7 @@ const basemap = new Basemap(map, connection, byId("basemap"), byId("attribution"
 const notices = new Notices(connection, fleet);
 const table = new TagTable(byId("table"), byId("count"), fleet, choice, (tag) => select(tag));
 
+table.isElsewhere = (row) => map.isElsewhere(row);
 const measure = new Measure(map, byId("measure"), byId("measured"));
 map.pressed = (px, py) => measure.press(px, py) || zones.press(px, py);
 const past = new Past({ fleet, trails, roster, evidence, map, choice, connection, updatePanels, byId });
@@ -198,6 +199,7 @@ Object.defineProperty(window, "dropanchor", {
     zones: () => Object.fromEntries(zones.store.zones.map(({ id }) => [id, zones.store.inside.get(id) ?? 0])),
     draft: () => plans.editor.draft && { ...plans.editor.draft, corners: cornersOf(plans.editor.draft.placement, plans.editor.draft.image).map(([x, y]) => [map.view.screenX(x), map.view.screenY(y)]) },
     plans: () => plans.store.plans.map((plan) => ({ id: plan.id, placement: plan.placement, isReady: plans.images.isReady(plan.image) })),
+    screen: (/** @type {number} */ x, /** @type {number} */ y) => [map.view.screenX(x), map.view.screenY(y)],
     basemap: () => basemap.stats,
     drawing: () => ({ ...map.stats, still: map.still }),
     anchors: () => map.anchors.map((anchor) => ({ ...anchor, pixel: [map.view.screenX(anchor.x), map.view.screenY(anchor.y)] })),

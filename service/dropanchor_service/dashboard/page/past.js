@@ -3,12 +3,14 @@
 import { momentIn, momentValues } from "./address.js";
 import { writeAddress } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
+import { HeatPanel } from "../panel/heat_panel.js";
 import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
 import { PastTrails } from "../data/past_trails.js";
 import { RecentTrack } from "../data/recent.js";
-import { Replay, tracksUrl } from "../data/replay.js";
-import { Track, frameAt } from "../data/tracks.js";
+import { Replay } from "../data/replay.js";
+import { readTracks } from "../data/track_reader.js";
+import { frameAt } from "../data/tracks.js";
 import { TRAIL_S } from "../data/trails.js";
 import { t } from "../i18n/language.js";
 
@@ -45,6 +47,7 @@ export class Past {
     this.page = page;
     this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
+    this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
     page.map.trackOf = (tag) => this.#trackOf(tag);
     page.byId("history").addEventListener("click", () => (this.active ? this.leave() : this.enter()));
     this.bar.addEventListener("leave", () => this.leave());
@@ -65,8 +68,8 @@ export class Past {
     if (!this.#hasHistory) return;
     const end_ms = Date.now();
     const zero_ms = performance.now() - end_ms;
-    const { tracks } = await getJson(tracksUrl(end_ms - TRAIL_S * 1000, end_ms, TRAIL_POINTS)).catch(() => ({ tracks: [] }));
-    for (const track of tracks) trails.prepend(new Track(track), zero_ms);
+    const tracks = await readTracks(end_ms - TRAIL_S * 1000, end_ms, TRAIL_POINTS).catch(() => null);
+    for (const track of tracks ?? []) trails.prepend(track, zero_ms);
     if (!fleet.past) map.redraw();
   }
 
@@ -87,6 +90,7 @@ export class Past {
   leave() {
     if (!this.active) return;
     this.replay.close();
+    this.heat.hide();
     this.#become(false);
     this.#writeAddress();
     this.page.connection.retry(); // the service sends all poses again
@@ -134,8 +138,7 @@ export class Past {
 
   /** Return the track of the period that is shown, or the recent one. @param {string | null} tag */
   #trackOf(tag) {
-    const period = this.replay.figures.get(tag ?? "");
-    return this.active ? period && new Track(period) : this.#recent.of(tag);
+    return this.active ? this.replay.figures.get(tag) : this.#recent.of(tag);
   }
 
   #readAddress() {

@@ -1,11 +1,13 @@
 /** What the selected tag did in the shown period, and its track as a file. */
 
-import { request } from "../data/access.js";
+import { RefusedError, request } from "../data/access.js";
 import { api } from "../data/connection.js";
 import { UNKNOWN, age, count, distance, speed } from "../data/format.js";
 import { t } from "../i18n/language.js";
-import { nanoseconds } from "../data/replay.js";
+import { nanoseconds } from "../data/track_reader.js";
 import { isSi } from "../data/units.js";
+
+const GEOREFERENCED = ["geojson", "gpx"];
 
 export class PastFigures {
   /** @param {HTMLElement} box @param {import("../data/replay.js").Replay} replay @param {import("../page/choice.js").Choice} choice */
@@ -23,21 +25,21 @@ export class PastFigures {
 
   /** Whether the site has a georeference, without which there are no latitudes and longitudes. @param {boolean} is */
   set georeferenced(is) {
-    for (const button of this.box.querySelectorAll("button")) button.disabled = !is && button.dataset.format !== "csv";
+    for (const button of this.box.querySelectorAll("button")) button.disabled = !is && GEOREFERENCED.includes(button.dataset.format ?? "");
     this.#part("no-georeference").hidden = is;
   }
 
   update() {
-    const track = this.replay.figures.get(this.choice.selected ?? "");
-    this.box.hidden = !track;
+    const figure = this.replay.figures.get(this.choice.selected)?.figure;
+    this.box.hidden = !figure;
     this.#part("answer").textContent = "";
-    if (!track) return;
+    if (!figure) return;
     const texts = {
-      distance: distance(track.distance_m, 4),
-      tracked: age(track.tracked_s),
-      mean: speed(track.mean_speed_mps),
-      max: speed(track.max_speed_mps),
-      poses: count(track.poses),
+      distance: distance(figure.distance_m, 4),
+      tracked: age(figure.tracked_s),
+      mean: speed(figure.mean_speed_mps),
+      max: speed(figure.max_speed_mps),
+      poses: count(figure.poses),
     };
     for (const [name, text] of Object.entries(texts)) this.#part(name).textContent = text || UNKNOWN;
   }
@@ -56,8 +58,9 @@ export class PastFigures {
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
       this.#part("answer").textContent = t("figures.saved", { file: `${tag}.${format}` });
-    } catch {
-      this.#part("answer").textContent = t("figures.failed");
+    } catch (error) {
+      const lacks = format === "parquet" && error instanceof RefusedError;
+      this.#part("answer").textContent = t(lacks ? "figures.no_parquet" : "figures.failed");
     }
   }
 

@@ -24,6 +24,8 @@ export class TagTable {
   #lines = [];
   #names = new NameColumn();
   #active = "";
+  /** Return whether a tag is on a floor that the map does not show. */
+  isElsewhere = (/** @type {number} */ _row) => false;
 
   /** @param {HTMLElement} box scrolls and holds the table @param {HTMLElement} count @param {Fleet} fleet
    * @param {import("../page/choice.js").Choice} choice @param {(tag: string) => void} chosen */
@@ -126,9 +128,12 @@ export class TagTable {
       age(seconds), !fleet.current ? UNKNOWN : t(fleet.online[row] ? "figure.online" : "figure.offline"),
     ];
     texts.forEach((value, i) => text(i === 0 ? nameOf(line) : line.cells[i], value));
+    const isElsewhere = this.isElsewhere(row);
     const full = label === name ? name : `${label} (${name})`;
-    attribute(line.cells[0], "title", full);
-    attribute(line.cells[0], "aria-label", full);
+    const words = isElsewhere ? t("table.elsewhere", { tag: full }) : full;
+    set(line.element.dataset, "elsewhere", String(isElsewhere));
+    attribute(line.cells[0], "title", words);
+    attribute(line.cells[0], "aria-label", words);
     line.cells[0].style.setProperty("--mark", fleet.colours[row] || "transparent");
     line.cells[7].classList.toggle("yes", fleet.current && fleet.online[row] === 1);
   }

@@ -6,6 +6,9 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from dropanchor_schemas.track import Track
@@ -73,7 +76,7 @@ def test_too_much_a_missing_history_and_a_damaged_one_are_different_problems(
     bench = driven(tmp_path)
     assert kind_of(ask(make_api_bench().app(), "GET", "/api/v1/tracks")) == "no-history"
     monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
-    monkeypatch.setattr("dropanchor_service.history.overview.MAX_BYTES", -1)
+    monkeypatch.setattr("dropanchor_service.history.covering.MAX_BYTES", -1)
     refused = ask(bench.app(), "GET", "/api/v1/tracks")
     assert (kind_of(refused), "name the tags" in refused.text) == ("invalid-request", True)
     for file in tmp_path.glob("history.sqlite*"):
@@ -103,6 +106,51 @@ def test_a_file_holds_every_pose_once_however_many_pages_that_takes(
     gpx = ElementTree.fromstring(exported(bench, "gpx"))
     assert len(list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkpt"))) == len(expected)
     assert len(list(gpx.iter("{http://www.topografix.com/GPX/1/1}trkseg"))) == 1
+
+
+def parquet(bench: ApiBench, query: str = "") -> pq.ParquetFile:
+    response = ask(bench.app(), "GET", f"/api/v1/tags/a/track/file?format=parquet{query}")
+    assert (response.status_code, response.headers["content-type"]) == (200, "application/vnd.apache.parquet")
+    assert response.headers["content-disposition"] == "attachment; filename*=UTF-8''a.parquet"
+    return pq.ParquetFile(io.BytesIO(response.content))
+
+
+def test_a_parquet_file_holds_every_pose_in_row_groups_with_units_and_frame(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = driven(tmp_path, GEOREFERENCED)
+    monkeypatch.setattr(track_file, "PAGE", 100)
+    monkeypatch.setattr("dropanchor_service.api.formats.parquet.GROUP_ROWS", 250)
+    file = parquet(bench)
+    rows = file.read().to_pylist()
+    csv_rows = list(csv.DictReader(io.StringIO(exported(bench, "csv"))))
+    assert [file.metadata.row_group(group).num_rows for group in range(file.num_row_groups)] == [300, 300, 1]
+    assert [file.schema_arrow.field("t_ns").type, file.schema_arrow.field("lat").type] == [
+        pa.timestamp("ns", "UTC"),
+        pa.float64(),
+    ]
+    assert [value.value for value in file.read(["t_ns"])["t_ns"]] == [int(row["t_ns"]) for row in csv_rows]
+    for name in set(csv_rows[0]) - {"t_ns", "t_utc"}:
+        texts = [row[name] for row in csv_rows]
+        numbers = isinstance(rows[0][name], float)
+        assert [row[name] for row in rows] == (pytest.approx([float(text) for text in texts]) if numbers else texts)
+    units = {field.name: (field.metadata or {}).get(b"unit", b"").decode() for field in file.schema_arrow}
+    assert (units["x"], units["heading_rad"], units["cov_xh"], units["state"]) == ("m", "rad", "m·rad", "")
+    about = file.schema_arrow.metadata
+    assert (about[b"dropanchor.tag"], about[b"dropanchor.site"]) == (b"a", b"default")
+    assert json.loads(about[b"dropanchor.georeference"]) == {"lat": 52.5, "lon": 13.4, "rotation_rad": 0.0}
+    assert b"counter-clockwise" in about[b"dropanchor.frame"]
+
+
+def test_unknown_numbers_are_null_in_parquet_and_no_poses_are_no_rows(tmp_path: Path) -> None:
+    bench = make_api_bench(folder=tmp_path, retention=RETENTION)
+    bench.move("a", x=np.nan, cov=np.nan)
+    bench.write_history()
+    file = parquet(bench, f"&from={T_NS}&to={T_NS}")
+    (row,) = file.read().to_pylist()
+    assert (row["x"], row["var_x"], row["state"], row["y"]) == (None, None, "tracking", 0.0)
+    assert "lat" not in row
+    assert parquet(bench, "&from=0&to=1").metadata.num_rows == 0
 
 
 def test_a_track_without_poses_is_an_empty_file(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ export default {
   "destination.addresses": "Adressen",
   "destination.digest": "Höchstens eine Mail alle",
   "destination.digest_title": "Ereignisse, die inzwischen eintreten, werden eine Mail",
+  "destination.language": "Mails auf",
   "destination.secret": "Geheimnis",
   "destination.secret_placeholder": "whsec_… (leer: wie bisher)",
   "destination.topic": "Topic",

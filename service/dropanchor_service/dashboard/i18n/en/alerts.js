@@ -23,6 +23,7 @@ export default {
   "destination.addresses": "Addresses",
   "destination.digest": "At most one mail every",
   "destination.digest_title": "Events that happen meanwhile become one mail",
+  "destination.language": "Mails in",
   "destination.secret": "Secret",
   "destination.secret_placeholder": "whsec_… (empty: as before)",
   "destination.topic": "Topic",

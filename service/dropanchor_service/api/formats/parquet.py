@@ -1,0 +1,121 @@
+"""Pages of a track as a Parquet file, written row group by row group. Needs the extra `parquet`."""
+
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from dropanchor_schemas.site import Site
+from dropanchor_service.answers.track_pages import TrackPage
+from dropanchor_service.api.formats.track import COVARIANCES
+
+GROUP_ROWS = 20_000
+FRAME = (
+    "x and y are east and north of the origin of the site in m, turned counter-clockwise by georeference.rotation_rad; "
+    "the heading is counter-clockwise from x in rad; a pose whose frame is `relative` is turned about the anchor by an "
+    "unknown angle"
+)
+_TEXTS = ("state", "reason", "frame", "anchor")
+_UNITS = {
+    "t_ns": "ns since 1970-01-01 UTC",
+    "x": "m",
+    "y": "m",
+    "heading_rad": "rad",
+    "speed_mps": "m/s",
+    "yaw_rate_radps": "rad/s",
+    "p_mode": "1",
+    "sigma_pos_m": "m",
+    "sigma_obs_m": "m",
+    "range_m": "m",
+    "lat": "degrees, WGS 84",
+    "lon": "degrees, WGS 84",
+    "var_x": "m²",
+    "cov_xy": "m²",
+    "cov_xh": "m·rad",
+    "var_y": "m²",
+    "cov_yh": "m·rad",
+    "var_h": "rad²",
+}
+_DEGREES = ("lat", "lon")  # a float32 would be 2 m wide
+
+
+def stream(pages: Iterable[TrackPage], tag: str, site: Site) -> Iterator[bytes]:
+    """Yield one Parquet file with all pages. Not more than a row group is in memory."""
+    sink = _Sink()
+    schema = _schema(tag, site)
+    with pq.ParquetWriter(sink, schema, compression="zstd") as writer:
+        for group in _groups(pages):
+            writer.write_table(_table(group, schema))
+            yield sink.taken()
+    yield sink.taken()
+
+
+class _Sink(io.RawIOBase):
+    """A file that gives away what was written into it."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._written = 0
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, content: Any) -> int:
+        piece = bytes(content)
+        self._pieces.append(piece)
+        self._written += len(piece)
+        return len(piece)
+
+    def tell(self) -> int:
+        return self._written
+
+    def taken(self) -> bytes:
+        pieces, self._pieces = self._pieces, []
+        return b"".join(pieces)
+
+
+def _groups(pages: Iterable[TrackPage]) -> Iterator[list[TrackPage]]:
+    """Yield the pages of each row group."""
+    group: list[TrackPage] = []
+    for page in pages:
+        group.append(page)
+        if sum(map(len, group)) >= GROUP_ROWS:
+            yield group
+            group = []
+    if any(map(len, group)):
+        yield group
+
+
+def _schema(tag: str, site: Site) -> pa.Schema:
+    names = [name for name in _UNITS if name not in _DEGREES or site.georeference is not None]
+    numbers = [pa.field(name, _type_of(name), metadata={"unit": _UNITS[name]}) for name in names]
+    texts = [pa.field(name, pa.dictionary(pa.int32(), pa.string())) for name in _TEXTS]
+    origin = "null" if site.georeference is None else site.georeference.model_dump_json()
+    metadata = {"tag": tag, "site": site.id, "frame": FRAME, "georeference": origin}
+    return pa.schema(
+        [numbers[0], *texts, *numbers[1:]],
+        metadata={f"dropanchor.{name}": text for name, text in metadata.items()},
+    )
+
+
+def _type_of(name: str) -> pa.DataType:
+    if name == "t_ns":
+        return pa.timestamp("ns", tz="UTC")
+    return pa.float64() if name in _DEGREES else pa.float32()
+
+
+def _table(pages: Sequence[TrackPage], schema: pa.Schema) -> pa.Table:
+    names = pages[0].columns
+    columns: dict[str, Any] = {name: [value for page in pages for value in page.columns[name]] for name in names}
+    covariances = np.array([_numbers(cov) for cov in columns.pop("covariance")]).reshape(-1, 3, 3)
+    columns |= {name: covariances[:, i, j] for name, (i, j) in COVARIANCES.items()}
+    arrays = [pa.array(columns[field.name], field.type, from_pandas=True) for field in schema]  # NaN: null
+    return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _numbers(covariance: Any) -> NDArray[np.float64]:
+    return np.full((3, 3), np.nan) if covariance is None else np.array(covariance)
