@@ -50,11 +50,16 @@ def running_chromium() -> Iterator[Browser]:
 
 @dataclass
 class WatchedPage:
-    """A page, the origins that it sent requests to, and the errors and warnings that it logged."""
+    """A page, and the errors and warnings that it logged."""
 
     page: Page
-    origins: set[str] = field(default_factory=set)
     errors: list[str] = field(default_factory=list)
+
+    @property
+    def origins(self) -> set[str]:
+        """The origins that the page sent requests to. A refused request is among the errors instead."""
+        script = "[location, ...performance.getEntriesByType('resource')].map(({ href, name }) => new URL(href ?? name).origin)"
+        return set(self.page.evaluate(script))
 
     def tags(self) -> dict[str, dict[str, Any]]:
         """Return what the page knows about each tag, by name."""
@@ -132,7 +137,6 @@ def open_page(
     watched = WatchedPage(context.new_page())
     page = watched.page
     prepare(page)
-    page.on("request", lambda request: watched.origins.add("/".join(request.url.split("/", 3)[:3])))
     page.on("pageerror", lambda error: watched.errors.append(str(error)))
     page.on("console", lambda line: watched.errors.append(line.text) if line.type in ("error", "warning") else None)
     page.goto(url)

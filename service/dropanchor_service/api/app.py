@@ -102,6 +102,8 @@ def create_app(
     plans, sites = plans or PlanStore(None), AnswersOfSites([answers])
     events = events or EventParts.in_memory(answers.site.site.id)
     app = app_without_routes(authenticator, rate_limiter, cors_origins, answers.tags_in_group)
+    if dashboard is not None:
+        app.router.routes.extend(page_mounts(dashboard))  # before the interfaces: a page needs many files at once
     for router in (
         *site_routers(SiteOfRequest(sites), lambda _: max_tags),
         sites_router(sites, lambda _: max_tags),
@@ -133,8 +135,6 @@ def create_app(
     app.include_router(metrics_router(registry))
     hub = Hub(answers, events.items.zones, events.store, omlox or OmloxItems.opened(None), max_tags)
     add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
-    if dashboard is not None:
-        app.router.routes.extend(page_mounts(dashboard))
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 

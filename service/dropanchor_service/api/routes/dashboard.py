@@ -1,11 +1,16 @@
 """The dashboard: static files that browsers always revalidate and that may load nothing from other origins."""
 
+import stat
+from functools import lru_cache
+from hashlib import sha256
 from importlib.resources import files
+from mimetypes import guess_type
 from pathlib import Path
 
+from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.routing import Match, Mount
-from starlette.staticfiles import StaticFiles
+from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Scope
 
 from dropanchor_service.api.http.errors import OMLOX_PREFIX
@@ -20,10 +25,29 @@ _HEADERS = {
 
 
 class _Files(StaticFiles):
+    """Files that stay in memory. A page loads more than a hundred, and reading each in a thread took most of the time."""
+
     async def get_response(self, path: str, scope: Scope) -> Response:
-        response = await super().get_response(path, scope)
+        found, status = self.lookup_path(path)
+        if scope["method"] in ("GET", "HEAD") and status is not None and stat.S_ISREG(status.st_mode):
+            response = _from_memory(found, status.st_mtime_ns, Headers(scope=scope))
+        else:
+            response = await super().get_response(path, scope)
         response.headers.update(_HEADERS)
         return response
+
+
+def _from_memory(path: str, changed_ns: int, request: Headers) -> Response:
+    content, etag = _content(path, changed_ns)
+    if etag in (tag.strip(" W/") for tag in request.get("if-none-match", "").split(",")):
+        return NotModifiedResponse(Headers({"etag": etag}))
+    return Response(content, media_type=guess_type(path)[0] or "text/plain", headers={"etag": etag})
+
+
+@lru_cache(maxsize=512)
+def _content(path: str, changed_ns: int) -> tuple[bytes, str]:  # noqa: ARG001 - a changed file is read again
+    content = Path(path).read_bytes()
+    return content, f'"{sha256(content).hexdigest()[:32]}"'
 
 
 def page_mounts(dashboard: Path) -> list[Mount]:
@@ -40,7 +64,7 @@ class DashboardMount(Mount):
         super().__init__("/", app=_Files(directory=folder, html=True), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        if scope["type"] != "http" or scope["path"].startswith(("/api/", OMLOX_PREFIX)):
+        if scope["type"] != "http" or scope["path"].startswith(("/api/", OMLOX_PREFIX, "/metrics")):
             return Match.NONE, {}
         is_read = scope["method"] in ("GET", "HEAD")
         match, child_scope = super().matches(scope)
