@@ -58,8 +58,8 @@ class WatchedPage:
     @property
     def origins(self) -> set[str]:
         """The origins that the page sent requests to. A refused request is among the errors instead."""
-        script = "[location, ...performance.getEntriesByType('resource')].map(({ href, name }) => new URL(href ?? name).origin)"
-        return set(self.page.evaluate(script))
+        resources = "performance.getEntriesByType('resource').map(({ name }) => new URL(name).origin)"
+        return {*self.page.evaluate(resources), self.page.evaluate("location.origin")}
 
     def tags(self) -> dict[str, dict[str, Any]]:
         """Return what the page knows about each tag, by name."""

@@ -25,7 +25,7 @@ _HEADERS = {
 
 
 class _Files(StaticFiles):
-    """Files that stay in memory. A page loads more than a hundred, and reading each in a thread took most of the time."""
+    """Files that stay in memory. A page loads more than a hundred, and threads that read them took most of the time."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         found, status = self.lookup_path(path)
