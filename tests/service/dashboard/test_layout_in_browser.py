@@ -62,6 +62,7 @@ def test_no_number_is_cut_off(chromium: Browser, place: Place) -> None:
         page.page.locator("#detail").wait_for()
         for size in every_size(page):
             assert page.page.evaluate(CUT_OFF) == [], size
+            assert page.page.evaluate("document.getElementById('detail').clientHeight") > 150, size
 
 
 def test_names_that_differ_at_the_end_look_different(chromium: Browser, place: Place) -> None:
