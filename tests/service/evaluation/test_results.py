@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.report import PAGE as PERFORMANCE
+from benchmarks.report import SOURCES
 from dropanchor_service.evaluation import results
-from dropanchor_service.evaluation.results import Measured, NoPlaceError, main, problems, write
+from dropanchor_service.evaluation.results import Measured, NoPlaceError, main, problems, require_place, write
 
 PAGE = "# Results\n\n<!-- results speed -->\n<!-- end speed -->\n\nWhat it means.\n"
 CODE = '"""Doc."""\n\n\ndef twice(x):\n    """Double."""\n    return 2 * x  # why\n'
@@ -105,3 +107,8 @@ def test_the_command_says_where_to_find_how_to_measure_an_outdated_table(
 def test_a_page_without_a_place_is_an_error(root: Path) -> None:
     with pytest.raises(NoPlaceError, match=r"page\.md has no place for height"):
         write(root, root / "page.md", "height", "", Measured(["code.py"]))
+
+
+@pytest.mark.parametrize("table", SOURCES)
+def test_every_table_of_the_benchmarks_has_a_place(table: str) -> None:
+    assert require_place(PERFORMANCE, table)

@@ -1,6 +1,6 @@
 """The dashboard: static files that browsers always revalidate and that may load nothing from other origins."""
 
-import stat
+import os
 from functools import lru_cache
 from hashlib import sha256
 from importlib.resources import files
@@ -10,7 +10,7 @@ from pathlib import Path
 from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.routing import Match, Mount
-from starlette.staticfiles import NotModifiedResponse, StaticFiles
+from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import Scope
 
 from dropanchor_service.api.http.errors import OMLOX_PREFIX
@@ -28,20 +28,17 @@ class _Files(StaticFiles):
     """Files that stay in memory. A page loads more than a hundred, and threads that read them took most of the time."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        found, status = self.lookup_path(path)
-        if scope["method"] in ("GET", "HEAD") and status is not None and stat.S_ISREG(status.st_mode):
-            response = _from_memory(found, status.st_mtime_ns, Headers(scope=scope))
-        else:
-            response = await super().get_response(path, scope)
+        response = await super().get_response(path, scope)
         response.headers.update(_HEADERS)
         return response
 
-
-def _from_memory(path: str, changed_ns: int, request: Headers) -> Response:
-    content, etag = _content(path, changed_ns)
-    if etag in (tag.strip(" W/") for tag in request.get("if-none-match", "").split(",")):
-        return NotModifiedResponse(Headers({"etag": etag}))
-    return Response(content, media_type=guess_type(path)[0] or "text/plain", headers={"etag": etag})
+    def file_response(
+        self, full_path: PathLike, stat_result: os.stat_result, scope: Scope, status_code: int = 200
+    ) -> Response:
+        content, etag = _content(os.fspath(full_path), stat_result.st_mtime_ns)
+        response = Response(content, status_code, {"etag": etag}, guess_type(full_path)[0] or "text/plain")
+        is_known = self.is_not_modified(response.headers, Headers(scope=scope))
+        return NotModifiedResponse(response.headers) if is_known else response
 
 
 @lru_cache(maxsize=512)
