@@ -1,10 +1,11 @@
 """Standstill: whether the tag is at rest, and what the gyroscope reads then.
 
 A tag is quiet while the exponentially weighted standard deviations of accelerometer and gyroscope and the mean rotation
-are small. It is at rest when it has been quiet for HOLD seconds. The gyroscope's bias is learned in blocks of rest, and
-only from blocks that another block of rest followed, so that neither the end nor the start of a motion counts. The
-first rest after switch-on has no motion before it: it is used sooner, in shorter blocks, with the noise that the
-gyroscope shows. Many tags rest for no more than a second.
+are small. It is at rest when it has been quiet for HOLD seconds. Where an accelerometer's own noise is as large as the
+limit, its variance falls below it for tenths of a second, in motion as well: time near the limit counts a third.
+The gyroscope's bias is learned in blocks of rest, and only from blocks that another block of rest followed, so that
+neither the end nor the start of a motion counts. The first rest after switch-on has no motion before it: it is used
+sooner, in shorter blocks, with the noise that the gyroscope shows. Many tags rest for no more than a second.
 Bias: scalar Kalman filter per axis, P += Q dt, block mean of rate with variance R.
 """
 
@@ -33,10 +34,11 @@ Standstill: TypeAlias = Any  # a record of STANDSTILL
 
 TAU = 0.12  # s
 ACC_SD = 0.08  # m/s^2, root of the sum over three axes: 0.045 per axis
+CLEAR, DOUBT = 0.8, 3.0  # share of the limit's variance above which quiet counts only a third
 GYRO_SD = 0.05  # rad/s, likewise
 RATE = 0.08  # rad/s, of the mean rotation before the bias is known
 RATE_KNOWN = 0.02  # rad/s, afterwards
-REORDER_WINDOW = 0.2  # s of quiet that make rest
+HOLD = 0.2  # s of quiet that make rest
 CONFIRM = 0.5  # s of quiet before the bias is learned
 BLOCK = 0.5  # s
 FIRST_CONFIRM, FIRST_BLOCK = 0.2, 0.15  # s, of the rest at switch-on
@@ -85,7 +87,8 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
     x, y, z = s.mean[3] - bias[0], s.mean[4] - bias[1], s.mean[5] - bias[2]
     limit = RATE_KNOWN + min(RATE, 3.0 * math.sqrt(s.bias_var))
     calm = s.acc_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
-    s.quiet = s.quiet + dt if calm and s.seen > TAU else 0.0
+    clear = s.acc_var < CLEAR * ACC_SD * ACC_SD
+    s.quiet = s.quiet + (dt if clear else dt / DOUBT) if calm and s.seen > TAU else 0.0
     if s.quiet == 0.0 and s.seen > TAU:
         s.moved = 1
 
@@ -93,7 +96,7 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
 @njit(cache=True, nogil=True)
 def at_rest(s: Standstill) -> bool:
     """Return whether the tag is at rest, for a zero-velocity update."""
-    return s.quiet > REORDER_WINDOW  # type: ignore[no-any-return]
+    return s.quiet > HOLD  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)

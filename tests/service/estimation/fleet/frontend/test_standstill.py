@@ -92,3 +92,8 @@ def test_a_second_of_rest_at_switch_on_teaches_the_bias_and_the_same_second_late
     assert np.sqrt(row["bias_var"]) < 2.5e-3
     acc, gyro = (np.concatenate([moving[i], rest[i][:90], moving[i]]) for i in (0, 1))
     assert (watched(acc, gyro)[1] == 0).all()
+
+
+def test_noise_just_above_the_limit_is_hardly_ever_rest() -> None:
+    shares = [watched(*noise(seed, 6000, 0.052, 0.003))[0].mean() for seed in range(20, 30)]
+    assert np.mean(shares) < 0.003
