@@ -52,7 +52,7 @@ def offer_turnabout(work: Hypotheses, count: int, row: Row, node: Node, t: Tunin
         for h in range(count):
             work[h].reverse = 0
         return count
-    if row.settings.reverse_allowed == 1 or node.carried == 1 or row.publication.resolved == 0:
+    if row.settings.reverse_allowed == 1 or node.carried == 1:
         return count
     row.since_turnabout_s += node.dt_s
     count = _offer_ahead_again(work, count, row)

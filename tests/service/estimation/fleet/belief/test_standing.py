@@ -70,3 +70,11 @@ def test_a_tag_that_reverses_after_a_stop_is_followed_though_nobody_said_that_it
         assert beliefs["speed"][-1] == pytest.approx(1.2, abs=0.3)
         assert beliefs["state"][-1] == State.TRACKING
     assert np.median(errors) < 0.6
+
+
+def test_a_tag_that_reverses_before_its_start_is_found_is_followed_as_well() -> None:
+    for seed in (3000, 3001, 3007):
+        d = there_and_back(seed)
+        beliefs = run(rows_of(1, known=False), make_pool(512), d.nodes)
+        assert beliefs["state"][100] != State.TRACKING  # when it turns back
+        assert np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y)[-60:].max() < 1.0
