@@ -94,7 +94,7 @@ def _clear(P: Floats, i: int, variance: float) -> None:
 def _become_carried(one: Hypothesis, node: Node, t: Tuning) -> None:
     """Replace what a vehicle's hypothesis says of speed, slip and accelerometer."""
     s, P = one.mean, one.cov
-    one.reverse = 0
+    one.reverse = one.aligned = 0
     for i in (V, SLIP, GAIT_OFFSET, STEP_SCALE, GYRO_BIAS):
         s[i] = 0.0
     _clear(P, V, t.walk_speed_std**2)

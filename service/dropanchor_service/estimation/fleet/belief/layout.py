@@ -44,6 +44,7 @@ EXACT: Final = 0  # no more than the heading model says
 OWN_ERROR: Final = 1  # the heading reference has a slow error of its own, or drifts
 DRIFTING: Final = 2  # the gyroscope drifts and the heading does not
 CLASSES: Final = 3
+FAMILIES: Final = 2 * CLASSES  # each of them, with and without a body axis along the course
 
 SETTINGS: Final = np.dtype(
     [
@@ -198,6 +199,7 @@ POOL_SLOT: Final = np.dtype(
         ("heading_class", np.int32),  # EXACT, OWN_ERROR or DRIFTING
         ("nlos", np.int32),  # 1: there is no line of sight now, so ranges are too long
         ("reverse", np.int32),  # 1: the tag moves backwards since it last stood
+        ("aligned", np.int32),  # 1: the body axis is taken to point along the course
         ("free", np.int32),  # in slot 0: how many slots are free
         ("log_weight", np.float64),
         ("los_bias", np.float64),  # m, range bias before the line of sight was lost
@@ -236,6 +238,7 @@ WORKING_HYPOTHESIS: Final = np.dtype(
         ("heading_class", np.int32),
         ("nlos", np.int32),
         ("reverse", np.int32),
+        ("aligned", np.int32),
         ("los_bias", np.float64),
         ("los_bias_var", np.float64),
         ("mean", np.float64, (N,)),
@@ -265,7 +268,7 @@ SCRATCH: Final = np.dtype(
         ("mean", np.float64, (5,)),
         ("cov", np.float64, (3, 3)),
         ("part", np.float64, (3, 3)),
-        ("share", np.float64, (CLASSES,)),
+        ("share", np.float64, (FAMILIES,)),
         ("point", np.float64, (3,)),
     ]
 )

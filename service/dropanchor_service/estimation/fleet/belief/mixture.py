@@ -10,6 +10,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     YAW,
     Floats,
     Hypotheses,
+    Hypothesis,
     N,
     R,
     V,
@@ -19,6 +20,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
 SPLIT_SHIFT = 1.0576  # standard deviations
 SPLIT_REMOVED = 0.549  # share of the variance
+ALIKE = 2.0  # ratio of two variances that are alike
 
 
 @njit(nogil=True)
@@ -98,12 +100,32 @@ def angle_variance(P: Floats) -> float:
 
 
 @njit(nogil=True)
+def are_aligned_alike(work: Hypotheses, count: int) -> bool:
+    """Return whether all hypotheses, or none, take the body axis to point along the course."""
+    aligned = 0
+    for h in range(count):
+        aligned += work[h].aligned
+    return bool(aligned == 0 or aligned == count)
+
+
+@njit(nogil=True)
+def _know_mount_alike(a: Hypothesis, b: Hypothesis) -> bool:
+    """Return whether two hypotheses know the mounting angle about as well, if only one took the body as aligned.
+
+    Else the wide one, which keeps other angles possible, would vanish in the narrow one that is heavier by its prior.
+    """
+    least, most = min(a.cov[MOUNT, MOUNT], b.cov[MOUNT, MOUNT]), max(a.cov[MOUNT, MOUNT], b.cov[MOUNT, MOUNT])
+    return bool(a.aligned == b.aligned or most < ALIKE * least)
+
+
+@njit(nogil=True)
 def _are_close(work: Hypotheses, a: int, b: int, distance: float) -> bool:
     """Return whether r, v, phi and that angle are each within `distance` standard deviations of the heavier one, a."""
     if (
         work[a].heading_class != work[b].heading_class
         or work[a].nlos != work[b].nlos
         or work[a].reverse != work[b].reverse
+        or not _know_mount_alike(work[a], work[b])
     ):
         return False
     P = work[a].cov

@@ -22,7 +22,7 @@ from dropanchor_service.estimation.fleet.belief.states import (
 from dropanchor_service.estimation.fleet.belief.summary import (
     best_mode,
     spread_over_all,
-    spread_over_classes,
+    spread_over_families,
     widen_by_reference,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
@@ -60,7 +60,7 @@ def publish(
     if row.publication.resolved == 0 or p_mode < DOMINANT or row.walk.carried == 1:
         spread_over_all(work, count, scratch)
     else:
-        spread_over_classes(work, count, head, scratch, t.class_rejected_weight)
+        spread_over_families(work, count, head, scratch, t.class_rejected_weight)
     widen_by_reference(row, mean, cov)
     spread = t.walk_spread if row.walk.carried == 1 else 1.0
     for i in range(3):

@@ -72,7 +72,7 @@ def _initialise(work: Hypotheses, h: int, row: Row, node: Node, yaw: float, yaw_
     P[RANGE_BIAS, RANGE_BIAS] = settings.range_bias_std**2
     work[h].log_weight = 0.0
     work[h].heading_class = EXACT
-    work[h].nlos = work[h].reverse = 0
+    work[h].nlos = work[h].reverse = work[h].aligned = 0
 
 
 @njit(nogil=True)
@@ -117,6 +117,7 @@ def _add_aligned(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
     for h in range(count):
         copy_hypothesis(work, h, count + h)
         work[count + h].cov[MOUNT, MOUNT] = t.aligned_std**2
+        work[count + h].aligned = 1
         work[count + h].log_weight += t.aligned_log_prior
     return count
 

@@ -5,6 +5,7 @@ import math
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
+    FAMILIES,
     MOUNT,
     PHI,
     SLIP,
@@ -181,17 +182,23 @@ def spread_over_all(work: Hypotheses, count: int, scratch: Scratch) -> None:
 
 
 @njit(nogil=True)
-def _counts(one: Hypothesis, head: Hypothesis) -> bool:
-    """Return whether a hypothesis counts: all of other classes, of the head's class only its mode."""
-    return bool(one.in_mode or one.heading_class != head.heading_class)
+def _family(one: Hypothesis) -> int:
+    """Return the number of the heading class and the guess of the mounting angle that a hypothesis belongs to."""
+    return int(one.heading_class + CLASSES * one.aligned)
 
 
 @njit(nogil=True)
-def spread_over_classes(work: Hypotheses, count: int, head: int, scratch: Scratch, rejected_weight: float) -> None:
-    """Set scratch.cov to the mean over all heading classes above `rejected_weight`, about scratch.mean.
+def _counts(one: Hypothesis, head: Hypothesis) -> bool:
+    """Return whether a hypothesis counts: all of other families, of the head's family only its mode."""
+    return bool(one.in_mode or _family(one) != _family(head))
 
-    Each class counts the same. Ranges tell late whether a reference is exact; until then an ellipse must not rest on
-    the prior that it mostly is.
+
+@njit(nogil=True)
+def spread_over_families(work: Hypotheses, count: int, head: int, scratch: Scratch, rejected_weight: float) -> None:
+    """Set scratch.cov to the mean over all families above `rejected_weight`, about scratch.mean.
+
+    Each family counts the same. Ranges tell late whether a reference is exact, or whether a tag is mounted straight;
+    until then an ellipse must not rest on the prior that it mostly is.
     """
     mean, share = scratch.mean, scratch.share
     x, y, course = mean[0], mean[1], mean[2]
@@ -199,14 +206,14 @@ def spread_over_classes(work: Hypotheses, count: int, head: int, scratch: Scratc
     scratch.cov[:] = 0.0
     for h in range(count):
         if _counts(work[h], work[head]):
-            share[work[h].heading_class] += work[h].weight
-    classes = 0
-    for heading_class in range(CLASSES):
-        classes += share[heading_class] > rejected_weight
+            share[_family(work[h])] += work[h].weight
+    families = 0
+    for family in range(FAMILIES):
+        families += share[family] > rejected_weight
     for h in range(count):
-        of_class = share[work[h].heading_class]
-        if of_class > rejected_weight and _counts(work[h], work[head]):
-            _add_moments(work[h], work[h].weight / (of_class * classes), x, y, course, scratch)
+        of_family = share[_family(work[h])]
+        if of_family > rejected_weight and _counts(work[h], work[head]):
+            _add_moments(work[h], work[h].weight / (of_family * families), x, y, course, scratch)
     mean[0], mean[1], mean[2] = x, y, course
 
 

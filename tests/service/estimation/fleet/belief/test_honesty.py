@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
-from dropanchor_service.estimation.columns import State
+from dropanchor_service.estimation.columns import State, default_settings
+from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
+from dropanchor_service.estimation.fleet.configure import configure_row
+from dropanchor_service.estimation.fleet.frontend.node import RELATIVE_HEADING
 from dropanchor_service.evaluation.accuracy import nees
-from support.fleet_tracks import Drive, drive, rows_of, run, track
+from support.fleet_tracks import CALIBRATED, Drive, drive, rows_of, run, track
 
 BURSTS_S = ((3.0, 5.0, 1.5), (12.0, 13.5, 0.8), (20.0, 23.0, 1.2))  # from, to, metres too long
 BIAS = 0.1  # rad
@@ -114,3 +117,30 @@ def test_after_a_wrong_turn_of_belief_an_exact_heading_is_tried_again() -> None:
         truth.nodes["z"][:25] += 0.6
         runs.append((track(truth, known=True), truth))
     assert np.median([distance(b, d)[-80:].mean() for b, d in runs]) < 0.6
+
+
+def mounted(seed: int, angle: float) -> Drive:
+    """Return a drive of a tag whose body points to the right of its course by this angle, with a gyroscope alone."""
+    truth = drive(seed)
+    nodes = truth.nodes
+    forward, left = nodes["dv_forward"].copy(), nodes["dv_left"].copy()
+    nodes["dv_forward"] = forward * np.cos(angle) - left * np.sin(angle)
+    nodes["dv_left"] = forward * np.sin(angle) + left * np.cos(angle)
+    nodes["heading"] -= angle
+    nodes["heading_kind"] = RELATIVE_HEADING
+    return truth
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_an_untold_mounting_angle_is_in_the_ellipse_from_the_start(angle: float) -> None:
+    held = []
+    for seed in range(2000, 2012):
+        truth = mounted(seed, angle)
+        settings = default_settings()
+        settings["range_std"], settings["start_known"], settings["start_x"] = 0.1, True, 10.0
+        settings["start_y"], settings["start_heading"] = 0.0, truth.nodes["heading"][0]
+        rows = np.zeros(1, ROW)
+        rows[:] = configure_row(settings, CALIBRATED)
+        beliefs = run(rows, make_pool(512), truth.nodes)
+        held.append(inside(beliefs, truth)[beliefs["state"] == State.TRACKING])
+    assert np.concatenate(held).mean() > 0.93
