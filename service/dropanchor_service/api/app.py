@@ -32,6 +32,7 @@ from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import events_router
+from dropanchor_service.api.routes.figures import figures_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.heat_map import heat_map_router
 from dropanchor_service.api.routes.history import history_router
@@ -112,6 +113,7 @@ def create_app(
         track_file_router(answers),
         tracks_router(answers),
         heat_map_router(answers),
+        figures_router(answers, events),
         history_router(answers),
         stream_router(answers, stopping, lambda: (answers.site.version, plans.version)),
         access_router(),
