@@ -170,7 +170,11 @@ def test_figures_and_the_file_of_a_tag(chromium: Browser, past: tuple[Place, int
         table, dialog = page.page.locator("#figures table"), page.page.locator("#figures")
         expect(table.locator("thead")).to_have_text("TagTrackedDistanceMean speedMaximum speedIn dock (deleted)")
         expect(table.locator("tbody tr")).to_have_text(
-            ["first0:05:00300.0 m1.00 m/s1.00 m/s0:03:20", re.compile("^second0:04:4"), re.compile("^turned0:00:000.0 m–")]
+            [
+                "first0:05:00300.0 m1.00 m/s1.00 m/s0:03:20",
+                re.compile("^second0:04:4"),
+                re.compile("^turned0:00:000.0 m–"),
+            ]
         )
         table.locator("th button").nth(2).click()
         expect(table.locator("[aria-sort]")).to_have_text("Distance")
