@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from dropanchor_schemas.figures import Figures
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.routes.event_parts import EventParts
-from dropanchor_service.events.drafts import StateKey, StateValue, Stay
+from dropanchor_service.events.drafts import StateKey, States, StateValue, Stay
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
@@ -34,7 +34,7 @@ def parts() -> EventParts:
         Stay("a", "dock", START_NS + 20 * SECOND, START_NS + 25 * SECOND),
         Stay("c", "gone", START_NS + 100 * SECOND, T_NS),
     ]
-    inside = {StateKey("zone", "dock", tag): StateValue(1, START_NS + 40 * SECOND) for tag in ("a", "b")}
+    inside: States = {StateKey("zone", "dock", tag): StateValue(1, START_NS + 40 * SECOND) for tag in ("a", "b")}
     inside[StateKey("rule", "dock", "a")] = StateValue(1, 1)  # not a zone
     made.store.commit([], inside, stays)
     return made
