@@ -32,6 +32,7 @@ from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import events_router
+from dropanchor_service.api.routes.figures import figures_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.heat_map import heat_map_router
 from dropanchor_service.api.routes.history import history_router
@@ -95,9 +96,9 @@ def create_app(
     recorder: None when there is no folder for recordings. dashboard: the folder of the page; None for no page.
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
-    no limit. cors_origins: of other web pages that may use the interface. events:
-    zones, events and destinations; None keeps them in memory and watches nothing. plans, omlox: floor plans, and what
-    omlox clients have said; None keeps them in memory. basemap: None when there is none.
+    no limit. cors_origins: of other web pages that may use the interface. events: zones, events and destinations; None
+    keeps them in memory and watches nothing. plans: floor plans; None keeps them in memory. omlox: what omlox clients
+    have said; None for no omlox interface. basemap: None when there is none.
     """
     plans, sites = plans or PlanStore(None), AnswersOfSites([answers])
     events = events or EventParts.in_memory(answers.site.site.id)
@@ -112,6 +113,7 @@ def create_app(
         track_file_router(answers),
         tracks_router(answers),
         heat_map_router(answers),
+        figures_router(answers, events),
         history_router(answers),
         stream_router(answers, stopping, lambda: (answers.site.version, plans.version)),
         access_router(),
@@ -133,8 +135,9 @@ def create_app(
     ):
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))
-    hub = Hub(answers, events.items.zones, events.store, omlox or OmloxItems.opened(None), max_tags)
-    add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
+    if omlox is not None:
+        hub = Hub(answers, events.items.zones, events.store, omlox, max_tags)
+        add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 

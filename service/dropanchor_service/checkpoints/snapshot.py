@@ -9,7 +9,7 @@ from dropanchor_service.checkpoints.files import CheckpointError, Snapshot, layo
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
-from dropanchor_service.runtime.kernel_cache import sources_digest
+from dropanchor_service.runtime.kernel_cache import STATE_SOURCES, sources_digest
 from dropanchor_service.store import LatestPoses, ServedSite, Sites
 from dropanchor_service.store.records import put
 
@@ -25,7 +25,7 @@ class ServiceState:
         self._publishers = publishers
         self._buffers: dict[str, Array] = {}
         self.template = self.snapshot()
-        self.layout = layout_of(self.template, meaning=sources_digest())
+        self.layout = layout_of(self.template, meaning=sources_digest(STATE_SOURCES))
 
     @property
     def messages(self) -> int:
