@@ -17,7 +17,6 @@ from dropanchor_schemas.keys import health_key, samples_key
 from dropanchor_service.answers.of_sites import answers_of_sites
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
-from dropanchor_service.api.several_sites import create_app_of_sites
 from dropanchor_service.api.starting import CurrentApp, create_starting_app
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.snapshot import ServiceState
@@ -43,6 +42,7 @@ from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.several_sites import refuse_for_several_sites
+from dropanchor_service.several_sites import SeveralSites
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.events import ZenohEvents
@@ -85,6 +85,7 @@ class Service:
         self.sites = open_sites(settings)
         only, now_ns = self.sites.only, self.clock.now_ns
         self._only = OnlySite(settings, self._credentials, only, self.latest, now_ns, self.metrics) if only else None
+        self._several = None if only else SeveralSites(settings, self._credentials, self.sites, self.metrics)
         self._publishers = Publishers()
         tracks = self._only.persistence.tracks if self._only else None
         self.answers = answers_of_sites(self.sites, self.latest, now_ns, tracks, self._publishers)
@@ -257,16 +258,19 @@ class Service:
             self.clock,
         )
 
-    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
+    def _receive(self, site: str, tag: str, payload: bytes, encoding: str) -> None:
         """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
-        site = self.sites[0]
-        site.tags.presence.note_http_message(tag)
-        self._on_live(samples_key(site.id, tag), payload, encoding, self.clock.now_ns())
+        self._note_http_message(site, tag)
+        self._on_live(samples_key(site, tag), payload, encoding, self.clock.now_ns())
 
-    def _receive_health(self, tag: str, payload: bytes, encoding: str) -> None:
-        site = self.sites[0]
-        site.tags.presence.note_http_message(tag)
-        self._ingest.health.put(health_key(site.id, tag), payload, encoding, self.clock.now_ns())
+    def _receive_health(self, site: str, tag: str, payload: bytes, encoding: str) -> None:
+        self._note_http_message(site, tag)
+        self._ingest.health.put(health_key(site, tag), payload, encoding, self.clock.now_ns())
+
+    def _note_http_message(self, site: str, tag: str) -> None:
+        served = self.sites.find(site)
+        assert served is not None
+        served.tags.presence.note_http_message(tag)
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         """Return the thread of the HTTP server. Until the service is ready, it serves the page with the progress."""
@@ -278,15 +282,11 @@ class Service:
         def ready() -> tuple[bool, Sequence[str]]:
             return not (found := self.problems()), found
 
-        if self._only is not None and self.answers.only is not None:
-            return self._only.app(
-                self.answers.only, ready, self.impairments, self._stopping, self._receive, self._receive_health
+        if self._several is not None:
+            return self._several.app(
+                self.answers, ready, self.impairments, self._stopping, self._receive, self._receive_health
             )
-        return create_app_of_sites(
-            self.answers,
-            ready=ready,
-            impaired=self.impairments,
-            registry=self.metrics.registry,
-            max_tags=self.sites.max_tags,
-            settings=self._settings.http,
-        )
+        assert self._only is not None
+        assert self.answers.only is not None
+        receive, receive_health = (partial(take, self.sites[0].id) for take in (self._receive, self._receive_health))
+        return self._only.app(self.answers.only, ready, self.impairments, self._stopping, receive, receive_health)

@@ -21,8 +21,6 @@ def refuse_for_several_sites(settings: Settings) -> None:
 
 def _of_one(settings: Settings) -> Iterator[tuple[str, str]]:
     """Yield each key that is of one site only, and what to do about it."""
-    if settings.security.folder is not None or settings.security.oidc is not None:
-        yield "security", "leave it out, and listen on the loopback only"
     if settings.data_dir is not None and settings.history.enabled:
         yield "history", "set history.enabled = false"
     if settings.recording.enabled:

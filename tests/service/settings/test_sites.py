@@ -64,6 +64,10 @@ def test_one_site_needs_no_table_of_its_own() -> None:
         ('[sites.a.site]\nid = "b"', "[sites.a] has the id 'b': leave out `id`, which is 'a'"),
         ("[sites.a]\nmax_tags = 1\n[sites.a.tags.x]\n[sites.a.tags.y]", "max_tags of the site 'a' is 1, but 2 tags"),
         ('[sites."a*"]', "sites.a*: 'a*' would be the id of one"),
+        (
+            '[sites.a]\noidc_scopes = { read = "yard-a" }',
+            "oidc_scopes of the site 'a' needs a provider: set [security.oidc]",
+        ),
         ("[sites.a]\nmax_tag = 1", "sites.a.max_tag is not a setting; did you mean max_tags?"),
     ],
 )
@@ -77,7 +81,6 @@ def test_a_table_that_contradicts_another_is_refused(tmp_path: Path, text: str, 
     ("text", "sentence"),
     [
         ('data_dir = "data"', "history is for one site so far, and there are 2: set history.enabled = false"),
-        ('[security]\nfolder = "security"', "security is for one site so far, and there are 2"),
         ("[recording]\nenabled = true", "recording is for one site so far, and there are 2"),
         ("[mqtt]\ntls = false", "mqtt is for one site so far, and there are 2: leave out [mqtt]"),
         ('[basemap]\ntiles = "yard.pmtiles"', "basemap is for one site so far, and there are 2"),

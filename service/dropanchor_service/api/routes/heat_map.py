@@ -4,7 +4,7 @@ import sqlite3
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
@@ -14,6 +14,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.history.covering import TooMuchError
 from dropanchor_service.history.heat_cells import LARGEST_M, SMALLEST_M
 from dropanchor_service.history.heat_map import MAX_SQUARES
@@ -53,7 +54,7 @@ class HeatMapQuery(TagFilter, Period):
     )
 
 
-def heat_map_router(answers: Answers) -> APIRouter:
+def heat_map_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -64,7 +65,8 @@ def heat_map_router(answers: Answers) -> APIRouter:
         response_model=HeatMap,
         responses=example_response(_EXAMPLE) | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
-    def get_heat_map(query: Annotated[HeatMapQuery, Query()]) -> Response:
+    def get_heat_map(query: Annotated[HeatMapQuery, Query()], request: Request) -> Response:
+        answers = site_of(request)
         from_ns, to_ns = limits_of(query, answers.now_ns())
         tracks = history_of(answers)
         try:
