@@ -50,7 +50,7 @@ def app_of_sites(
 
     parts = [
         SiteParts(
-            Answers(site.store, site.tags, latest, now_ns=lambda: T_NS),
+            Answers(site.store, site.tags, latest, now_ns=lambda: T_NS, health=site.health),
             receive=partial(take, site.id),
             receive_health=partial(take, site.id),
             max_tags=1 if site.id == "full" else 10,

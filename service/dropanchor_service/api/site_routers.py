@@ -80,7 +80,7 @@ def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter
         heat_map_router(site_of),
         history_router(site_of),
         stream_router(site_of, shared.stopping),
-        access_router(),
+        access_router(site_of),
         connect_router(site_of, shared.endpoints, shared.credentials),
         *ingest_routers(site_of, shared),
         recordings_router(site_of),

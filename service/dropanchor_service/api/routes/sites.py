@@ -8,7 +8,7 @@ from fastapi.routing import APIRoute
 from starlette.responses import Response
 
 from dropanchor_schemas.answers import SiteList
-from dropanchor_service.answers.answers import Answer, Answers
+from dropanchor_service.answers.site_summaries import summaries
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
@@ -50,17 +50,5 @@ def _add_list_route(router: APIRouter, sites: SiteOfRequest) -> None:
     )
     def list_sites(request: Request) -> Response:
         scope_in = getattr(request.state, "scope_in", lambda _: Scope.ADMIN)  # without authentication
-        return json_response({"sites": [_summary(one.answers) for one in sites if scope_in(one.id) is not None]})
-
-
-def _summary(answers: Answers) -> Answer:
-    """Return the `SiteSummary` of a site."""
-    site = answers.site.site
-    return {
-        "site": site.id,
-        "name": site.name,
-        "georeference": None if site.georeference is None else site.georeference.model_dump(),
-        "anchors": len(site.anchors),
-        "tags": len(answers.tags.listed()),
-        "online": answers.tags.presence.count(),
-    }
+        wanted = {one.id for one in sites if scope_in(one.id) is not None}
+        return json_response({"sites": list(summaries([one.answers for one in sites], wanted))})

@@ -118,7 +118,7 @@ class Changes:
 
     def _selected(self, poses: Array) -> Array:
         if not self._names:
-            return poses
+            return self._answers.tags.own(poses)
         rows = [tag.row for tag in map(self._answers.tags.find, self._names) if tag is not None]
         return poses[np.isin(poses["row"], rows)]
 

@@ -65,7 +65,7 @@ def test_no_operation_of_another_site_takes_the_key_of_a_site_or_of_its_tag(comp
 
 def test_the_key_of_a_site_reads_and_changes_its_own_site(company: Company) -> None:
     assert company.ask("GET", "/sites/a/poses", company.admin_of_a).json()["poses"][0]["x"] == 1.0
-    assert company.ask("GET", "/sites/a/access", company.admin_of_a).json() == {"scope": "admin"}
+    assert company.ask("GET", "/sites/a/access", company.admin_of_a).json() == {"scope": "admin", "events": False}
     assert company.ask("PUT", "/sites/a/tags/cart/settings", company.admin_of_a, json={}).status_code == 200
     refused = company.ask("GET", "/sites/b/poses", company.admin_of_a)
     assert refused.json()["detail"] == (

@@ -1,11 +1,17 @@
 """Each site has its routes below /sites; the routes without a site are those of the only one."""
 
+import json
+from threading import Event
+
+import httpx
+
 from dropanchor_schemas import Anchor
 from dropanchor_schemas.answers import SiteList
 from dropanchor_service.api.http.access import required_scope
 from dropanchor_service.security.identity import Scope
 from support.api import ask, kind_of, make_api_bench
-from support.sites import app_of_sites, make_sites
+from support.http_server import running_server
+from support.sites import T_NS, app_of_sites, make_sites
 
 
 def test_poses_tags_and_anchors_are_those_of_the_site_in_the_path() -> None:
@@ -51,7 +57,6 @@ def test_with_several_sites_a_path_without_one_is_refused_with_a_sentence() -> N
         ("GET", "/api/v1/stream"),
         ("GET", "/api/v1/recordings"),
         ("PUT", "/api/v1/zones/1"),
-        ("GET", "/"),
     ):
         refused = ask(app, method, path)
         assert kind_of(refused) == "several-sites"
@@ -59,6 +64,27 @@ def test_with_several_sites_a_path_without_one_is_refused_with_a_sentence() -> N
     assert kind_of(ask(app, "GET", "/api/v1/sites/c/poses")) == "unknown-site"
     assert kind_of(ask(app, "POST", "/api/v1/ingest/samples?tag=cart", json={})) == "several-sites"
     assert ask(app, "GET", "/api/v1/health/live").status_code == 200
+
+
+def test_the_page_needs_a_site_in_its_address_and_leads_to_the_overview_without_one() -> None:
+    app = app_of_sites(make_sites("a", "b"))
+    without = ask(app, "GET", "/")
+    assert (without.status_code, without.headers["location"]) == (307, "sites/")
+    assert 'src="page.js"' in ask(app, "GET", "/sites/").text
+    assert 'src="page/main.js"' in ask(app, "GET", "/?site=a").text
+
+
+def test_the_list_of_sites_counts_states_and_tags_that_need_a_person() -> None:
+    sites = make_sites("a", "b")
+    app = app_of_sites(sites)
+    sites[0].tags.register("lift")
+    row = sites[1].tags.register("low").row
+    sites[1].health.record(row, {"battery_fraction": 0.1}, T_NS)
+    listed = SiteList.model_validate(ask(app, "GET", "/api/v1/sites").json()).sites
+    assert [(site.tags, site.states, site.needs_care) for site in listed] == [
+        (2, {"tracking": 1}, 0),
+        (2, {"tracking": 1}, 1),
+    ]
 
 
 def test_an_only_site_has_both_paths() -> None:
@@ -77,3 +103,17 @@ def test_the_same_changes_need_the_same_scope_with_and_without_a_site_in_the_pat
         assert required_scope("PUT", f"{prefix}/anchors/1") is Scope.WRITE
         assert required_scope("DELETE", f"{prefix}/tags/a") is Scope.ADMIN
         assert required_scope("GET", f"{prefix}/poses") is Scope.READ
+
+
+def test_the_stream_of_a_site_holds_its_tags_alone_whatever_it_asks_for() -> None:
+    sites, stopping = make_sites("a", "b"), Event()
+    app = app_of_sites(sites, stopping=stopping)
+    with running_server(app, stopping) as port:
+        for site, x in (("a", 1.0), ("b", 2.0)):
+            for query in ("", "?tags=cart", "?group=", "?box=0,-1,9,1"):
+                url = f"http://127.0.0.1:{port}/api/v1/sites/{site}/stream{query}"
+                with httpx.stream("GET", url, timeout=20.0, trust_env=False) as stream:
+                    lines = stream.iter_lines()
+                    assert next(lines) == "event: snapshot"
+                    frame = json.loads(next(lines).removeprefix("data: "))
+                assert (frame["tags"], frame["x"]) == (["cart"], [x]), (site, query)
