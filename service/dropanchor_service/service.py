@@ -242,7 +242,7 @@ class Service:
         caches = ZenohCaches(session, self.sites, self.metrics, self.clock)
         catch_up = CatchUp(
             self._buffer,
-            expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all()],
+            expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all() if self.sites.is_served(tag)],
             states_of=sequence_states(self.sites, self._publishers),
             ask=caches.ask,
             new_publisher_limit=caches.new_publisher_limit,

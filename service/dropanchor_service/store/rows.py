@@ -126,6 +126,11 @@ class Rows:
             self._counts[row] = 0
             self._deleted |= {row}
 
+    def hide(self, row: int) -> None:
+        """Note that the tag of a row is deleted, but keep its counters."""
+        with self._lock:
+            self._deleted |= {row}
+
     def undelete(self, row: int) -> None:
         """Note that the tag of a row is registered again."""
         with self._lock:
