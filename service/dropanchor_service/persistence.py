@@ -35,8 +35,9 @@ class Persistence:
     """
 
     def __init__(
-        self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics
+        self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics | None
     ) -> None:
+        """metrics: where history and recorder are registered; None for one of several sites."""
         self._settings = settings
         self._opened = ExitStack()
         self.plans = _open_plans(settings.data_dir)
@@ -49,7 +50,6 @@ class Persistence:
             return
         if settings.history.enabled:
             self.tracks = Tracks(folder, retention_of(settings.history), tags, site, now_ns)
-            metrics.register(HistoryMetrics(self.tracks))
         metadata = {
             "engine": settings.engine,
             "paper": settings.paper.model_dump_json(),
@@ -57,7 +57,10 @@ class Persistence:
         }
         period_ns = round(settings.recording.pose_period_s * 1e9)
         self.recorder = Recorder(folder, file_limits_of(settings.recording), period_ns, tags, site, now_ns, metadata)
-        metrics.register(RecordingMetrics(self.recorder))
+        if metrics is not None:
+            if self.tracks is not None:
+                metrics.register(HistoryMetrics(self.tracks))
+            metrics.register(RecordingMetrics(self.recorder))
 
     def __enter__(self) -> Self:
         if self.basemap is not None:
@@ -71,6 +74,11 @@ class Persistence:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+    @property
+    def all(self) -> Sequence["Persistence"]:
+        """This one, as `SiteFolders.all` has those of several sites."""
+        return [self]
 
     @property
     def observers(self) -> Observers:
@@ -133,11 +141,13 @@ def open_sites(settings: Settings) -> Sites:
     """Return the sites, as the settings and the data folder have them. Raises SettingsError."""
     if not settings.sites:
         return Sites([(open_site(settings), settings.quota)])
-    return Sites([(_open(settings, name), site.quota(settings.quota)) for name, site in settings.sites.items()])
+    stores = [open_site(settings_of_site(settings, name)) for name in settings.sites]
+    quotas = [site.quota(settings.quota) for site in settings.sites.values()]
+    return Sites(list(zip(stores, quotas, strict=True)))
 
 
-def _open(settings: Settings, name: str) -> SiteStore:
-    """Return a site of `[sites]`. Its changes are in a folder of its own. Raises SettingsError."""
+def settings_of_site(settings: Settings, name: str) -> Settings:
+    """Return the settings of a site of `[sites]` as those of an only site. Its files are in a folder of its own."""
     site, folder = settings.sites[name], settings.data_dir
     own = {
         "site": site.site.model_copy(update={"id": name}),
@@ -145,7 +155,7 @@ def _open(settings: Settings, name: str) -> SiteStore:
         "tag_defaults": site.tag_defaults.over(settings.tag_defaults),
         "data_dir": None if folder is None else folder / "sites" / chunk_from_id(name),
     }
-    return open_site(settings.model_copy(update=own))
+    return settings.model_copy(update=own)
 
 
 def _open_omlox(settings: Settings) -> OmloxItems:

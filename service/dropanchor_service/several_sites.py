@@ -1,4 +1,4 @@
-"""What a service with several sites has, so far: access, and for each site its routes."""
+"""What a service with several sites has, so far: access, and for each site its folder and its routes."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -16,6 +16,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.security.credentials import authenticator_of
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings.model import Settings
+from dropanchor_service.site_folders import SiteFolders
 from dropanchor_service.store import Sites
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
 
@@ -26,12 +27,20 @@ ReceiveOfSite = Callable[[str, str, bytes, str], None]
 class SeveralSites:
     """The parts of a service with several sites. Creating it raises SettingsError."""
 
-    def __init__(self, settings: Settings, credentials: SecurityFolder | None, sites: Sites, metrics: Metrics) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        credentials: SecurityFolder | None,
+        sites: Sites,
+        now_ns: Callable[[], int],
+        metrics: Metrics,
+    ) -> None:
         self._settings = settings
         self._credentials = credentials
         self._authenticator = authenticator_of(settings)
         self._sites = sites
         self._metrics = metrics
+        self.folders = SiteFolders(settings, sites, now_ns, metrics)
 
     def app(
         self,
@@ -57,8 +66,10 @@ class SeveralSites:
                 of_site,
                 partial(receive, site.id),
                 partial(receive_health, site.id),
+                plans=folder.plans,
+                recorder=folder.recorder,
                 max_tags=site.quota.max_tags,
             )
-            for site, of_site in zip(self._sites, answers, strict=True)
+            for site, of_site, folder in zip(self._sites, answers, self.folders.all, strict=True)
         ]
         return create_app_of_sites(parts, shared, ready=ready, impaired=impaired, registry=self._metrics.registry)
