@@ -18,10 +18,6 @@ from support.zenoh_router import connected_session, wait_until
 
 RANGES, BEFORE = 60, 40
 ALL = slice(None)
-HEAD = """
-[history]
-enabled = false
-"""
 NORTH = """
 [sites.north.site]
 anchors = [{ id = "7" }]
@@ -75,7 +71,7 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
     tmp_path: Path, router_endpoint: str
 ) -> None:
     config = tmp_path / "sites.toml"
-    config.write_text(HEAD + NORTH + SOUTH)
+    config.write_text(NORTH + SOUTH)
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", router_endpoint)
     frame = straight_north(RANGES)
     with ExitStack() as opened:
@@ -95,6 +91,7 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
             publish(clients[0], frame, slice(BEFORE, BEFORE + 10))
             publish(clients[1], frame, slice(BEFORE, BEFORE + 10))
             wait_until(lambda: {keys.poses_key("south"), keys.pose_key("north", "cart")} == set(received))
+            _check_tracks(service)
             kill(service)
         for client in clients:
             publish(client, frame, slice(BEFORE + 10, None))
@@ -112,7 +109,7 @@ def test_a_site_that_leaves_and_one_that_comes_keep_the_tracks_of_the_others_thr
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", router_endpoint)
     poses: dict[str, dict[str, Any]] = {}
     for sites in ((NORTH, SOUTH), (WEST, NORTH), (NORTH, SOUTH, WEST)):
-        config.write_text(HEAD + "".join(sites))
+        config.write_text("".join(sites))
         with running_service(*options) as service:
             served = [site["site"] for site in service.get("/api/v1/sites")["sites"]]
             if not poses:
@@ -131,6 +128,20 @@ def test_a_site_that_leaves_and_one_that_comes_keep_the_tracks_of_the_others_thr
             with TagClient("mark", site="north", connect=router_endpoint) as mark:  # only messages make checkpoints
                 publish(mark, frame, slice(1))
             kill(service)
+
+
+def _check_tracks(service: Running) -> None:
+    """Check that each site has a history of its own tag, 100 m and 50 m apart."""
+
+    def first(site: str) -> tuple[float, float] | None:
+        t_ns = service.get(f"/api/v1/sites/{site}/tags/cart/pose")["t_ns"]
+        period = f"from={t_ns - 60 * 10**9}&to={t_ns}"
+        poses = service.get(f"/api/v1/sites/{site}/tags/cart/track?{period}&limit=1")["poses"]
+        return place(poses[0]) if poses else None
+
+    wait_until(lambda: first("north") is not None and first("south") is not None)
+    x, y = first("north") or (0.0, 0.0)
+    assert first("south") == pytest.approx((x + 100.0, y + 50.0), abs=1e-3)
 
 
 def _check_answers(service: Running, session: zenoh.Session) -> None:
