@@ -20,6 +20,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import Sites, SiteStore, TagTable
@@ -44,7 +45,7 @@ class Persistence:
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         self.omlox = _open_omlox(settings)
-        self.basemap = _open_basemap(settings, site)
+        self.basemap = open_basemap(settings, [site])
         folder = settings.data_dir
         if folder is None:
             return
@@ -154,6 +155,7 @@ def settings_of_site(settings: Settings, name: str) -> Settings:
         "tags": site.tags,
         "tag_defaults": site.tag_defaults.over(settings.tag_defaults),
         "data_dir": None if folder is None else folder / "sites" / chunk_from_id(name),
+        "basemap": BasemapSettings(),  # all sites share one
     }
     return settings.model_copy(update=own)
 
@@ -168,8 +170,8 @@ def _open_omlox(settings: Settings) -> OmloxItems:
         ) from error
 
 
-def _open_basemap(settings: Settings, site: SiteStore) -> ServedBasemap | None:
-    """Return the base map; None without one. Raises SettingsError."""
+def open_basemap(settings: Settings, sites: Sequence[SiteStore]) -> ServedBasemap | None:
+    """Return the base map of these sites; None without one. Raises SettingsError."""
     path = settings.basemap.tiles
     if path is None:
         return None
@@ -179,8 +181,9 @@ def _open_basemap(settings: Settings, site: SiteStore) -> ServedBasemap | None:
         raise SettingsError(f"basemap.tiles: {path} cannot be read: {error.strerror}") from error
     except UnusableFileError as error:
         raise SettingsError(f"basemap.tiles: {error}") from error
-    if site.site.georeference is None:
+    if all(site.site.georeference is None for site in sites):
         _log.warning(
-            "basemap.tiles: the site has no latitude and longitude, so the page shows no base map until it has"
+            "basemap.tiles: %s, so the page shows no base map until it has",
+            "the site has no latitude and longitude" if len(sites) == 1 else "no site has latitude and longitude",
         )
     return basemap

@@ -60,6 +60,7 @@ class SeveralSites:
             self._authenticator,
             RateLimiter(http.requests_per_s, http.burst),
             http.cors_origins,
+            self.folders.basemap,
         )
         parts = [
             SiteParts(

@@ -1,4 +1,4 @@
-"""What each of several sites has on disk: floor plans, history and recordings, in its folder."""
+"""What several sites have on disk: each its floor plans, history and recordings, and all the base map."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -8,7 +8,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence, settings_of_site
+from dropanchor_service.persistence import Persistence, open_basemap, settings_of_site
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
 
@@ -25,6 +25,7 @@ class SiteFolders:
         self.all = [
             Persistence(settings_of_site(settings, site.id), site.tags, site.store, now_ns, None) for site in sites
         ]
+        self.basemap = open_basemap(settings, [site.store for site in sites])
         if tracks := [one.tracks for one in self.all if one.tracks is not None]:
             metrics.register(HistoryMetrics(*tracks))
         if recorders := [one.recorder for one in self.all if one.recorder is not None]:
@@ -32,6 +33,8 @@ class SiteFolders:
 
     def __enter__(self) -> Self:
         with self._opened:
+            if self.basemap is not None:
+                self._opened.callback(self.basemap.file.close)
             for one in self.all:
                 self._opened.enter_context(one)
             self._opened = self._opened.pop_all()

@@ -3,16 +3,20 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from prometheus_client import generate_latest
 
 from dropanchor_schemas.wire import ENCODING_JSON
+from dropanchor_service.basemap.file import UnreadableTileError
 from dropanchor_service.estimation.columns import POSE, State
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence import open_sites
 from dropanchor_service.recording.reading import RecordingReader
+from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_service.site_folders import SiteFolders
+from support.basemap_files import basemap_file, image_tile
 
 S = 1_000_000_000
 T = 1_760_000_000 * S
@@ -53,3 +57,15 @@ def test_poses_and_messages_reach_the_files_of_their_site_alone(tmp_path: Path) 
     text = generate_latest(metrics.registry).decode()
     assert "dropanchor_history_poses_total 3.0" in text
     assert text.count("# TYPE dropanchor_recording_running") == 1
+
+
+def test_all_sites_share_one_base_map_which_closes_with_the_service(tmp_path: Path) -> None:
+    tiles = basemap_file(tmp_path / "map.pmtiles", {(0, 0, 0): image_tile((1, 2, 3))})
+    settings = settings_in(tmp_path / "data").model_copy(update={"basemap": BasemapSettings(tiles=tiles)})
+    sites = open_sites(settings)
+    with SiteFolders(settings, sites, lambda: T, Metrics()) as folders:
+        assert folders.basemap is not None
+        assert folders.basemap.file.tile(0, 0, 0) is not None
+        assert [one.basemap for one in folders.all] == [None, None]
+    with pytest.raises(UnreadableTileError):
+        folders.basemap.file.tile(0, 0, 0)

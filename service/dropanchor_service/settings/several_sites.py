@@ -39,8 +39,6 @@ def _refuse_many_files(settings: Settings) -> None:
 
 def _of_one(settings: Settings) -> Iterator[tuple[str, str]]:
     """Yield each key that is of one site only, and what to do about it."""
-    if settings.basemap.tiles is not None:
-        yield "basemap", "leave out basemap.tiles"
     for section in _OF_EVENTS:
         if section in settings.model_fields_set:
             yield section, f"leave out [{section}]"

@@ -81,7 +81,6 @@ def test_a_table_that_contradicts_another_is_refused(tmp_path: Path, text: str, 
     ("text", "sentence"),
     [
         ("[mqtt]\ntls = false", "mqtt is for one site so far, and there are 2: leave out [mqtt]"),
-        ('[basemap]\ntiles = "yard.pmtiles"', "basemap is for one site so far, and there are 2"),
         ("[events]\nperiod_ms = 300", "events is for one site so far, and there are 2: leave out [events]"),
     ],
 )

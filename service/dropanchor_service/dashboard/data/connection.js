@@ -41,7 +41,7 @@ export class Connection extends EventTarget {
   status = "connecting";
   /** What the service does while it is starting. */
   progress = "";
-  /** Whether the site has zones, events and deliveries. */
+  /** Whether the site has what an only site has: zones, events, deliveries and share links. */
   hasEvents = true;
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;

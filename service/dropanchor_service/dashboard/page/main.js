@@ -176,7 +176,7 @@ const share = new SharePanel(byId("share"), choice);
 byId("options").addEventListener("click", () => {
   byId("link").textContent = location.href;
   /** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location);
-  share.open();
+  if (connection.hasEvents) share.open();
 });
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);
