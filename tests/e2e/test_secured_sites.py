@@ -66,4 +66,6 @@ def test_two_sites_share_a_secured_service_and_a_router(tmp_path: Path, capsys: 
             assert service.ask("GET", f"/api/v1/sites/{site}/poses", headers=of_north).status_code == status
         listed = service.ask("GET", "/api/v1/sites", headers=of_north).json()["sites"]
         assert [site["site"] for site in listed] == ["north"]
+        assert service.ask("GET", "/").headers["location"] == "sites/"
+        assert "page/main.js" in service.ask("GET", "/?site=north").text
         assert service.stop() == 0
