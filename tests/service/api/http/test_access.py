@@ -43,7 +43,9 @@ def guarded(tmp_path: Path) -> Guarded:
 
 def every_operation() -> list[tuple[str, str]]:
     paths = make_api_bench().app().openapi()["paths"]
-    return [(method.upper(), path) for path, operations in paths.items() for method in operations]
+    return [
+        (method.upper(), path) for path, operations in paths.items() for method in operations if "{site}" not in path
+    ]
 
 
 @pytest.mark.parametrize(("method", "path"), every_operation())

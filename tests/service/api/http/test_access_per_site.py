@@ -57,6 +57,7 @@ def test_no_operation_of_another_site_takes_the_key_of_a_site_or_of_its_tag(comp
     families = {path.split("/")[3] for _, path in crossed}
     assert families >= {"poses", "stream", "tags", "tracks", "anchors", "site", "ingest", "recordings", "plans"}
     for method, path in crossed:
+        assert kind_of(ask(company.app, method, f"/api/v1{path}".replace("{site}", "b"))) == "unauthenticated"
         for secret in (company.admin_of_a, company.cart_of_a, company.cart_of_no_site):
             response = company.ask(method, path.replace("{site}", "b"), secret)
             assert kind_of(response) == "forbidden", (method, path)
