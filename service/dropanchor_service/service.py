@@ -22,6 +22,7 @@ from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.compile_apart import compile_apart
 from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest, warm_up_zones
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.ingest.admission import Admission
@@ -146,6 +147,8 @@ class Service:
         """Return the engine. Compile whatever the service will run, so that no sample waits for it."""
         self._progress.page = f"{self.url}/"
         with self._compiling:
+            if self._settings.engine == "fleet":
+                compile_apart(self._progress)
             warm_up_ingest(self._progress)
             warm_up_answers(self._progress)
             warm_up_zones(self._progress)
@@ -196,10 +199,8 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        found = [
-            *(self._only.problems() if self._only else self._persistence.problems()),
-            self._checkpoints.problem if self._checkpoints else None,
-        ]
+        stores = self._only or self._persistence
+        found = [*stores.problems(), self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property

@@ -233,7 +233,7 @@ def test_garbage_is_counted_for_its_tag_and_the_service_goes_on(service: Running
 
 def test_settings_given_over_rest_start_the_tag_afresh(service: Running, session: zenoh.Session) -> None:
     put(session, "late", straight_north(3))
-    wait_until(lambda: samples_of(service, "late").get("range") == 3)
+    wait_until(lambda: service.ask("GET", "/api/v1/tags/late/pose").is_success)
     assert service.get("/api/v1/tags/late/pose")["state"] == "initialising"
     service.put("/api/v1/tags/late/settings", {"start": {"x": 10.0, "y": -20.0, "heading_rad": 1.5707963}})
     put(session, "late", straight_north(5))

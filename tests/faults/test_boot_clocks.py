@@ -107,7 +107,7 @@ def assert_equal_up_to_a_time_shift(one: Run, other: Run, max_shift_ns: int) -> 
     for row, poses in one.poses().items():
         others = other.poses()[row]
         assert len(poses) == len(others) > 400
-        shift_ns = np.abs(poses["t_ns"] - others["t_ns"])
+        shift_ns = abs(poses["t_ns"] - others["t_ns"])
         assert shift_ns.max() < max_shift_ns
         for name in set(POSE.names or ()) - {"t_ns"}:
             np.testing.assert_array_equal(poses[name], others[name], err_msg=name)
@@ -170,7 +170,7 @@ def test_two_boot_clocks_of_a_tag_leave_its_poses_within_their_ellipses() -> Non
     for row, poses in one.poses().items():
         others = other.poses()[row]
         assert len(poses) == len(others) > 400
-        apart = np.stack([poses["x"] - others["x"], poses["y"] - others["y"]], axis=1)
+        apart = np.stack([poses[axis] for axis in "xy"], axis=1) - np.stack([others[axis] for axis in "xy"], axis=1)
         outside = np.einsum("ki,kij,kj->k", apart, np.linalg.inv(poses["cov"][:, :2, :2]), apart)
         _log.info(
             "The largest distance is %.3g m, the largest chi squared %.3g.", np.hypot(*apart.T).max(), outside.max()

@@ -23,14 +23,18 @@ def many_tracks(
     begins = np.searchsorted(found.points["tag"], found.figures["tag"])
     ends = np.searchsorted(found.points["tag"], found.figures["tag"], side="right")
     each = [
-        {"tag": found.names[int(figures["tag"])], **_figures(figures)}
+        {"tag": found.names[int(figures["tag"])], **figures_of(figures)}
         | {"points": {name: column[begin:end] for name, column in columns.items()}}
         for figures, begin, end in zip(found.figures, begins.tolist(), ends.tolist(), strict=True)
     ]
     return {"from_ns": from_ns, "to_ns": to_ns, "tracks": sorted(each, key=lambda track: str(track["tag"]))}
 
 
-def _figures(summary: Array) -> dict[str, Any]:
+NO_FIGURES = {"poses": 0, "tracked_s": 0.0, "distance_m": 0.0, "mean_speed_mps": None, "max_speed_mps": None}
+
+
+def figures_of(summary: Array) -> dict[str, Any]:
+    """Return the figures of a tag, as `TagTrack` has them. summary: one SUMMARY."""
     tracked_s, distance_m = float(summary["tracked_s"]), float(summary["distance_m"])
     return {
         "poses": int(summary["poses"]),

@@ -76,9 +76,9 @@ def create_app(
     recorder: None when there is no folder for recordings. dashboard: the folder of the page; None for no page.
     endpoints: those of the Zenoh router, as configured. credentials: those of the tags; None when they need none.
     authenticator: None when every client may do everything. rate_limiter: limits the requests of each client; None for
-    no limit. cors_origins: of other web pages that may use the interface. events:
-    zones, events and destinations; None keeps them in memory and watches nothing. plans, omlox: floor plans, and what
-    omlox clients have said; None keeps them in memory. basemap: None when there is none.
+    no limit. cors_origins: of other web pages that may use the interface. events: zones, events and destinations; None
+    keeps them in memory and watches nothing. plans: floor plans; None keeps them in memory. omlox: what omlox clients
+    have said; None for no omlox interface. basemap: None when there is none.
     """
     events = events or EventParts.in_memory(answers.site.site.id)
     site_of = SiteOfRequest(
@@ -97,8 +97,9 @@ def create_app(
     ):
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))
-    hub = Hub(answers, events.items.zones, events.store, omlox or OmloxItems.opened(None), max_tags)
-    add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
+    if omlox is not None:
+        hub = Hub(answers, events.items.zones, events.store, omlox, max_tags)
+        add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 

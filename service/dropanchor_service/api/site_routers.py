@@ -12,6 +12,7 @@ from dropanchor_service.api.routes.basemap import basemap_router
 from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.events import events_router
+from dropanchor_service.api.routes.figures import figures_router
 from dropanchor_service.api.routes.heat_map import heat_map_router
 from dropanchor_service.api.routes.history import history_router
 from dropanchor_service.api.routes.ingest import ingest_router
@@ -91,8 +92,9 @@ def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter
 
 
 def event_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter, ...]:
-    """Return the routes of zones, events and their delivery."""
+    """Return the routes of zones, events and their delivery, and the figures that tell the time in zones."""
     return (
+        figures_router(site_of),
         zones_router(site_of),
         zone_occupancy_router(site_of),
         events_router(site_of, shared.stopping),

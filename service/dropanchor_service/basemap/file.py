@@ -152,7 +152,8 @@ def _header(content: bytes) -> HeaderDict:
     tile_type, tiles, inner = header["tile_type"], header["tile_compression"], header["internal_compression"]
     if tile_type not in _MEDIA_TYPES:
         kinds = ", ".join(kind.name for kind in _MEDIA_TYPES)
-        raise UnusableFileError(f"has tiles of the type {tile_type.name}; the types {kinds} can be shown")
+        advice = "; the program `pmtiles convert` writes the type" if tile_type is TileType.UNKNOWN else ""
+        raise UnusableFileError(f"has tiles of the type {tile_type.name}; the types {kinds} can be shown{advice}")
     if inner is not Compression.GZIP or tiles not in (Compression.GZIP, Compression.NONE):
         unreadable = tiles if inner is Compression.GZIP else inner
         raise UnusableFileError(f"has the compression {unreadable.name}; only GZIP can be read, and tiles with NONE")

@@ -10,7 +10,7 @@ from dropanchor_service.checkpoints.files import Snapshot, layout_of
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
-from dropanchor_service.runtime.kernel_cache import sources_digest
+from dropanchor_service.runtime.kernel_cache import STATE_SOURCES, sources_digest
 from dropanchor_service.store import LatestPoses, ServedSite, Sites
 from dropanchor_service.store.records import put
 
@@ -31,7 +31,7 @@ class ServiceState:
         self._publishers = publishers
         self._buffers: dict[str, Array] = {}
         self.template = self.snapshot()
-        self.layout = layout_of(Snapshot(self.template.arrays, _NAMES), meaning=sources_digest())
+        self.layout = layout_of(Snapshot(self.template.arrays, _NAMES), meaning=sources_digest(STATE_SOURCES))
 
     @property
     def messages(self) -> int:

@@ -4,6 +4,7 @@ import argparse
 
 from dropanchor_service.commands.options import add_log_option
 from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.engines.compile_apart import mark_complete
 from dropanchor_service.engines.warm_up import warm_up_answers, warm_up_ingest, warm_up_zones
 from dropanchor_service.runtime import logs
 from dropanchor_service.settings.model import Settings
@@ -30,4 +31,5 @@ def run(arguments: argparse.Namespace) -> int:
     warm_up_ingest()
     warm_up_answers()
     warm_up_zones()
+    mark_complete()
     return 0

@@ -44,8 +44,8 @@ def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
             writer = csv.writer(stack.enter_context(arguments.out.open("w", newline="")))
             writer.writerow(COLUMNS)
             write = writer.writerows
-        for session, group in groupby(files, _session):
-            _replay_session(arguments, [RecordingReader(file) for file in group], session, write)
+        for _, group in groupby(files, _session):
+            _replay_session(arguments, [RecordingReader(file) for file in group], write)
     if arguments.out:
         print(f"poses: {arguments.out}")
     return 0
@@ -62,9 +62,7 @@ def _session(file: Path) -> str:
     return reader.metadata.get(SESSION, file.name)
 
 
-def _replay_session(
-    arguments: argparse.Namespace, readers: Sequence[RecordingReader], session: str, write: Write
-) -> None:
+def _replay_session(arguments: argparse.Namespace, readers: Sequence[RecordingReader], write: Write) -> None:
     turns = (turn for reader in readers for turn in reader.turns())
     first = next(turns, None)
     if first is None or first.site is None:
@@ -72,7 +70,7 @@ def _replay_session(
     settings = settings_of(readers[0].metadata, load_settings(arguments.config), arguments.engine)
     service, outcome = OfflineService(settings, first.site), Outcome()
     print(f"recorded {_utc(first.t_ns)}, {len(readers)} file(s), engine {settings.engine}")
-    for turn, poses in service.poses_of(tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc=session)):
+    for turn, poses in service.poses_of(tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc="replayed")):
         tags = [service.tags.at(row).name for row in poses["row"].tolist()]
         outcome.add(turn, tags, poses)
         write(_rows(tags, poses))

@@ -1,7 +1,9 @@
 """Open the way to a destination of any type, and refuse those to which nothing could be delivered."""
 
 import importlib
+import ssl
 from contextlib import AbstractAsyncContextManager
+from functools import cached_property
 
 from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
 from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
@@ -24,8 +26,8 @@ class Channels:
         self._email = email
         self._mqtt = mqtt
         self._name_of = name_of
-        # A library may change its context, so each has its own.
-        self._webhook_tls, self._email_tls, self._mqtt_tls = (tls_context(delivery.authorities) for _ in range(3))
+        if delivery.authorities is not None:
+            tls_context(delivery.authorities)  # a file that cannot be read is refused at the start
 
     def open(self, destination: Destination) -> AbstractAsyncContextManager[Channel]:
         """Return the way to a destination as a context. It must have passed `check_settings`."""
@@ -40,6 +42,19 @@ class Channels:
                 from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
 
                 return open_mqtt(destination, self._mqtt, self._mqtt_tls, timeout_s)
+
+    # A context takes some 20 ms, so only types in use have one. A library may change its context, so none is shared.
+    @cached_property
+    def _webhook_tls(self) -> ssl.SSLContext:
+        return tls_context(self._delivery.authorities)
+
+    @cached_property
+    def _email_tls(self) -> ssl.SSLContext:
+        return tls_context(self._delivery.authorities)
+
+    @cached_property
+    def _mqtt_tls(self) -> ssl.SSLContext:
+        return tls_context(self._delivery.authorities)
 
     def check(self, destination: Destination) -> None:
         """Raise ChannelError when nothing could be delivered. It may resolve a name, and blocks then."""

@@ -8,7 +8,7 @@ import logging
 import sqlite3
 import time
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from threading import RLock
@@ -17,9 +17,21 @@ from typing import Any
 from dropanchor_service.history.damaged_file import is_damage, move_aside
 
 FILE_NAME = "events.sqlite"
-VERSION = 2
+VERSION = 3
 BUSY_S = 5.0
 
+_STAYS = """
+CREATE TABLE stays (tag TEXT NOT NULL, zone TEXT NOT NULL, entered_ns INTEGER NOT NULL, left_ns INTEGER NOT NULL);
+CREATE INDEX stays_by_end ON stays (left_ns);
+"""
+_STAYS_OF_EVENTS = """
+INSERT INTO stays SELECT tag, zone, entered_ns, since_ns FROM (
+    SELECT tag, zone, type, since_ns, lag(type) OVER pairs AS before, lag(since_ns) OVER pairs AS entered_ns
+    FROM (SELECT *, json_extract(body, '$.data.since_ns') AS since_ns FROM events)
+    WHERE type IN ('dropanchor.zone.enter', 'dropanchor.zone.exit')
+    WINDOW pairs AS (PARTITION BY tag, zone ORDER BY sequence)
+) WHERE type = 'dropanchor.zone.exit' AND before = 'dropanchor.zone.enter';
+"""
 _SCHEMA = f"""
 CREATE TABLE events (
     sequence INTEGER PRIMARY KEY AUTOINCREMENT, type TEXT NOT NULL, tag TEXT NOT NULL, zone TEXT,
@@ -35,6 +47,7 @@ CREATE TABLE deliveries (
     destination TEXT NOT NULL, sequence INTEGER NOT NULL, refusals INTEGER NOT NULL DEFAULT 0, dead TEXT,
     PRIMARY KEY (destination, sequence)
 ) WITHOUT ROWID;
+{_STAYS}
 PRAGMA user_version = {VERSION};
 """
 
@@ -84,6 +97,11 @@ class Database:
         with self._lock:
             return self._connection.execute(sql, values).fetchall()
 
+    def snapshot(self, *queries: tuple[str, Mapping[str, Any]]) -> list[list[tuple[Any, ...]]]:
+        """Return the rows of several queries at one moment. Raises sqlite3.Error."""
+        with self._lock:
+            return [self._connection.execute(sql, values).fetchall() for sql, values in queries]
+
     def used_bytes(self) -> int:
         """Return the size of the file without its free pages."""
         pages, free, size = (
@@ -109,6 +127,9 @@ class Database:
             connection.executescript(
                 "BEGIN; ALTER TABLE deliveries RENAME webhook TO destination; PRAGMA user_version = 2; COMMIT;"
             )
+            version = 2
+        if version == 2:
+            connection.executescript(f"BEGIN; {_STAYS} {_STAYS_OF_EVENTS} PRAGMA user_version = 3; COMMIT;")
             version = VERSION
         if version not in (0, VERSION) or (version == 0 and tables):
             raise EventFileError(

@@ -46,6 +46,15 @@ class StateValue(NamedTuple):
     since_ns: int
 
 
+class Stay(NamedTuple):
+    """A tag was in a zone, with the certainty of an event."""
+
+    tag: str
+    zone: str
+    entered_ns: int
+    left_ns: int
+
+
 States = dict[StateKey, StateValue | None]
 """New states by key; None: the state ends."""
 

@@ -10,7 +10,8 @@ import orjson
 
 from dropanchor_schemas.events import EventData
 from dropanchor_service.events.database import Database
-from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue
+from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue, Stay
+from dropanchor_service.events.stays import add_stays, prune_stays
 
 PRUNED = 5_000  # events per transaction
 
@@ -65,8 +66,8 @@ class EventStore:
         """The sequence of the newest event. Readers poll it."""
         self.dropped_deliveries = 0
 
-    def commit(self, drafts: Sequence[Draft], states: States) -> None:
-        """Store events and states, and queue the events for their destinations."""
+    def commit(self, drafts: Sequence[Draft], states: States, stays: Sequence[Stay] = ()) -> None:
+        """Store events, states and ended stays, and queue the events for their destinations."""
         with self.database.transaction() as connection:
             found = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence").fetchone()
             first = int(found[0]) + 1
@@ -91,6 +92,7 @@ class EventStore:
                 "DELETE FROM states WHERE source = ? AND item = ? AND tag = ? AND other = ?",
                 [key for key, value in states.items() if value is None],
             )
+            add_stays(connection, stays)
         self.newest = first + len(drafts) - 1
 
     def states(self) -> dict[StateKey, StateValue]:
@@ -123,7 +125,7 @@ class EventStore:
         return [StoredEvent(*row) for row in reversed(self.database.rows(sql, 0, *values, limit))]
 
     def prune(self, keep_from_ns: int, max_bytes: int) -> int:
-        """Delete the oldest events that are too old or too many, at most PRUNED. Return how many.
+        """Delete the oldest events and stays that are too old or too many, at most PRUNED. Return how many events.
 
         What is still queued of them is lost, and counted.
         """
@@ -131,6 +133,7 @@ class EventStore:
         condition = "1" if oversized else "t_ns < ?"
         values = [] if oversized else [keep_from_ns]
         with self.database.transaction() as connection:
+            prune_stays(connection, None if oversized else keep_from_ns, PRUNED)
             end = connection.execute(
                 f"SELECT max(sequence) FROM (SELECT sequence, t_ns FROM events ORDER BY sequence LIMIT {PRUNED}) "
                 f"WHERE {condition}",

@@ -67,10 +67,10 @@ class EventThread(Worker):
             self._log.warning("too close", "a rule has too many pairs to follow: give it fewer tags or less distance")
 
     def _save(self) -> None:
-        drafts, states = self._watcher.drafts, self._watcher.states
+        drafts, states, stays = self._watcher.drafts, self._watcher.states, self._watcher.stays
         if drafts or states:
-            self._store.commit(drafts, states)
-            self._watcher.drafts, self._watcher.states = [], {}
+            self._store.commit(drafts, states, stays)
+            self._watcher.drafts, self._watcher.states, self._watcher.stays = [], {}, []
             self.stored += len(drafts)
 
     def _prune(self) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from dropanchor_schemas.zones import TooCloseRule
 from dropanchor_service.answers.columns import aged_poses
 from dropanchor_service.events.describe import pair_event, tag_event, zone_event
-from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue
+from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue, Stay
 from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, TagTable
 from dropanchor_service.zones.items import ZoneItems
 from dropanchor_service.zones.judge import INSIDE
@@ -35,7 +35,7 @@ class Fleet:
 
 
 class Watcher:
-    """Follows zones and rules. One thread owns it. `turn` adds to `drafts` and `states`; their owner stores them."""
+    """Follows zones and rules. One thread owns it, and stores what `turn` adds to `drafts`, `states` and `stays`."""
 
     def __init__(self, fleet: Fleet, items: ZoneItems, states: Mapping[StateKey, StateValue]) -> None:
         """states: what was stored, so that nothing that is known becomes an event again."""
@@ -54,6 +54,8 @@ class Watcher:
         self._slow_due_ns = self._pairs_due_ns = 0
         self.drafts: list[Draft] = []
         self.states: States = {}
+        self.stays: list[Stay] = []
+        self._deleted: frozenset[int] = frozenset()
 
     @property
     def is_full(self) -> bool:
@@ -64,6 +66,7 @@ class Watcher:
         """Judge what is new."""
         self._follow_edits()
         self._register_tags()
+        self._follow_deletions()
         now_ns = self._fleet.now_ns()
         self._judge_zones(now_ns)
         if self._rules and now_ns >= self._pairs_due_ns:
@@ -83,6 +86,29 @@ class Watcher:
         else:
             self._states[key] = value
 
+    def _end(self, key: StateKey, left_ns: int) -> None:
+        """End a state. That of a tag in a zone becomes a stay."""
+        value = self._states.get(key)
+        if value is not None and key.source == "zone":
+            self.stays.append(Stay(key.tag, key.item, value.since_ns, max(left_ns, value.since_ns)))
+        self._set(key, None)
+
+    def _forget(self, key: StateKey) -> None:
+        """End a state for another reason than the tag's way: a tag counts in its zone until it was last seen there."""
+        tag = self._fleet.tags.find(key.tag) if key.source == "zone" else None
+        is_watched = tag is not None and tag.row < len(self._names)
+        seen_ns = self._zones.forget(key.item, tag.row) if tag is not None and is_watched else 0
+        self._end(key, seen_ns or self._fleet.now_ns())
+
+    def _follow_deletions(self) -> None:
+        deleted = self._fleet.tags.rows.deleted
+        if deleted is self._deleted:
+            return
+        names = {self._names[row] for row in deleted - self._deleted if row < len(self._names)}
+        for key in [key for key in self._states if key.source == "zone" and key.tag in names]:
+            self._forget(key)
+        self._deleted = deleted
+
     def _follow_edits(self) -> None:
         groups = self._fleet.site.groups
         versions = (*self._items.versions, groups)
@@ -90,16 +116,23 @@ class Watcher:
             return
         zones, rules = self._items.zones.all, self._items.rules.all
         for key in [key for key in self._states if key.item not in (zones if key.source == "zone" else rules)]:
-            self._set(key, None)
+            self._forget(key)
         self._zones.set_zones(list(zones.values()), groups)
         self._rules = {
             name: PairWatch(rule, groups) if isinstance(rule, TooCloseRule) else TagWatch(rule, groups)
             for name, rule in rules.items()
         }
         self._versions = versions
-        for key in self._states:
+        for key in list(self._states):
             if key.source == "rule":
                 self._restore(key)
+            else:
+                self._forget_unconcerned(key)
+
+    def _forget_unconcerned(self, key: StateKey) -> None:
+        tag = self._fleet.tags.find(key.tag)
+        if tag is not None and tag.row < len(self._names) and not self._zones.concerns(key.item, tag.row):
+            self._forget(key)
 
     def _register_tags(self) -> None:
         count = len(self._names)
@@ -122,6 +155,7 @@ class Watcher:
         watch = self._rules.get(key.item)
         if key.source == "zone":
             self._zones.restore(key.item, rows[0], value.flags, value.since_ns)
+            self._forget_unconcerned(key)
         elif isinstance(watch, PairWatch) and len(rows) == 2:
             watch.restore((rows[0], rows[1]), value.since_ns)
         elif isinstance(watch, TagWatch) and len(rows) == 1:
@@ -134,7 +168,10 @@ class Watcher:
             return
         for change in self._zones.judge(placed(poses, self._fleet.tags.age_s(poses, now_ns), self._fleet.latest)):
             key = StateKey("zone", change.zone.id, self._names[change.row])
-            self._set(key, StateValue(change.flags, change.entered_ns) if change.flags & INSIDE else None)
+            if change.flags & INSIDE:
+                self._set(key, StateValue(change.flags, change.entered_ns))
+            else:
+                self._end(key, change.left_ns)
             event = zone_event(change, self._name_of)
             if event is not None:
                 self.drafts.append(event)

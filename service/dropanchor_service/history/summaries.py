@@ -137,7 +137,8 @@ def _since_previous(summaries: Array) -> tuple[Array, Array, Array]:
     between = np.where(tracked, Between.TRACKING, np.where(known, Between.DOUBTFUL, Between.UNKNOWN))
     with np.errstate(invalid="ignore"):
         moving = ~(np.maximum(np.abs(end["speed"]), np.abs(start["speed"])) < MOVING_MPS)
-        distance = np.where(tracked & moving, np.hypot(start["x"] - end["x"], start["y"] - end["y"]), 0.0)
+        dx, dy = start["x"] - end["x"], start["y"] - end["y"]
+    distance = np.where(tracked & moving, np.hypot(dx, dy), 0.0)
     elapsed_s = np.where(tracked, elapsed_ns * 1e-9, 0.0)
     return np.append(Between.UNKNOWN, between), np.append(0.0, distance), np.append(0.0, elapsed_s)
 

@@ -8,17 +8,20 @@ import hashlib
 import logging
 import os
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
-_PACKAGES = ("estimation", "ingest/kernels", "answers/kernels")
+STATE_SOURCES = ("estimation", "ingest/kernels")
+"""Packages that define the meaning of the rows in a checkpoint."""
+KERNEL_SOURCES = (*STATE_SOURCES, "answers/kernels", "zones")
 
 _log = logging.getLogger(__name__)
 
 
-def sources_digest() -> str:
-    """Return a digest of all sources that define the kernels and the meaning of their rows."""
-    sources = sorted(source for name in _PACKAGES for source in (Path(__file__).parents[1] / name).rglob("*.py"))
+def sources_digest(packages: Sequence[str] = KERNEL_SOURCES) -> str:
+    """Return a digest of all sources in these packages, by default of all that define kernels."""
+    sources = sorted(source for name in packages for source in (Path(__file__).parents[1] / name).rglob("*.py"))
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
 
 

@@ -18,9 +18,11 @@ INSIDE, DWELT, TOO_FAST = 1, 2, 4  # flags of a tag in a zone
 ENTER, EXIT, DWELL, SPEED = 0, 1, 2, 3  # kinds of Change
 PER_PAIR: Final = 3  # changes that one pose can cause in one zone
 
-STAY = np.dtype([("flags", "u1"), ("since_ns", "i8"), ("pending_ns", "i8"), ("fast_ns", "i8")], align=True)
+STAY = np.dtype(
+    [("flags", "u1"), ("since_ns", "i8"), ("pending_ns", "i8"), ("fast_ns", "i8"), ("seen_ns", "i8")], align=True
+)
 """A tag in a zone. since_ns: when it entered. pending_ns, fast_ns: since when it seems to have changed sides, or to be
-too fast; 0: it does not."""
+too fast; 0: it does not. seen_ns: the last pose that was not surely outside; 0: none since the start of the service."""
 
 CHANGE = np.dtype([("kind", "u1"), ("pose", "i4"), ("zone", "i4"), ("since_ns", "i8"), ("p", "f8")])
 
@@ -118,6 +120,7 @@ def _follow(
         stay.flags = (stay.flags ^ INSIDE) & INSIDE
         stay.since_ns, stay.pending_ns, stay.fast_ns = stay.pending_ns, 0, 0
         if stay.flags:
+            stay.seen_ns = now
             count = _note(changes, count, ENTER, stay.since_ns, inside)
         else:
             count = _note(changes, count, EXIT, stay.since_ns, weight - inside)
@@ -185,6 +188,7 @@ def _turned(stay: Any, inside: float, outside: float, now: int, continues: bool,
     """Return whether the tag has been on the other side for the delay. Note since when it is there."""
     if (outside < EXIT_P) if stay.flags & INSIDE else (inside < ENTER_P):
         stay.pending_ns = 0
+        stay.seen_ns = now if stay.flags & INSIDE else 0
         return False
     if stay.pending_ns == 0 or not continues or stay.pending_ns > now:
         stay.pending_ns = now

@@ -10,7 +10,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.store.records import enlarged
 from dropanchor_service.zones.concerned import concerned
-from dropanchor_service.zones.judge import CHANGE, PER_PAIR, STAY, Memory, Poses, empty_stays, judge
+from dropanchor_service.zones.judge import CHANGE, MAX_GAP_NS, PER_PAIR, STAY, Memory, Poses, empty_stays, judge
 from dropanchor_service.zones.modes import PlacedPoses
 from dropanchor_service.zones.shapes import table_of
 
@@ -18,7 +18,7 @@ MIN_ROOM = 4096  # changes per call of the kernel
 
 
 class ZoneChange(NamedTuple):
-    """What happened to a tag in a zone. kind: as in CHANGE. flags, since_ns: its STAY after the change."""
+    """What happened to a tag in a zone. kind: as in CHANGE. flags, entered_ns, seen_ns: its STAY after the change."""
 
     kind: int
     zone: Zone
@@ -29,6 +29,13 @@ class ZoneChange(NamedTuple):
     p: float
     flags: int
     entered_ns: int
+    seen_ns: int
+
+    @property
+    def left_ns(self) -> int:
+        """When a tag with an exit left, or when it was last seen inside, if nothing is known of it in between."""
+        unseen = self.seen_ns > 0 and self.since_ns - self.seen_ns > MAX_GAP_NS
+        return self.seen_ns if unseen else self.since_ns
 
 
 class ZoneWatch:
@@ -77,6 +84,19 @@ class ZoneWatch:
                 stay["flags"], stay["since_ns"] = flags, since_ns
                 self._stays[row, column], self._touched[row, column] = stay, True
 
+    def forget(self, zone: str, row: int) -> int:
+        """Forget that a tag is in a zone. Return when it was last seen there, 0 if that is unknown."""
+        seen_ns = 0
+        for column, known in enumerate(self.zones):
+            if known.id == zone:
+                seen_ns = int(self._stays[row, column]["seen_ns"])
+                self._stays[row, column], self._touched[row, column] = np.zeros((), STAY), False
+        return seen_ns
+
+    def concerns(self, zone: str, row: int) -> bool:
+        """Return whether this is one of the zones, and concerns the tag."""
+        return any(known.id == zone and self._concerned[row, column] for column, known in enumerate(self.zones))
+
     def judge(self, placed: PlacedPoses) -> Iterable[ZoneChange]:
         """Judge new poses, and yield what has changed, per tag in order."""
         begin, found = 0, placed.poses
@@ -90,10 +110,7 @@ class ZoneWatch:
 
     def _named(self, changes: Array, poses: Array) -> Iterable[ZoneChange]:
         stays = self._stays[poses["row"][changes["pose"]], changes["zone"]]
-        for (kind, index, zone, since_ns, p), flags, entered_ns in zip(
-            changes.tolist(), stays["flags"].tolist(), stays["since_ns"].tolist(), strict=True
-        ):
+        after = zip(*(stays[name].tolist() for name in ("flags", "since_ns", "seen_ns")), strict=True)
+        for (kind, index, zone, since_ns, p), stay in zip(changes.tolist(), after, strict=True):
             pose = poses[index]
-            yield ZoneChange(
-                kind, self.zones[zone], int(pose["row"]), pose, int(pose["t_ns"]), since_ns, p, flags, entered_ns
-            )
+            yield ZoneChange(kind, self.zones[zone], int(pose["row"]), pose, int(pose["t_ns"]), since_ns, p, *stay)

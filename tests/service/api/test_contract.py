@@ -25,6 +25,7 @@ BEYOND_THE_SCHEMA = {
     "delete_tag": [positive_data_acceptance],
     "get_basemap_tile": [positive_data_acceptance],
     "get_track": [positive_data_acceptance],
+    "get_figures": [positive_data_acceptance],
     "get_heat_map": [positive_data_acceptance],
     "get_tracks": [positive_data_acceptance],
     "export_track": [positive_data_acceptance],

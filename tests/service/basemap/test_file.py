@@ -102,7 +102,8 @@ def test_what_cannot_be_a_base_map_is_refused_with_one_sentence(tmp_path: Path) 
 
     known = "the types PNG, JPEG, WEBP, AVIF, MVT can be shown"
     assert refused(tile_type=TileType.MLT) == f"has tiles of the type MLT; {known}"
-    assert refused(tile_type=TileType.UNKNOWN) == f"has tiles of the type UNKNOWN; {known}"
+    unknown = f"has tiles of the type UNKNOWN; {known}; the program `pmtiles convert` writes the type"
+    assert refused(tile_type=TileType.UNKNOWN) == unknown
     only = "only GZIP can be read, and tiles with NONE"
     assert refused(tile_compression=Compression.BROTLI) == f"has the compression BROTLI; {only}"
     assert refused(tile_compression=Compression.UNKNOWN) == f"has the compression UNKNOWN; {only}"

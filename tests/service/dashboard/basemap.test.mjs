@@ -185,3 +185,26 @@ test("a road is as wide as on the ground, but never invisible", () => {
   assert.equal(widthOf(road, 10), 60);
   assert.equal(widthOf(road, 0.01), 1.25);
 });
+
+test("a thread that cannot run is replaced by the page: pictures that wait are painted, tiles that wait are requested again", async () => {
+  /** @type {FailingWorker[]} */
+  const workers = [];
+  class FailingWorker extends EventTarget {
+    ended = false;
+    constructor() { super(); workers.push(this); }
+    postMessage() {}
+    terminate() { this.ended = true; }
+  }
+  const canvas = { width: 0, height: 0, getContext: () => ({}) };
+  Object.assign(globalThis, {
+    Worker: FailingWorker, OffscreenCanvas: class {}, document: { createElement: () => canvas },
+    createImageBitmap: async (/** @type {any} */ from) => ({ picture: from.width }),
+  });
+  const { PaintingThread } = await import("../../../service/dropanchor_service/dashboard/basemap/thread.js");
+  const thread = new PaintingThread();
+  const painting = /** @type {any} */ ({ width: 7, height: 5, tiles: [], colours: { map: "#fff" } });
+  const [read, painted] = [thread.read("1/0/0", "image/png", new ArrayBuffer(1)), thread.paint(painting)];
+  workers[0].dispatchEvent(new Event("error"));
+  assert.deepEqual([await read, await painted], [false, { picture: 7 }]);
+  assert.deepEqual([await thread.read("1/0/0", "image/png", new ArrayBuffer(1)), workers.length, workers[0].ended], [true, 1, true]);
+});

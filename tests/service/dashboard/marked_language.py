@@ -41,7 +41,8 @@ SYMBOLS = re.compile(
 
 def marked(message: str) -> str:
     """Return a message whose every word is inside marks, and whose values are not."""
-    return re.sub(r"[^\s{}]*[^\W\d_][^{}]*?(?=\s*(?:[{}]|$))", lambda word: f"⟦{word[0]}⟧", message)
+    text = r"\{\w+\}|[^\s{}]*[^\W\d_][^{}]*?(?=\s*(?:[{}]|$))"
+    return re.sub(text, lambda found: found[0] if found[0].startswith("{") else f"⟦{found[0]}⟧", message)
 
 
 def speak_marked(page: Page) -> None:

@@ -111,3 +111,37 @@ test("the line of a period is dashed where poses were doubtful and broken where 
   drawTrack(/** @type {any} */ ({ ctx, view, palette: {} }), track({ since_previous: ["unknown", "tracking", "unknown", "doubtful"] }));
   assert.deepEqual(drawn, [["solid", 0, 1], ["dashed", 2, 3]]);
 });
+
+test("the clock waits for a missing piece, and the tags stay where they are", async () => {
+  /** @type {(() => void)[]} */
+  const answers = [];
+  let number = 0;
+  Object.assign(globalThis, {
+    document: { baseURI: "http://site/" }, sessionStorage: { getItem: () => null },
+    fetch: async () => {
+      if (number > 1) await new Promise((resolve) => answers.push(() => resolve(null))); // after the figures and the first piece
+      return { ok: true, status: 200, arrayBuffer: async () => new ArrayBuffer(8) };
+    },
+    Worker: class extends EventTarget {
+      postMessage() {
+        const all = packed(Array.from({ length: 10_000 }, (_, i) => /** @type {any} */ ({ tag: `tag-${i}`, points: points({}, 1) })));
+        this.dispatchEvent(Object.assign(new Event("message"), { data: { number: number++, all } }));
+      }
+    },
+  });
+  const { Replay } = await import("../../../service/dropanchor_service/dashboard/data/replay.js");
+  const replay = new Replay();
+  await replay.open(0, 60_000);
+  replay.speed = 10;
+  replay.play(true);
+  const shown = () => [replay.time_ms, replay.tracks.size];
+  for (const at of [3000, 6000, 9000, 9000, 9000]) {
+    replay.advance(300);
+    assert.deepEqual(shown(), [at, 10_000]);
+  }
+  answers.forEach((answer) => answer());
+  for (let turns = 0; turns < 20; turns++) await Promise.resolve();
+  replay.advance(300);
+  assert.deepEqual(shown(), [12_000, 10_000]);
+  replay.close();
+});

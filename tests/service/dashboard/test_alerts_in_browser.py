@@ -14,6 +14,7 @@ from service.dashboard.alert_place import SECRET, alert_place, happen, put_mail
 from service.dashboard.zone_place import served
 from support.browser import WatchedPage, open_page, watched_page
 from support.mail_server import MailServer, running_mail_server
+from support.zenoh_router import wait_until
 
 pytestmark = pytest.mark.browser
 
@@ -107,8 +108,8 @@ def test_dead_letters_are_shown_sent_again_and_dropped(chromium: Browser) -> Non
         place.parts.deliveries.bury("shift", [1], "refused")
         alerts.get_by_role("button", name="Drop what shift did not get").click()
         page.page.get_by_role("button", name="Drop", exact=True).last.click()
+        wait_until(lambda: place.parts.deliveries.states()["shift"][:2] == (1, 0))
         expect(alerts.get_by_role("list", name="Destinations").get_by_text("1 event waiting")).to_be_visible()
-        assert place.parts.deliveries.states()["shift"][:2] == (1, 0)
 
 
 def test_rules_are_made_and_edited_and_those_of_zones_lead_to_the_zone(chromium: Browser) -> None:

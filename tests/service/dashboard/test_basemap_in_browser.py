@@ -123,7 +123,12 @@ def _check_the_switch(page: WatchedPage, place: Place, chromium: Browser) -> Non
     expect(credit).to_be_hidden()
     wait_until(lambda: shares(page, 16)[0] == 0)
     page.wait_for("location.hash.includes('basemap=off')")
-    with watched_page(chromium, page.page.url, reduced_motion="reduce") as copied:
+    with watched_page(
+        chromium,
+        page.page.url,
+        reduced_motion="reduce",
+        prepare=lambda old: old.add_init_script("delete globalThis.OffscreenCanvas"),  # it paints in the page then
+    ) as copied:
         copied.wait_for("dropanchor.anchors().length === 2 && dropanchor.drawing().still")
         expect(copied.page.get_by_role("button", name="Base map")).to_have_attribute("aria-pressed", "false")
         copied.page.get_by_role("button", name="Base map").click()

@@ -47,7 +47,7 @@ def drive(place: Place, tag: str = "cart", hard_gate: bool = False) -> Array:
     poses["row"] = innovations["row"] = row
     poses["state"], poses["reason"], poses["p_mode"] = State.TRACKING, StateReason.RESOLVED, 1.0
     poses["cov"], poses["sigma_pos"] = np.diag([0.04, 0.01, HEADING_SIGMA**2]), 0.22
-    innovations["measured"] = innovations["predicted"] + innovations["innovation"]
+    innovations["measured"] = np.add(innovations["predicted"], innovations["innovation"])
     innovations["S"] = 0.1**2
     innovations["fused"] = [i not in REFUSED for i in range(COUNT)]
     innovations["p_outlier"] = np.nan if hard_gate else ~innovations["fused"]

@@ -14,7 +14,9 @@ from playwright.sync_api import Browser, expect
 
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.estimation.columns import Frame, State
+from dropanchor_service.events.drafts import Stay
 from dropanchor_service.history.tracks import Retention
 from service.dashboard.place import Place, live_api_bench
 from support.axe import violations
@@ -49,7 +51,9 @@ def past(tmp_path: Path) -> Iterator[tuple[Place, int]]:
     """A page whose service stores the past until one hour ago, and the end of that past in ns."""
     bench = live_api_bench(folder=tmp_path, retention=RETENTION)
     end_ns = time.time_ns() // SECOND * SECOND - 3600 * SECOND
-    with running_server(bench.app(DASHBOARD), bench.stopping) as port:
+    events = EventParts.in_memory("default")
+    events.store.commit([], {}, [Stay("first", "dock", end_ns - 4000 * SECOND, end_ns - 100 * SECOND)])
+    with running_server(bench.app(DASHBOARD, events=events), bench.stopping) as port:
         place = Place(bench, f"http://127.0.0.1:{port}/")
         write_past(place, end_ns)
         place.move("first", x=-3.0, y=-3.0)
@@ -162,6 +166,22 @@ def test_figures_and_the_file_of_a_tag(chromium: Browser, past: tuple[Place, int
         with page.page.expect_download() as download:
             figures.locator("[data-format='parquet']").click()
         assert pq.read_metadata(download.value.path()).num_rows == 60 * MINUTES + 1
+        page.page.locator("[data-part='figures']").click()
+        table, dialog = page.page.locator("#figures table"), page.page.locator("#figures")
+        expect(table.locator("thead")).to_have_text("TagTrackedDistanceMean speedMaximum speedIn dock (deleted)")
+        expect(table.locator("tbody tr")).to_have_text(
+            [
+                "first0:05:00300.0 m1.00 m/s1.00 m/s0:03:20",
+                re.compile("^second0:04:4"),
+                re.compile("^turned0:00:000.0 m–"),
+            ]
+        )
+        table.locator("th button").nth(2).click()
+        expect(table.locator("[aria-sort]")).to_have_text("Distance")
+        with page.page.expect_download() as download:
+            dialog.locator("[data-part='save']").click()
+        assert download.value.path().read_text().splitlines()[1].startswith("first,")
+        dialog.locator("[data-part='close']").click()
         assert page.errors == []
 
 
@@ -277,4 +297,18 @@ def test_the_past_is_accessible_and_nothing_is_cut_off(
             page.page.screenshot(path=tmp_path / f"past-{look}.png")
             assert page.page.evaluate(cut) == [], look
             assert page.page.evaluate(site), look
+        page.page.set_viewport_size({"width": 390, "height": 844})
+        page.page.reload()  # on a phone the legend begins folded
+        expect(page.page.locator("#heat [data-part='high']")).to_have_text("1.0 s")
+        expect(page.page.locator("#heat [data-part='note']")).to_be_hidden()
+        covered = "((legend, map) => legend.height / map.height)(...['heat', 'map'].map("
+        covered += "(id) => document.getElementById(id).getBoundingClientRect()))"
+        assert page.page.evaluate(covered) < 0.35
+        page.page.screenshot(path=tmp_path / "folded.png")
+        page.page.locator("#heat summary").click()
+        expect(page.page.locator("#heat [data-part='note']")).to_contain_text("Most:")
+        page.page.locator("[data-part='figures']").click()
+        page.page.locator("#figures tbody tr").first.wait_for()
+        assert violations(page.page, axe) == []
+        page.page.screenshot(path=tmp_path / "figures.png")
         assert page.errors == []

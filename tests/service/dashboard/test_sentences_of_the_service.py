@@ -1,6 +1,7 @@
 """The page can say every sentence of the service in German."""
 
 import json
+import re
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -19,13 +20,17 @@ from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 from dropanchor_service.store.tags import KINDS
 from dropanchor_service.store.unknown_anchors import hint_about
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
+from support.refusals import sentences_about_bodies, sentences_of_the_code
+
+OTHERWISE = "Der Dienst hat abgelehnt: "
 
 SAY = """
+import { readFileSync } from "node:fs";
 globalThis.location = { search: "?lang=de", hash: "" };
-const { said } = await import(process.argv[1] + "/i18n/said.js");
+const { refusal, said } = await import(process.argv[1] + "/i18n/said.js");
 const { words } = await import(process.argv[1] + "/data/format.js");
-const { sentences, codes } = JSON.parse(process.argv[2]);
-console.log(JSON.stringify([...sentences.map(said), ...codes.map(words)]));
+const { sentences = [], codes = [], refusals = [] } = JSON.parse(readFileSync(0));
+console.log(JSON.stringify([...sentences.map(said), ...codes.map(words), ...refusals.map(refusal)]));
 """
 
 
@@ -76,20 +81,62 @@ def progress() -> Iterator[str]:
         yield compilation.sentence
 
 
-def test_every_sentence_and_every_code_has_a_german_translation() -> None:
+def in_german(**texts: list[str]) -> list[str]:
+    """Return what the page makes of `sentences`, `codes` and `refusals`."""
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed: this test runs a module of the page")
+    command = [node, "--input-type=module", "--eval", SAY, str(DASHBOARD)]
+    run = subprocess.run(command, input=json.dumps(texts), capture_output=True, text=True, timeout=60, check=True)
+    translations: list[str] = json.loads(run.stdout)
+    return translations
+
+
+def test_every_sentence_and_every_code_has_a_german_translation() -> None:
     sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *progress()})
     codes = [*REASONS, *Reason, *KINDS]
-    given = json.dumps({"sentences": sentences, "codes": codes})
-    command = [node, "--input-type=module", "--eval", SAY, str(DASHBOARD), given]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    translations = json.loads(run.stdout)
     same = {"imu"}
     untranslated = [
         text
-        for text, said in zip([*sentences, *codes], translations, strict=True)
+        for text, said in zip([*sentences, *codes], in_german(sentences=sentences, codes=codes), strict=True)
         if said.lower() == text.replace("_", " ").lower() and text not in same
     ]
     assert untranslated == []
+
+
+def test_every_refusal_that_the_page_can_show_has_a_german_translation() -> None:
+    of_code, of_bodies = sorted(sentences_of_the_code()), sorted(sentences_about_bodies())
+    assert len(of_code) > 80
+    assert len(of_bodies) > 60
+    parts = [f"body.shape.points.3: {text}" for text in of_bodies]
+    several = ["; ".join(f"body.{number}: {text}" for number, text in enumerate(of_bodies[at::30])) for at in range(30)]
+    texts = [*of_code, *of_bodies, *parts, *several]
+    untranslated = [
+        (text, said)
+        for text, said in zip(texts, in_german(refusals=texts), strict=True)
+        if text in said
+        or said.startswith(OTHERWISE)
+        or re.search(r"\b(the|should|is|not|must)\b", without_quotes(said))
+    ]
+    assert untranslated == []
+
+
+def without_quotes(text: str) -> str:
+    """Return the text without what the service quotes, such as values and commands."""
+    return re.sub(r"'[^']*'|`[^`]*`|https?:\S*", "", text)
+
+
+def test_values_inside_a_refusal_are_translated_too_and_the_unknown_is_quoted() -> None:
+    refusals = {
+        "Authentication failed: the API key has expired. Send an API key or a token in the header `Authorization: "
+        "Bearer …`. An operator creates a key with `dropanchor key add NAME --scope read`; for the samples of a tag, "
+        "with `--tag TAG` instead of `--scope`.": "Anmeldung gescheitert: Der API-Schlüssel ist abgelaufen. Senden",
+        "The API key of 'x' has the scope read; this request needs the scope write.": "Der Zugang 'x' (API-Schlüssel) "
+        "hat den Umfang read; diese Anfrage braucht den Umfang write.",
+        "List should have at most 2 items after validation, not 3": "Die Liste ist zu lang: 3 statt höchstens 2 Eintr",
+        "body.x: Input should be less than or equal to 0.9; body.y: Field required": "body.x: Der Wert darf höchstens "
+        "0,9 sein; body.y: Die Angabe fehlt",
+        "Nothing that anybody foresaw.": "Der Dienst hat abgelehnt: Nothing that anybody foresaw.",
+    }
+    for said, wanted in zip(in_german(refusals=list(refusals)), refusals.values(), strict=True):
+        assert said.startswith(wanted)

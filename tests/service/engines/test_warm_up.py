@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_service.runtime.kernel_cache import VARIABLE, use_kernel_cache
+from dropanchor_service.runtime.kernel_cache import KERNEL_SOURCES, VARIABLE, use_kernel_cache
 from support.service import ROOT, environment
 
 PRINT_FOLDER = (
@@ -27,6 +27,15 @@ def test_the_cache_lies_in_the_users_cache_folder_and_is_named_after_the_sources
     first = cache_folder(XDG_CACHE_HOME=str(tmp_path))
     assert first.startswith(str(tmp_path / "dropanchor" / "kernels-"))
     assert cache_folder(XDG_CACHE_HOME=str(tmp_path)) == first
+
+
+def test_the_name_depends_on_every_package_with_kernels() -> None:
+    """The kernels of the evaluation call none of other files, so numba sees their changes by itself."""
+    package = ROOT / "service/dropanchor_service"
+    found = {source for source in package.rglob("*.py") if "njit(" in source.read_text()}
+    of_packages = {source for name in KERNEL_SOURCES for source in (package / name).rglob("*.py")}
+    assert len(found) > 10
+    assert found - of_packages == {package / "evaluation/pcrb.py", package / "evaluation/paper/compiled.py"}
 
 
 def test_without_a_writable_cache_folder_a_fresh_private_folder_is_used(tmp_path: Path) -> None:

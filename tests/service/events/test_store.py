@@ -120,11 +120,12 @@ def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
     bench.store.commit([draft("a")], {})
     with bench.database.transaction() as connection:
         connection.execute("ALTER TABLE deliveries RENAME destination TO webhook")
+        connection.execute("DROP TABLE stays")
         connection.execute("PRAGMA user_version = 1")
     bench.database.close()
     database = Database(tmp_path)
     assert Deliveries(database).states()["hook"].pending == 1
-    assert database.rows("PRAGMA user_version") == [(2,)]
+    assert database.rows("PRAGMA user_version") == [(3,)]
     database.close()
 
 

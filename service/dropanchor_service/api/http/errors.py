@@ -159,7 +159,7 @@ async def _on_invalid_request(request: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     parts = [
         # Never repeat the input: it may be a secret, or a number that JSON cannot express.
-        {"location": _location(part["loc"]), "detail": _message(part)}
+        {"location": _location(part["loc"]), "detail": message_of(part)}
         for part in error.errors()[:_MAX_PARTS]
     ]
     detail = "; ".join(f"{part['location']}: {part['detail']}" for part in parts[:3])
@@ -181,7 +181,8 @@ def _location(parts: Iterable[Any]) -> str:
     return ".".join(str(part) for part in parts)[:_MAX_LOCATION]
 
 
-def _message(part: Mapping[str, Any]) -> str:
+def message_of(part: Mapping[str, Any]) -> str:
+    """Return what is wrong with a part of a request. part: an error of Pydantic."""
     if part["type"] == "json_invalid":
         return f"is not JSON: {part['ctx']['error']}"
     if part["type"] == "extra_forbidden":

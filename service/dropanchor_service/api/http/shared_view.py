@@ -9,8 +9,8 @@ from dropanchor_service.security.identity import Limit
 
 _PREFIX = "/api/v1/"
 _OF_THE_SITE = {f"{_PREFIX}{name}" for name in ("access", "history", "site")}
-_BY_GROUP = {f"{_PREFIX}{name}" for name in ("heat-map", "poses", "stream")}
-_BY_TAG = {f"{_PREFIX}{name}" for name in ("heat-map", "poses", "stream", "tags", "tracks")}
+_BY_GROUP = {f"{_PREFIX}{name}" for name in ("figures", "heat-map", "poses", "stream")}
+_BY_TAG = {f"{_PREFIX}{name}" for name in ("figures", "heat-map", "poses", "stream", "tags", "tracks")}
 _OF_ONE_TAG = f"{_PREFIX}tags/"
 
 Members = Callable[[str], list[str]]

@@ -9,11 +9,9 @@ from pydantic import Field
 from starlette.responses import Response
 
 from dropanchor_schemas.heat_map import HeatMap
-from dropanchor_schemas.site import Label
-from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
-from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
-from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
+from dropanchor_service.api.routes.parameters import example_response, json_response
+from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.history.covering import TooMuchError
 from dropanchor_service.history.heat_cells import LARGEST_M, SMALLEST_M
@@ -36,16 +34,9 @@ _EXAMPLE = {
 }
 
 
-class HeatMapQuery(TagFilter, Period):
+class HeatMapQuery(TagsInPeriod):
     """The tags, the period and the size of the cells."""
 
-    group: list[Label] = Field(
-        default=[],
-        max_length=100,
-        description="Only tags whose settings name this group now. Repeat the parameter for several groups; an empty "
-        "one stands for tags without a group.",
-        examples=[["forklifts"]],
-    )
     cell_m: float = Field(
         default=1.0,
         ge=SMALLEST_M,
@@ -70,7 +61,7 @@ def heat_map_router(site_of: SiteOfRequest) -> APIRouter:
         from_ns, to_ns = limits_of(query, answers.now_ns())
         tracks = history_of(answers)
         try:
-            tags = _selected(answers, tracks, query)
+            tags = selected_tags(answers, tracks, query)
             return json_response(_heat_map(tracks, tags, from_ns, to_ns, query.cell_m))
         except TooMuchError as error:
             raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
@@ -78,15 +69,6 @@ def heat_map_router(site_of: SiteOfRequest) -> APIRouter:
             raise unreadable(error) from error
 
     return router
-
-
-def _selected(answers: Answers, tracks: Tracks, query: HeatMapQuery) -> list[str] | None:
-    """Return the tags that the query names, None for all."""
-    if not query.group:
-        return query.tags or None
-    names = query.tags or tracks.tags()
-    are_in = answers.site.groups.are_in(names, query.group)
-    return [name for name, is_in in zip(names, are_in, strict=True) if is_in]
 
 
 def _heat_map(tracks: Tracks, tags: list[str] | None, from_ns: int, to_ns: int, cell_m: float) -> dict[str, Any]:

@@ -4,10 +4,11 @@ import sqlite3
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from dropanchor_schemas.site import Label
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes.known_tag import unknown_tag
-from dropanchor_service.api.routes.parameters import TimeNs
+from dropanchor_service.api.routes.parameters import TagFilter, TimeNs
 from dropanchor_service.history.tracks import Tracks
 
 HOUR_NS = 3_600_000_000_000
@@ -35,6 +36,34 @@ class Period(BaseModel):
         description="End of the period, UTC in ns, or ISO 8601 with a time zone, "
         "at most 31 days after `from`. The default is now.",
     )
+
+
+class TagsInPeriod(TagFilter, Period):
+    """The query of a route that reads a period of selected tags."""
+
+    group: list[Label] = Field(
+        default=[],
+        max_length=100,
+        description="Only tags whose settings name this group now. Repeat the parameter for several groups; an empty "
+        "one stands for tags without a group.",
+        examples=[["forklifts"]],
+    )
+
+    def of_names(self, answers: Answers, names: list[str]) -> list[str]:
+        """Return those of these tags that the query selects."""
+        listed = set(self.tags)
+        names = [name for name in names if not listed or name in listed]
+        if not self.group:
+            return names
+        are_in = answers.site.groups.are_in(names, self.group)
+        return [name for name, is_in in zip(names, are_in, strict=True) if is_in]
+
+
+def selected_tags(answers: Answers, tracks: Tracks, query: TagsInPeriod) -> list[str] | None:
+    """Return the tags that the query names, None for all. Raises sqlite3.Error."""
+    if not query.group:
+        return query.tags or None
+    return query.of_names(answers, query.tags or tracks.tags())
 
 
 def limits_of(period: Period, now_ns: int) -> tuple[int, int]:

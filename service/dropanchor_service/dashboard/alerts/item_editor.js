@@ -3,7 +3,7 @@
 import { ChangedMeanwhileError } from "../data/access.js";
 import { newId } from "../zones/editor.js";
 import { t } from "../i18n/language.js";
-import { refusal } from "../i18n/said.js";
+import { refusalInForm } from "../i18n/said.js";
 
 /** @typedef {import("../data/items.js").Item} Item */
 
@@ -43,7 +43,7 @@ export class ItemEditor extends EventTarget {
       this.#etag = etag;
       this.#say("");
     } catch (error) {
-      this.#say(messageOf(error));
+      this.#say(refusalInForm(error));
     }
   }
 
@@ -72,7 +72,7 @@ export class ItemEditor extends EventTarget {
       this.dispatchEvent(new Event("saved"));
     } catch (error) {
       undo();
-      this.#say(messageOf(error), error instanceof ChangedMeanwhileError);
+      this.#say(refusalInForm(error), error instanceof ChangedMeanwhileError);
     }
   }
 
@@ -82,10 +82,4 @@ export class ItemEditor extends EventTarget {
     this.conflict = conflict;
     this.dispatchEvent(new Event("change"));
   }
-}
-
-/** Return the sentence of an error without the paths of fields. @param {unknown} error */
-function messageOf(error) {
-  const text = (error instanceof Error ? error.message : String(error)).replace(/body(\.\w+)+: /g, "");
-  return refusal(text.charAt(0).toUpperCase() + text.slice(1));
 }

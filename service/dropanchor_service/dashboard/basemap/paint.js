@@ -22,7 +22,7 @@ const DARK_OPACITY = 0.5;
 /** Share of a tile by which its ground reaches beyond it, so that no gap shows between two. */
 const OVERLAP = 0.002;
 
-/** @param {OffscreenCanvas} canvas @param {Painting} painting @param {(key: string) => Content | undefined} find */
+/** @param {OffscreenCanvas | HTMLCanvasElement} canvas @param {Painting} painting @param {(key: string) => Content | undefined} find */
 export function paint(canvas, painting, find) {
   Object.assign(canvas, { width: painting.width, height: painting.height }); // clears it
   const ctx = /** @type {OffscreenCanvasRenderingContext2D} */ (canvas.getContext("2d"));

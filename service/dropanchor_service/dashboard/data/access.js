@@ -60,7 +60,7 @@ export async function sendChange(url, method, body, conditions) {
  * @param {object | null} body @param {Record<string, string>} [conditions] headers */
 export async function send(url, method, body, conditions = {}) {
   const headers = { ...authorization(), ...conditions, "content-type": "application/json" };
-  const response = await fetch(url, { method, headers, body: body && JSON.stringify(body), cache: "no-store" });
+  const response = await answerTo(url, { method, headers, body: body && JSON.stringify(body) });
   if (response.ok) return response;
   const { detail } = await response.json();
   throw response.status === CHANGED_MEANWHILE ? new ChangedMeanwhileError(detail) : new Error(detail);
@@ -70,7 +70,7 @@ export async function send(url, method, body, conditions = {}) {
  * @param {URL} url @param {File} file @returns {Promise<any>} */
 export async function upload(url, file) {
   const headers = { ...authorization(), "content-type": file.type || "application/octet-stream" };
-  const response = await fetch(url, { method: "POST", headers, body: file, cache: "no-store" });
+  const response = await answerTo(url, { method: "POST", headers, body: file });
   const answer = await response.json();
   if (!response.ok) throw new Error(answer.detail);
   return answer;
@@ -81,9 +81,19 @@ export async function upload(url, file) {
  * @param {URL} url @param {"POST" | "DELETE"} method
  */
 export async function requestChange(url, method) {
-  const response = await fetch(url, { method, headers: authorization(), cache: "no-store" });
+  const response = await answerTo(url, { method, headers: authorization() });
   if (response.ok) return response;
   throw new Error((await response.json()).detail);
+}
+
+/** Return the response to a change. Throws Error with a sentence like those of the service when it does not answer.
+ * @param {URL} url @param {RequestInit} options */
+async function answerTo(url, options) {
+  try {
+    return await fetch(url, { ...options, cache: "no-store" });
+  } catch {
+    throw new Error("The service cannot be reached.");
+  }
 }
 
 /** @returns {Record<string, string>} */

@@ -73,6 +73,13 @@ export function age(seconds) {
   return `${Math.round(seconds / 86400)} d`;
 }
 
+/** Format a time that is to be compared or added up, such as 1:05:09. @param {number} seconds */
+export function duration(seconds) {
+  const whole = Math.round(seconds);
+  const two = (/** @type {number} */ value) => String(value % 60).padStart(2, "0");
+  return `${Math.floor(whole / 3600)}:${two(Math.floor(whole / 60))}:${two(whole)}`;
+}
+
 /** Format the distance of a ring or scale bar, such as 0.5 m, 20 m or 2 km. @param {number} value_m @param {number} [digits] at most */
 export function distance(value_m, digits = 6) {
   const short = (/** @type {number} */ value) => decimal(Number(value.toPrecision(digits)), 0, 6);

@@ -80,15 +80,18 @@ export class Replay extends EventTarget {
     await this.#load(this.time_ms);
   }
 
-  /** Let the clock run on, unless the next piece is still missing. @param {number} elapsed_ms */
+  /** Let the clock run on. It waits at the end of a piece while the next one is missing, and the tags stay where they are.
+   * @param {number} elapsed_ms */
   advance(elapsed_ms) {
     if (!this.playing || this.loading) return;
-    this.seek(this.time_ms + elapsed_ms * this.#speed);
-    this.#load(this.time_ms + AHEAD * this.#pieceLength);
+    const next_ms = Math.min(this.to_ms, this.time_ms + elapsed_ms * this.#speed);
+    if (this.#pieceAt(this.time_ms) && !this.#pieceAt(next_ms)) return void this.#load(next_ms);
+    this.seek(next_ms);
+    this.#load(next_ms + AHEAD * this.#pieceLength);
     if (this.time_ms >= this.to_ms) this.play(false);
   }
 
-  /** Return the tracks around the current time; none while they are loading. */
+  /** Return the tracks around the current time; none after a jump, while they are loading. */
   get tracks() {
     return this.#pieceAt(this.time_ms)?.tracks ?? NO_TRACKS;
   }

@@ -35,8 +35,8 @@ export function countCells({ fleet, view, rows, now_ms }) {
 /** @param {import("./scene.js").Scene} scene */
 export function drawDensity(scene) {
   const cells = countCells(scene);
-  const small = new OffscreenCanvas(cells.columns, cells.lines);
-  const pen = /** @type {OffscreenCanvasRenderingContext2D} */ (small.getContext("2d"));
+  const small = Object.assign(document.createElement("canvas"), { width: cells.columns, height: cells.lines });
+  const pen = /** @type {CanvasRenderingContext2D} */ (small.getContext("2d"));
   const image = pen.createImageData(cells.columns, cells.lines);
   const [good, doubtful] = [rgb(scene.palette.state[2]), rgb(scene.palette.state[4])];
   cells.total.forEach((total, cell) => {

@@ -2,7 +2,7 @@
 
 import { horizontal } from "./geometry.js";
 import { percent } from "../data/format.js";
-import { haloText, traceRing } from "./draw_site.js";
+import { haloStroke, haloText, traceRing } from "./draw_site.js";
 import { hasGhosts, markerRadius, traceTick } from "./draw_tags.js";
 import { FADE, alike } from "./scene.js";
 import { AMBIGUOUS, STATES } from "../data/states.js";
@@ -22,7 +22,7 @@ export function drawEllipses(scene) {
   for (const { state, stale, rows } of alike(scene)) {
     ctx.beginPath();
     for (const row of rows) if (hasEllipse(scene, row)) traceRowEllipse(scene, row);
-    paintEllipses(ctx, palette.state[state], STATES[state].trusted && stale === 0, FADE[stale]);
+    paintEllipses(ctx, palette, palette.state[state], STATES[state].trusted && stale === 0, FADE[stale]);
   }
 }
 
@@ -30,16 +30,13 @@ export function drawEllipses(scene) {
 const hasEllipse = ({ fleet, selected }, row) =>
   STATES[fleet.state[row]].placed || (row === selected && !hasGhosts(fleet, row) && !fleet.isTurned(row));
 
-/** @param {CanvasRenderingContext2D} ctx @param {string} colour @param {boolean} trusted @param {number} alpha */
-function paintEllipses(ctx, colour, trusted, alpha) {
-  ctx.fillStyle = ctx.strokeStyle = colour;
-  ctx.lineWidth = 1.25;
+/** @param {CanvasRenderingContext2D} ctx @param {import("./palette.js").Palette} palette @param {string} colour @param {boolean} trusted
+ * @param {number} alpha */
+function paintEllipses(ctx, palette, colour, trusted, alpha) {
+  ctx.fillStyle = colour;
   ctx.globalAlpha = 0.13 * alpha;
   if (trusted) ctx.fill();
-  ctx.globalAlpha = 0.8 * alpha;
-  ctx.setLineDash(trusted ? [] : [5, 4]);
-  ctx.stroke();
-  ctx.setLineDash([]);
+  haloStroke(ctx, palette, colour, 1.25, trusted ? [] : [5, 4], alpha);
   ctx.globalAlpha = 1;
 }
 
@@ -76,16 +73,12 @@ function drawGhost({ ctx, view, palette, rows, selected }, row, ghost, left) {
   const [x, y] = [view.screenX(ghost.x), view.screenY(ghost.y)];
   const radius = markerRadius(rows.length);
   if (left <= 0 || x < -20 || x > view.width + 20 || y < -20 || y > view.height + 20) return;
-  ctx.globalAlpha = 0.35 + 0.65 * ghost.weight;
-  ctx.strokeStyle = palette.state[AMBIGUOUS];
-  ctx.lineWidth = 1.75;
-  ctx.setLineDash([3, 2.5]);
   ctx.beginPath();
   ctx.arc(x, y, radius, 0, 2 * Math.PI);
   traceTick(ctx, x, y, ghost.heading_rad, radius);
   const shape = row === selected ? ghost.ellipse_95 : null;
   if (shape) traceEllipse(ctx, view, ghost.x, ghost.y, shape.semi_major_m, shape.semi_minor_m, shape.angle_rad);
-  ctx.stroke();
+  haloStroke(ctx, palette, palette.state[AMBIGUOUS], 1.75, [3, 2.5], 0.35 + 0.65 * ghost.weight);
   if (row === selected) labelGhost(ctx, palette, percent(ghost.weight), x, y + 16);
 }
 

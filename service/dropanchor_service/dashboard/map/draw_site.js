@@ -88,6 +88,25 @@ export function haloText(ctx, palette, text, x, y, colour) {
   ctx.fillText(text, x, y);
 }
 
+/** How far a line in the colour of the map reaches beyond what it makes visible on a plan, a photo or another mark. */
+const HALO_PX = 1.5;
+
+/** Stroke the path on a wider, solid and opaque line in the colour of the map. @param {CanvasRenderingContext2D} ctx
+ * @param {Palette} palette @param {string} colour @param {number} width @param {number[]} [dash] @param {number} [alpha] */
+export function haloStroke(ctx, palette, colour, width, dash = [], alpha = 1) {
+  ctx.globalAlpha = 1;
+  ctx.setLineDash([]);
+  ctx.lineWidth = width + 2 * HALO_PX;
+  ctx.strokeStyle = palette.map;
+  ctx.stroke();
+  ctx.globalAlpha = alpha;
+  ctx.setLineDash(dash);
+  ctx.lineWidth = width;
+  ctx.strokeStyle = colour;
+  ctx.stroke();
+  ctx.setLineDash([]);
+}
+
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Palette} palette @param {readonly Anchor[]} anchors */
 export function drawAnchors(ctx, view, palette, anchors) {
   ctx.font = `600 11px ${palette.font}`;
@@ -132,11 +151,7 @@ export function drawScaleBar(ctx, view, palette) {
   ctx.lineTo(x + 0.5, y + 0.5);
   ctx.lineTo(x + width + 0.5, y + 0.5);
   ctx.lineTo(x + width + 0.5, y - 5);
-  for (const [colour, line] of /** @type {const} */ ([[palette.map, 5], [palette["ink-2"], 1.5]])) {
-    ctx.strokeStyle = colour;
-    ctx.lineWidth = line;
-    ctx.stroke();
-  }
+  haloStroke(ctx, palette, palette["ink-2"], 1.5);
   ctx.font = `11px ${palette.font}`;
   ctx.textAlign = "center";
   ctx.textBaseline = "alphabetic";

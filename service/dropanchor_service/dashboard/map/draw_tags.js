@@ -1,7 +1,7 @@
 /** Draw the dots, heading ticks and names of the tags. */
 
 import { ago } from "../data/format.js";
-import { SCALE_BAR_PX, haloText } from "./draw_site.js";
+import { SCALE_BAR_PX, haloStroke, haloText } from "./draw_site.js";
 import { shortened } from "../data/names.js";
 import { FADE, alike } from "./scene.js";
 import { dashOf, isFilled, traceMarker } from "./shapes.js";
@@ -12,18 +12,23 @@ import { AMBIGUOUS, STATES } from "../data/states.js";
 const LABELS_UP_TO = 80;
 const TICK_PX = 9;
 const ELSEWHERE_ALPHA = 0.45;
+const RIM_PX = 3;
+/** Dots in a crowd are small: their halo is thin, and their headings have none. */
+const CROWD_RIM_PX = 1.25;
 
 /** @param {number} count dots on the screen */
 export const markerRadius = (count) => (count <= 200 ? 5.5 : count <= 1500 ? 4 : 3);
+
+/** @param {number} radius */
+const isCrowd = (radius) => radius < 4;
 
 /** @param {Scene} scene */
 export function drawMarkers(scene) {
   const radius = markerRadius(scene.rows.length);
   for (const group of alike(scene)) {
     const rows = group.rows.filter((row) => !hasGhosts(scene.fleet, row));
-    scene.ctx.globalAlpha = FADE[group.stale];
-    scene.ctx.strokeStyle = scene.palette.state[group.state];
-    strokeHeadings(scene, group.state, rows, radius);
+    scene.ctx.globalAlpha = 1;
+    strokeHeadings(scene, group, rows, radius);
     paintMarkers(scene, group, rows, radius);
   }
   scene.ctx.globalAlpha = 1;
@@ -52,22 +57,28 @@ export const hasGhosts = (fleet, row) => fleet.state[row] === AMBIGUOUS && !flee
 
 /** @param {Scene} scene @param {{state: number, stale: number}} group @param {number[]} rows @param {number} radius */
 function paintMarkers({ ctx, view, palette, fleet }, group, rows, radius) {
+  const colour = palette.state[group.state];
+  const filled = isFilled(group.state, group.stale);
+  const rim = isCrowd(radius) ? CROWD_RIM_PX : RIM_PX;
+  const traced = filled ? radius + (rim - CROWD_RIM_PX) / 2 : radius; // half of the rim lies inside
   ctx.beginPath();
   for (const row of rows) {
-    traceMarker(ctx, group.state, view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), radius);
+    traceMarker(ctx, group.state, view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), traced);
   }
-  const filled = isFilled(group.state, group.stale);
-  ctx.fillStyle = filled ? palette.state[group.state] : palette.map;
-  if (STATES[group.state].shape !== "cross") ctx.fill();
-  ctx.strokeStyle = filled ? palette.map : palette.state[group.state];
-  ctx.lineWidth = filled ? 1.25 : 2;
-  ctx.setLineDash(dashOf(group.state));
-  ctx.stroke();
-  ctx.setLineDash([]);
+  if (!filled) {
+    ctx.fillStyle = palette.map;
+    if (STATES[group.state].shape !== "cross") ctx.fill();
+    return haloStroke(ctx, palette, colour, 2, dashOf(group.state), FADE[group.stale]);
+  }
+  ctx.fillStyle = colour;
+  ctx.fill();
+  ctx.strokeStyle = palette.map;
+  ctx.lineWidth = rim;
+  return ctx.stroke();
 }
 
-/** @param {Scene} scene @param {number} state @param {number[]} rows @param {number} radius */
-function strokeHeadings({ ctx, view, fleet }, state, rows, radius) {
+/** @param {Scene} scene @param {{state: number, stale: number}} group @param {number[]} rows @param {number} radius */
+function strokeHeadings({ ctx, view, palette, fleet }, { state, stale }, rows, radius) {
   if (!STATES[state].placed) return;
   ctx.beginPath();
   for (const row of rows) {
@@ -75,10 +86,13 @@ function strokeHeadings({ ctx, view, fleet }, state, rows, radius) {
     if (Number.isNaN(heading)) continue;
     traceTick(ctx, view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), heading, radius);
   }
-  ctx.lineWidth = radius > 4 ? 2.5 : 1.5;
   ctx.lineCap = "round";
-  ctx.stroke();
+  if (isCrowd(radius)) {
+    [ctx.strokeStyle, ctx.lineWidth, ctx.globalAlpha] = [palette.state[state], 1.5, FADE[stale]];
+    ctx.stroke();
+  } else haloStroke(ctx, palette, palette.state[state], radius > 4 ? 2.5 : 1.5, [], FADE[stale]);
   ctx.lineCap = "butt";
+  ctx.globalAlpha = 1;
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {number} x @param {number} y @param {number} heading
@@ -177,8 +191,6 @@ export function drawSelection({ ctx, view, palette, fleet, selected, hovered, ro
     if (row < 0 || Number.isNaN(fleet.drawnX[row])) continue;
     ctx.beginPath();
     ctx.arc(view.screenX(fleet.drawnX[row]), view.screenY(fleet.drawnY[row]), radius + 6, 0, 2 * Math.PI);
-    ctx.lineWidth = width;
-    ctx.strokeStyle = palette.accent;
-    ctx.stroke();
+    haloStroke(ctx, palette, palette.accent, width);
   }
 }

@@ -255,9 +255,9 @@ export class LiveMap extends EventTarget {
     drawAnchors(scene.ctx, scene.view, scene.palette, scene.anchors);
     drawGhosts(scene, isShown);
     const apart = density ? { ...scene, rows: Int32Array.from(scene.selected >= 0 ? [scene.selected] : []) } : scene;
-    drawColours(apart);
     drawSelection(apart);
     this.stats.labels = drawLabels(apart);
     drawMarkers(apart);
+    drawColours(apart); // above the halos of the dots
   }
 }

@@ -15,8 +15,8 @@
  * @property {number} now_ms
  */
 
-/** Opacity of fresh, stale and old poses. */
-export const FADE = [1, 0.75, 0.55];
+/** Opacity of fresh, stale and old poses. Their contrast with the halo is at least 3 : 1. */
+export const FADE = [1, 0.85, 0.72];
 
 const MARGIN_PX = 24;
 

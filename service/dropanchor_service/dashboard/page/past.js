@@ -3,6 +3,7 @@
 import { momentIn, momentValues } from "./address.js";
 import { writeAddress } from "../data/address.js";
 import { api, getJson } from "../data/connection.js";
+import { FiguresPanel } from "../panel/figures_panel.js";
 import { HeatPanel } from "../panel/heat_panel.js";
 import { PastBar } from "../panel/past_bar.js";
 import { PastFigures } from "../panel/past_figures.js";
@@ -48,6 +49,7 @@ export class Past {
     this.bar = new PastBar(/** @type {HTMLFormElement} */ (page.byId("past")), this.replay);
     this.figures = new PastFigures(page.byId("past-figures"), this.replay, page.choice);
     this.heat = new HeatPanel(this.bar.heatButton, page.byId("heat"), page.map, this.replay, page.choice);
+    new FiguresPanel(this.bar.figuresButton, /** @type {HTMLDialogElement} */ (page.byId("figures")), this.replay, page.choice, page.fleet);
     page.map.trackOf = (tag) => this.#trackOf(tag);
     page.byId("history").addEventListener("click", () => (this.active ? this.leave() : this.enter()));
     this.bar.addEventListener("leave", () => this.leave());

@@ -20,6 +20,7 @@ export class HeatPanel {
     this.replay = replay;
     this.choice = choice;
     this.fleet = liveMap.fleet;
+    this.#unfold(!matchMedia("(max-width: 800px)").matches); // on a phone it would cover half of the map
     liveMap.underlays.push((scene) => this.#painter.draw(this.map, scene));
     button.addEventListener("click", () => this.#turn(!this.map.active));
     replay.addEventListener("period", () => this.update());
@@ -60,10 +61,16 @@ export class HeatPanel {
     this.#part("scale").hidden = !scale;
     if (scale) scale.marks.forEach((seconds, i) => this.#put(["low", "middle", "high"][i], age(seconds)));
     this.#put("unit", heat && scale ? t("heat.unit", { side: distance(heat.cell_m, 3) }) : "");
+    if (problem || (heat && !scale)) this.#unfold(true);
     this.#put("note", problem || (heat ? noteOf(heat) : t("heat.loading")));
     const isDark = document.documentElement.dataset.theme === "dark";
     const stops = Array.from({ length: STOPS }, (_, i) => heatColour(i / (STOPS - 1), isDark));
     this.#part("bar").style.backgroundImage = `linear-gradient(to right, ${stops.join(", ")})`;
+  }
+
+  /** @param {boolean} is */
+  #unfold(is) {
+    /** @type {HTMLDetailsElement} */ (this.#part("fold")).open = is;
   }
 
   get #who() {

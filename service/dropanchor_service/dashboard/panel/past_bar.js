@@ -14,6 +14,7 @@ export class PastBar extends EventTarget {
     this.bar = bar;
     this.replay = replay;
     this.heatButton = this.#part("heat");
+    this.figuresButton = this.#part("figures");
     this.slider = /** @type {HTMLInputElement} */ (this.#part("slider"));
     this.speed = /** @type {HTMLSelectElement} */ (this.#part("speed"));
     this.speed.append(...SPEEDS.map((speed) => new Option(`× ${decimal(speed, 0, 1)}`, String(speed), speed === 1)));

@@ -1,9 +1,10 @@
 /** What the selected tag did in the shown period, and its track as a file. */
 
-import { RefusedError, request } from "../data/access.js";
+import { RefusedError } from "../data/access.js";
 import { api } from "../data/connection.js";
 import { UNKNOWN, age, count, distance, speed } from "../data/format.js";
 import { t } from "../i18n/language.js";
+import { saveFile } from "../data/save_file.js";
 import { nanoseconds } from "../data/track_reader.js";
 import { isSi } from "../data/units.js";
 
@@ -44,7 +45,7 @@ export class PastFigures {
     for (const [name, text] of Object.entries(texts)) this.#part(name).textContent = text || UNKNOWN;
   }
 
-  /** Save the whole track. A link could not carry a key. @param {string} format */
+  /** Save the whole track. @param {string} format */
   async #save(format) {
     const tag = this.choice.selected ?? "";
     const url = api(`tags/${encodeURIComponent(tag)}/track/file`);
@@ -53,10 +54,7 @@ export class PastFigures {
     }).toString();
     this.#part("answer").textContent = t("figures.preparing");
     try {
-      const content = await (await request(url, {})).blob();
-      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(content), download: `${tag}.${format}` });
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+      await saveFile(url, `${tag}.${format}`);
       this.#part("answer").textContent = t("figures.saved", { file: `${tag}.${format}` });
     } catch (error) {
       const lacks = format === "parquet" && error instanceof RefusedError;

@@ -1,6 +1,6 @@
 /** Draw zones: dashed while nobody is inside, grey while that is not known, such as in the past. */
 
-import { haloText } from "../map/draw_site.js";
+import { haloStroke, haloText } from "../map/draw_site.js";
 import { tagCount } from "../data/format.js";
 import { t } from "../i18n/language.js";
 
@@ -36,17 +36,8 @@ export function drawShape({ ctx, view, palette }, shape, { colour, dash, width }
   ctx.globalAlpha = FILL_ALPHA;
   ctx.fillStyle = colour;
   ctx.fill();
-  ctx.globalAlpha = 1;
-  ctx.setLineDash([]);
   ctx.lineJoin = "round";
-  ctx.lineWidth = width + 3;
-  ctx.strokeStyle = palette.map;
-  ctx.stroke();
-  ctx.setLineDash(dash);
-  ctx.lineWidth = width;
-  ctx.strokeStyle = colour;
-  ctx.stroke();
-  ctx.setLineDash([]);
+  haloStroke(ctx, palette, colour, width, dash);
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {View} view @param {Shape} shape */

@@ -3,7 +3,7 @@
 import { ChangedMeanwhileError } from "../data/access.js";
 import { placeIn, withCorner } from "./shape_edit.js";
 import { t } from "../i18n/language.js";
-import { refusal } from "../i18n/said.js";
+import { refusalInForm } from "../i18n/said.js";
 
 /** @typedef {import("./zone_store.js").Zone} Zone @typedef {import("./zone_store.js").Shape} Shape */
 
@@ -50,7 +50,7 @@ export class ZoneEditor extends EventTarget {
     this.zone = {
       id: "", name: "", colour: COLOUR, shape, enter: true, exit: true, dwell_s: null, speed_mps: null, delay_s: 1, tags: [], groups: [],
     };
-    this.#say("");
+    this.#say(null);
   }
 
   /** Edit a zone as it is now. @param {string} id */
@@ -60,9 +60,9 @@ export class ZoneEditor extends EventTarget {
       this.zone = /** @type {Zone} */ (/** @type {unknown} */ (item));
       this.#etag = etag;
       this.drawing = false;
-      this.#say("");
+      this.#say(null);
     } catch (error) {
-      this.#say(messageOf(error));
+      this.#say(error);
     }
   }
 
@@ -82,7 +82,7 @@ export class ZoneEditor extends EventTarget {
   close() {
     this.zone = null;
     this.drawing = false;
-    this.#say("");
+    this.#say(null);
   }
 
   /** Take a click on the map. Return whether it was for the zone. @param {number} x @param {number} y */
@@ -132,16 +132,16 @@ export class ZoneEditor extends EventTarget {
       this.close();
       return true;
     } catch (error) {
-      this.#say(messageOf(error), error instanceof ChangedMeanwhileError);
+      this.#say(error);
       return false;
     }
   }
 
-  /** @param {string} problem @param {boolean} [conflict] */
-  #say(problem, conflict = false) {
-    this.problem = conflict ? t("zone.conflict") : capitalised(refusal(problem));
-    this.problemAt = placeIn(problem);
-    this.conflict = conflict;
+  /** @param {unknown} error null: none */
+  #say(error) {
+    this.conflict = error instanceof ChangedMeanwhileError;
+    this.problem = error === null ? "" : this.conflict ? t("zone.conflict") : refusalInForm(error);
+    this.problemAt = error instanceof Error ? placeIn(error.message) : null;
     this.#changed();
   }
 
@@ -149,9 +149,3 @@ export class ZoneEditor extends EventTarget {
     this.dispatchEvent(new Event("change"));
   }
 }
-
-/** Return the sentence of an error without the name of the field. @param {unknown} error */
-const messageOf = (error) => (error instanceof Error ? error.message : String(error)).replace(/^body\.shape: /, "");
-
-/** @param {string} text */
-const capitalised = (text) => text.charAt(0).toUpperCase() + text.slice(1);

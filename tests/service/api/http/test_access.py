@@ -41,22 +41,17 @@ def guarded(tmp_path: Path) -> Guarded:
     return Guarded(tmp_path)
 
 
-def every_operation() -> list[tuple[str, str]]:
-    paths = make_api_bench().app().openapi()["paths"]
-    return [
-        (method.upper(), path) for path, operations in paths.items() for method in operations if "{site}" not in path
-    ]
-
-
-@pytest.mark.parametrize(("method", "path"), every_operation())
-def test_every_operation_but_the_open_ones_needs_credentials(guarded: Guarded, method: str, path: str) -> None:
-    response = guarded.ask(method, path.replace("{tag}", "a").replace("{anchor}", "17"))
-    if path in OPEN_PATHS:
-        assert response.status_code == 200
-    else:
-        assert kind_of(response) == "unauthenticated"
-        assert response.headers["www-authenticate"].startswith("Bearer")
-        assert "dropanchor key add" in response.json()["detail"]
+def test_every_operation_but_the_open_ones_needs_credentials(guarded: Guarded) -> None:
+    paths = guarded.app.openapi()["paths"]
+    assert len(paths) > 50
+    for method, path in ((method, path) for path, operations in paths.items() for method in operations):
+        response = guarded.ask(method.upper(), path.replace("{tag}", "a").replace("{anchor}", "17"))
+        if path in OPEN_PATHS:
+            assert response.status_code == 200, path
+        else:
+            assert kind_of(response) == "unauthenticated", (method, path)
+            assert response.headers["www-authenticate"].startswith("Bearer")
+            assert "dropanchor key add" in response.json()["detail"]
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from uuid import uuid4
 
 import pytest
 
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence import Persistence
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
@@ -141,7 +142,7 @@ def test_positions_of_others_are_refused(path: str) -> None:
 
 def test_the_limit_of_tags_holds_here_too() -> None:
     bench = OmloxBench()
-    bench.app = bench.poses.app(max_tags=1)
+    bench.app = bench.poses.app(max_tags=1, omlox=OmloxItems.opened(None))
     assert bench.ask("POST", "providers", json={"id": "a", "type": "uwb"}).status_code == 201
     assert bench.refusal("POST", "providers", json={"id": "b", "type": "uwb"})[0] == "tags-full"
 

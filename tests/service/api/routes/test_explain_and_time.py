@@ -93,7 +93,7 @@ def explained_house() -> ApiBench:
     records["predicted"] = 10.0 + 2.0 * (records["t_ns"] - T_NS) * 1e-9
     records["innovation"], records["S"], records["p_outlier"], records["fused"] = 0.1, 0.04, 0.02, True
     records["innovation"][-1], records["p_outlier"][-1], records["fused"][-1] = 3.0, 0.99, False
-    records["measured"] = records["predicted"] + records["innovation"]
+    records["measured"] = np.add(records["predicted"], records["innovation"])
     pose = np.zeros(1, POSE)
     pose["t_ns"], pose["state"], pose["speed"], pose["cov"] = T_NS + 1, State.TRACKING, 2.0, np.eye(3) * 0.01
     bench.answers.latest.write(pose, np.empty(0, HYPOTHESIS), records)

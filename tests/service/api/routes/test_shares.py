@@ -11,6 +11,7 @@ import pytest
 from websockets.sync.client import connect
 
 from dropanchor_schemas.site import TagSettings
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
@@ -33,7 +34,8 @@ class Shared:
         self.bench = make_api_bench()
         self.bench.move("a", "b", "c d")
         self.bench.answers.site.set_tag("b", TagSettings(group="forklifts"))
-        self.app = self.bench.app(authenticator=Authenticator({share_links.SOURCE: self.links, api_keys.SOURCE: keys}))
+        authenticator = Authenticator({share_links.SOURCE: self.links, api_keys.SOURCE: keys})
+        self.app = self.bench.app(authenticator=authenticator, omlox=OmloxItems.opened(None))
 
     def ask(self, method: str, path: str, secret: str | Scope = Scope.ADMIN, **options: Any) -> httpx.Response:
         bearer = self.secrets[secret] if isinstance(secret, Scope) else secret

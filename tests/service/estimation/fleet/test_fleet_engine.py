@@ -121,7 +121,7 @@ def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
     assert len(innovations) >= len(result.poses) - 1
     assert (innovations["t_ns"] == result.poses["t_ns"][-len(innovations) :]).all()
     assert (innovations["measured"] == result.poses["range"][-len(innovations) :]).all()
-    np.testing.assert_allclose(innovations["predicted"] + innovations["innovation"], innovations["measured"])
+    np.testing.assert_allclose(innovations["measured"] - innovations["predicted"], innovations["innovation"])
     outlier = np.abs(innovations["measured"] - batch.ranges["range"][40]) < 1e-12
     assert innovations["p_outlier"][outlier] > 0.9
     assert not innovations["fused"][outlier]

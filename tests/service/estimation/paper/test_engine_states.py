@@ -51,7 +51,7 @@ def test_every_range_that_met_a_belief_comes_with_its_innovation() -> None:
     made = engine()
     made.process(headings((0, 0.0)))
     innovations = made.process(ranges((0.1, 10.0), (0.2, 10.1), (0.3, 30.0))).innovations
-    np.testing.assert_allclose(innovations["predicted"] + innovations["innovation"], innovations["measured"])
+    np.testing.assert_allclose(innovations["measured"] - innovations["predicted"], innovations["innovation"])
     assert innovations["measured"].tolist() == [10.0, 10.1, 30.0]
     assert innovations["fused"].tolist() == [True, True, False]
     assert innovations["innovation"][-1] ** 2 / innovations["S"][-1] > 25

@@ -9,7 +9,8 @@ import tags from "./tags.js";
 import setup from "./setup.js";
 import zones from "./zones.js";
 import phone from "./phone.js";
+import refusals from "./refusals.js";
 import service from "./service.js";
 import share from "./share.js";
 
-export default { ...alerts, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...share };
+export default { ...alerts, ...plans, ...keys, ...notify, ...page, ...tags, ...setup, ...zones, ...phone, ...service, ...refusals, ...share };

@@ -1,0 +1,56 @@
+"""Compile in a process of its own: compiling leaves its process with some 500 MB that it never needs again."""
+
+import logging
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+from dropanchor_service.engines.warm_up import PROGRESS_S, CompilationProgress
+from dropanchor_service.runtime.kernel_cache import VARIABLE
+
+_log = logging.getLogger(__name__)
+
+
+def compile_apart(progress: CompilationProgress) -> None:
+    """Fill the cache of the kernels with `dropanchor compile`, unless it is full.
+
+    When this fails, the caller compiles what is missing: more memory, but no harm. An exception ends the process, too.
+    """
+    if (mark := _mark()) is None or mark.exists():
+        return
+    shown = f"; {progress.page} shows the progress" if progress.page else ""
+    progress.begin("the estimator, which takes about a minute")
+    _log.warning("compiling the estimator; please wait. This happens once after an update%s", shown)
+    command = [sys.executable, "-m", "dropanchor_service", "compile"]
+    # A session of its own: Ctrl-C goes to the service, which ends the process.
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True) as made:
+        try:
+            while made.poll() is None:
+                try:
+                    made.wait(PROGRESS_S)
+                except subprocess.TimeoutExpired:
+                    _log.warning("compiling: %.0f s so far", progress.elapsed_s)
+        finally:
+            made.terminate()
+    if mark.exists():
+        _log.warning("compiled in %.0f s; the result is cached in %s", progress.elapsed_s, mark.parent)
+    progress.end()
+
+
+def mark_complete() -> None:
+    """Note in the cache that all kernels are compiled for this processor."""
+    if (mark := _mark()) is not None:
+        mark.touch()
+
+
+def _mark() -> Path | None:
+    """Return the file that says that the cache is full. numba compiles again for another version or processor."""
+    folder = os.environ.get(VARIABLE)
+    if folder is None:
+        return None
+    import numba
+    from llvmlite.binding import get_host_cpu_name
+
+    return Path(folder) / f"complete-{numba.__version__}-{platform.python_version()}-{get_host_cpu_name()}"

@@ -1,0 +1,52 @@
+"""The first start compiles in a process of its own."""
+
+import logging
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from dropanchor_service.engines.compile_apart import compile_apart
+from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.runtime.kernel_cache import VARIABLE
+from support.kernel_cache import compile_once
+from support.service import environment
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache with all kernels, of which nothing says that it is full."""
+    compile_once()
+    folder = tmp_path / "cache"
+    shutil.copytree(os.environ[VARIABLE], folder, ignore=shutil.ignore_patterns("complete-*"))
+    for name, value in environment(**{VARIABLE: str(folder)}).items():
+        monkeypatch.setenv(name, value)
+    return folder
+
+
+def test_a_cache_is_filled_once(cache: Path, caplog: pytest.LogCaptureFixture) -> None:
+    progress = CompilationProgress("http://here/")
+    compile_apart(progress)
+    (mark,) = cache.glob("complete-*")
+    first, last = caplog.messages[0], caplog.messages[-1]
+    assert "http://here/ shows the progress" in first
+    assert str(cache) in last
+    assert progress.sentence == "The service is starting."
+    caplog.clear()
+    compile_apart(progress)
+    assert caplog.messages == []
+    mark.unlink()
+    compile_apart(progress)
+    assert mark.exists()
+
+
+def test_a_failure_leaves_the_compiling_to_the_caller(
+    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caplog.set_level(logging.DEBUG)
+    monkeypatch.setenv("PYTHONPATH", "/nowhere")
+    monkeypatch.setattr("sys.executable", shutil.which("false"))
+    compile_apart(CompilationProgress())
+    assert list(cache.glob("complete-*")) == []
+    assert not any("compiled in" in message for message in caplog.messages)
