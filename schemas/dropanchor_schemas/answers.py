@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.site import Anchor, Georeference, RemoteSettings, TagSettings
 from dropanchor_schemas.tag_health import Care, TagHealth
 
@@ -84,6 +85,10 @@ class ClientAccess(_Answer):
     scope: Literal["read", "write", "admin"] = Field(
         description="read: read; write: also set anchors and tags; admin: also delete, and replace the site."
     )
+    events: bool = Field(
+        default=True,
+        description="false: this site has no zones, events and deliveries, because the service has several sites.",
+    )
 
 
 class SamplesReceived(_Answer):
@@ -158,6 +163,8 @@ class SiteSummary(_Answer):
     anchors: int = Field(description="Number of its anchors.")
     tags: int = Field(description="Number of its tags.")
     online: int = Field(description="Number of its tags that are online.")
+    states: dict[TrackingState, int] = Field(description="Number of its tags in each state; without those with none.")
+    needs_care: int = Field(description="Number of its tags that need a person.")
 
 
 class SiteList(_Answer):

@@ -97,6 +97,15 @@ def poses_of_all_sites() -> str:
     return f"{PREFIX}/*/poses"
 
 
+def services_of_all_sites() -> str:
+    return f"{PREFIX}/*/service/*/alive"
+
+
+def everything_of_all_sites() -> str:
+    """Return the key expression of every key of every site."""
+    return f"{PREFIX}/*/**"
+
+
 def all_anchors(site: str) -> str:
     return f"{_site_prefix(site)}/anchor/*"
 

@@ -20,6 +20,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import Sites, SiteStore, TagTable
@@ -35,21 +36,21 @@ class Persistence:
     """
 
     def __init__(
-        self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics
+        self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics | None
     ) -> None:
+        """metrics: where history and recorder are registered; None for one of several sites."""
         self._settings = settings
         self._opened = ExitStack()
         self.plans = _open_plans(settings.data_dir)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         self.omlox = _open_omlox(settings)
-        self.basemap = _open_basemap(settings, site)
+        self.basemap = open_basemap(settings, [site])
         folder = settings.data_dir
         if folder is None:
             return
         if settings.history.enabled:
             self.tracks = Tracks(folder, retention_of(settings.history), tags, site, now_ns)
-            metrics.register(HistoryMetrics(self.tracks))
         metadata = {
             "engine": settings.engine,
             "paper": settings.paper.model_dump_json(),
@@ -57,7 +58,10 @@ class Persistence:
         }
         period_ns = round(settings.recording.pose_period_s * 1e9)
         self.recorder = Recorder(folder, file_limits_of(settings.recording), period_ns, tags, site, now_ns, metadata)
-        metrics.register(RecordingMetrics(self.recorder))
+        if metrics is not None:
+            if self.tracks is not None:
+                metrics.register(HistoryMetrics(self.tracks))
+            metrics.register(RecordingMetrics(self.recorder))
 
     def __enter__(self) -> Self:
         if self.basemap is not None:
@@ -71,6 +75,11 @@ class Persistence:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+    @property
+    def all(self) -> Sequence["Persistence"]:
+        """This one, as `SiteFolders.all` has those of several sites."""
+        return [self]
 
     @property
     def observers(self) -> Observers:
@@ -133,19 +142,22 @@ def open_sites(settings: Settings) -> Sites:
     """Return the sites, as the settings and the data folder have them. Raises SettingsError."""
     if not settings.sites:
         return Sites([(open_site(settings), settings.quota)])
-    return Sites([(_open(settings, name), site.quota(settings.quota)) for name, site in settings.sites.items()])
+    stores = [open_site(settings_of_site(settings, name)) for name in settings.sites]
+    quotas = [site.quota(settings.quota) for site in settings.sites.values()]
+    return Sites(list(zip(stores, quotas, strict=True)))
 
 
-def _open(settings: Settings, name: str) -> SiteStore:
-    """Return a site of `[sites]`. Its changes are in a folder of its own. Raises SettingsError."""
+def settings_of_site(settings: Settings, name: str) -> Settings:
+    """Return the settings of a site of `[sites]` as those of an only site. Its files are in a folder of its own."""
     site, folder = settings.sites[name], settings.data_dir
     own = {
         "site": site.site.model_copy(update={"id": name}),
         "tags": site.tags,
         "tag_defaults": site.tag_defaults.over(settings.tag_defaults),
         "data_dir": None if folder is None else folder / "sites" / chunk_from_id(name),
+        "basemap": BasemapSettings(),  # all sites share one
     }
-    return open_site(settings.model_copy(update=own))
+    return settings.model_copy(update=own)
 
 
 def _open_omlox(settings: Settings) -> OmloxItems:
@@ -158,8 +170,8 @@ def _open_omlox(settings: Settings) -> OmloxItems:
         ) from error
 
 
-def _open_basemap(settings: Settings, site: SiteStore) -> ServedBasemap | None:
-    """Return the base map; None without one. Raises SettingsError."""
+def open_basemap(settings: Settings, sites: Sequence[SiteStore]) -> ServedBasemap | None:
+    """Return the base map of these sites; None without one. Raises SettingsError."""
     path = settings.basemap.tiles
     if path is None:
         return None
@@ -169,8 +181,9 @@ def _open_basemap(settings: Settings, site: SiteStore) -> ServedBasemap | None:
         raise SettingsError(f"basemap.tiles: {path} cannot be read: {error.strerror}") from error
     except UnusableFileError as error:
         raise SettingsError(f"basemap.tiles: {error}") from error
-    if site.site.georeference is None:
+    if all(site.site.georeference is None for site in sites):
         _log.warning(
-            "basemap.tiles: the site has no latitude and longitude, so the page shows no base map until it has"
+            "basemap.tiles: %s, so the page shows no base map until it has",
+            "the site has no latitude and longitude" if len(sites) == 1 else "no site has latitude and longitude",
         )
     return basemap

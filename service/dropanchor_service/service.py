@@ -17,7 +17,6 @@ from dropanchor_schemas.keys import health_key, samples_key
 from dropanchor_service.answers.of_sites import answers_of_sites
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
-from dropanchor_service.api.several_sites import create_app_of_sites
 from dropanchor_service.api.starting import CurrentApp, create_starting_app
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.snapshot import ServiceState
@@ -30,7 +29,6 @@ from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
-from dropanchor_service.ingest.observers import NO_OBSERVERS
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
@@ -38,12 +36,14 @@ from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.only_site import OnlySite
-from dropanchor_service.persistence import open_sites
+from dropanchor_service.persistence import Persistence, open_sites
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.several_sites import refuse_for_several_sites
+from dropanchor_service.several_sites import SeveralSites
+from dropanchor_service.site_folders import SiteFolders
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.events import ZenohEvents
@@ -86,8 +86,9 @@ class Service:
         self.sites = open_sites(settings)
         only, now_ns = self.sites.only, self.clock.now_ns
         self._only = OnlySite(settings, self._credentials, only, self.latest, now_ns, self.metrics) if only else None
+        self._several = None if only else SeveralSites(settings, self._credentials, self.sites, now_ns, self.metrics)
         self._publishers = Publishers()
-        tracks = self._only.persistence.tracks if self._only else None
+        tracks = [one.tracks for one in self._persistence.all]
         self.answers = answers_of_sites(self.sites, self.latest, now_ns, tracks, self._publishers)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
@@ -110,8 +111,7 @@ class Service:
             self._http.start()
             self._opened.callback(self._http.ask_to_stop)
             self._build_ingest(self._compiled_engine())
-            if self._only is not None:
-                self._opened.enter_context(self._only.persistence)
+            self._opened.enter_context(self._persistence)
             if self._checkpoints is not None:
                 self._checkpoints.load()
                 self._checkpoints.start()
@@ -131,6 +131,14 @@ class Service:
             reason = "data_dir is not set" if self._settings.data_dir is None else engine
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
+
+    @property
+    def _persistence(self) -> Persistence | SiteFolders:
+        """What the service has on disk."""
+        if self._several is not None:
+            return self._several.folders
+        assert self._only is not None
+        return self._only.persistence
 
     def _name(self) -> str:
         return f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"
@@ -157,7 +165,7 @@ class Service:
             self.latest,
             self.metrics,
             self.clock,
-            observers=NO_OBSERVERS if self._only is None else self._only.persistence.observers,
+            observers=self._persistence.observers,
             reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
         )
         self._checkpoints = self._checkpointer(guarded)
@@ -191,10 +199,8 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        found = [
-            *(self._only.problems() if self._only else []),
-            self._checkpoints.problem if self._checkpoints else None,
-        ]
+        stores = self._only or self._persistence
+        found = [*stores.problems(), self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -244,7 +250,7 @@ class Service:
         caches = ZenohCaches(session, self.sites, self.metrics, self.clock)
         catch_up = CatchUp(
             self._buffer,
-            expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all()],
+            expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all() if self.sites.is_served(tag)],
             states_of=sequence_states(self.sites, self._publishers),
             ask=caches.ask,
             new_publisher_limit=caches.new_publisher_limit,
@@ -260,16 +266,19 @@ class Service:
             self.clock,
         )
 
-    def _receive(self, tag: str, payload: bytes, encoding: str) -> None:
+    def _receive(self, site: str, tag: str, payload: bytes, encoding: str) -> None:
         """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
-        site = self.sites[0]
-        site.tags.presence.note_http_message(tag)
-        self._on_live(samples_key(site.id, tag), payload, encoding, self.clock.now_ns())
+        self._note_http_message(site, tag)
+        self._on_live(samples_key(site, tag), payload, encoding, self.clock.now_ns())
 
-    def _receive_health(self, tag: str, payload: bytes, encoding: str) -> None:
-        site = self.sites[0]
-        site.tags.presence.note_http_message(tag)
-        self._ingest.health.put(health_key(site.id, tag), payload, encoding, self.clock.now_ns())
+    def _receive_health(self, site: str, tag: str, payload: bytes, encoding: str) -> None:
+        self._note_http_message(site, tag)
+        self._ingest.health.put(health_key(site, tag), payload, encoding, self.clock.now_ns())
+
+    def _note_http_message(self, site: str, tag: str) -> None:
+        served = self.sites.find(site)
+        assert served is not None
+        served.tags.presence.note_http_message(tag)
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         """Return the thread of the HTTP server. Until the service is ready, it serves the page with the progress."""
@@ -281,15 +290,11 @@ class Service:
         def ready() -> tuple[bool, Sequence[str]]:
             return not (found := self.problems()), found
 
-        if self._only is not None and self.answers.only is not None:
-            return self._only.app(
-                self.answers.only, ready, self.impairments, self._stopping, self._receive, self._receive_health
+        if self._several is not None:
+            return self._several.app(
+                self.answers, ready, self.impairments, self._stopping, self._receive, self._receive_health
             )
-        return create_app_of_sites(
-            self.answers,
-            ready=ready,
-            impaired=self.impairments,
-            registry=self.metrics.registry,
-            max_tags=self.sites.max_tags,
-            settings=self._settings.http,
-        )
+        assert self._only is not None
+        assert self.answers.only is not None
+        receive, receive_health = (partial(take, self.sites[0].id) for take in (self._receive, self._receive_health))
+        return self._only.app(self.answers.only, ready, self.impairments, self._stopping, receive, receive_health)

@@ -17,17 +17,22 @@ from support.service import Running, running_service, straight_north
 from support.zenoh_router import connected_session, wait_until
 
 RANGES, BEFORE = 60, 40
-SETTINGS = """
-[history]
-enabled = false
+ALL = slice(None)
+NORTH = """
 [sites.north.site]
 anchors = [{ id = "7" }]
 [sites.north.tags.cart]
 start = { x = 10.0, y = -20.0, heading_rad = 1.5707963 }
+"""
+SOUTH = """
 [sites.south.site]
 anchors = [{ id = "6" }, { id = "7", x = 100.0, y = 50.0 }]
 [sites.south.tags.cart]
 start = { x = 110.0, y = 30.0, heading_rad = 1.5707963 }
+"""
+WEST = """
+[sites.west.site]
+anchors = [{ id = "7" }]
 """
 
 
@@ -46,6 +51,13 @@ def wait_for_ranges(service: Running, count: int) -> None:
     wait_until(lambda: [ranges(site) for site in ("north", "south")] == [count, count])
 
 
+def kill(service: Running) -> None:
+    """Kill the service after its next checkpoint."""
+    now_s = time.monotonic()
+    wait_until(lambda: time.monotonic() - service.metric("dropanchor_checkpoint_age_seconds") > now_s + 0.1)
+    service.stop(signal.SIGKILL)
+
+
 def place(pose: dict[str, Any]) -> tuple[float, float]:
     return pose["x"], pose["y"]
 
@@ -59,7 +71,7 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
     tmp_path: Path, router_endpoint: str
 ) -> None:
     config = tmp_path / "sites.toml"
-    config.write_text(SETTINGS)
+    config.write_text(NORTH + SOUTH)
     options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", router_endpoint)
     frame = straight_north(RANGES)
     with ExitStack() as opened:
@@ -79,9 +91,8 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
             publish(clients[0], frame, slice(BEFORE, BEFORE + 10))
             publish(clients[1], frame, slice(BEFORE, BEFORE + 10))
             wait_until(lambda: {keys.poses_key("south"), keys.pose_key("north", "cart")} == set(received))
-            now_s = time.monotonic()
-            wait_until(lambda: time.monotonic() - service.metric("dropanchor_checkpoint_age_seconds") > now_s + 0.1)
-            service.stop(signal.SIGKILL)
+            _check_tracks(service)
+            kill(service)
         for client in clients:
             publish(client, frame, slice(BEFORE + 10, None))
         with running_service(*options) as service:
@@ -89,6 +100,48 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
             wait_for_ranges(service, RANGES)
             _check_answers(service, session)
             assert service.stop() == 0
+
+
+def test_a_site_that_leaves_and_one_that_comes_keep_the_tracks_of_the_others_through_kills(
+    tmp_path: Path, router_endpoint: str
+) -> None:
+    config, frame = tmp_path / "sites.toml", straight_north(RANGES)
+    options = ("--config", str(config), "--data-dir", str(tmp_path / "data"), "--zenoh-connect", router_endpoint)
+    poses: dict[str, dict[str, Any]] = {}
+    for sites in ((NORTH, SOUTH), (WEST, NORTH), (NORTH, SOUTH, WEST)):
+        config.write_text("".join(sites))
+        with running_service(*options) as service:
+            served = [site["site"] for site in service.get("/api/v1/sites")["sites"]]
+            if not poses:
+                with ExitStack() as opened:
+                    for site in served:
+                        publish(opened.enter_context(TagClient("cart", site=site, connect=router_endpoint)), frame, ALL)
+                    wait_for_ranges(service, RANGES)
+                poses = {site: service.get(f"/api/v1/sites/{site}/tags/cart/pose") for site in served}
+            else:
+                assert any("going on from a checkpoint" in line for line in service.log)
+            for site in poses.keys() & set(served):
+                tag = service.get(f"/api/v1/sites/{site}/tags/cart")
+                assert tag["samples"]["range"] == RANGES
+            north = service.get("/api/v1/sites/north/tags/cart/pose")
+            assert (place(north), north["t_ns"]) == (place(poses["north"]), poses["north"]["t_ns"])
+            with TagClient("mark", site="north", connect=router_endpoint) as mark:  # only messages make checkpoints
+                publish(mark, frame, slice(1))
+            kill(service)
+
+
+def _check_tracks(service: Running) -> None:
+    """Check that each site has a history of its own tag, 100 m and 50 m apart."""
+
+    def first(site: str) -> tuple[float, float] | None:
+        t_ns = service.get(f"/api/v1/sites/{site}/tags/cart/pose")["t_ns"]
+        period = f"from={t_ns - 60 * 10**9}&to={t_ns}"
+        poses = service.get(f"/api/v1/sites/{site}/tags/cart/track?{period}&limit=1")["poses"]
+        return place(poses[0]) if poses else None
+
+    wait_until(lambda: first("north") is not None and first("south") is not None)
+    x, y = first("north") or (0.0, 0.0)
+    assert first("south") == pytest.approx((x + 100.0, y + 50.0), abs=1e-3)
 
 
 def _check_answers(service: Running, session: zenoh.Session) -> None:

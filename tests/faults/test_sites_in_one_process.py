@@ -5,11 +5,9 @@ from copy import deepcopy
 from typing import NamedTuple
 
 import numpy as np
-import pytest
 
 from dropanchor_schemas import Anchor, Site, TagSettings
 from dropanchor_schemas.wire import Frame, RangeSample, encode_packed
-from dropanchor_service.checkpoints.files import CheckpointError
 from dropanchor_service.estimation.columns import POSE, Array
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.ingest.observers import Observers
@@ -152,5 +150,22 @@ def test_after_a_restart_the_bits_go_on_and_only_a_site_whose_anchor_has_moved_s
     assert after.poses("south") == before.poses("south")
     assert moved.poses("north") == before.poses("north")
     assert moved.poses("south") != before.poses("south")
-    with pytest.raises(CheckpointError, match="it holds the site 'south', which is no longer served"):
-        Run(north(), (SiteStore(Site(id="west"), {}), Quota())).bench.service_state().restore(snapshot)
+
+
+def test_a_site_that_leaves_changes_no_bit_of_another_and_goes_on_where_it_was_when_it_comes_back() -> None:
+    messages = [*of_site("north", 1), *of_site("south", 2)]
+    middle_ns = T0_NS + 9 * S
+    first, second = [m for m in messages if m.due_ns < middle_ns], [m for m in messages if m.due_ns >= middle_ns]
+    before = Run(north(), south()).feed(first)
+    snapshot = before.bench.service_state().snapshot()
+    before.batches.clear()
+    before.feed(second)
+    for others in ([], [(SiteStore(Site(id="west"), {}), Quota())]):
+        left = Run(north(), *others)
+        left.bench.service_state().restore(deepcopy(snapshot))
+        back = Run(south(), north())
+        back.bench.service_state().restore(deepcopy(left.bench.service_state().snapshot()))
+        left.feed([message for message in second if message.site == "north"])
+        back.feed(second)
+        assert left.poses("north") == back.poses("north") == before.poses("north")
+        assert back.poses("south") == before.poses("south")

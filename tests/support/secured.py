@@ -8,7 +8,8 @@ from pathlib import Path
 
 import zenoh
 
-from dropanchor_service.security.folder import SecurityFolder, Table
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.security.issued import Table
 from support.zenoh_router import free_port
 
 
@@ -30,7 +31,7 @@ class SecuredSite:
 
     @contextmanager
     def session(self, name: str) -> Iterator[zenoh.Session]:
-        """Open a session as `service`, as `reader`, or as the tag of that name."""
+        """Open a session as `service`, as a reader (by the name of its files), or as the tag of that common name."""
         path = self.folder.path
         is_tag = name in self.folder.table.tags
         cert, key = (

@@ -2,15 +2,12 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-import numpy as np
-
 from dropanchor_schemas import keys
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store import LatestPoses, Sites
 from dropanchor_service.store.clock_offsets import ClockOffsets
-from dropanchor_service.store.records import take
 
 
 class AnswersOfSites:
@@ -49,24 +46,21 @@ class AnswersOfSites:
         if self.only is not None:
             yield self.only, poses
             return
-        of_site = self._answers[0].tags.rows.sites(poses["row"])
-        order = np.argsort(of_site, kind="stable")
-        sites, begins = np.unique(of_site[order], return_index=True)
-        for site, rows in zip(sites.tolist(), np.split(order, begins[1:]), strict=False):
-            yield self._answers[site], take(poses, rows)
+        for site, of_site in self._answers[0].tags.rows.by_site(poses):
+            yield self._answers[site], of_site
 
 
 def answers_of_sites(
     sites: Sites,
     latest: LatestPoses,
     now_ns: Callable[[], int],
-    tracks: Tracks | None,
+    tracks: Sequence[Tracks | None],
     clock_offsets: ClockOffsets,
 ) -> AnswersOfSites:
-    """Return the answers of these sites; see `Answers`. tracks: of the only site."""
+    """Return the answers of these sites; see `Answers`. tracks: of each site."""
     return AnswersOfSites(
         [
-            Answers(site.store, site.tags, latest, now_ns, tracks, site.pending_tags, site.health, clock_offsets)
-            for site in sites
+            Answers(site.store, site.tags, latest, now_ns, of_site, site.pending_tags, site.health, clock_offsets)
+            for site, of_site in zip(sites, tracks, strict=True)
         ]
     )

@@ -14,7 +14,6 @@ from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.api.http.access import OPEN_PATHS, Access
 from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
@@ -25,34 +24,15 @@ from dropanchor_service.api.omlox.feed.socket import Doorkeeper
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import add_omlox
-from dropanchor_service.api.routes.access import access_router
-from dropanchor_service.api.routes.basemap import basemap_router
-from dropanchor_service.api.routes.connect import connect_router
 from dropanchor_service.api.routes.dashboard import page_mounts
-from dropanchor_service.api.routes.destinations import destinations_router
 from dropanchor_service.api.routes.event_parts import EventParts
-from dropanchor_service.api.routes.events import events_router
-from dropanchor_service.api.routes.figures import figures_router
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
-from dropanchor_service.api.routes.heat_map import heat_map_router
-from dropanchor_service.api.routes.history import history_router
-from dropanchor_service.api.routes.ingest import ingest_router
-from dropanchor_service.api.routes.ingest_health import ingest_health_router
-from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
-from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
-from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES, plan_images_router
-from dropanchor_service.api.routes.plans import plans_router
-from dropanchor_service.api.routes.recordings import recordings_router
-from dropanchor_service.api.routes.remote_settings import remote_settings_router
+from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
 from dropanchor_service.api.routes.shares import shares_router
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
-from dropanchor_service.api.routes.sites import site_routers, sites_router
-from dropanchor_service.api.routes.stream import stream_router
-from dropanchor_service.api.routes.track import track_router
-from dropanchor_service.api.routes.track_file import track_file_router
-from dropanchor_service.api.routes.tracks import tracks_router
-from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
-from dropanchor_service.api.routes.zones import zones_router
+from dropanchor_service.api.routes.site_parts import SiteParts
+from dropanchor_service.api.routes.sites import sites_router
+from dropanchor_service.api.site_routers import SharedParts, event_routers, site_routers
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
@@ -100,36 +80,18 @@ def create_app(
     keeps them in memory and watches nothing. plans: floor plans; None keeps them in memory. omlox: what omlox clients
     have said; None for no omlox interface. basemap: None when there is none.
     """
-    plans, sites = plans or PlanStore(None), AnswersOfSites([answers])
     events = events or EventParts.in_memory(answers.site.site.id)
-    app = app_without_routes(authenticator, rate_limiter, cors_origins, answers.tags_in_group)
+    site_of = SiteOfRequest(
+        [SiteParts(answers, receive, receive_health, plans or PlanStore(None), events, recorder, max_tags)]
+    )
+    shared = SharedParts(stopping, endpoints, credentials, authenticator, rate_limiter, cors_origins, basemap)
+    app = app_without_routes(shared, site_of, answers.tags_in_group)
     if dashboard is not None:
         app.router.routes.extend(page_mounts(dashboard))  # before the interfaces: a page needs many files at once
     for router in (
-        *site_routers(SiteOfRequest(sites), lambda _: max_tags),
-        sites_router(sites, lambda _: max_tags),
-        remote_settings_router(answers),
-        track_router(answers),
-        track_file_router(answers),
-        tracks_router(answers),
-        heat_map_router(answers),
-        figures_router(answers, events),
-        history_router(answers),
-        stream_router(answers, stopping, lambda: (answers.site.version, plans.version)),
-        access_router(),
-        connect_router(answers.site, endpoints, credentials),
-        ingest_router(receive, receive_health),
-        ingest_phyphox_router(receive, receive_health),
-        ingest_health_router(receive_health),
-        ingest_stream_router(receive, answers, stopping, authenticator, rate_limiter),
-        recordings_router(recorder),
-        plans_router(plans),
-        plan_images_router(plans, answers.site),
-        basemap_router(basemap),
-        zones_router(events.items),
-        zone_occupancy_router(events),
-        events_router(events.store, stopping),
-        destinations_router(events),
+        *site_routers(site_of, shared),
+        *event_routers(site_of, shared),
+        sites_router(site_of, (*site_routers(site_of, shared), *event_routers(site_of, shared))),
         shares_router(share_links_of(authenticator)),
         health_router(ready, impaired),
     ):
@@ -142,13 +104,8 @@ def create_app(
     return app
 
 
-def app_without_routes(
-    authenticator: Authenticator | None,
-    rate_limiter: RateLimiter | None,
-    cors_origins: Sequence[str],
-    members: Members,
-) -> FastAPI:
-    """Return an application with the middleware alone; see `create_app`. members: returns the tags of a group."""
+def app_without_routes(shared: SharedParts, site_of: SiteOfRequest, members: Members) -> FastAPI:
+    """Return an application with the middleware alone. members: returns the tags of a group."""
     app = FastAPI(
         title="Dropanchor",
         version="1",
@@ -158,10 +115,17 @@ def app_without_routes(
         redirect_slashes=False,
     )
     app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES, of_paths={f"{PREFIX}/plan-images": MAX_UPLOAD_BYTES})
-    app.add_middleware(Access, authenticator=authenticator, rate_limiter=rate_limiter, members=members)
+    only_site = None if site_of.only is None else site_of.only.id
+    app.add_middleware(
+        Access,
+        authenticator=shared.authenticator,
+        rate_limiter=shared.rate_limiter,
+        members=members,
+        only_site=only_site,
+    )
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
-    allow_origins(app, cors_origins)
+    allow_origins(app, shared.cors_origins)
     add_error_handlers(app)
     return app
 

@@ -1,17 +1,23 @@
 """Collect and restore the state that a service needs to continue after a restart."""
 
+import logging
 from typing import Any
 
 import numpy as np
 
 from dropanchor_schemas.site import Anchor
-from dropanchor_service.checkpoints.files import CheckpointError, Snapshot, layout_of
+from dropanchor_service.checkpoints.files import Snapshot, layout_of
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.runtime.kernel_cache import STATE_SOURCES, sources_digest
 from dropanchor_service.store import LatestPoses, ServedSite, Sites
 from dropanchor_service.store.records import put
+
+_NAMES: dict[str, Any] = {"site": "", "anchors": [], "tags": []}
+"""The document of one site. The layout does not tell how many sites a checkpoint holds."""
+
+_log = logging.getLogger(__name__)
 
 
 class ServiceState:
@@ -25,7 +31,7 @@ class ServiceState:
         self._publishers = publishers
         self._buffers: dict[str, Array] = {}
         self.template = self.snapshot()
-        self.layout = layout_of(self.template, meaning=sources_digest(STATE_SOURCES))
+        self.layout = layout_of(Snapshot(self.template.arrays, _NAMES), meaning=sources_digest(STATE_SOURCES))
 
     @property
     def messages(self) -> int:
@@ -46,14 +52,14 @@ class ServiceState:
 
     def _document(self) -> dict[str, Any]:
         """Return the names in the order of rows and indices. With several sites, each has the place of its site."""
-        only, tags = self._sites.only, self._rows.all()
-        if only is not None:
+        only, tags, sites = self._sites.only, self._rows.all(), self._sites.with_former
+        if only is not None and len(sites) == 1:
             anchors = [anchor.model_dump() for anchor in only.store.anchors_by_index()]
             return {"site": only.id, "anchors": anchors, "tags": [tag.name for tag in tags]}
-        of_sites = [iter(site.store.anchors_by_index()) for site in self._sites]
+        of_sites = [iter(site.store.anchors_by_index()) for site in sites]
         places = self._engine.anchors.sites.tolist()
         return {
-            "sites": [site.id for site in self._sites],
+            "sites": [site.id for site in sites],
             "anchors": [(place, next(of_sites[place]).model_dump()) for place in places],
             "tags": [(tag.site, tag.name) for tag in tags],
         }
@@ -71,10 +77,7 @@ class ServiceState:
         return buffer[: len(array)]
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Restore a snapshot of this layout, before the first message.
-
-        Raises CheckpointError when it holds a site that is no longer served.
-        """
+        """Restore a snapshot of this layout, before the first message. It may be of other sites, too."""
         self._restore_names(snapshot.document)
         self._rows.restore_counts(snapshot.arrays["counts"])
         self._publishers.columns = snapshot.arrays["publishers"]
@@ -86,31 +89,35 @@ class ServiceState:
     def _restore_names(self, document: dict[str, Any]) -> None:
         """Give tags their rows and anchors their indices."""
         sites, anchors, tags = self._sites_in(document), document["anchors"], document["tags"]
-        if self._sites.only is not None:
+        if "site" in document:
             anchors, tags = [(0, anchor) for anchor in anchors], [(0, tag) for tag in tags]
-        of_sites: list[list[Anchor]] = [[] for _ in self._sites]
+        of_sites: list[list[Anchor]] = [[] for _ in self._sites.with_former]
         for place, anchor in anchors:
             of_sites[sites[place].index].append(Anchor.model_validate(anchor))
-        for site in self._sites:
+        for site in self._sites.with_former:
             site.store.restore_indices(of_sites[site.index])
         self._engine.anchors.restore([sites[place].index for place, _ in anchors])
         for place, tag in tags:
             sites[place].tags.register(tag)
 
     def _sites_in(self, document: dict[str, Any]) -> list[ServedSite]:
-        """Return the sites of a document, in its order. Raises CheckpointError for one that is no longer served."""
-        if self._sites.only is not None:
+        """Return the sites of a document, in its order. One that is no longer served keeps its rows."""
+        if "site" in document and self._sites.only is not None:
             return [self._sites.only]
-        found = [self._sites.find(site) for site in document["sites"]]
-        for site, name in zip(found, document["sites"], strict=True):
-            if site is None:
-                raise CheckpointError(f"it holds the site {name!r}, which is no longer served")
-        return [site for site in found if site is not None]
+        names = [document["site"]] if "site" in document else document["sites"]
+        return [self._sites.find(name) or self._former(name) for name in names]
+
+    def _former(self, name: str) -> ServedSite:
+        _log.info("the checkpoint holds the site %s, which is not served: its tags wait until it is again", name)
+        return self._sites.add_former(name)
 
     def _forget_deleted(self) -> None:
-        """Delete the tags that were deleted after this snapshot was made."""
+        """Delete the tags that were deleted after this snapshot was made, and hide those of sites that left."""
         for tag in self._rows.all():
-            if self._sites[tag.site].store.was_deleted_after(tag.name, tag.last_heard_ns or 0):
+            if not self._sites.is_served(tag):
+                self._rows.hide(tag.row)
+                self._latest.forget(tag.row)
+            elif self._sites[tag.site].store.was_deleted_after(tag.name, tag.last_heard_ns or 0):
                 self._rows.delete(tag.row)
                 self._latest.forget(tag.row)
 

@@ -7,7 +7,7 @@ from urllib.parse import quote, urlsplit
 import segno
 
 from dropanchor_service.commands.options import positive
-from dropanchor_service.commands.security import add_folder_option
+from dropanchor_service.commands.security import add_folder_option, add_site_option
 from dropanchor_service.phones.phyphox_experiment import link_of
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
@@ -24,6 +24,7 @@ examples:
   dropanchor key add dashboard --scope read
   dropanchor key add anna-phone --tag anna --url https://yard.example:8080
   dropanchor key add anna-phone --tag anna --url https://yard.example:8080 --phyphox
+  dropanchor key add yard-manager --scope write --site annexe
   dropanchor key list
   dropanchor key revoke dashboard
   curl --cacert security/ca.pem -H "Authorization: Bearer $KEY" https://localhost:8080/api/v1/poses
@@ -38,6 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     allowed = add.add_mutually_exclusive_group()
     allowed.add_argument("--scope", choices=SCOPES, default="read", help="what the key allows (default: %(default)s)")
     allowed.add_argument("--tag", help="allow only to send the samples of this tag")
+    add_site_option(add, "allow only this site (default: all); needed for --tag where the folder has several")
     add.add_argument("--url", metavar="URL", help="print the link that makes a phone this tag, and its QR code")
     add.add_argument(
         "--phyphox", action="store_true", help="with --url: print the code that the app phyphox scans instead"
@@ -53,12 +55,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the action. Return 0, or 2 on an error."""
     try:
-        keys = ApiKeys(SecurityFolder.open(arguments.security).path)
+        folder = SecurityFolder.open(arguments.security)
+        _refuse_site(folder, arguments)
+        keys = ApiKeys(folder.path)
         {"add": _add, "revoke": _revoke, "list": _list}[arguments.action](keys, arguments)
     except (SecurityError, ApiKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor key: {error}\n")
         return EXIT_ERROR
     return 0
+
+
+def _refuse_site(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
+    """Raise SecurityError where a key would be for a site that is not there, or for a tag of an unnamed one."""
+    if arguments.action == "add" and (arguments.site is not None or arguments.tag is not None):
+        folder.site_named(arguments.site)
 
 
 def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
@@ -68,9 +78,9 @@ def _add(keys: ApiKeys, arguments: argparse.Namespace) -> None:
     elif arguments.phyphox:
         raise ApiKeyError("--phyphox needs --url: the address at which the phone reaches the service")
     if arguments.tag is None:
-        print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days))
+        print(keys.add(arguments.name, Scope.named(arguments.scope), arguments.days, arguments.site))
     else:
-        secret = keys.add_for_tag(arguments.name, arguments.tag, arguments.days)
+        secret = keys.add_for_tag(arguments.name, arguments.tag, arguments.days, arguments.site)
         print(secret)
         if arguments.url is not None:
             _show_link(arguments.url, arguments.tag, secret, arguments.phyphox)

@@ -10,7 +10,8 @@ from pathlib import Path
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.answers.connect_command import reachable_endpoint
 from dropanchor_service.commands.options import positive
-from dropanchor_service.security.folder import SecurityError, SecurityFolder, Table
+from dropanchor_service.security.folder import SecurityError, SecurityFolder
+from dropanchor_service.security.issued import Table
 
 DESCRIPTION = """\
 Creates a folder with the credentials of a site: a certificate authority (ca), certificates for router, service and
@@ -21,6 +22,7 @@ EPILOG = """\
 examples:
   dropanchor security init --host yard.example --host 192.168.1.10
   dropanchor security init --security /etc/dropanchor --site yard --host yard.example
+  dropanchor security add-site annexe          a second site of the same router and service
   dropanchor security renew
 """
 FOLDER = Path("security")
@@ -52,6 +54,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_folder_option(renew)
     renew.add_argument("--host", action="append", default=[], metavar="NAME", help="an additional name, as with init")
     add_days_option(renew)
+    site = actions.add_parser("add-site", help="let the router and the service have another site")
+    site.add_argument("name", metavar="NAME", help="id of the site")
+    add_folder_option(site)
+    add_days_option(site)
+
+
+def add_site_option(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument("--site", help=what)
 
 
 def add_folder_option(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +87,7 @@ def add_days_option(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the action. Return 0, or 2 on an error."""
     try:
-        {"init": _init, "renew": _renew}[arguments.action](arguments)
+        {"init": _init, "renew": _renew, "add-site": _add_site}[arguments.action](arguments)
     except (SecurityError, InvalidKeyError, OSError) as error:
         sys.stderr.write(f"dropanchor security: {error}\n")
         return EXIT_ERROR
@@ -97,6 +107,13 @@ def _renew(arguments: argparse.Namespace) -> None:
     folder.renew(_checked(arguments.host), arguments.days)
     print(f"Router, service and reader have new certificates for {', '.join(folder.table.hosts)}.")
     print("Restart each of them to use the new certificates. To renew a tag's: dropanchor tag add NAME --renew")
+
+
+def _add_site(arguments: argparse.Namespace) -> None:
+    folder, site = SecurityFolder.open(arguments.security), arguments.name
+    folder.add_site(site, arguments.days)
+    print(f"The router of {folder.path} serves {', '.join(folder.table.sites)} after a restart.")
+    print(f"Its tags: dropanchor tag add NAME --site {site}. Keys for it alone: dropanchor key add NAME --site {site}")
 
 
 def _hosts(given: list[str]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from dropanchor_schemas.keys import InvalidKeyError
-from dropanchor_service.commands.security import add_days_option, add_folder_option
+from dropanchor_service.commands.security import add_days_option, add_folder_option, add_site_option
 from dropanchor_service.security.folder import ROUTER_FILE, SecurityError, SecurityFolder
 
 DESCRIPTION = """\
@@ -16,6 +16,7 @@ EPILOG = """\
 examples:
   dropanchor tag add forklift-7
   dropanchor tag add forklift-7 --renew
+  dropanchor tag add forklift-7 --site annexe      where the folder has several sites
   dropanchor tag revoke forklift-7
   dropanchor tag list
 """
@@ -31,6 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     revoke = actions.add_parser("revoke", help="revoke a certificate")
     revoke.add_argument("name", metavar="NAME", nargs="+", help="id of a tag")
     listed = actions.add_parser("list", help="list the tags and their certificates")
+    for action in (add, revoke):
+        add_site_option(action, "site of the tags; needed where the folder has several")
     for action in (add, revoke, listed):
         add_folder_option(action)
 
@@ -48,14 +51,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _add(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
     for name in arguments.name:
-        bundle = folder.add_tag(name, arguments.days, arguments.renew)
+        bundle = folder.add_tag(name, arguments.days, arguments.renew, arguments.site)
         print(f"{name}: copy the folder {bundle} to the tag, then: dropanchor-tag publish --credentials {bundle.name}")
     print(_restart(folder.path))
 
 
 def _revoke(folder: SecurityFolder, arguments: argparse.Namespace) -> None:
     for name in arguments.name:
-        folder.revoke_tag(name)
+        folder.revoke_tag(name, arguments.site)
         print(f"{name}: no longer admitted")
     print(_restart(folder.path))
 

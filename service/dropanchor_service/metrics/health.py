@@ -34,7 +34,7 @@ class HealthGauges(Collector):
         self._clock_offsets = clock_offsets
 
     def collect(self) -> Iterable[Metric]:
-        now_ns, tags = self._now_ns(), self._sites.rows.all()
+        now_ns, tags = self._now_ns(), [tag for tag in self._sites.rows.all() if self._sites.is_served(tag)]
         offsets = self._clock_offsets.clock_offsets(now_ns)
         cares = (care_of(tag, self._sites[tag.site].health, now_ns, offsets.get(tag.row)) for tag in tags)
         reasons = Counter(care["reason"] for of_tag in cares for care in of_tag)

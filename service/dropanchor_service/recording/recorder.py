@@ -67,12 +67,12 @@ class Recorder:
         )
 
     def __enter__(self) -> "Recorder":
-        self.writer.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        self.writer.stop()
+        if self.writer.is_alive:
+            self.writer.stop()
 
     @property
     def running(self) -> RunningRecording | None:
@@ -105,6 +105,8 @@ class Recorder:
         """Start recording these tags, or all. Return False when a recording is already running."""
         if self._running is not None:
             return False
+        if not self.writer.is_alive:  # most of many sites never record
+            self.writer.start()
         self._site_version = 0
         self._decimation = Decimation(self._pose_period_ns)
         since_ns = self._now_ns()

@@ -17,6 +17,10 @@ The base path is `/api/v1`. The whole document, with every field, lies at `/api/
 `schemas/dropanchor_schemas/openapi.json`. SI units and radians; a heading counts counter-clockwise from east; times
 are UTC in ns. With credentials, every request but those for health and the document itself carries
 `Authorization: Bearer KEY`.
+
+Every path below, but those for lists of sites, health and share links, also exists with the site before it, as
+`/api/v1/sites/{site}/poses` for `/api/v1/poses`. A service with [several
+sites](../how-to/serve-several-sites.md) has these alone, and not for zones, events and destinations.
 """
 
 _STREAM = """\
@@ -90,12 +94,12 @@ def _stream_of_samples() -> str:
 
 
 def operations_in(document: dict[str, Any], group: str) -> list[tuple[str, str, dict[str, Any]]]:
-    """Return path, method and operation of each operation of a group."""
+    """Return path, method and operation of each operation of a group. A path with a site stands for one without."""
     return [
         (path, method, operation)
         for path, operations in document["paths"].items()
         for method, operation in operations.items()
-        if group in operation.get("tags", [])
+        if group in operation.get("tags", []) and "{site}" not in path
     ]
 
 

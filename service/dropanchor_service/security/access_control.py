@@ -1,11 +1,11 @@
-"""Zenoh's access control for one site. It lists who may send what on which keys, and denies everything else.
+"""Zenoh's access control for the sites of a router. It lists who may send what on which keys, and denies all else.
 
 Zenoh rules have no placeholder for the name of the client, so every tag gets its own rules. Publishers that recover
 lost messages keep their caches under the verbatim chunk `@adv`. `**` does not match it, so it is listed separately.
 """
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.health import MAX_HEALTH_BYTES
@@ -33,13 +33,29 @@ _EVERYTHING = [
 Section = dict[str, Any]
 
 
-def access_control(site: str, tags: Iterable[str]) -> Section:
+class Holder(NamedTuple):
+    """A tag that has a certificate. name: the common name of the certificate."""
+
+    name: str
+    site: str
+    tag: str
+
+
+def reader_of(site: str) -> str:
+    """Return the common name of the certificate that reads this site and no other."""
+    return f"{READER}/{site}"
+
+
+def access_control(sites: Sequence[str], tags: Iterable[Holder]) -> Section:
     """Return the section `access_control` of a router's configuration.
 
-    tags: the ids of the tags, which are also the common names of their certificates.
+    With several sites, `service` and `reader` are for all of them, and each site has a reader of its own.
     """
-    by_name = {SERVICE: _service(site), READER: _reader(site)}
-    by_name |= {tag: _tag(site, tag) for tag in tags}
+    shared = sites[0] if len(sites) == 1 else None
+    by_name = {SERVICE: _service(shared), READER: _reader(shared, "readers")}
+    if shared is None:
+        by_name |= {reader_of(site): _reader(site, f"readers of {site}") for site in sites}
+    by_name |= {holder.name: _tag(holder, shared) for holder in tags}
     rules = [rule for subject_rules in by_name.values() for rule in subject_rules]
     return {
         "enabled": True,
@@ -53,15 +69,16 @@ def access_control(site: str, tags: Iterable[str]) -> Section:
     }
 
 
-def low_pass_filter(site: str) -> list[Section]:
+def low_pass_filter(sites: Sequence[str]) -> list[Section]:
     """Return the section `low_pass_filter`, which limits the size of the messages of tags."""
-    samples = keys.all_tags(site, "samples")
+    shared = sites[0] if len(sites) == 1 else None
+    samples = _all_tags(shared, "samples")
     return [
         {
             "id": "health",
             "flows": ["ingress"],
             "messages": ["put", "delete"],
-            "key_exprs": [keys.all_tags(site, "health")],
+            "key_exprs": [_all_tags(shared, "health")],
             "size_limit": MAX_HEALTH_BYTES + _OVERHEAD_BYTES,
         },
         {
@@ -74,38 +91,52 @@ def low_pass_filter(site: str) -> list[Section]:
     ]
 
 
-def _tag(site: str, tag: str) -> list[Section]:
+def _all_tags(site: str | None, leaf: str) -> str:
+    """Return the key expression of `leaf` of every tag of a site; None: of all sites."""
+    return keys.all_sites(leaf) if site is None else keys.all_tags(site, leaf)
+
+
+def _tag(holder: Holder, shared: str | None) -> list[Section]:
+    """Return the rules of a tag. shared: the only site of the router; None: it has several."""
+    name, site, tag = holder
     samples, alive, pose = keys.samples_key(site, tag), keys.tag_alive_key(site, tag), keys.pose_key(site, tag)
     to_tag = [pose, keys.settings_key(site, tag), keys.all_anchors(site)]
-    all_samples = keys.all_tags(site, "samples")
+    # A service with several sites asks for the samples of all of them at once. These queries hold no data.
+    asked = [keys.all_tags(site, "samples"), *([] if shared else [keys.all_sites("samples")])]
     own = [samples, f"{samples}/@adv/**"]
     return [
-        _rule(f"{tag}: puts its samples", "ingress", ["put"], own),
-        _rule(f"{tag}: reports its health", "ingress", ["put"], [keys.health_key(site, tag)]),
-        _rule(f"{tag}: declares its liveliness", "ingress", ["liveliness_token"], [alive, f"{samples}/@adv/**"]),
-        _rule(f"{tag}: answers from its cache", "ingress", ["declare_queryable", "reply"], own),
+        _rule(f"{name}: puts its samples", "ingress", ["put"], own),
+        _rule(f"{name}: reports its health", "ingress", ["put"], [keys.health_key(site, tag)]),
+        _rule(f"{name}: declares its liveliness", "ingress", ["liveliness_token"], [alive, f"{samples}/@adv/**"]),
+        _rule(f"{name}: answers from its cache", "ingress", ["declare_queryable", "reply"], own),
         _rule(
-            f"{tag}: receives queries to its cache", "egress", _RECOVERY, [all_samples, f"{all_samples}/@adv/**", *own]
+            f"{name}: receives queries to its cache",
+            "egress",
+            _RECOVERY,
+            [*asked, *(f"{key}/@adv/**" for key in asked), *own],
         ),
-        _rule(f"{tag}: requests its pose and settings", "ingress", ["query", "declare_subscriber"], to_tag),
-        _rule(f"{tag}: receives its pose and settings", "egress", ["put", "reply"], to_tag),
+        _rule(f"{name}: requests its pose and settings", "ingress", ["query", "declare_subscriber"], to_tag),
+        _rule(f"{name}: receives its pose and settings", "egress", ["put", "reply"], to_tag),
     ]
 
 
-def _service(site: str) -> list[Section]:
-    samples = keys.all_tags(site, "samples")
-    return [_rule("the service", "both", _EVERYTHING, [keys.everything(site), f"{samples}/@adv/**"])]
+def _service(site: str | None) -> list[Section]:
+    everything = keys.everything_of_all_sites() if site is None else keys.everything(site)
+    return [_rule("the service", "both", _EVERYTHING, [everything, f"{_all_tags(site, 'samples')}/@adv/**"])]
 
 
-def _reader(site: str) -> list[Section]:
-    poses = [keys.all_tags(site, leaf) for leaf in ("pose", "event")] + [keys.poses_key(site), keys.all_anchors(site)]
-    alive = [keys.all_tags(site, "alive"), keys.all_services_alive(site)]
+def _reader(site: str | None, who: str) -> list[Section]:
+    of_all = [keys.poses_of_all_sites(), keys.anchors_of_all_sites()]
+    of_site = of_all if site is None else [keys.poses_key(site), keys.all_anchors(site)]
+    poses = [_all_tags(site, "pose"), _all_tags(site, "event"), *of_site]
+    services = keys.services_of_all_sites() if site is None else keys.all_services_alive(site)
+    alive = [_all_tags(site, "alive"), services]
     liveliness = ["liveliness_query", "declare_liveliness_subscriber"]
     return [
-        _rule("readers request poses", "ingress", ["query", "declare_subscriber"], poses),
-        _rule("readers receive poses", "egress", ["put", "reply", "declare_queryable"], poses),
-        _rule("readers request liveliness", "ingress", liveliness, alive),
-        _rule("readers receive liveliness", "egress", ["liveliness_token", "reply"], alive),
+        _rule(f"{who} request poses", "ingress", ["query", "declare_subscriber"], poses),
+        _rule(f"{who} receive poses", "egress", ["put", "reply", "declare_queryable"], poses),
+        _rule(f"{who} request liveliness", "ingress", liveliness, alive),
+        _rule(f"{who} receive liveliness", "egress", ["liveliness_token", "reply"], alive),
     ]
 
 

@@ -34,7 +34,10 @@ class ApiKeyError(ValueError):
 
 
 class ApiKey(BaseModel):
-    """The stored record of a key, without its secret. It has either a scope or a tag, whose samples it may send."""
+    """The stored record of a key, without its secret. It has either a scope or a tag, whose samples it may send.
+
+    site: the only site that the key is for; None: every site that the service has.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -44,13 +47,15 @@ class ApiKey(BaseModel):
     made: datetime
     expires: datetime | None = None
     tag: str | None = None
+    site: str | None = None
 
     @property
     def permission(self) -> str:
         """What the key allows, in words."""
+        where = "" if self.site is None else f" in site {self.site!r}"
         if self.tag is not None:
-            return f"ingest of tag {self.tag!r}"
-        return "nothing" if self.scope is None else self.scope.word
+            return f"ingest of tag {self.tag!r}{where}"
+        return "nothing" if self.scope is None else f"{self.scope.word}{where}"
 
     @property
     def is_expired(self) -> bool:
@@ -76,23 +81,31 @@ class ApiKeys:
     def all(self) -> Mapping[str, ApiKey]:
         return self._keys
 
-    def add(self, name: str, scope: Scope, days: int | None = None) -> str:
+    def add(self, name: str, scope: Scope, days: int | None = None, site: str | None = None) -> str:
         """Create a key and return its secret, which cannot be read again later.
 
-        days: the lifetime; None for a key that never expires. Raises ApiKeyError when the name is taken.
+        days: the lifetime; None for a key that never expires. site: the only one that it is for; None: every site.
+        Raises ApiKeyError when the name is taken.
         """
-        return self._add(name, days, scope=scope)
+        return self._add(name, days, scope=scope, site=site)
 
-    def add_for_tag(self, name: str, tag: str, days: int | None = None) -> str:
+    def add_for_tag(self, name: str, tag: str, days: int | None = None, site: str | None = None) -> str:
         """Create a key that may send the samples of this tag and nothing else; otherwise as `add`."""
         try:
             chunk_from_id(tag)
             refuse_pattern(tag)
         except InvalidKeyError as error:
             raise ApiKeyError(str(error)) from error
-        return self._add(name, days, tag=tag)
+        return self._add(name, days, tag=tag, site=site)
 
-    def _add(self, name: str, days: int | None, scope: Scope | None = None, tag: str | None = None) -> str:
+    def _add(
+        self,
+        name: str,
+        days: int | None,
+        scope: Scope | None = None,
+        tag: str | None = None,
+        site: str | None = None,
+    ) -> str:
         with exclusive_lock(self._file.parent):
             keys = self._read()
             if any(key.name == name for key in keys.values()):
@@ -100,7 +113,9 @@ class ApiKeys:
             identifier, made = secrets.token_hex(4), datetime.now(UTC)
             secret = f"{PREFIX}{identifier}_{secrets.token_urlsafe(32)}"
             expires = None if days is None else made + timedelta(days=days)
-            keys[identifier] = ApiKey(name=name, scope=scope, sha256=_hash(secret), made=made, expires=expires, tag=tag)
+            keys[identifier] = ApiKey(
+                name=name, scope=scope, sha256=_hash(secret), made=made, expires=expires, tag=tag, site=site
+            )
             self._write(keys)
         return secret
 
@@ -124,7 +139,9 @@ class ApiKeys:
             raise UnauthenticatedError("the API key is unknown or was revoked")
         if key.is_expired:
             raise UnauthenticatedError("the API key has expired")
-        return Identity(SOURCE, key.name, key.scope, tag=key.tag)
+        if key.site is None or key.scope is None:
+            return Identity(SOURCE, key.name, key.scope, tag=key.tag, site=key.site)
+        return Identity(SOURCE, key.name, None, of_sites={key.site: key.scope})
 
     def is_still_valid(self, identity: Identity) -> bool:
         self._reload_if_changed()
@@ -161,7 +178,11 @@ class ApiKeys:
             raise ApiKeyError(f"{self._file} is damaged") from error
 
     def _write(self, keys: Mapping[str, ApiKey]) -> None:
-        content = json.dumps(_KEYS.dump_python(dict(keys), mode="json"), indent=2, ensure_ascii=False)
+        document = _KEYS.dump_python(dict(keys), mode="json")
+        for key in document.values():
+            if key["site"] is None:
+                del key["site"]
+        content = json.dumps(document, indent=2, ensure_ascii=False)
         write_atomically(self._file, [content.encode(), b"\n"], PRIVATE)
         self._keys, self._version = dict(keys), self._file_version()
 

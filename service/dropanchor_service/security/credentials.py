@@ -12,7 +12,7 @@ from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import Authenticator, IdentityProvider
 from dropanchor_service.security.share_links import ShareLinkError, ShareLinks
-from dropanchor_service.settings.model import HttpSettings, SecuritySettings, Settings
+from dropanchor_service.settings.model import HttpSettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 
 EXPIRY_WARNING = timedelta(days=30)
@@ -29,6 +29,8 @@ def credentials_of(settings: Settings) -> SecurityFolder | None:
         return None
     try:
         folder = SecurityFolder.open(settings.security.folder)
+        for site in settings.sites if len(settings.sites) > 1 else ():
+            folder.site_named(site)
     except SecurityError as error:
         raise SettingsError(f"security.folder: {error}") from error
     for sentence in folder.expiring(EXPIRY_WARNING):
@@ -67,11 +69,11 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
 
 def authenticator_of(settings: Settings) -> Authenticator | None:
     """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError."""
-    providers = _providers_of(settings.security)
+    providers = _providers_of(settings)
     folder = settings.data_dir or settings.security.folder
     if not providers:
         return None
-    if folder is None:
+    if folder is None or len(settings.sites) > 1:  # share links are of an only site, so far
         return Authenticator(providers)
     try:
         return Authenticator({share_links.SOURCE: ShareLinks(folder), **providers})
@@ -79,13 +81,15 @@ def authenticator_of(settings: Settings) -> Authenticator | None:
         raise SettingsError(f"share links: {error}") from error
 
 
-def _providers_of(settings: SecuritySettings) -> dict[str, IdentityProvider]:
+def _providers_of(settings: Settings) -> dict[str, IdentityProvider]:
     providers: dict[str, IdentityProvider] = {}
+    security = settings.security
     try:
-        if settings.folder is not None:
-            providers[api_keys.SOURCE] = ApiKeys(settings.folder)
+        if security.folder is not None:
+            providers[api_keys.SOURCE] = ApiKeys(security.folder)
     except ApiKeyError as error:
         raise SettingsError(f"security.folder: {error}") from error
-    if settings.oidc is not None:
-        providers[oidc.SOURCE] = oidc.OidcTokens(settings.oidc)
+    if security.oidc is not None:
+        of_sites = {name: site.oidc_scopes for name, site in settings.sites.items()}
+        providers[oidc.SOURCE] = oidc.OidcTokens(security.oidc, of_sites)
     return providers

@@ -1,19 +1,20 @@
 """The folder that `dropanchor security init` creates: certificates, issued tags, and the router's configuration."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
-from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE
+from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE, reader_of
 from dropanchor_service.security.authority import Authority, Issued, expiry
 from dropanchor_service.security.files import PRIVATE, PUBLIC, exclusive_lock
+from dropanchor_service.security.issued import IssuedTag, Table
 from dropanchor_service.security.router import router_configuration
 
 TABLE = "issued.json"
@@ -23,32 +24,6 @@ MAX_COMMON_NAME_BYTES = 64  # RFC 5280, ub-common-name
 
 class SecurityError(ValueError):
     """Credentials cannot be created or used; the message says what to do."""
-
-
-class IssuedTag(BaseModel):
-    """The record of a certificate that was issued to a tag."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    serial: str
-    expires: datetime
-    revoked: datetime | None = None
-
-
-class Table(BaseModel):
-    """The issued certificates and the addresses of the router."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    site: str
-    hosts: tuple[str, ...]
-    listen: tuple[str, ...]
-    tags: Mapping[str, IssuedTag] = {}
-
-    @property
-    def admitted(self) -> list[str]:
-        """The ids of the tags whose certificates are not revoked."""
-        return [name for name, tag in self.tags.items() if tag.revoked is None]
 
 
 class SecurityFolder:
@@ -102,6 +77,21 @@ class SecurityFolder:
             self._save(self.table.model_copy(update={"hosts": all_hosts}))
             self._issue_roles(authority, days)
 
+    def add_site(self, site: str, days: int) -> None:
+        """Let the router serve another site, and issue a certificate to a reader of each site. Raises SecurityError."""
+        with self._changing():
+            chunk_from_id(site)
+            if site in self.table.sites:
+                raise SecurityError(f"the site {site!r} is there already")
+            taken = [name for name in (reader_of(one) for one in (*self.table.sites, site)) if name in self.table.tags]
+            if taken or len(reader_of(site).encode()) > MAX_COMMON_NAME_BYTES:
+                why = "a tag has the name of its reader" if taken else "its name is too long for a certificate"
+                raise SecurityError(f"the site {site!r} cannot be added: {why}")
+            authority, before = self._authority(), self.table.more_sites
+            self._save(self.table.model_copy(update={"more_sites": (*before, site)}))
+            for one in (site,) if before else self.table.sites:
+                self._issue_reader(authority, one, days)
+
     def expiring(self, within: timedelta) -> list[str]:
         """Return a sentence for each certificate that expires `within` this time.
 
@@ -114,15 +104,19 @@ class SecurityFolder:
 
     def expiries(self) -> dict[str, datetime]:
         """Return when each certificate in the folder expires, by its name. Those that are missing are left out."""
-        found = {name: self._expires(name) for name in ("ca", *ROLES)}
+        found = {name: self._expires(name) for name in ("ca", *ROLES, *map(_reader_file, self._sites_with_readers))}
         return {name: end for name, end in found.items() if end is not None}
 
-    def add_tag(self, name: str, days: int, renew: bool = False) -> Path:
+    def add_tag(self, tag: str, days: int, renew: bool = False, site: str | None = None) -> Path:
         """Issue a certificate to a tag, and return the folder to copy onto it.
 
-        renew: replace the certificate that the tag has. Raises SecurityError or InvalidKeyError.
+        renew: replace the certificate that the tag has. site: of the tag; None: the only one. Raises SecurityError or
+        InvalidKeyError.
         """
         with self._changing():
+            of_site = self.site_named(site)
+            name = self.table.common_name(of_site, tag)
+            chunk_from_id(tag)
             self._refuse_tag(name, renew)
             issued = self._authority().client(name, days)
             bundle = self.bundle(name)
@@ -130,22 +124,35 @@ class SecurityFolder:
             write_atomically(bundle / "ca.pem", [(self.path / "ca.pem").read_bytes()], PUBLIC)
             write_atomically(bundle / "tag.pem", [issued.certificate], PUBLIC)
             write_atomically(bundle / "tag.key", [issued.key], PRIVATE)
-            write_atomically(bundle / "tag.json", [_json(self._connection(name))], PUBLIC)
-            entry = IssuedTag(serial=issued.serial, expires=issued.expires)
+            write_atomically(bundle / "tag.json", [_json(self._connection(of_site, tag))], PUBLIC)
+            others = None if of_site == self.table.site else of_site
+            entry = IssuedTag(serial=issued.serial, expires=issued.expires, site=others)
             self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: entry}}))
         return bundle
 
-    def revoke_tag(self, name: str) -> None:
-        """Mark the certificate of a tag as revoked. Raises SecurityError when the tag has none."""
+    def revoke_tag(self, tag_id: str, site: str | None = None) -> None:
+        """Mark the certificate of a tag as revoked. Raises SecurityError when the tag has none; see `add_tag`."""
         with self._changing():
+            name = self.table.common_name(self.site_named(site), tag_id)
             tag = self.table.tags.get(name)
             if tag is None or tag.revoked is not None:
                 raise SecurityError(f"tag {name!r} " + ("is revoked already" if tag else "has no certificate"))
             revoked = tag.model_copy(update={"revoked": datetime.now(UTC)})
             self._save(self.table.model_copy(update={"tags": {**self.table.tags, name: revoked}}))
 
+    def site_named(self, site: str | None) -> str:
+        """Return the site with this id; with None, the only one. Raises SecurityError."""
+        if site is None and len(self.table.sites) > 1:
+            raise SecurityError(f"say which site it is of, with --site: {', '.join(self.table.sites)}")
+        if site is not None and site not in self.table.sites:
+            raise SecurityError(
+                f"there is no site {site!r} in {self.path}, which has {', '.join(self.table.sites)}; add it with: "
+                f"dropanchor security add-site {site}"
+            )
+        return site or self.table.site
+
     def bundle(self, name: str) -> Path:
-        """Return the folder with the credentials of a tag."""
+        """Return the folder with the credentials of the tag whose certificate has this common name."""
         return self.path / "tags" / chunk_from_id(name)
 
     def certificate(self, role: str) -> Path:
@@ -157,12 +164,23 @@ class SecurityFolder:
     def router_configuration(self, listen: Sequence[str] | None = None) -> dict[str, Any]:
         """Return the Zenoh configuration of the router, with access control for the tags admitted now."""
         files = {name: str(path.resolve()) for name, path in self._tls_files().items()}
-        return router_configuration(self.table.site, self.table.admitted, listen or self.table.listen, files)
+        holders = [self.table.holder(name) for name in self.table.admitted]
+        return router_configuration(self.table.sites, holders, listen or self.table.listen, files)
 
     def _issue_roles(self, authority: Authority, days: int) -> None:
         for role in (ROUTER, SERVICE):
             self._write_pair(role, authority.server(role, self.table.hosts, days))
         self._write_pair(READER, authority.client(READER, days))
+        for site in self._sites_with_readers:
+            self._issue_reader(authority, site, days)
+
+    @property
+    def _sites_with_readers(self) -> Sequence[str]:
+        """The sites with a reader of their own: all, or none of an only one."""
+        return self.table.sites if self.table.more_sites else ()
+
+    def _issue_reader(self, authority: Authority, site: str, days: int) -> None:
+        self._write_pair(_reader_file(site), authority.client(reader_of(site), days))
 
     def _expires(self, name: str) -> datetime | None:
         """Return when a certificate expires; None when it is missing, since not every host needs all of them."""
@@ -175,12 +193,11 @@ class SecurityFolder:
         return {"ca": self.certificate("ca"), "certificate": self.certificate(ROUTER), "key": self.key(ROUTER)}
 
     def _refuse_tag(self, name: str, renew: bool) -> None:
-        chunk_from_id(name)
         if len(name.encode()) > MAX_COMMON_NAME_BYTES:
             raise SecurityError(
                 f"{name!r} is too long for a certificate: a name may have {MAX_COMMON_NAME_BYTES} bytes"
             )
-        if name in ROLES:
+        if name in ROLES or name in map(reader_of, self._sites_with_readers):
             raise SecurityError(f"{name!r} is a reserved name; choose another name for the tag")
         existing = self.table.tags.get(name)
         if existing is None:
@@ -194,12 +211,12 @@ class SecurityFolder:
         elif existing.revoked is None and not renew:
             raise SecurityError(f"tag {name!r} has a certificate already; replace it with --renew")
 
-    def _connection(self, name: str) -> dict[str, str]:
+    def _connection(self, site: str, tag: str) -> dict[str, str]:
         """Return the contents of `tag.json`: who the tag is and where it connects."""
         port = self.table.listen[0].rpartition(":")[2]
         host = self.table.hosts[0]
         host = f"[{host}]" if ":" in host else host
-        return {"tag": name, "site": self.table.site, "connect": f"tls/{host}:{port}"}
+        return {"tag": tag, "site": site, "connect": f"tls/{host}:{port}"}
 
     def _authority(self) -> Authority:
         try:
@@ -217,7 +234,7 @@ class SecurityFolder:
 
     def _save(self, table: Table) -> None:
         self.table = table
-        write_atomically(self.path / TABLE, [_json(table.model_dump(mode="json"))], PUBLIC)
+        write_atomically(self.path / TABLE, [_json(table.document())], PUBLIC)
         write_atomically(self.path / ROUTER_FILE, [_json(self.router_configuration())], PUBLIC)
 
     @contextmanager
@@ -226,6 +243,11 @@ class SecurityFolder:
         with exclusive_lock(self.path):
             self.table = type(self).open(self.path).table
             yield
+
+
+def _reader_file(site: str) -> str:
+    """Return the name of the files of the reader of one site."""
+    return f"{READER}-{chunk_from_id(site)}"
 
 
 def _json(document: Any) -> bytes:

@@ -1,7 +1,7 @@
 """The identity and scope of REST clients."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol, Self
 
@@ -38,8 +38,9 @@ class Limit:
 class Identity:
     """An authenticated client.
 
-    source: the identity provider. scope: None when the client may do nothing. expires_s: Unix time; None: never.
-    tag: the tag whose samples the client may send; None: no tag. limit: the only tags that it may read; None: all.
+    source: the identity provider. scope: what the client may do in every site; None: nothing. expires_s: Unix time;
+    None: never. tag: the tag whose samples the client may send; None: no tag. limit: the only tags that it may read;
+    None: all. site: that of `tag`; None: the only one. of_sites: what the client may do in single sites.
     """
 
     source: str
@@ -48,6 +49,13 @@ class Identity:
     expires_s: float | None = None
     tag: str | None = None
     limit: Limit | None = None
+    site: str | None = None
+    of_sites: Mapping[str, Scope] = field(default_factory=dict)
+
+    def scope_in(self, site: str | None) -> Scope | None:
+        """Return what the client may do in a site; None: nothing. site: None for what concerns all sites."""
+        own = None if site is None else self.of_sites.get(site)
+        return max((scope for scope in (self.scope, own) if scope is not None), default=None)
 
 
 class UnauthenticatedError(Exception):

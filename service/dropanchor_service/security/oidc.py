@@ -10,6 +10,7 @@ import jwt
 
 from dropanchor_service.security.identity import Identity, Scope, UnauthenticatedError
 from dropanchor_service.settings.model import OidcSettings, is_safe_url
+from dropanchor_service.settings.sites import ScopeName
 
 SOURCE = "token"
 ALGORITHMS = ("RS256", "RS384", "RS512", "PS256", "PS384", "PS512", "ES256", "ES384", "ES512", "EdDSA")
@@ -22,12 +23,16 @@ _log = logging.getLogger(__name__)
 
 
 class OidcTokens:
-    """Verifies signature, issuer, audience and times of a token, and maps its scopes to those of the service."""
+    """Verifies signature, issuer, audience and times of a token, and maps its scopes to those of the service.
+
+    of_sites: for each site the provider's names of our scopes in this site alone.
+    """
 
     may_block = True
 
-    def __init__(self, settings: OidcSettings) -> None:
+    def __init__(self, settings: OidcSettings, of_sites: Mapping[str, Mapping[ScopeName, str]] | None = None) -> None:
         self._settings = settings
+        self._of_sites = of_sites or {}
         self._keys = SigningKeys(settings.issuer, settings.jwks_url)
 
     def recognises(self, secret: str) -> bool:
@@ -51,19 +56,25 @@ class OidcTokens:
         except jwt.PyJWTError as error:
             raise UnauthenticatedError(f"the token is not valid: {error}") from error
         name = str(claims.get("sub") or claims.get("client_id") or "a token without a subject")
-        return Identity(SOURCE, name, self._scope(claims), float(claims["exp"]))
+        granted = self._granted(claims)
+        in_sites = ((site, _highest(names, granted)) for site, names in self._of_sites.items())
+        of_sites = {site: scope for site, scope in in_sites if scope is not None}
+        return Identity(SOURCE, name, _highest(self._settings.scopes, granted), float(claims["exp"]), of_sites=of_sites)
 
     def is_still_valid(self, identity: Identity) -> bool:
         return identity.expires_s is None or time.time() < identity.expires_s + LEEWAY_S
 
-    def _scope(self, claims: Mapping[str, Any]) -> Scope | None:
-        """Return the highest scope that the claims grant; None when they grant none."""
+    def _granted(self, claims: Mapping[str, Any]) -> set[Any]:
+        """Return the provider's names of the scopes that the claims grant."""
         value: Any = claims
         for part in self._settings.scope_claim.split("."):
             value = value.get(part) if isinstance(value, Mapping) else None
-        granted = set(value.split() if isinstance(value, str) else value if isinstance(value, list) else [])
-        scopes = [Scope.named(name) for name, theirs in self._settings.scopes.items() if theirs in granted]
-        return max(scopes, default=None)
+        return set(value.split() if isinstance(value, str) else value if isinstance(value, list) else [])
+
+
+def _highest(names: Mapping[ScopeName, str], granted: set[Any]) -> Scope | None:
+    """Return the highest scope that is granted; None when none is. names: those of the provider."""
+    return max((Scope.named(name) for name, theirs in names.items() if theirs in granted), default=None)
 
 
 class SigningKeys:

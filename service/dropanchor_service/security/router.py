@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from dropanchor_service.security.access_control import access_control, low_pass_filter
+from dropanchor_service.security.access_control import Holder, access_control, low_pass_filter
 
 LINK: dict[str, Any] = {"tx": {"lease": 4000, "keep_alive": 4}, "rx": {"max_message_size": 2**20}}
 
@@ -27,7 +27,7 @@ def router_transport(tls: Mapping[str, Any] | None = None) -> dict[str, Any]:
 
 
 def router_configuration(
-    site: str, tags: Iterable[str], listen: Sequence[str], files: Mapping[str, str]
+    sites: Sequence[str], tags: Iterable[Holder], listen: Sequence[str], files: Mapping[str, str]
 ) -> dict[str, Any]:
     """Return the configuration of a router with mutual TLS and access control.
 
@@ -44,6 +44,6 @@ def router_configuration(
         "mode": "router",
         "listen": {"endpoints": list(listen)},
         "transport": router_transport(tls),
-        "access_control": access_control(site, tags),
-        "low_pass_filter": low_pass_filter(site),
+        "access_control": access_control(sites, tags),
+        "low_pass_filter": low_pass_filter(sites),
     } | QUIET

@@ -16,7 +16,7 @@ from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
-from dropanchor_service.settings.sites import SiteSettings
+from dropanchor_service.settings.sites import ScopeName, SiteSettings
 
 
 def _is_endpoint(text: str) -> str:
@@ -114,7 +114,7 @@ class OidcSettings(_Section):
         default=None, description="Where the provider's keys are; without it, the issuer is asked."
     )
     scope_claim: str = Field(default="scope", description="The claim that holds the scopes; dots lead into objects.")
-    scopes: dict[Literal["read", "write", "admin"], str] = Field(
+    scopes: dict[ScopeName, str] = Field(
         default={"read": "dropanchor:read", "write": "dropanchor:write", "admin": "dropanchor:admin"},
         description="The provider's names of our scopes.",
     )
@@ -294,4 +294,6 @@ class Settings(_Section):
             raise ValueError("[site] and [tags] are of an only site: move them into the tables of [sites]")
         for name, site in self.sites.items():
             site.require_fit(name, self.quota)
+            if site.oidc_scopes and self.security.oidc is None:
+                raise ValueError(f"oidc_scopes of the site {name!r} needs a provider: set [security.oidc]")
         return self

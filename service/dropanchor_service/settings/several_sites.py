@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 
+MOST_WITH_FILES = 100  # that write a history or record at once: each has files and a thread of its own
 _OF_EVENTS = ("events", "delivery", "email", "mqtt")
 
 
@@ -12,6 +13,8 @@ def refuse_for_several_sites(settings: Settings) -> None:
     """Raise SettingsError when there are several sites and something is set that works for one site only."""
     if len(settings.sites) < 2:
         return
+    if len(settings.sites) > MOST_WITH_FILES:
+        _refuse_many_files(settings)
     found = [
         f"{key} is for one site so far, and there are {len(settings.sites)}: {what}" for key, what in _of_one(settings)
     ]
@@ -19,16 +22,23 @@ def refuse_for_several_sites(settings: Settings) -> None:
         raise SettingsError("\n".join(found))
 
 
+def _refuse_many_files(settings: Settings) -> None:
+    """Raise SettingsError when more sites than can have one would have a history, or a recording from the start."""
+    with_files = {
+        "history": settings.data_dir is not None and settings.history.enabled,
+        "recording": settings.recording.enabled,
+    }
+    found = [
+        f"{key} is for up to {MOST_WITH_FILES} sites, and there are {len(settings.sites)}: set {key}.enabled = false"
+        for key, is_on in with_files.items()
+        if is_on
+    ]
+    if found:
+        raise SettingsError("\n".join(found))
+
+
 def _of_one(settings: Settings) -> Iterator[tuple[str, str]]:
     """Yield each key that is of one site only, and what to do about it."""
-    if settings.security.folder is not None or settings.security.oidc is not None:
-        yield "security", "leave it out, and listen on the loopback only"
-    if settings.data_dir is not None and settings.history.enabled:
-        yield "history", "set history.enabled = false"
-    if settings.recording.enabled:
-        yield "recording", "set recording.enabled = false"
-    if settings.basemap.tiles is not None:
-        yield "basemap", "leave out basemap.tiles"
     for section in _OF_EVENTS:
         if section in settings.model_fields_set:
             yield section, f"leave out [{section}]"

@@ -1,12 +1,14 @@
 """The settings of each of several sites in one process."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
+
+ScopeName = Literal["read", "write", "admin"]
 
 
 class SiteSettings(BaseModel):
@@ -24,6 +26,12 @@ class SiteSettings(BaseModel):
     site: Site = Field(default=Site(), description="The frame and the anchors of this site, without `id`.")
     tags: dict[SettingsId, TagSettings] = Field(default={}, description="A tag of this site.")
     tag_defaults: TagSettings = Field(default=TagSettings(), description="What every tag of this site gets.")
+
+    oidc_scopes: dict[ScopeName, str] = Field(
+        default={},
+        description="The OpenID Connect provider's names of our scopes in this site alone. Those of `security.oidc` "
+        "hold in every site.",
+    )
 
     def require_fit(self, name: str, default: Quota) -> None:
         """Raise ValueError if the table contradicts its name or its quota. default: the quota at the top level."""

@@ -1,7 +1,7 @@
 """The columns of all tags of all sites: a row for each tag, with its counters and what is known about its samples."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from threading import Lock
 
@@ -12,7 +12,7 @@ from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.presence import OnlineUntil, Presence
-from dropanchor_service.store.records import enlarged
+from dropanchor_service.store.records import enlarged, take
 
 KINDS = tuple(kind.name for kind in kinds.KINDS)
 REASONS = tuple(Reason)
@@ -111,6 +111,14 @@ class Rows:
         sites: Array = self._sites[rows]
         return sites
 
+    def by_site(self, poses: Array) -> Iterator[tuple[int, Array]]:
+        """Yield POSE, or other records with a row, by site: its index, and its records in their order."""
+        of_site = self._sites[poses["row"]]
+        order = np.argsort(of_site, kind="stable")
+        sites, begins = np.unique(of_site[order], return_index=True)
+        for site, rows in zip(sites.tolist(), np.split(order, begins[1:]), strict=False):
+            yield site, take(poses, rows)
+
     def are_online(self, rows: Array) -> Array:
         """Return whether the tag of each row is online."""
         return self.online_until.are_online(rows)
@@ -124,6 +132,11 @@ class Rows:
         """Clear the counters of a row, and note that its tag is deleted."""
         with self._lock:
             self._counts[row] = 0
+            self._deleted |= {row}
+
+    def hide(self, row: int) -> None:
+        """Note that the tag of a row is deleted, but keep its counters."""
+        with self._lock:
             self._deleted |= {row}
 
     def undelete(self, row: int) -> None:

@@ -7,6 +7,7 @@ from functools import partial
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.keys import InvalidKeyError
+from dropanchor_schemas.site import Site
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store.health import HealthTable
 from dropanchor_service.store.pending_tags import MAX_BYTES, PendingTags
@@ -39,37 +40,53 @@ class Sites:
     def __init__(self, sites: Sequence[tuple[SiteStore, Quota]]) -> None:
         self.rows = Rows()
         paths = ["/api/v1"] if len(sites) == 1 else [f"/api/v1/sites/{_chunk(store)}" for store, _ in sites]
-        pending_bytes = max(MAX_BYTES // len(sites), LEAST_PENDING_BYTES)
-        self._sites = [
-            ServedSite(
-                index,
-                store,
-                TagTable(self.rows, index, paths[index]),
-                PendingTags(quota.max_tags, pending_bytes),
-                HealthTable(),
-                quota,
-            )
-            for index, (store, quota) in enumerate(sites)
-        ]
+        self._pending_bytes = max(MAX_BYTES // len(sites), LEAST_PENDING_BYTES)
+        self._served = len(sites)
+        self._sites: list[ServedSite] = []
+        self._changed: deque[int] = deque()
+        for (store, quota), path in zip(sites, paths, strict=True):
+            self._add(store, quota, path)
         self._by_id = {site.id: site for site in self._sites}
         self._chunks = {_chunk(site.store) for site in self._sites}
-        self._changed = deque(range(len(sites)))
-        for site in self._sites:
-            site.store.on_change(partial(self._changed.append, site.index))
+
+    def _add(self, store: SiteStore, quota: Quota, path: str) -> ServedSite:
+        index = len(self._sites)
+        tags, pending = TagTable(self.rows, index, path), PendingTags(quota.max_tags, self._pending_bytes)
+        site = ServedSite(index, store, tags, pending, HealthTable(), quota)
+        self._sites.append(site)
+        self._changed.append(index)
+        store.on_change(partial(self._changed.append, index))
+        return site
+
+    def add_former(self, name: str) -> ServedSite:
+        """Return a place for the rows of a site that is no longer served, in case it is served again later.
+
+        Its messages are dropped and nothing shows its tags. Call this before the first message.
+        """
+        return self._add(SiteStore(Site(id=name), {}), Quota(), "/api/v1")
 
     def __len__(self) -> int:
-        return len(self._sites)
+        return self._served
 
     def __iter__(self) -> Iterator[ServedSite]:
-        return iter(self._sites)
+        return iter(self._sites[: self._served])
 
     def __getitem__(self, index: int) -> ServedSite:
         return self._sites[index]
 
     @property
+    def with_former(self) -> Sequence[ServedSite]:
+        """The sites, and then those that are no longer served."""
+        return self._sites
+
+    @property
     def only(self) -> ServedSite | None:
         """The site, if there is only one."""
-        return self._sites[0] if len(self._sites) == 1 else None
+        return self._sites[0] if self._served == 1 else None
+
+    def is_served(self, tag: Tag) -> bool:
+        """Return whether the site of a tag is served."""
+        return tag.site < self._served
 
     def find(self, site: str) -> ServedSite | None:
         """Return the site with this id, or None."""

@@ -34,6 +34,10 @@ class TagTable:
         """Whether there are no tags of other sites."""
         return len(self._by_name) == len(self.rows)
 
+    def own(self, poses: Array) -> Array:
+        """Return those of these POSE that are of tags of this site."""
+        return poses if self.has_every_row else poses[self.rows.sites(poses["row"]) == self._site]
+
     def find(self, name: str) -> Tag | None:
         """Return the tag of this name, or None."""
         return self._by_name.get(name)

@@ -9,7 +9,8 @@ from prometheus_client import CollectorRegistry
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.credentials import expiries_of
-from dropanchor_service.security.folder import SecurityFolder, Table
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.security.issued import Table
 from support.certificate import self_signed
 
 DAY_S = 86_400

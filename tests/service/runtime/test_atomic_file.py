@@ -12,8 +12,9 @@ from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot
 from dropanchor_service.recording.mcap_file import McapFile
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.api_keys import ApiKeys
-from dropanchor_service.security.folder import SecurityFolder, Table
+from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Scope
+from dropanchor_service.security.issued import Table
 from dropanchor_service.store import SiteStore
 
 

@@ -73,3 +73,27 @@ def test_the_command_line_adds_lists_and_revokes_keys(tmp_path: Path, capsys: py
     assert main(["key", "revoke", "dash", *folder]) == 0
     assert main(["key", "revoke", "dash", *folder]) == 2
     assert "there is no key named 'dash'" in capsys.readouterr().err
+
+
+def test_the_command_line_makes_keys_of_a_site_and_refuses_a_tag_without_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = secured_site(tmp_path / "security", site="north").folder.path
+    folder = ["--security", str(path)]
+    assert main(["key", "add", "before", *folder]) == 0
+    assert "site" not in (path / FILE).read_text()
+    assert main(["security", "add-site", "south", *folder]) == 0
+    capsys.readouterr()
+    assert main(["key", "add", "manager", "--scope", "write", "--site", "south", *folder]) == 0
+    identity = ApiKeys(path).identify(capsys.readouterr().out.strip())
+    assert [identity.scope_in(site) for site in ("south", "north", None)] == [Scope.WRITE, None, None]
+    assert main(["key", "add", "phone", "--tag", "cart", *folder]) == 2
+    assert "say which site it is of, with --site: north, south" in capsys.readouterr().err
+    assert main(["key", "add", "west", "--site", "west", *folder]) == 2
+    assert "there is no site 'west'" in capsys.readouterr().err
+    assert main(["key", "add", "phone", "--tag", "cart", "--site", "north", *folder]) == 0
+    capsys.readouterr()
+    assert main(["key", "list", *folder]) == 0
+    listed = capsys.readouterr().out
+    assert "manager\twrite in site 'south'" in listed
+    assert "phone\tingest of tag 'cart' in site 'north'" in listed

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from dropanchor_service.security.identity import Scope, UnauthenticatedError
 from dropanchor_service.security.oidc import RETRY_S, OidcTokens, SigningKeys
 from dropanchor_service.settings.model import OidcSettings
+from dropanchor_service.settings.sites import ScopeName
 
 AUDIENCE = "dropanchor-yard"
 
@@ -105,6 +106,15 @@ def test_scopes_are_mapped_as_the_settings_say(
     provider: Provider, more: dict[str, Any], claims: dict[str, Any], scope: Scope | None
 ) -> None:
     assert OidcTokens(provider.settings(**more)).identify(provider.token(**claims)).scope == scope
+
+
+def test_scopes_of_single_sites_hold_in_these_alone(provider: Provider) -> None:
+    names: dict[str, dict[ScopeName, str]] = {"a": {"write": "yard-a"}, "b": {"read": "yard-b", "admin": "boss"}}
+    tokens = OidcTokens(provider.settings(), names)
+    identity = tokens.identify(provider.token(scope="yard-a yard-b boss"))
+    assert [identity.scope_in(site) for site in ("a", "b", "c", None)] == [Scope.WRITE, Scope.ADMIN, None, None]
+    everywhere = tokens.identify(provider.token(scope="dropanchor:read yard-a"))
+    assert [everywhere.scope_in(site) for site in ("a", "b", None)] == [Scope.WRITE, Scope.READ, Scope.READ]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from dropanchor_schemas import Anchor
 from dropanchor_service.persistence import open_sites
 from dropanchor_service.settings.quota import Quota
-from dropanchor_service.settings.several_sites import refuse_for_several_sites
+from dropanchor_service.settings.several_sites import MOST_WITH_FILES, refuse_for_several_sites
 from dropanchor_service.settings.sources import SettingsError, load_settings
 
 FILE = """
@@ -64,6 +64,10 @@ def test_one_site_needs_no_table_of_its_own() -> None:
         ('[sites.a.site]\nid = "b"', "[sites.a] has the id 'b': leave out `id`, which is 'a'"),
         ("[sites.a]\nmax_tags = 1\n[sites.a.tags.x]\n[sites.a.tags.y]", "max_tags of the site 'a' is 1, but 2 tags"),
         ('[sites."a*"]', "sites.a*: 'a*' would be the id of one"),
+        (
+            '[sites.a]\noidc_scopes = { read = "yard-a" }',
+            "oidc_scopes of the site 'a' needs a provider: set [security.oidc]",
+        ),
         ("[sites.a]\nmax_tag = 1", "sites.a.max_tag is not a setting; did you mean max_tags?"),
     ],
 )
@@ -76,11 +80,7 @@ def test_a_table_that_contradicts_another_is_refused(tmp_path: Path, text: str, 
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ('data_dir = "data"', "history is for one site so far, and there are 2: set history.enabled = false"),
-        ('[security]\nfolder = "security"', "security is for one site so far, and there are 2"),
-        ("[recording]\nenabled = true", "recording is for one site so far, and there are 2"),
         ("[mqtt]\ntls = false", "mqtt is for one site so far, and there are 2: leave out [mqtt]"),
-        ('[basemap]\ntiles = "yard.pmtiles"', "basemap is for one site so far, and there are 2"),
         ("[events]\nperiod_ms = 300", "events is for one site so far, and there are 2: leave out [events]"),
     ],
 )
@@ -92,6 +92,13 @@ def test_what_works_for_one_site_only_is_refused_for_several(tmp_path: Path, tex
     refuse_for_several_sites(load_settings(file_with(tmp_path, f"{text}\n[sites.a]"), environment={}))
 
 
-def test_several_sites_with_a_data_folder_and_without_history_are_allowed(tmp_path: Path) -> None:
-    text = f'data_dir = "{tmp_path}"\n[history]\nenabled = false\n[sites.a]\n[sites.b]'
-    refuse_for_several_sites(load_settings(file_with(tmp_path, text), environment={}))
+def test_a_history_and_recordings_are_for_a_limited_number_of_sites(tmp_path: Path) -> None:
+    text = f'data_dir = "{tmp_path}"\n[recording]\nenabled = true\n'
+    sites = [f"[sites.s{number}]\n" for number in range(MOST_WITH_FILES + 1)]
+    refuse_for_several_sites(load_settings(file_with(tmp_path, text + "".join(sites[1:])), environment={}))
+    with pytest.raises(SettingsError) as refused:
+        refuse_for_several_sites(load_settings(file_with(tmp_path, text + "".join(sites)), environment={}))
+    for key in ("history", "recording"):
+        assert f"{key} is for up to 100 sites, and there are 101: set {key}.enabled = false" in str(refused.value)
+    off = text.replace("true", "false") + "[history]\nenabled = false\n"
+    refuse_for_several_sites(load_settings(file_with(tmp_path, off + "".join(sites)), environment={}))

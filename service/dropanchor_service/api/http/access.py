@@ -3,7 +3,6 @@
 import asyncio
 import ipaddress
 import math
-import re
 from collections.abc import Mapping
 
 from starlette.requests import HTTPConnection, Request
@@ -13,6 +12,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, problem_response
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.shared_view import Members, narrowed
+from dropanchor_service.api.http.site_in_path import divided
 from dropanchor_service.security import share_links
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 from dropanchor_service.security.identity import Scope as AccessScope
@@ -28,7 +28,7 @@ INGEST = "/api/v1/ingest/"
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
-_SITE = re.compile(r"/api/v1/(sites/[^/]+/)?site")
+_SITES, _SITE = "/api/v1/sites", "/api/v1/site"
 _SHARES = "/api/v1/shares"
 _DESTINATIONS = "/api/v1/destinations/"
 _HOW_TO_AUTHENTICATE = (
@@ -41,7 +41,8 @@ class Access:
     """ASGI middleware. Without an authenticator every client may do everything, and loopback has no rate limit.
 
     WebSockets pass: a browser can read why it is refused only after their handshake, so their route checks them.
-    members: returns the tags of a group, to which a share link may be limited.
+    members: returns the tags of a group, to which a share link may be limited. only_site: its id; None: there are
+    several.
     """
 
     def __init__(
@@ -50,8 +51,10 @@ class Access:
         authenticator: Authenticator | None,
         rate_limiter: RateLimiter | None,
         members: Members,
+        only_site: str | None,
     ) -> None:
         self._app = app
+        self._only_site = only_site
         self._members = members
         self._authenticator = authenticator
         self._rate_limiter = rate_limiter
@@ -68,7 +71,10 @@ class Access:
         elif identity is None:
             await self._app(scope, receive, send)
         else:
-            scope.setdefault("state", {}).update(tag=identity.tag, scope=identity.scope)
+            site = self._site_of(request)
+            scope.setdefault("state", {}).update(
+                tag=identity.tag, site=identity.site, scope=identity.scope_in(site), scope_in=identity.scope_in
+            )
             await self._app(scope, receive, self._while_valid(identity, send))
 
     async def _authenticate(self, request: Request) -> tuple[Identity | None, Response | None]:
@@ -100,7 +106,11 @@ class Access:
             and not narrowed(request.scope, identity.limit, self._members)
         ):
             return problem_response(request, Kind.FORBIDDEN, "This share link shows its tags and nothing else.")
-        return _forbidden(request, identity)
+        return _forbidden(request, identity, self._site_of(request), self._only_site is None)
+
+    def _site_of(self, request: Request) -> str | None:
+        """Return the site that a request concerns: the one in its path, or the only one; None for all sites."""
+        return divided(request.scope["path"])[0] or self._only_site
 
     def _while_valid(self, identity: Identity, send: Send) -> Send:
         """Return a `send` that ends a stream when its key is revoked or its token expires."""
@@ -145,7 +155,7 @@ def bearer_of(connection: HTTPConnection) -> str:
 
 def secret_of(request: Request) -> str:
     """Return the key or token of a request; empty without one. Apps of phones may put it into the URL."""
-    in_url = request.query_params.get("token", "") if request.scope["path"] in KEY_IN_URL else ""
+    in_url = request.query_params.get("token", "") if divided(request.scope["path"])[1] in KEY_IN_URL else ""
     return bearer_of(request) or in_url
 
 
@@ -156,27 +166,49 @@ def _is_protected(path: str) -> bool:
 
 def required_scope(method: str, path: str) -> AccessScope:
     """Return READ for reading, ADMIN for deleting, the site, destinations and share links, WRITE for other changes."""
+    path = divided(path)[1]
     if path.startswith(_SHARES):
         return AccessScope.ADMIN
     if method in ("GET", "HEAD", "OPTIONS"):
         return AccessScope.READ
-    is_admin = method == "DELETE" or _SITE.fullmatch(path) is not None or path.startswith(_DESTINATIONS)
+    is_admin = method == "DELETE" or path == _SITE or path.startswith(_DESTINATIONS)
     return AccessScope.ADMIN if is_admin else AccessScope.WRITE
 
 
-def _forbidden(request: Request, identity: Identity | None) -> Response | None:
+def _forbidden(request: Request, identity: Identity | None, site: str | None, several_sites: bool) -> Response | None:
+    """Return a refusal of what the client may not do in a site, or with None in all of them."""
     if identity is None:
         return None
-    if request.scope["path"].startswith(INGEST):
-        allowed, needs = identity.tag is not None, "a key that was created with dropanchor key add NAME --tag TAG"
+    path = divided(request.scope["path"])[1]
+    scope = identity.scope_in(site)
+    where = "" if not several_sites else f" in site {site!r}" if site else " in every site"
+    if path.startswith(INGEST):
+        allowed = speaks_in(identity, site, several_sites)
+        needs = f"a key that was created with {key_command(several_sites)}"
+    elif request.scope["path"] == _SITES and identity.of_sites:
+        return None  # it learns of its sites alone
     else:
-        required = required_scope(request.method, request.scope["path"])
-        allowed, needs = identity.scope is not None and identity.scope >= required, f"the scope {required.word}"
+        required = required_scope(request.method, path)
+        allowed, needs = scope is not None and scope >= required, f"the scope {required.word}{where}"
     if allowed:
         return None
-    has = "no scope" if identity.scope is None else f"the scope {identity.scope.word}"
+    has = f"no scope{where}" if scope is None else f"the scope {scope.word}{where}"
     detail = f"The {identity.source} of {identity.name!r} has {has}; this request needs {needs}."
     return problem_response(request, Kind.FORBIDDEN, detail)
+
+
+def speaks_in(identity: Identity, site: str | None, several_sites: bool) -> bool:
+    """Return whether a client may send samples of its tag to a site; None: that of its key."""
+    if identity.tag is None:
+        return False
+    if several_sites:
+        return identity.site is not None and site in (None, identity.site)
+    return identity.site in (None, site)
+
+
+def key_command(several_sites: bool) -> str:
+    """Return the command that creates a key for a tag."""
+    return "dropanchor key add NAME --tag TAG" + (" --site SITE" if several_sites else "")
 
 
 def _unauthenticated(request: Request, detail: str) -> Response:

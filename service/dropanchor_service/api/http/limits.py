@@ -11,6 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError, problem_response
+from dropanchor_service.api.http.site_in_path import divided
 
 
 class BodyLimit:
@@ -26,7 +27,7 @@ class BodyLimit:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        max_bytes = self._of_paths.get(scope["path"], self._max_bytes)
+        max_bytes = self._of_paths.get(divided(scope["path"])[1], self._max_bytes)
         content_length = Headers(scope=scope).get("content-length", "0")
         if content_length.isdigit() and int(content_length[:20]) > max_bytes:
             response = problem_response(Request(scope), Kind.BODY_TOO_LARGE, _too_large(max_bytes))

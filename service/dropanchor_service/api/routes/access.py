@@ -6,10 +6,11 @@ from starlette.responses import Response
 from dropanchor_schemas.answers import ClientAccess
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.security.identity import Scope
 
 
-def access_router() -> APIRouter:
+def access_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["site"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -21,6 +22,7 @@ def access_router() -> APIRouter:
     )
     async def get_access(request: Request) -> Response:
         scope: Scope = getattr(request.state, "scope", Scope.ADMIN)  # without authentication everybody may do all
-        return json_response({"scope": scope.word})
+        has_events = site_of.parts(request).events is not None
+        return json_response({"scope": scope.word} | ({} if has_events else {"events": False}))
 
     return router

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 import orjson
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.destinations import (
@@ -22,6 +22,7 @@ from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.items import CHANGE_KINDS, DestinationId, delete, found, item_response, put
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.delivery.channel import ChannelError, Verdict
 from dropanchor_service.events.deliveries import QueueState
 from dropanchor_service.events.drafts import destination_test
@@ -31,16 +32,16 @@ _READ = (Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE)
 _ONE = (Kind.UNKNOWN_DESTINATION, *_READ)
 
 
-def destinations_router(parts: EventParts) -> APIRouter:
+def destinations_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["destinations"], dependencies=[NO_QUERY])
-    _add_read_routes(router, parts)
-    _add_change_routes(router, parts)
-    _add_test_route(router, parts)
-    _add_dead_letter_routes(router, parts)
+    _add_read_routes(router, site_of)
+    _add_change_routes(router, site_of)
+    _add_test_route(router, site_of)
+    _add_dead_letter_routes(router, site_of)
     return router
 
 
-def _add_read_routes(router: APIRouter, parts: EventParts) -> None:
+def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/destinations",
         operation_id="list_destinations",
@@ -48,7 +49,8 @@ def _add_read_routes(router: APIRouter, parts: EventParts) -> None:
         response_model=DestinationList,
         responses=example_response({"destinations": [examples.DESTINATION_STATE]}) | problems(*_READ),
     )
-    def list_destinations() -> Response:
+    def list_destinations(request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         with reading():
             queues = parts.deliveries.states()
         states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
@@ -61,11 +63,12 @@ def _add_read_routes(router: APIRouter, parts: EventParts) -> None:
         response_model=DestinationState,
         responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
     )
-    def get_destination(destination: DestinationId) -> Response:
+    def get_destination(destination: DestinationId, request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
 
 
-def _add_change_routes(router: APIRouter, parts: EventParts) -> None:
+def _add_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.put(
         "/destinations/{destination}",
         operation_id="put_destination",
@@ -80,7 +83,9 @@ def _add_change_routes(router: APIRouter, parts: EventParts) -> None:
         destination: DestinationId,
         body: Annotated[Destination, Body(examples=[examples.WEBHOOK])],
         allows: Conditions,
+        request: Request,
     ) -> Response:
+        parts = site_of.parts(request).zone_events
         usable = _usable(parts, body)
         put(parts.destinations, destination, body.id, usable, allows)
         return _response(parts, usable)
@@ -92,14 +97,15 @@ def _add_change_routes(router: APIRouter, parts: EventParts) -> None:
         status_code=204,
         responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
     )
-    def delete_destination(destination: DestinationId, allows: Conditions) -> Response:
+    def delete_destination(destination: DestinationId, allows: Conditions, request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         response = delete(parts.destinations, destination, allows, Kind.UNKNOWN_DESTINATION)
         with reading():
             parts.deliveries.drop(destination)
         return response
 
 
-def _add_test_route(router: APIRouter, parts: EventParts) -> None:
+def _add_test_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.post(
         "/destinations/{destination}/test",
         operation_id="test_destination",
@@ -107,7 +113,8 @@ def _add_test_route(router: APIRouter, parts: EventParts) -> None:
         response_model=DestinationTest,
         responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
     )
-    async def test_destination(destination: DestinationId) -> Response:
+    async def test_destination(destination: DestinationId, request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         known = found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         try:
             parts.channels.check_settings(known)
@@ -119,7 +126,7 @@ def _add_test_route(router: APIRouter, parts: EventParts) -> None:
         return json_response(answer)
 
 
-def _add_dead_letter_routes(router: APIRouter, parts: EventParts) -> None:
+def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/destinations/{destination}/dead-letters",
         operation_id="list_dead_letters",
@@ -127,7 +134,8 @@ def _add_dead_letter_routes(router: APIRouter, parts: EventParts) -> None:
         response_model=DeadLetterList,
         responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
     )
-    def list_dead_letters(destination: DestinationId) -> Response:
+    def list_dead_letters(destination: DestinationId, request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             dead = parts.deliveries.dead(destination)
@@ -141,7 +149,8 @@ def _add_dead_letter_routes(router: APIRouter, parts: EventParts) -> None:
         response_model=Retried,
         responses=example_response({"retried": 1}) | problems(*_ONE),
     )
-    def retry_dead_letters(destination: DestinationId) -> Response:
+    def retry_dead_letters(destination: DestinationId, request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             return json_response({"retried": parts.deliveries.retry(destination)})
@@ -154,7 +163,8 @@ def _add_dead_letter_routes(router: APIRouter, parts: EventParts) -> None:
         status_code=204,
         responses=problems(*_ONE),
     )
-    def delete_dead_letters(destination: DestinationId) -> Response:
+    def delete_dead_letters(destination: DestinationId, request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             parts.deliveries.drop_dead(destination)

@@ -18,6 +18,7 @@ from dropanchor_schemas.events import EventList, EventType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.parameters import Ids, TagFilter, example_response, json_response, split_ids
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.stream import HEARTBEAT_S, MEDIA_TYPE, stopped_within
 from dropanchor_service.events.store import EventStore, Selection, StoredEvent
 
@@ -56,14 +57,14 @@ class EventQuery(EventFilter):
     limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")
 
 
-def events_router(store: EventStore, stopping: ThreadEvent) -> APIRouter:
+def events_router(site_of: SiteOfRequest, stopping: ThreadEvent) -> APIRouter:
     router = APIRouter(tags=["events"], dependencies=[Depends(_refuse_repeated)])
-    _add_list_route(router, store)
-    _add_stream_route(router, store, stopping)
+    _add_list_route(router, site_of)
+    _add_stream_route(router, site_of, stopping)
     return router
 
 
-def _add_list_route(router: APIRouter, store: EventStore) -> None:
+def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/events",
         operation_id="list_events",
@@ -73,7 +74,8 @@ def _add_list_route(router: APIRouter, store: EventStore) -> None:
         response_model=EventList,
         responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
     )
-    def list_events(query: Annotated[EventQuery, Query()]) -> Response:
+    def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Response:
+        store = site_of.parts(request).zone_events.store
         selection, after = query.selection(query.since), query.position()
         with reading():
             if query.since is None and after is None:
@@ -85,7 +87,7 @@ def _add_list_route(router: APIRouter, store: EventStore) -> None:
         return json_response({"events": [orjson.Fragment(event.body) for event in found], "next": following})
 
 
-def _add_stream_route(router: APIRouter, store: EventStore, stopping: ThreadEvent) -> None:
+def _add_stream_route(router: APIRouter, site_of: SiteOfRequest, stopping: ThreadEvent) -> None:
     @router.get(
         "/events/stream",
         operation_id="stream_events",
@@ -96,12 +98,14 @@ def _add_stream_route(router: APIRouter, store: EventStore, stopping: ThreadEven
     )
     async def stream_events(
         query: Annotated[EventFilter, Query()],
+        request: Request,
         last_event_id: Annotated[
             str | None, Header(description="The last id that the client has. Another text than an id is ignored.")
         ] = None,
     ) -> Response:
         if last_event_id is not None and re.fullmatch(SEQUENCE, last_event_id):
             query = query.model_copy(update={"after": last_event_id})
+        store = site_of.parts(request).zone_events.store
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
 

@@ -149,6 +149,8 @@ SITE_LIST: dict[str, Any] = {
             "anchors": 1,
             "tags": 10,
             "online": 9,
+            "states": {"tracking": 8, "coasting": 1},
+            "needs_care": 1,
         }
     ]
 }

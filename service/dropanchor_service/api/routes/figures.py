@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from pydantic import AfterValidator, Field
 from starlette.responses import Response
 
@@ -18,6 +18,7 @@ from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import Ids, example_response, json_response, split_ids
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.events.stays import TimeInZone, times_in_zones
 from dropanchor_service.history.covering import TooMuchError
 from dropanchor_service.history.overview import Overview
@@ -59,7 +60,7 @@ class FiguresQuery(TagsInPeriod):
     )
 
 
-def figures_router(answers: Answers, events: EventParts) -> APIRouter:
+def figures_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -71,8 +72,9 @@ def figures_router(answers: Answers, events: EventParts) -> APIRouter:
         responses=_offers()
         | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE, Kind.EVENTS_UNREADABLE),
     )
-    def get_figures(query: Annotated[FiguresQuery, Query()]) -> Response:
-        found = _figures(answers, events, query)
+    def get_figures(query: Annotated[FiguresQuery, Query()], request: Request) -> Response:
+        parts = site_of.parts(request)
+        found = _figures(parts.answers, parts.zone_events, query)
         if query.format == "json":
             return json_response(found)
         headers = {"cache-control": "no-store", "content-disposition": 'attachment; filename="figures.csv"'}

@@ -2,19 +2,19 @@
 
 import sqlite3
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.tracks import History
-from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.period import unreadable
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 _EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
 
 
-def history_router(answers: Answers) -> APIRouter:
+def history_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["poses"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -24,7 +24,8 @@ def history_router(answers: Answers) -> APIRouter:
         response_model=History,
         responses=example_response(_EXAMPLE) | problems(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
-    def get_history() -> Response:
+    def get_history(request: Request) -> Response:
+        answers = site_of(request)
         if answers.tracks is None:
             return json_response({"enabled": False, "from_ns": None, "to_ns": None})
         try:

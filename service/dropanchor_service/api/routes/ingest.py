@@ -17,7 +17,8 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Reason, Reje
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.phones.intake import PhoneIntake, Receive
+from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
+from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_service.phones.pairing import Signs
 from dropanchor_service.phones.readings import PhoneError
 from dropanchor_service.phones.sensor_logger import Message, parse
@@ -71,10 +72,12 @@ class OfSensorLogger(OfApp):
     )
 
 
-def ingest_router(receive: Receive, receive_health: Receive) -> APIRouter:
+def ingest_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["ingest"])
-    _add_samples_route(router, receive)
-    _add_sensor_logger_route(router, PhoneIntake(receive, receive_health, parse, Session))
+    _add_samples_route(router, site_of)
+    _add_sensor_logger_route(
+        router, ForEachSite(site_of, lambda site: PhoneIntake(site.receive, site.receive_health, parse, Session))
+    )
     return router
 
 
@@ -83,7 +86,7 @@ def encoding_of(request: Request) -> str:
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
-def _add_samples_route(router: APIRouter, receive: Receive) -> None:
+def _add_samples_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.post(
         "/ingest/samples",
         operation_id="ingest_samples",
@@ -99,14 +102,14 @@ def _add_samples_route(router: APIRouter, receive: Receive) -> None:
     async def ingest_samples(request: Request, query: Annotated[OfTag, Query()]) -> Response:
         tag, payload = tag_of(request, query), await request.body()
         encoding = encoding_of(request)
-        receive(tag, payload, encoding)  # what cannot be decoded is counted there too
+        site_of.parts(request).receive(tag, payload, encoding)  # what cannot be decoded is counted there too
         samples = count_samples(payload, encoding)
         if isinstance(samples, Rejection):
             raise ProblemError(Kind.SAMPLES_REJECTED, f"{samples.reason}: {samples.detail}.", reason=samples.reason)
         return json_response({"samples": samples}, status=202)
 
 
-def _add_sensor_logger_route(router: APIRouter, phones: PhoneIntake[Message]) -> None:
+def _add_sensor_logger_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Message]]) -> None:
     @router.post(
         "/ingest/sensor-logger",
         operation_id="ingest_sensor_logger",
@@ -122,7 +125,7 @@ def _add_sensor_logger_route(router: APIRouter, phones: PhoneIntake[Message]) ->
         },
     )
     async def ingest_sensor_logger(request: Request, query: Annotated[OfSensorLogger, Query()]) -> Response:
-        tag, body = tag_of(request, query), await request.body()
+        tag, phones, body = tag_of(request, query), phones_of(request), await request.body()
         try:
             posted = await run_in_threadpool(phones.post, tag, body, query.signs)
         except PhoneError as error:

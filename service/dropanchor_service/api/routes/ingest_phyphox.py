@@ -18,7 +18,9 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.ingest import OfApp, OfTag, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
-from dropanchor_service.phones.intake import PhoneIntake, Receive
+from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
+from dropanchor_service.api.routes.site_parts import SiteParts
+from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_service.phones.phyphox import Message, parse
 from dropanchor_service.phones.phyphox_experiment import AXES, COLUMNS, MEDIA_TYPE, experiment, link_of
 from dropanchor_service.phones.phyphox_session import PhyphoxSession
@@ -37,11 +39,15 @@ _BODY = {
 }
 
 
-def ingest_phyphox_router(receive: Receive, receive_health: Receive) -> APIRouter:
+def ingest_phyphox_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["ingest"])
     _add_experiment_routes(router)
-    _add_readings_route(router, PhoneIntake(receive, receive_health, parse, lambda _: PhyphoxSession()))
+    _add_readings_route(router, ForEachSite(site_of, _phones))
     return router
+
+
+def _phones(site: SiteParts) -> PhoneIntake[Message]:
+    return PhoneIntake(site.receive, site.receive_health, parse, lambda _: PhyphoxSession())
 
 
 def _add_experiment_routes(router: APIRouter) -> None:
@@ -77,7 +83,7 @@ def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:
     return {200: {"content": {media_type: {}}, "description": description}}
 
 
-def _add_readings_route(router: APIRouter, phones: PhoneIntake[Message]) -> None:
+def _add_readings_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Message]]) -> None:
     @router.post(
         "/ingest/phyphox",
         operation_id="ingest_phyphox",
@@ -90,7 +96,7 @@ def _add_readings_route(router: APIRouter, phones: PhoneIntake[Message]) -> None
         openapi_extra={"requestBody": {"required": True, "content": {"application/json": {"schema": _BODY}}}},
     )
     async def ingest_phyphox(request: Request, query: Annotated[OfApp, Query()]) -> Response:
-        tag, body = tag_of(request, query), await request.body()
+        tag, phones, body = tag_of(request, query), phones_of(request), await request.body()
         try:
             outcome = await run_in_threadpool(phones.post, tag, body)
         except PhoneError as error:

@@ -16,11 +16,13 @@ from dropanchor_schemas.answers import SamplesAcknowledged
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
+from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify, key_command, speaks_in
 from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError, is_of_another_page
+from dropanchor_service.api.http.errors import ProblemError
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest import count_samples
-from dropanchor_service.phones.intake import Receive
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 
 PROTOCOL = "dropanchor.samples"
@@ -32,7 +34,6 @@ MAX_REASON_BYTES = 123
 
 RESTART = 1012
 UNREADABLE, UNAUTHENTICATED, FORBIDDEN, TOO_MANY = 4400, 4401, 4403, 4429
-_MAKE_A_KEY = "Make a key with dropanchor key add NAME --tag TAG."
 
 
 class _ClosedError(Exception):
@@ -93,14 +94,13 @@ class _Stream:
 
     def __init__(
         self,
-        receive: Receive,
-        answers: Answers,
+        site_of: SiteOfRequest,
         stopping: Event,
         authenticator: Authenticator | None,
         rate_limiter: RateLimiter | None,
     ) -> None:
-        self._receive = receive
-        self._answers = answers
+        self._site_of = site_of
+        self._make_a_key = f"Make a key with {key_command(site_of.only is None)}."
         self._stopping = stopping
         self._authenticator = authenticator
         self._rate_limiter = rate_limiter
@@ -113,15 +113,15 @@ class _Stream:
         Raises _ClosedError, TooManyConnectionsError and WebSocketDisconnect.
         """
         identity = await self._identity(socket)
-        tag = _tag(socket, identity)
-        client = client_of(socket, identity)
-        acknowledgements = _Acknowledgements(self._answers, tag, self._started_ns)
-        with self._connections.one_more(client), self._answers.tags.presence.connected(tag):
+        tag, site = self._tag(socket, identity), self._site(socket, identity)
+        client, answers = client_of(socket, identity), site.answers
+        acknowledgements = _Acknowledgements(answers, tag, self._started_ns)
+        with self._connections.one_more(client), answers.tags.presence.connected(tag):
             await socket.send_text(acknowledgements.greeting())
             async for payload, encoding in _messages(socket):
                 await self._wait_for_turn(client)
                 self._require_open(identity)
-                self._receive(tag, payload, encoding)
+                site.receive(tag, payload, encoding)
                 await socket.send_text(acknowledgements.of(payload, encoding))
 
     async def _identity(self, socket: WebSocket) -> Identity | None:
@@ -134,11 +134,40 @@ class _Stream:
         offered = (name.removeprefix(KEY_PROTOCOL) for name in _protocols(socket) if name.startswith(KEY_PROTOCOL))
         secret = bearer_of(socket) or next(offered, "")
         if not secret:
-            raise _ClosedError(UNAUTHENTICATED, f"This service needs a key. {_MAKE_A_KEY}")
+            raise _ClosedError(UNAUTHENTICATED, f"This service needs a key. {self._make_a_key}")
         try:
             return await identify(self._authenticator, secret)
         except UnauthenticatedError as error:
             raise _ClosedError(UNAUTHENTICATED, f"Not accepted: {error}.") from error
+
+    def _tag(self, socket: WebSocket, identity: Identity | None) -> str:
+        """Return the tag that a connection speaks for: that of its key, or without credentials the one it names."""
+        named = socket.query_params.get("tag")
+        own = None if identity is None else identity.tag
+        if identity is not None and own is None:
+            raise _ClosedError(FORBIDDEN, f"This key may not send samples. {self._make_a_key}")
+        if own is not None and named not in (None, own):
+            raise _ClosedError(FORBIDDEN, f"This key speaks for the tag {own!r} only.")
+        tag = own or named
+        if tag is None:
+            raise _ClosedError(UNREADABLE, "Say which tag this is: add ?tag=NAME to the URL.")
+        try:
+            chunk_from_id(tag)
+        except InvalidKeyError as error:
+            raise _ClosedError(UNREADABLE, f"The tag's name cannot be used: {error}.") from error
+        return tag
+
+    def _site(self, socket: WebSocket, identity: Identity | None) -> SiteParts:
+        """Return the site that a connection speaks in: the one in its path, or that of its key. Raises _ClosedError."""
+        if identity is not None:
+            socket.state.site = identity.site
+        try:
+            site = self._site_of.parts(socket)
+        except ProblemError as error:
+            raise _ClosedError(UNREADABLE, error.detail) from error
+        if identity is not None and not speaks_in(identity, site.id, self._site_of.only is None):
+            raise _ClosedError(FORBIDDEN, f"This key may not send samples to the site {site.id!r}. {self._make_a_key}")
+        return site
 
     async def _wait_for_turn(self, client: str) -> None:
         """Wait until the rate limit of the client allows another message. Nothing is lost."""
@@ -156,18 +185,17 @@ class _Stream:
             and self._authenticator is not None
             and not self._authenticator.is_still_valid(identity)
         ):
-            raise _ClosedError(UNAUTHENTICATED, f"The key was revoked or has expired. {_MAKE_A_KEY}")
+            raise _ClosedError(UNAUTHENTICATED, f"The key was revoked or has expired. {self._make_a_key}")
 
 
 def ingest_stream_router(
-    receive: Receive,
-    answers: Answers,
+    site_of: SiteOfRequest,
     stopping: Event,
     authenticator: Authenticator | None,
     rate_limiter: RateLimiter | None,
 ) -> APIRouter:
     """Return the router of the WebSocket. OpenAPI has no WebSockets: `reference/rest.md` describes it."""
-    router, stream = APIRouter(), _Stream(receive, answers, stopping, authenticator, rate_limiter)
+    router, stream = APIRouter(), _Stream(site_of, stopping, authenticator, rate_limiter)
 
     @router.websocket("/ingest/stream")
     async def ingest_stream(socket: WebSocket) -> None:
@@ -194,21 +222,3 @@ async def _messages(socket: WebSocket) -> AsyncIterator[tuple[bytes, str]]:
 def _protocols(socket: WebSocket) -> list[str]:
     found: list[str] = socket.scope.get("subprotocols", [])
     return found
-
-
-def _tag(socket: WebSocket, identity: Identity | None) -> str:
-    """Return the tag that a connection speaks for: that of its key, or without credentials the one it names."""
-    named = socket.query_params.get("tag")
-    own = None if identity is None else identity.tag
-    if identity is not None and own is None:
-        raise _ClosedError(FORBIDDEN, f"This key may not send samples. {_MAKE_A_KEY}")
-    if own is not None and named not in (None, own):
-        raise _ClosedError(FORBIDDEN, f"This key speaks for the tag {own!r} only.")
-    tag = own or named
-    if tag is None:
-        raise _ClosedError(UNREADABLE, "Say which tag this is: add ?tag=NAME to the URL.")
-    try:
-        chunk_from_id(tag)
-    except InvalidKeyError as error:
-        raise _ClosedError(UNREADABLE, f"The tag's name cannot be used: {error}.") from error
-    return tag

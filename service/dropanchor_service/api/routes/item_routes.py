@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Generic
 
-from fastapi import APIRouter, Body, Depends
+from fastapi import APIRouter, Body, Depends, Request
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import Kind, problems
@@ -18,11 +18,12 @@ from dropanchor_service.store.items import NamedItems
 class Resource(Generic[Item]):
     """Items of one kind, and how the OpenAPI document describes them.
 
-    path: of the list; the ids of the operations follow from it. name: of one item, in its path and in sentences.
-    check: raises ProblemError for an item that cannot be saved, with one of the kinds in `refusals`.
+    items_of: returns the items of the site of a request. path: of the list; the ids of the operations follow from it.
+    name: of one item, in its path and in sentences. check: raises ProblemError for an item that cannot be saved in the
+    site of the request, with one of the kinds in `refusals`.
     """
 
-    items: NamedItems[Item]
+    items_of: Callable[[Request], NamedItems[Item]]
     path: str
     name: str
     list_summary: str
@@ -32,7 +33,7 @@ class Resource(Generic[Item]):
     unknown: Kind
     put_description: str = ""
     delete_description: str = ""
-    check: Callable[[Item], None] = lambda _: None
+    check: Callable[[Item, Request], None] = lambda _item, _request: None
     refusals: Sequence[Kind] = ()
 
     @property
@@ -49,7 +50,7 @@ def add_item_routes(router: APIRouter, resource: Resource[Item]) -> None:
 
 
 def _add_reading(router: APIRouter, resource: Resource[Item], id_of_path: Any) -> None:
-    items, key = resource.items, f"{resource.name}s"
+    items_of, key = resource.items_of, f"{resource.name}s"
 
     @router.get(
         f"/{resource.path}",
@@ -58,8 +59,8 @@ def _add_reading(router: APIRouter, resource: Resource[Item], id_of_path: Any) -
         response_model=resource.list_model,
         responses=example_response({key: [resource.example]}) | problems(Kind.INVALID_REQUEST),
     )
-    async def list_items() -> Response:
-        return json_response({key: [item.model_dump() for item in items.all.values()]})
+    async def list_items(request: Request) -> Response:
+        return json_response({key: [item.model_dump() for item in items_of(request).all.values()]})
 
     @router.get(
         f"/{resource.path}/{{{resource.name}}}",
@@ -68,8 +69,8 @@ def _add_reading(router: APIRouter, resource: Resource[Item], id_of_path: Any) -
         response_model=resource.model,
         responses=example_response(resource.example) | problems(resource.unknown, Kind.INVALID_REQUEST),
     )
-    async def get_item(item_id: Annotated[str, id_of_path]) -> Response:
-        return item_response(found(items, item_id, resource.unknown))
+    async def get_item(item_id: Annotated[str, id_of_path], request: Request) -> Response:
+        return item_response(found(items_of(request), item_id, resource.unknown))
 
 
 def _add_put(router: APIRouter, resource: Resource[Item], id_of_path: Any) -> None:
@@ -86,9 +87,10 @@ def _add_put(router: APIRouter, resource: Resource[Item], id_of_path: Any) -> No
         item_id: Annotated[str, id_of_path],
         body: Annotated[resource.model, Body(examples=[resource.example])],  # type: ignore[name-defined]
         allows: Conditions,
+        request: Request,
     ) -> Response:
-        resource.check(body)
-        put(resource.items, item_id, body.id, body, allows)
+        resource.check(body, request)
+        put(resource.items_of(request), item_id, body.id, body, allows)
         return item_response(body)
 
 
@@ -101,5 +103,5 @@ def _add_delete(router: APIRouter, resource: Resource[Item], id_of_path: Any) ->
         status_code=204,
         responses=problems(resource.unknown, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, Kind.INVALID_REQUEST),
     )
-    def delete_item(item_id: Annotated[str, id_of_path], allows: Conditions) -> Response:
-        return delete(resource.items, item_id, allows, resource.unknown)
+    def delete_item(item_id: Annotated[str, id_of_path], allows: Conditions, request: Request) -> Response:
+        return delete(resource.items_of(request), item_id, allows, resource.unknown)

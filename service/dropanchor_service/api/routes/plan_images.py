@@ -11,6 +11,7 @@ from dropanchor_schemas.plans import PlanImage, UploadedPlanImage
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.plans.reading.file_types import file_type_of
 from dropanchor_service.plans.reading.messages import Request as ReadRequest
 from dropanchor_service.plans.reading.refused import RefusedError
@@ -64,14 +65,14 @@ class UploadQuery(BaseModel):
         )
 
 
-def plan_images_router(store: PlanStore, site: SiteStore) -> APIRouter:
+def plan_images_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["plans"])
-    _add_upload_route(router, store, site)
-    _add_image_route(router, store)
+    _add_upload_route(router, site_of)
+    _add_image_route(router, site_of)
     return router
 
 
-def _add_upload_route(router: APIRouter, store: PlanStore, site: SiteStore) -> None:
+def _add_upload_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     reader = PlanReader()
 
     @router.post(
@@ -86,20 +87,20 @@ def _add_upload_route(router: APIRouter, store: PlanStore, site: SiteStore) -> N
         openapi_extra={"requestBody": {"required": True, "content": _binary(*_UPLOADED)}},
     )
     async def upload_plan_image(request: Request, query: Annotated[UploadQuery, Query()]) -> Response:
-        content = await request.body()
+        parts, content = site_of.parts(request), await request.body()
         try:
             media_type = file_type_of(content, request.headers.get("content-type", ""))
-            read = await reader.read(content, query.to_read(media_type, site))
+            read = await reader.read(content, query.to_read(media_type, parts.answers.site))
         except RefusedError as error:
             raise ProblemError(Kind.PLAN_IMAGE_REFUSED, str(error)) from error
         with saving():
-            image = await run_in_threadpool(store.add_image, read)
+            image = await run_in_threadpool(parts.plans.add_image, read)
         found = read.description
         uploaded = UploadedPlanImage(image=image, pages=found.pages, placement=found.placement, note=found.note)
         return json_response(uploaded.model_dump(), status=201)
 
 
-def _add_image_route(router: APIRouter, store: PlanStore) -> None:
+def _add_image_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/plan-images/{image}",
         operation_id="get_plan_image",
@@ -114,7 +115,9 @@ def _add_image_route(router: APIRouter, store: PlanStore) -> None:
         image: Annotated[
             str, Path(pattern="^[0-9a-f]{32}$", description="Id of the image.", examples=[examples.IMAGE["id"]])
         ],
+        request: Request,
     ) -> Response:
+        store = site_of.parts(request).plans
         known = store.image(image)
         content = None if known is None else _content(store, known)
         if known is None or content is None:

@@ -1,29 +1,29 @@
 """The routes for floor plans."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
 from dropanchor_schemas.plans import Plan, PlanList
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes import plan_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
-from dropanchor_service.plans.store import PlanStore
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 
-def plans_router(store: PlanStore) -> APIRouter:
+def plans_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["plans"], dependencies=[NO_QUERY])
-    add_item_routes(router, _plans(store))
+    add_item_routes(router, _plans(site_of))
     return router
 
 
-def _plans(store: PlanStore) -> Resource[Plan]:
-    def check_image(plan: Plan) -> None:
-        if store.image(plan.image.id) != plan.image:
+def _plans(site_of: SiteOfRequest) -> Resource[Plan]:
+    def check_image(plan: Plan, request: Request) -> None:
+        if site_of.parts(request).plans.image(plan.image.id) != plan.image:
             detail = "Upload the image with POST /api/v1/plan-images, and put `image` of the answer here."
             raise ProblemError(Kind.IMAGE_NOT_UPLOADED, detail)
 
     return Resource(
-        store,
+        lambda request: site_of.parts(request).plans,
         path="plans",
         name="plan",
         list_summary="List the floor plans",

@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Annotated, Any, BinaryIO
 
-from fastapi import APIRouter, Body, Path
+from fastapi import APIRouter, Body, Path, Request
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.recordings import RecordingList, RecordingRequest, RecordingState
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.recording.recorder import Recorder
 
 MEDIA_TYPE = "application/octet-stream"
@@ -25,16 +26,16 @@ FileName = Annotated[
 ]
 
 
-def recordings_router(recorder: Recorder | None) -> APIRouter:
+def recordings_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["recordings"], dependencies=[NO_QUERY])
-    _add_list_route(router, recorder)
-    _add_start_route(router, recorder)
-    _add_stop_route(router, recorder)
-    _add_download_route(router, recorder)
+    _add_list_route(router, site_of)
+    _add_start_route(router, site_of)
+    _add_stop_route(router, site_of)
+    _add_download_route(router, site_of)
     return router
 
 
-def _add_list_route(router: APIRouter, recorder: Recorder | None) -> None:
+def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/recordings",
         operation_id="list_recordings",
@@ -42,8 +43,8 @@ def _add_list_route(router: APIRouter, recorder: Recorder | None) -> None:
         response_model=RecordingList,
         responses=example_response(examples.RECORDINGS) | problems(Kind.NO_RECORDER, Kind.INVALID_REQUEST),
     )
-    def list_recordings() -> Response:
-        found = _required(recorder)
+    def list_recordings(request: Request) -> Response:
+        found = _required(site_of, request)
         files = [
             {"name": file.name, "bytes": file.size, "changed_ns": file.changed_ns, "finished": file.finished}
             for file in found.files()
@@ -51,7 +52,7 @@ def _add_list_route(router: APIRouter, recorder: Recorder | None) -> None:
         return json_response(_state(found) | {"files": files})
 
 
-def _add_start_route(router: APIRouter, recorder: Recorder | None) -> None:
+def _add_start_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.post(
         "/recordings",
         operation_id="start_recording",
@@ -63,18 +64,20 @@ def _add_start_route(router: APIRouter, recorder: Recorder | None) -> None:
             *(Kind.NO_RECORDER, Kind.RECORDS_ALREADY, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED)
         ),
     )
-    def start_recording(request: Annotated[RecordingRequest, Body(examples=[{"tags": None}])]) -> Response:
-        found = _required(recorder)
+    def start_recording(
+        wanted: Annotated[RecordingRequest, Body(examples=[{"tags": None}])], request: Request
+    ) -> Response:
+        found = _required(site_of, request)
         with saving():
             found.prepare()
-        if not found.start(request.tags):
+        if not found.start(wanted.tags):
             raise ProblemError(
                 Kind.RECORDS_ALREADY, "A recording is running. Stop it first with POST /api/v1/recordings/stop."
             )
         return json_response(_state(found), status=201)
 
 
-def _add_stop_route(router: APIRouter, recorder: Recorder | None) -> None:
+def _add_stop_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.post(
         "/recordings/stop",
         operation_id="stop_recording",
@@ -83,14 +86,14 @@ def _add_stop_route(router: APIRouter, recorder: Recorder | None) -> None:
         responses=example_response(examples.NO_RECORDING)
         | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
     )
-    def stop_recording() -> Response:
-        found = _required(recorder)
+    def stop_recording(request: Request) -> Response:
+        found = _required(site_of, request)
         if not found.stop():
             raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
         return json_response(_state(found))
 
 
-def _add_download_route(router: APIRouter, recorder: Recorder | None) -> None:
+def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/recordings/{name}",
         operation_id="get_recording",
@@ -98,8 +101,8 @@ def _add_download_route(router: APIRouter, recorder: Recorder | None) -> None:
         response_class=StreamingResponse,
         responses=_file() | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.INVALID_REQUEST),
     )
-    def get_recording(name: FileName) -> Response:
-        return _download(_opened(_required(recorder), name), name)
+    def get_recording(name: FileName, request: Request) -> Response:
+        return _download(_opened(_required(site_of, request), name), name)
 
 
 def _opened(recorder: Recorder, name: str) -> BinaryIO:
@@ -131,7 +134,8 @@ def _chunks(file: BinaryIO, size: int) -> Iterator[bytes]:
             yield chunk
 
 
-def _required(recorder: Recorder | None) -> Recorder:
+def _required(site_of: SiteOfRequest, request: Request) -> Recorder:
+    recorder = site_of.parts(request).recorder
     if recorder is None:
         raise ProblemError(Kind.NO_RECORDER, "Set `data_dir`, where the service stores recordings.")
     return recorder

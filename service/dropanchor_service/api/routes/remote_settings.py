@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Header
+from fastapi import APIRouter, Body, Header, Request
 from pydantic import ValidationError
 from starlette.responses import Response
 
@@ -14,6 +14,7 @@ from dropanchor_service.api.http.etags import etag_of, matches
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import NO_QUERY, TagId, example_response, json_response, saving
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.tags import remote_answer
 from dropanchor_service.store import Tag
 
@@ -30,14 +31,14 @@ _PATCH = {
 }
 
 
-def remote_settings_router(answers: Answers) -> APIRouter:
+def remote_settings_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
-    _add_get_route(router, answers)
-    _add_patch_route(router, answers)
+    _add_get_route(router, site_of)
+    _add_patch_route(router, site_of)
     return router
 
 
-def _add_get_route(router: APIRouter, answers: Answers) -> None:
+def _add_get_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/tags/{tag}/remote-settings",
         operation_id="get_remote_settings",
@@ -45,11 +46,12 @@ def _add_get_route(router: APIRouter, answers: Answers) -> None:
         response_model=RemoteSettingsStatus,
         responses=example_response(examples.REMOTE_SETTINGS) | problems(Kind.UNKNOWN_TAG, Kind.INVALID_REQUEST),
     )
-    async def get_remote_settings(tag: TagId) -> Response:
+    async def get_remote_settings(tag: TagId, request: Request) -> Response:
+        answers = site_of(request)
         return _response(answers, known_tag(answers, tag))
 
 
-def _add_patch_route(router: APIRouter, answers: Answers) -> None:
+def _add_patch_route(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.patch(
         "/tags/{tag}/remote-settings",
         operation_id="patch_remote_settings",
@@ -63,8 +65,12 @@ def _add_patch_route(router: APIRouter, answers: Answers) -> None:
         openapi_extra=_PATCH,
     )
     def patch_remote_settings(
-        tag: TagId, patch: Annotated[dict[str, Any], Body()], if_match: Annotated[str | None, Header()] = None
+        tag: TagId,
+        patch: Annotated[dict[str, Any], Body()],
+        request: Request,
+        if_match: Annotated[str | None, Header()] = None,
     ) -> Response:
+        answers = site_of(request)
         known = known_tag(answers, tag)
         _change(answers, known, patch, if_match)
         return _response(answers, known)

@@ -1,16 +1,20 @@
 """Find the site that a request is about: the one in its path, or the only one."""
 
-from typing import Annotated
+from collections.abc import Callable, Iterator, Sequence
+from threading import Lock
+from typing import Annotated, Generic, TypeVar
 
-from fastapi import Depends, Path, Request
+from fastapi import Depends, Path
+from starlette.requests import HTTPConnection
 
 from dropanchor_schemas.site import ID_SCHEMA
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes.parameters import id_of
+from dropanchor_service.api.routes.site_parts import SiteParts
 
 SITE_PREFIX = "/sites/{site}"
+T = TypeVar("T")
 
 
 async def _describe_site(
@@ -25,27 +29,63 @@ SITE_IN_PATH = Depends(_describe_site)
 
 
 class SiteOfRequest:
-    """Returns the answers of the site that a request is about."""
+    """Returns the answers of the site that a request is about, or with `parts` all that its routes work on."""
 
-    def __init__(self, sites: AnswersOfSites) -> None:
-        self.sites = sites
+    def __init__(self, parts: Sequence[SiteParts]) -> None:
+        self._parts = {one.id: one for one in parts}
+        self.only = parts[0] if len(parts) == 1 else None
 
-    def __call__(self, request: Request) -> Answers:
-        """Raises ProblemError for an unknown site, and without a site in the path when there are several."""
-        escaped = request.path_params.get("site")
-        if escaped is None:
+    def __len__(self) -> int:
+        return len(self._parts)
+
+    def __iter__(self) -> Iterator[SiteParts]:
+        return iter(self._parts.values())
+
+    def __call__(self, connection: HTTPConnection) -> Answers:
+        """Raises ProblemError; see `parts`."""
+        return self.parts(connection).answers
+
+    def parts(self, connection: HTTPConnection) -> SiteParts:
+        """Return the parts of the site in the path, or of that of a tag's key, or of the only one.
+
+        Raises ProblemError for an unknown site, and where nothing names one of several.
+        """
+        escaped = connection.path_params.get("site")
+        name = getattr(connection.state, "site", None) if escaped is None else id_of(escaped)
+        if name is None:
             return self._only()
-        name = id_of(escaped)
-        found = self.sites.find(name)
+        found = self._parts.get(name)
         if found is None:
             raise ProblemError(Kind.UNKNOWN_SITE, f"There is no site {name!r}. /api/v1/sites lists the sites.")
         return found
 
-    def _only(self) -> Answers:
-        if self.sites.only is None:
+    def of_site(self, site: str) -> SiteParts | None:
+        """Return the parts of the site with this id, or None."""
+        return self._parts.get(site)
+
+    def _only(self) -> SiteParts:
+        if self.only is None:
             raise ProblemError(
                 Kind.SEVERAL_SITES,
-                f"This service has {len(self.sites)} sites: name one, as in /api/v1/sites/SITE/poses. /api/v1/sites "
+                f"This service has {len(self)} sites: name one, as in /api/v1/sites/SITE/poses. /api/v1/sites "
                 "lists the sites.",
             )
-        return self.sites.only
+        return self.only
+
+
+class ForEachSite(Generic[T]):
+    """What a route keeps for each site, made when the first request needs it."""
+
+    def __init__(self, site_of: SiteOfRequest, make: Callable[[SiteParts], T]) -> None:
+        self._site_of = site_of
+        self._make = make
+        self._made: dict[str, T] = {}
+        self._lock = Lock()
+
+    def __call__(self, connection: HTTPConnection) -> T:
+        """Return that of the site of a request. Raises ProblemError; see `SiteOfRequest.parts`."""
+        parts = self._site_of.parts(connection)
+        with self._lock:
+            if parts.id not in self._made:
+                self._made[parts.id] = self._make(parts)
+            return self._made[parts.id]

@@ -10,7 +10,7 @@ from threading import Event
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from numpy.typing import NDArray
 from pydantic import Field
 from starlette.responses import Response, StreamingResponse
@@ -20,6 +20,7 @@ from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import PoseQuery
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 Array = NDArray[Any]  # POSE rows of the store
 
@@ -47,7 +48,7 @@ Versions = Callable[[], Sequence[int]]
 """Returns numbers of which one grows with every change of settings."""
 
 
-def stream_router(answers: Answers, stopping: Event, versions: Versions) -> APIRouter:
+def stream_router(site_of: SiteOfRequest, stopping: Event) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -58,8 +59,11 @@ def stream_router(answers: Answers, stopping: Event, versions: Versions) -> APIR
         response_class=StreamingResponse,
         responses=_event_stream() | problems(Kind.INVALID_REQUEST),
     )
-    async def stream_poses(query: Annotated[StreamQuery, Query()]) -> Response:
-        events = _events(Changes(answers, versions, query.tags, query.wanted), 1 / query.max_hz, stopping)
+    async def stream_poses(query: Annotated[StreamQuery, Query()], request: Request) -> Response:
+        parts = site_of.parts(request)
+        answers, plans = parts.answers, parts.plans
+        changes = Changes(answers, lambda: (answers.site.version, plans.version), query.tags, query.wanted)
+        events = _events(changes, 1 / query.max_hz, stopping)
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(events, media_type=MEDIA_TYPE, headers=headers)
 
@@ -114,7 +118,7 @@ class Changes:
 
     def _selected(self, poses: Array) -> Array:
         if not self._names:
-            return poses
+            return self._answers.tags.own(poses)
         rows = [tag.row for tag in map(self._answers.tags.find, self._names) if tag is not None]
         return poses[np.isin(poses["row"], rows)]
 

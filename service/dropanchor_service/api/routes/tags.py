@@ -1,6 +1,6 @@
 """The routes for tags: what they have sent, and their settings."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Query, Request
@@ -39,12 +39,11 @@ def tags_router(site_of: SiteOfRequest) -> APIRouter:
     return router
 
 
-def tag_router(site_of: SiteOfRequest, max_tags: Callable[[str], int]) -> APIRouter:
-    """max_tags: returns how many tags a site admits."""
+def tag_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["tags"], dependencies=[NO_QUERY])
     _add_newcomers_route(router, site_of)
     _add_status_route(router, site_of)
-    _add_settings_routes(router, site_of, max_tags)
+    _add_settings_routes(router, site_of)
     _add_delete_route(router, site_of)
     return router
 
@@ -97,7 +96,7 @@ def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         return json_response(_timed(next(_statuses(answers, [known], {known.row: offset}, now_ns))))
 
 
-def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest, max_tags: Callable[[str], int]) -> None:
+def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
     @router.get(
         "/tags/{tag}/settings",
         operation_id="get_tag_settings",
@@ -126,8 +125,9 @@ def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest, max_tags: Ca
         allows: Conditions,
         request: Request,
     ) -> Response:
-        answers = site_of(request)
-        register_tag(answers, tag, settings, max_tags(answers.site.site.id), allows)
+        parts = site_of.parts(request)
+        answers = parts.answers
+        register_tag(answers, tag, settings, parts.max_tags, allows)
         return resource_response(answers.site.tag_settings(tag))
 
 

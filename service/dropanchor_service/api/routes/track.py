@@ -17,6 +17,7 @@ from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 MAX_POSES = 10_000
 
@@ -37,7 +38,7 @@ class TrackQuery(Period):
     )
 
 
-def track_router(answers: Answers) -> APIRouter:
+def track_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -53,7 +54,7 @@ def track_router(answers: Answers) -> APIRouter:
         ),
     )
     def get_track(tag: TagId, query: Annotated[TrackQuery, Query()], request: Request) -> Response:
-        form = track_formats.negotiate(request, query.format)
+        answers, form = site_of(request), track_formats.negotiate(request, query.format)
         if form in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[form])
         from_ns, to_ns = limits_of(query, answers.now_ns())

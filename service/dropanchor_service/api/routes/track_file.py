@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from pydantic import Field
 from starlette.responses import StreamingResponse
 
@@ -17,6 +17,7 @@ from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 PAGE = 5000
 PARQUET = "parquet"
@@ -36,7 +37,7 @@ class FileQuery(Period):
     )
 
 
-def track_file_router(answers: Answers) -> APIRouter:
+def track_file_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -51,7 +52,8 @@ def track_file_router(answers: Answers) -> APIRouter:
             *(Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
         ),
     )
-    def export_track(tag: TagId, query: Annotated[FileQuery, Query()]) -> StreamingResponse:
+    def export_track(tag: TagId, query: Annotated[FileQuery, Query()], request: Request) -> StreamingResponse:
+        answers = site_of(request)
         if query.format in track_formats.GEOREFERENCED:
             geojson.require_georeference(answers, track_formats.GEOREFERENCED[query.format])
         to_parquet = _parquet() if query.format == PARQUET else None

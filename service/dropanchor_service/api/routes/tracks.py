@@ -3,17 +3,17 @@
 import sqlite3
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
 from dropanchor_schemas.tracks import Tracks
-from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.many_tracks import many_tracks
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.history.covering import TooMuchError
 
 _DESCRIPTION = """\
@@ -28,7 +28,7 @@ class TracksQuery(TagFilter, Period):
     max_points: int = Field(default=300, ge=2, le=5000, description="The maximum number of points of a tag.")
 
 
-def tracks_router(answers: Answers) -> APIRouter:
+def tracks_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["poses"])
 
     @router.get(
@@ -40,7 +40,8 @@ def tracks_router(answers: Answers) -> APIRouter:
         responses=example_response(examples.TRACKS)
         | problems(Kind.NO_HISTORY, Kind.INVALID_REQUEST, Kind.HISTORY_UNREADABLE),
     )
-    def get_tracks(query: Annotated[TracksQuery, Query()]) -> Response:
+    def get_tracks(query: Annotated[TracksQuery, Query()], request: Request) -> Response:
+        answers = site_of(request)
         from_ns, to_ns = limits_of(query, answers.now_ns())
         tracks = history_of(answers)
         try:

@@ -1,17 +1,17 @@
 """The route that tells how many tags are in each zone."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.zones import ZoneOccupancyList
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import event_examples as examples
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 
 
-def zone_occupancy_router(parts: EventParts) -> APIRouter:
+def zone_occupancy_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
 
     @router.get(
@@ -23,7 +23,8 @@ def zone_occupancy_router(parts: EventParts) -> APIRouter:
         response_model=ZoneOccupancyList,
         responses=example_response(examples.OCCUPANCY) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
     )
-    def get_zone_occupancy() -> Response:
+    def get_zone_occupancy(request: Request) -> Response:
+        parts = site_of.parts(request).zone_events
         with reading():
             counts = parts.store.occupancy()
         known = parts.items.zones.all

@@ -1,26 +1,26 @@
 """The routes for zones, and for rules without a zone."""
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
 from dropanchor_schemas.zones import EventRule, EventRuleList, Zone, ZoneList
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.item_routes import Resource, add_item_routes
 from dropanchor_service.api.routes.parameters import NO_QUERY
-from dropanchor_service.zones.items import ZoneItems
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
 
 
-def zones_router(items: ZoneItems) -> APIRouter:
+def zones_router(site_of: SiteOfRequest) -> APIRouter:
     router = APIRouter(tags=["zones"], dependencies=[NO_QUERY])
-    add_item_routes(router, _zones(items))
-    add_item_routes(router, _rules(items))
+    add_item_routes(router, _zones(site_of))
+    add_item_routes(router, _rules(site_of))
     return router
 
 
-def _zones(items: ZoneItems) -> Resource[Zone]:
+def _zones(site_of: SiteOfRequest) -> Resource[Zone]:
     return Resource(
-        items.zones,
+        lambda request: site_of.parts(request).zone_events.items.zones,
         path="zones",
         name="zone",
         list_summary="List the zones",
@@ -35,9 +35,9 @@ def _zones(items: ZoneItems) -> Resource[Zone]:
     )
 
 
-def _rules(items: ZoneItems) -> Resource[EventRule]:
+def _rules(site_of: SiteOfRequest) -> Resource[EventRule]:
     return Resource(
-        items.rules,
+        lambda request: site_of.parts(request).zone_events.items.rules,
         path="event-rules",
         name="rule",
         list_summary="List the rules without a zone",
@@ -48,7 +48,7 @@ def _rules(items: ZoneItems) -> Resource[EventRule]:
     )
 
 
-def _check_shape(zone: Zone) -> None:
+def _check_shape(zone: Zone, _: Request) -> None:
     try:
         vertices_of(zone.shape)
     except ShapeError as error:

@@ -15,8 +15,15 @@ const STARTING_MS = 1000;
 const PROBE_MS = 3000;
 const PROBE_TIMEOUT_MS = 4000;
 
-/** Return the URL of a path below the root of the service, wherever that is mounted. @param {string} path */
-export const api = (path) => new URL(`api/v1/${path}`, document.baseURI);
+/** The site that the page shows, of a service with several: `?site=` in its address; null: the only one. */
+export const chosenSite = new URLSearchParams(globalThis.location?.search ?? "").get("site");
+const SITE_PATH = chosenSite === null ? "" : `sites/${encodeURIComponent(chosenSite)}/`;
+
+/** Return the URL of a path of this site, wherever the service is mounted. @param {string} path */
+export const api = (path) => new URL(`api/v1/${SITE_PATH}${path}`, document.baseURI);
+
+/** The URL of the list of sites. */
+export const sitesUrl = () => new URL("api/v1/sites", document.baseURI);
 
 /** @param {URL} url @returns {Promise<any>} */
 export async function getJson(url) {
@@ -34,6 +41,8 @@ export class Connection extends EventTarget {
   status = "connecting";
   /** What the service does while it is starting. */
   progress = "";
+  /** Whether the site has what an only site has: zones, events, deliveries and share links. */
+  hasEvents = true;
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;
   /** For tests and the console: number of frames so far, and the time that the last one took. */
@@ -77,6 +86,7 @@ export class Connection extends EventTarget {
   /** @param {AbortSignal} signal */
   async #follow(signal) {
     try {
+      if (chosenSite !== null) this.hasEvents = (await getJson(api("access"))).events !== false;
       const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal });
       this.#opened();
       for await (const { name, data } of eventsOf(response)) {

@@ -5,7 +5,7 @@ import { Basemap } from "../basemap/basemap.js";
 import { CareChip } from "../panel/care.js";
 import { Choice } from "./choice.js";
 import { StateChips } from "../panel/chips.js";
-import { Connection } from "../data/connection.js";
+import { chosenSite, Connection } from "../data/connection.js";
 import { Detail } from "../panel/detail.js";
 import { Evidence } from "../data/evidence.js";
 import { Fleet } from "../data/fleet.js";
@@ -111,6 +111,7 @@ connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(fr
 connection.addEventListener("settings", () => roster.refresh());
 roster.addEventListener("removed", () => connection.retry());
 connection.addEventListener("status", () => {
+  byId("zones").hidden = !connection.hasEvents;
   if (connection.status === "live" || past.active) return;
   fleet.current = false;
   byId("spoken").textContent = "";
@@ -175,10 +176,11 @@ const share = new SharePanel(byId("share"), choice);
 byId("options").addEventListener("click", () => {
   byId("link").textContent = location.href;
   /** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location);
-  share.open();
+  if (connection.hasEvents) share.open();
 });
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);
+if (chosenSite !== null) import("./site_chooser.js").then(({ installSites }) => installSites(byId("sites"), byId("site")));
 setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();

@@ -1,48 +1,22 @@
 """Each site has its routes below /sites; the routes without a site are those of the only one."""
 
-import numpy as np
-from fastapi import FastAPI
-from prometheus_client import CollectorRegistry
+import json
+from threading import Event
+
+import httpx
 
 from dropanchor_schemas import Anchor
 from dropanchor_schemas.answers import SiteList
-from dropanchor_service.answers.answers import Answers
-from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.api.http.access import required_scope
-from dropanchor_service.api.several_sites import create_app_of_sites
-from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
 from dropanchor_service.security.identity import Scope
-from dropanchor_service.settings.model import HttpSettings
-from dropanchor_service.store import LatestPoses, Sites
 from support.api import ask, kind_of, make_api_bench
-from support.sites import make_sites
-
-T = 1_800_000_000_000_000_000
-
-
-def app_of(sites: Sites) -> FastAPI:
-    """Return the application of these sites. The tag "cart" of each site stands at x = 1, 2, …"""
-    latest = LatestPoses()
-    poses = np.zeros(len(sites), POSE)
-    for site in sites:
-        site.store.set_anchor(Anchor(id="7"))
-        poses[site.index]["row"] = site.tags.register("cart").row
-        poses[site.index]["x"] = site.index + 1
-    poses["t_ns"], poses["state"], poses["anchor"] = T, State.TRACKING, 0
-    latest.write(poses, np.empty(0, HYPOTHESIS))
-    return create_app_of_sites(
-        AnswersOfSites([Answers(site.store, site.tags, latest, now_ns=lambda: T) for site in sites]),
-        ready=lambda: (True, []),
-        impaired=list,
-        registry=CollectorRegistry(),
-        max_tags=lambda site: 1 if site == "full" else 10,
-        settings=HttpSettings(),
-    )
+from support.http_server import running_server
+from support.sites import T_NS, app_of_sites, make_sites
 
 
 def test_poses_tags_and_anchors_are_those_of_the_site_in_the_path() -> None:
     sites = make_sites("north", "Lager Süd")
-    app = app_of(sites)
+    app = app_of_sites(sites)
     sites[1].store.set_anchor(Anchor(id="9"))
     for path, x, anchors in (("north", 1.0, ["7"]), ("Lager%20S%C3%BCd", 2.0, ["7", "9"])):
         base = f"/api/v1/sites/{path}"
@@ -56,7 +30,7 @@ def test_poses_tags_and_anchors_are_those_of_the_site_in_the_path() -> None:
 
 def test_a_change_in_one_site_leaves_the_other_as_it_was() -> None:
     sites = make_sites("a", "full")
-    app = app_of(sites)
+    app = app_of_sites(sites)
     assert ask(app, "PUT", "/api/v1/sites/a/anchors/7", json={"id": "7", "x": 4.0}).status_code == 200
     assert ask(app, "PUT", "/api/v1/sites/a/tags/lift/settings", json={"height_m": 2.0}).status_code == 200
     assert kind_of(ask(app, "PUT", "/api/v1/sites/full/tags/lift/settings", json={})) == "tags-full"
@@ -69,7 +43,7 @@ def test_a_change_in_one_site_leaves_the_other_as_it_was() -> None:
 
 def test_all_sites_are_listed_with_how_many_tags_they_have() -> None:
     sites = make_sites("a", "b")
-    app = app_of(sites)
+    app = app_of_sites(sites)
     sites[1].tags.presence.set_token("cart", True)
     sites[1].tags.register("lift")
     listed = SiteList.model_validate(ask(app, "GET", "/api/v1/sites").json()).sites
@@ -77,19 +51,40 @@ def test_all_sites_are_listed_with_how_many_tags_they_have() -> None:
 
 
 def test_with_several_sites_a_path_without_one_is_refused_with_a_sentence() -> None:
-    app = app_of(make_sites("a", "b"))
+    app = app_of_sites(make_sites("a", "b"))
     for method, path in (
         ("GET", "/api/v1/poses"),
         ("GET", "/api/v1/stream"),
-        ("POST", "/api/v1/ingest/samples"),
+        ("GET", "/api/v1/recordings"),
         ("PUT", "/api/v1/zones/1"),
-        ("GET", "/"),
     ):
         refused = ask(app, method, path)
         assert kind_of(refused) == "several-sites"
         assert refused.json()["detail"].startswith(f"{path} is for one site so far, and this service has 2.")
     assert kind_of(ask(app, "GET", "/api/v1/sites/c/poses")) == "unknown-site"
+    assert kind_of(ask(app, "POST", "/api/v1/ingest/samples?tag=cart", json={})) == "several-sites"
     assert ask(app, "GET", "/api/v1/health/live").status_code == 200
+
+
+def test_the_page_needs_a_site_in_its_address_and_leads_to_the_overview_without_one() -> None:
+    app = app_of_sites(make_sites("a", "b"))
+    without = ask(app, "GET", "/")
+    assert (without.status_code, without.headers["location"]) == (307, "sites/")
+    assert 'src="page.js"' in ask(app, "GET", "/sites/").text
+    assert 'src="page/main.js"' in ask(app, "GET", "/?site=a").text
+
+
+def test_the_list_of_sites_counts_states_and_tags_that_need_a_person() -> None:
+    sites = make_sites("a", "b")
+    app = app_of_sites(sites)
+    sites[0].tags.register("lift")
+    row = sites[1].tags.register("low").row
+    sites[1].health.record(row, {"battery_fraction": 0.1}, T_NS)
+    listed = SiteList.model_validate(ask(app, "GET", "/api/v1/sites").json()).sites
+    assert [(site.tags, site.states, site.needs_care) for site in listed] == [
+        (2, {"tracking": 1}, 0),
+        (2, {"tracking": 1}, 1),
+    ]
 
 
 def test_an_only_site_has_both_paths() -> None:
@@ -108,3 +103,17 @@ def test_the_same_changes_need_the_same_scope_with_and_without_a_site_in_the_pat
         assert required_scope("PUT", f"{prefix}/anchors/1") is Scope.WRITE
         assert required_scope("DELETE", f"{prefix}/tags/a") is Scope.ADMIN
         assert required_scope("GET", f"{prefix}/poses") is Scope.READ
+
+
+def test_the_stream_of_a_site_holds_its_tags_alone_whatever_it_asks_for() -> None:
+    sites, stopping = make_sites("a", "b"), Event()
+    app = app_of_sites(sites, stopping=stopping)
+    with running_server(app, stopping) as port:
+        for site, x in (("a", 1.0), ("b", 2.0)):
+            for query in ("", "?tags=cart", "?group=", "?box=0,-1,9,1"):
+                url = f"http://127.0.0.1:{port}/api/v1/sites/{site}/stream{query}"
+                with httpx.stream("GET", url, timeout=20.0, trust_env=False) as stream:
+                    lines = stream.iter_lines()
+                    assert next(lines) == "event: snapshot"
+                    frame = json.loads(next(lines).removeprefix("data: "))
+                assert (frame["tags"], frame["x"]) == (["cart"], [x]), (site, query)

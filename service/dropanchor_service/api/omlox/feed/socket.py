@@ -26,7 +26,7 @@ from dropanchor_service.api.omlox.feed.topics import Feed, feed_of
 from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.routes.providers import TAKES_NO_POSITIONS
 from dropanchor_service.api.routes.stream import stopped_within
-from dropanchor_service.security.identity import Authenticator, Identity, Scope, UnauthenticatedError
+from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 
 PERIOD_S = 0.1
 PAUSE_PER_WORK = 3.0  # so a connection takes at most a quarter of a core
@@ -149,7 +149,7 @@ class Connection:
             identity = await identify(authenticator, secret)
         except UnauthenticatedError as error:
             raise FeedError(Code.NOT_AUTHENTICATED, f"Authentication failed: {error}. {_AUTHENTICATE}") from error
-        if identity.scope is None or identity.scope < Scope.READ:
+        if identity.scope_in(self._hub.answers.site.site.id) is None:
             raise FeedError(Code.NOT_AUTHORIZED, "Subscribing needs a key with the scope read.")
         if identity.limit is not None:
             raise FeedError(Code.NOT_AUTHORIZED, "This share link shows its tags and nothing else.")

@@ -1,0 +1,102 @@
+"""The routes that each site has, below its id, and an only site also without it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Event
+
+from fastapi import APIRouter
+
+from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.routes.access import access_router
+from dropanchor_service.api.routes.basemap import basemap_router
+from dropanchor_service.api.routes.connect import connect_router
+from dropanchor_service.api.routes.destinations import destinations_router
+from dropanchor_service.api.routes.events import events_router
+from dropanchor_service.api.routes.figures import figures_router
+from dropanchor_service.api.routes.heat_map import heat_map_router
+from dropanchor_service.api.routes.history import history_router
+from dropanchor_service.api.routes.ingest import ingest_router
+from dropanchor_service.api.routes.ingest_health import ingest_health_router
+from dropanchor_service.api.routes.ingest_phyphox import ingest_phyphox_router
+from dropanchor_service.api.routes.ingest_stream import ingest_stream_router
+from dropanchor_service.api.routes.plan_images import plan_images_router
+from dropanchor_service.api.routes.plans import plans_router
+from dropanchor_service.api.routes.poses import poses_router
+from dropanchor_service.api.routes.recordings import recordings_router
+from dropanchor_service.api.routes.remote_settings import remote_settings_router
+from dropanchor_service.api.routes.site import site_router
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.stream import stream_router
+from dropanchor_service.api.routes.tags import tag_router, tags_router
+from dropanchor_service.api.routes.track import track_router
+from dropanchor_service.api.routes.track_file import track_file_router
+from dropanchor_service.api.routes.tracks import tracks_router
+from dropanchor_service.api.routes.zone_occupancy import zone_occupancy_router
+from dropanchor_service.api.routes.zones import zones_router
+from dropanchor_service.basemap.basemap import ServedBasemap
+from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.security.identity import Authenticator
+
+
+@dataclass(frozen=True)
+class SharedParts:
+    """What the routes of all sites share.
+
+    stopping: ends the streams when set. endpoints: those of the Zenoh router, as configured. credentials: those of the
+    tags; None when they need none. authenticator: None when every client may do everything. rate_limiter: limits the
+    requests of each client; None for no limit. cors_origins: of other web pages that may use the interface. basemap:
+    None when there is none.
+    """
+
+    stopping: Event
+    endpoints: tuple[str, ...] = ()
+    credentials: SecurityFolder | None = None
+    authenticator: Authenticator | None = None
+    rate_limiter: RateLimiter | None = None
+    cors_origins: Sequence[str] = ()
+    basemap: ServedBasemap | None = None
+
+
+def ingest_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter, ...]:
+    """Return the routes that take samples. The key of a tag says of which site it is."""
+    return (
+        ingest_router(site_of),
+        ingest_phyphox_router(site_of),
+        ingest_health_router(site_of),
+        ingest_stream_router(site_of, shared.stopping, shared.authenticator, shared.rate_limiter),
+    )
+
+
+def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter, ...]:
+    """Return the routes of the site that `site_of` finds."""
+    return (
+        poses_router(site_of),
+        tags_router(site_of),
+        tag_router(site_of),
+        site_router(site_of),
+        remote_settings_router(site_of),
+        track_router(site_of),
+        track_file_router(site_of),
+        tracks_router(site_of),
+        heat_map_router(site_of),
+        history_router(site_of),
+        stream_router(site_of, shared.stopping),
+        access_router(site_of),
+        connect_router(site_of, shared.endpoints, shared.credentials),
+        *ingest_routers(site_of, shared),
+        recordings_router(site_of),
+        plans_router(site_of),
+        plan_images_router(site_of),
+        basemap_router(shared.basemap),
+    )
+
+
+def event_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter, ...]:
+    """Return the routes of zones, events and their delivery, and the figures that tell the time in zones."""
+    return (
+        figures_router(site_of),
+        zones_router(site_of),
+        zone_occupancy_router(site_of),
+        events_router(site_of, shared.stopping),
+        destinations_router(site_of),
+    )

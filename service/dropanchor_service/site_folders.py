@@ -1,0 +1,74 @@
+"""What several sites have on disk: each its floor plans, history and recordings, and all the base map."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from typing import Self
+
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.ingest.observers import Observers
+from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.persistence import Persistence, open_basemap, settings_of_site
+from dropanchor_service.settings.model import Settings
+from dropanchor_service.store import Sites
+
+
+class SiteFolders:
+    """The `Persistence` of each site, in the order of their indices. They write while this context is open.
+
+    Creating it raises SettingsError.
+    """
+
+    def __init__(self, settings: Settings, sites: Sites, now_ns: Callable[[], int], metrics: Metrics) -> None:
+        self._sites = sites
+        self._opened = ExitStack()
+        self.all = [
+            Persistence(settings_of_site(settings, site.id), site.tags, site.store, now_ns, None) for site in sites
+        ]
+        self.basemap = open_basemap(settings, [site.store for site in sites])
+        if tracks := [one.tracks for one in self.all if one.tracks is not None]:
+            metrics.register(HistoryMetrics(*tracks))
+        if recorders := [one.recorder for one in self.all if one.recorder is not None]:
+            metrics.register(RecordingMetrics(*recorders))
+
+    def __enter__(self) -> Self:
+        with self._opened:
+            if self.basemap is not None:
+                self._opened.callback(self.basemap.file.close)
+            for one in self.all:
+                self._opened.enter_context(one)
+            self._opened = self._opened.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+    def problems(self) -> Sequence[str]:
+        """Return what cannot be written or read, with the name of its site."""
+        found = zip(self._sites, self.all, strict=True)
+        return [f"site {site.id}: {problem}" for site, one in found for problem in one.problems()]
+
+    @property
+    def observers(self) -> Observers:
+        """The observers that pass messages and poses of the ingest to the site that they are of."""
+        to_sites = [one.observers for one in self.all]
+        has_history = any(one.tracks is not None for one in self.all)
+
+        def on_messages(messages: Sequence[tuple[int, bytes, str, int]]) -> None:
+            if not self._records():
+                return
+            of_sites: dict[int, list[tuple[int, bytes, str, int]]] = {}
+            for message in messages:
+                of_sites.setdefault(self._sites.rows.at(message[0]).site, []).append(message)
+            for site, of_site in of_sites.items():
+                to_sites[site].messages(of_site)
+
+        def on_poses(poses: Array) -> None:
+            if has_history or self._records():
+                for site, of_site in self._sites.rows.by_site(poses):
+                    to_sites[site].poses(of_site)
+
+        return Observers(on_messages, on_poses)
+
+    def _records(self) -> bool:
+        return any(one.recorder is not None and one.recorder.running is not None for one in self.all)
