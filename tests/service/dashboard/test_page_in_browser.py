@@ -97,6 +97,7 @@ def test_an_ambiguous_tag_is_shown_at_all_its_possible_positions(chromium: Brows
     ambiguous(place, "cart", (0.6, 3.0, 4.0), (0.4, 3.0, -4.0))
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         page.page.locator("tr[data-tag='cart']").click()
+        page.page.locator("#detail li").first.wait_for()
         texts = page.page.locator("#detail li").all_inner_texts()
         assert [text.split() for text in texts] == [["3.0,", "4.0", "m", "60", "%"], ["3.0,", "−4.0", "m", "40", "%"]]
         page.page.locator("[data-part='hint']", has_text="Walk a few metres").wait_for()
