@@ -111,7 +111,7 @@ connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(fr
 connection.addEventListener("settings", () => roster.refresh());
 roster.addEventListener("removed", () => connection.retry());
 connection.addEventListener("status", () => {
-  byId("zones").hidden = !connection.hasEvents;
+  byId("zones").hidden = past.bar.figuresButton.hidden = !connection.hasEvents;
   if (connection.status === "live" || past.active) return;
   fleet.current = false;
   byId("spoken").textContent = "";
