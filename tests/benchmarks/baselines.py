@@ -10,7 +10,7 @@ from benchmarks.motion import MESSAGE_S, SAMPLES_PER_MESSAGE, STEP_NS, Track, me
 from dropanchor_schemas.site import StartPose, TagSettings
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, decode_packed
 from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.estimation.columns import ANCHOR, RANGE, SampleBatch
+from dropanchor_service.estimation.columns import ANCHOR, IMU, RANGE, SampleBatch
 from dropanchor_service.ingest.decode import decode
 from dropanchor_service.settings.engine_columns import tag_columns
 from dropanchor_service.settings.sources import load_settings
@@ -60,7 +60,11 @@ def _columns(motions: list[Track], tags: int, sequence: int) -> SampleBatch:
     ranges = np.zeros(len(decoded.ranges), RANGE)
     ranges["row"], ranges["t_ns"] = decoded.ranges["message"], decoded.ranges["t_ns"]
     ranges["range"], ranges["std"] = decoded.ranges["value"], decoded.ranges["std"]
-    return SampleBatch(imu=decoded.imu, ranges=ranges)
+    imu = np.zeros(len(decoded.imu), IMU)
+    imu["row"] = decoded.imu["message"]
+    for name in ("t_ns", "acc", "gyro", "mag"):
+        imu[name] = decoded.imu[name]
+    return SampleBatch(imu=imu, ranges=ranges)
 
 
 def _ekf(track: Track) -> Any:
