@@ -2,6 +2,8 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from dropanchor_schemas.tracks import TagSummary
+
 
 class _Answer(BaseModel):
     model_config = ConfigDict(frozen=True)
@@ -25,17 +27,9 @@ class TimeInZone(_Answer):
     stays: int = Field(description="How often the tag was inside; a stay that began earlier or goes on counts, too.")
 
 
-class TagFigures(_Answer):
+class TagFigures(TagSummary):
     """The figures of a tag over the period."""
 
-    tag: str
-    poses: int = Field(description="Stored poses in the period.")
-    tracked_s: float = Field(description="How long the tag was `tracking` in the frame of the site.")
-    distance_m: float = Field(
-        description="Length of the way while tracking. A tag that is slower than 0.1 m/s counts as standing."
-    )
-    mean_speed_mps: float | None = Field(description="Distance by tracked time; null if the tag was never tracking.")
-    max_speed_mps: float | None = Field(description="Of the stored poses that were tracking.")
     zones: list[TimeInZone] = Field(description="The zones that the tag was in, ordered by id.")
 
 

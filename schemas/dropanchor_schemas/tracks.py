@@ -41,8 +41,8 @@ class TrackPoints(_Answer):
     )
 
 
-class TagTrack(_Answer):
-    """The track of a tag over the period."""
+class TagSummary(_Answer):
+    """How far and how fast a tag went over the period."""
 
     tag: str
     poses: int = Field(description="Stored poses in the period.")
@@ -52,6 +52,11 @@ class TagTrack(_Answer):
     )
     mean_speed_mps: float | None = Field(description="Distance by tracked time; null if the tag was never tracking.")
     max_speed_mps: float | None = Field(description="Of the stored poses that were tracking.")
+
+
+class TagTrack(TagSummary):
+    """The track of a tag over the period."""
+
     points: TrackPoints
 
 
