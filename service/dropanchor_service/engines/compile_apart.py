@@ -14,11 +14,11 @@ _log = logging.getLogger(__name__)
 
 
 def compile_apart(progress: CompilationProgress) -> None:
-    """Fill the cache of the kernels with `dropanchor compile`, unless it is full.
+    """Fill the cache of the kernels with `dropanchor compile`, unless it is full or cannot be written.
 
     When this fails, the caller compiles what is missing: more memory, but no harm. An exception ends the process, too.
     """
-    if (mark := _mark()) is None or mark.exists():
+    if (mark := _mark()) is None or mark.exists() or not _is_writable(mark.parent):
         return
     shown = f"; {progress.page} shows the progress" if progress.page else ""
     progress.begin("the estimator, which takes about a minute")
@@ -43,6 +43,14 @@ def mark_complete() -> None:
     """Note in the cache that all kernels are compiled for this processor."""
     if (mark := _mark()) is not None:
         mark.touch()
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
 
 
 def _mark() -> Path | None:

@@ -45,8 +45,16 @@ def test_a_failure_leaves_the_compiling_to_the_caller(
     cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     caplog.set_level(logging.DEBUG)
-    monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setattr("sys.executable", shutil.which("false"))
     compile_apart(CompilationProgress())
     assert list(cache.glob("complete-*")) == []
     assert not any("compiled in" in message for message in caplog.messages)
+
+
+def test_a_cache_that_cannot_be_written_is_not_filled(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "file" / "cache"))
+    compile_apart(CompilationProgress())
+    assert caplog.messages == []
