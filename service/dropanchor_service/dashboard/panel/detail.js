@@ -140,23 +140,26 @@ export class Detail {
     const ghosts = this.fleet.state[row] === AMBIGUOUS ? (this.fleet.value.hypotheses[row] ?? []) : [];
     list.hidden = ghosts.length === 0;
     const likely = [...ghosts].sort((a, b) => b.weight - a.weight).slice(0, 6);
-    list.replaceChildren(...likely.map(hypothesisLine));
+    while (list.childElementCount > likely.length) list.lastElementChild?.remove();
+    while (list.childElementCount < likely.length) list.append(hypothesisLine());
+    likely.forEach((ghost, i) => putHypothesis(list.children[i], ghost));
   }
 }
 
-/** @param {import("../data/fleet.js").Hypothesis} ghost */
-function hypothesisLine(ghost) {
+function hypothesisLine() {
   const line = document.createElement("li");
   const bar = document.createElement("meter");
-  bar.max = 1;
-  bar.value = ghost.weight;
   bar.setAttribute("aria-label", t("tag.hypothesis"));
-  const where = document.createElement("span");
-  where.textContent = place(ghost.x, ghost.y, 1);
-  const weight = document.createElement("span");
-  weight.textContent = percent(ghost.weight);
-  line.append(where, bar, weight);
+  line.append(document.createElement("span"), bar, document.createElement("span"));
   return line;
+}
+
+/** @param {Element} line @param {import("../data/fleet.js").Hypothesis} ghost */
+function putHypothesis(line, ghost) {
+  const [where, bar, weight] = /** @type {[HTMLElement, HTMLMeterElement, HTMLElement]} */ ([...line.children]);
+  put(where, place(ghost.x, ghost.y, 1));
+  bar.value = ghost.weight;
+  put(weight, percent(ghost.weight));
 }
 
 /** @param {HTMLElement} list @param {string} title @param {Record<string, number> | undefined} byName */
