@@ -98,11 +98,11 @@ def test_a_broker_that_restarts_gets_everything(tmp_path: Path) -> None:
             broker.stop()
             for _ in range(5):
                 bench.happen("a", "b")
-            wait_until(lambda: bench.thread.problem_of("mes") is not None)
+            wait_until(lambda: bench.thread.problem_of(0, "mes") is not None)
             assert bench.counts() == (10, 0)
             broker.start()
             wait_until(lambda: bench.counts() == (0, 0))
-            assert bench.thread.problem_of("mes") is None
+            assert bench.thread.problem_of(0, "mes") is None
 
 
 def test_a_broker_without_the_right_to_publish_makes_dead_letters(tmp_path: Path) -> None:
@@ -121,7 +121,7 @@ def test_a_wrong_password_is_said_and_mended_without_a_restart(tmp_path: Path) -
         put(bench)
         with bench.thread:
             bench.happen("a")
-            wait_until(lambda: "refuses the connection" in (bench.thread.problem_of("mes") or ""))
+            wait_until(lambda: "refuses the connection" in (bench.thread.problem_of(0, "mes") or ""))
             (tmp_path / "password").write_text("yard")
             wait_until(lambda: bench.counts() == (0, 0))
 
@@ -136,5 +136,5 @@ def test_a_broker_whose_certificate_is_not_trusted_gets_nothing(tmp_path: Path) 
         put(bench)
         with bench.thread:
             bench.happen("a")
-            wait_until(lambda: "certificate" in (bench.thread.problem_of("mes") or "").lower())
+            wait_until(lambda: "certificate" in (bench.thread.problem_of(0, "mes") or "").lower())
             assert bench.counts() == (1, 0)
