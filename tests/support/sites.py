@@ -34,18 +34,20 @@ def app_of_sites(
     authenticator: Authenticator | None = None,
     received: list[tuple[str, str, bytes, str]] | None = None,
     stopping: Event | None = None,
+    latest: LatestPoses | None = None,
 ) -> FastAPI:
     """Return the application of these sites. The tag "cart" of each site stands at x = 1, 2, …
 
-    received: gets the samples and the health that come over HTTP: site, tag, payload, encoding.
+    received: gets the samples and the health that come over HTTP: site, tag, payload, encoding. latest: where the
+    poses are.
     """
-    latest, came = LatestPoses(), [] if received is None else received
+    latest, came = latest or LatestPoses(), [] if received is None else received
     poses = np.zeros(len(sites), POSE)
     for site in sites:
         site.store.set_anchor(Anchor(id="7"))
         poses[site.index]["row"] = site.tags.register("cart").row
         poses[site.index]["x"] = site.index + 1
-    poses["t_ns"], poses["state"], poses["anchor"] = T_NS, State.TRACKING, 0
+    poses["t_ns"], poses["state"], poses["anchor"], poses["p_mode"] = T_NS, State.TRACKING, 0, 1.0
     latest.write(poses, np.empty(0, HYPOTHESIS))
 
     def take(site: str, tag: str, payload: bytes, encoding: str) -> None:

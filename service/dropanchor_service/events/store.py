@@ -126,12 +126,16 @@ class EventStore:
 
     def after(self, sequence: int, limit: int, selection: Selection = EVERYTHING) -> list[StoredEvent]:
         """Return up to `limit` selected events that follow this sequence, in order."""
+        if not self.database.is_made:
+            return []
         where, values = selection.where()
         sql = f"SELECT sequence, body FROM events WHERE {where} ORDER BY sequence LIMIT ?"
         return [StoredEvent(*row) for row in self.database.rows(sql, sequence, *values, limit)]
 
     def last(self, limit: int, selection: Selection = EVERYTHING) -> list[StoredEvent]:
         """Return the newest selected events, at most `limit`, in order."""
+        if not self.database.is_made:
+            return []
         where, values = selection.where()
         sql = f"SELECT sequence, body FROM events WHERE {where} ORDER BY sequence DESC LIMIT ?"
         return [StoredEvent(*row) for row in reversed(self.database.rows(sql, 0, *values, limit))]

@@ -67,7 +67,7 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
     return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
 
 
-def authenticator_of(settings: Settings, only_site: str | None) -> Authenticator | None:
+def authenticator_of(settings: Settings, only_site: str | None = None) -> Authenticator | None:
     """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError.
 
     only_site: its id; None: there are several.

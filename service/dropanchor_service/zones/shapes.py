@@ -77,6 +77,9 @@ def joined(tables: Sequence[Zones]) -> Zones:
     return Zones(
         np.concatenate([table.vertices for table in tables]),
         np.concatenate([*firsts, corners[-1:]]),
-        *(np.concatenate(columns) for columns in list(zip(*tables, strict=True))[2:-1]),
+        np.concatenate([table.boxes for table in tables]),
+        np.concatenate([table.delay_ns for table in tables]),
+        np.concatenate([table.dwell_ns for table in tables]),
+        np.concatenate([table.speed for table in tables]),
         np.cumsum([0, *(len(table.boxes) for table in tables)]),
     )
