@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 from urllib.parse import quote
 
 from dropanchor_service.api.routes.event_parts import EventParts
-from dropanchor_service.delivery.channels import Channels, TlsContexts
+from dropanchor_service.delivery.channels import Channels, SharedWays
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.registry import addressees, open_destinations
 from dropanchor_service.delivery.thread import DeliveryThread, Outbox
@@ -48,8 +48,8 @@ class ZoneEvents:
         """Raises SettingsError when a file in the data folder cannot be read."""
         self._closing = ExitStack()
         self._sites = sites
-        tls = _tls(settings)
-        opened = [self._open(settings, site, tls, several=len(sites) > 1) for site in sites]
+        shared = _shared_ways(settings)
+        opened = [self._open(settings, site, shared, several=len(sites) > 1) for site in sites]
         outboxes = [one.outbox for one in opened]
         self.stores = [outbox.store for outbox in outboxes]
         patience = Patience(settings.delivery.retry_s, round(settings.delivery.give_up_hours * 3600e9))
@@ -74,7 +74,7 @@ class ZoneEvents:
         ]
         metrics.register(EventMetrics(self._events, outboxes, self._delivery, now_ns))
 
-    def _open(self, settings: Settings, site: ServedSite, tls: TlsContexts, several: bool) -> _Opened:
+    def _open(self, settings: Settings, site: ServedSite, shared: SharedWays, several: bool) -> _Opened:
         folder = settings_of(settings, site.id).data_dir
         try:
             items, destinations = ZoneItems.opened(folder), open_destinations(folder)
@@ -85,7 +85,7 @@ class ZoneEvents:
         except (OSError, ValueError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
         delivery = _with_page_of(settings.delivery, site.id) if several else settings.delivery
-        channels = Channels(delivery, settings.email, settings.mqtt, partial(_name_of, site.store), tls)
+        channels = Channels(delivery, settings.email, settings.mqtt, partial(_name_of, site.store), shared)
         return _Opened(items, Outbox(destinations, store, Deliveries(database), channels), watched)
 
     def __enter__(self) -> Self:
@@ -104,11 +104,11 @@ class ZoneEvents:
         return [f"site {self._sites[index].id}: {problem}" for index, problem in found]
 
 
-def _tls(settings: Settings) -> TlsContexts:
-    """Return the contexts of all sites. Raises SettingsError."""
+def _shared_ways(settings: Settings) -> SharedWays:
+    """Return what the sites share. Raises SettingsError."""
     authorities = settings.delivery.authorities
     try:
-        return TlsContexts(authorities)
+        return SharedWays(authorities)
     except OSError as error:
         raise SettingsError(f"delivery.authorities: {authorities} cannot be read: {error}") from error
 

@@ -5,6 +5,7 @@ import ssl
 from contextlib import AbstractAsyncContextManager
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
 from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
@@ -15,11 +16,15 @@ from dropanchor_service.delivery.signature import SecretError, key_of
 from dropanchor_service.delivery.webhook import open_webhook
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 
+if TYPE_CHECKING:
+    from dropanchor_service.delivery.mqtt import Brokers
 
-class TlsContexts:
-    """What all sites share, since a context takes some 20 ms and memory: only types in use have one.
 
-    A library may change its context, so each type has its own.
+class SharedWays:
+    """What all sites share: TLS contexts and the connections to the MQTT broker.
+
+    A context takes some 20 ms and memory, so only types in use have one. A library may change it, so each type has its
+    own.
     """
 
     def __init__(self, authorities: Path | None) -> None:
@@ -40,6 +45,12 @@ class TlsContexts:
     def mqtt(self) -> ssl.SSLContext:
         return tls_context(self._authorities)
 
+    @cached_property
+    def brokers(self) -> "Brokers":
+        from dropanchor_service.delivery.mqtt import Brokers  # an extra
+
+        return Brokers()
+
 
 class Channels:
     """The ways to the destinations of one site, as the settings want them."""
@@ -50,28 +61,29 @@ class Channels:
         email: EmailSettings,
         mqtt: MqttSettings,
         name_of: NameOf = str,
-        tls: TlsContexts | None = None,
+        shared: SharedWays | None = None,
     ) -> None:
-        """name_of: by default, the id of the tag. tls: of all sites. Raises OSError; see `TlsContexts`."""
+        """name_of: by default, the id of the tag. shared: by all sites. Raises OSError; see `SharedWays`."""
         self._delivery = delivery
         self._email = email
         self._mqtt = mqtt
         self._name_of = name_of
-        self._tls = tls or TlsContexts(delivery.authorities)
+        self._shared = shared or SharedWays(delivery.authorities)
 
     def open(self, destination: Destination) -> AbstractAsyncContextManager[Channel]:
         """Return the way to a destination as a context. It must have passed `check_settings`."""
         timeout_s = self._delivery.timeout_s
         match destination:
             case WebhookDestination():
-                return open_webhook(destination, self._tls.webhook, timeout_s, self._delivery.allow_networks)
+                return open_webhook(destination, self._shared.webhook, timeout_s, self._delivery.allow_networks)
             case EmailDestination():
                 page = self._delivery.page
-                return open_mail(destination, self._email, self._tls.email, timeout_s, page, self._name_of)
+                return open_mail(destination, self._email, self._shared.email, timeout_s, page, self._name_of)
             case MqttDestination():
                 from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
 
-                return open_mqtt(destination, self._mqtt, self._tls.mqtt, timeout_s)
+                shared = self._shared
+                return open_mqtt(destination, self._mqtt, shared.mqtt, timeout_s, shared.brokers)
 
     def check(self, destination: Destination) -> None:
         """Raise ChannelError when nothing could be delivered. It may resolve a name, and blocks then."""

@@ -124,7 +124,7 @@ class Database:
                 name = move_aside(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
                 _log.error("%s is damaged (%s): it was renamed to %s and new events start", self._path, error, name)
                 self._open = self._opened()
-            weakref.finalize(self, self._open.close)
+            weakref.finalize(self, self._open.close).atexit = False  # a thread may still be in a statement then
         return self._open
 
     def _opened(self) -> sqlite3.Connection:

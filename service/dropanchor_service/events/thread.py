@@ -14,6 +14,7 @@ from dropanchor_service.runtime.worker import Worker
 
 RETRY_S = 1.0
 RETRY_TURNS = 5  # between two attempts of a site whose events cannot be stored, while those of others can
+MAX_SAVE_S = 0.5  # in one turn
 PRUNE_S = 60.0
 PRUNED_AT_ONCE = 10  # sites
 MAX_PRUNE_S = 0.5
@@ -67,15 +68,25 @@ class EventThread(Worker):
         """Watch and store once. The thread calls this; without the thread, its owner may."""
         self._turns += 1
         self._watcher.turn()
-        for index in list(self._watcher.changed):
-            is_late = self._turns % RETRY_TURNS and len(self._stores) > 1
-            if not (index in self.problems and is_late):  # a site in trouble must not slow down the others
-                self._attempt(index, self._save)
+        self._save_changed()
         for index in self._due():
             if index not in self._watcher.changed:  # else its events could not be stored
                 self._attempt(index, self._prune)
         if self._watcher.is_full:
             self._log.warning("too close", "a rule has too many pairs to follow: give it fewer tags or less distance")
+
+    def _save_changed(self) -> None:
+        """Store what has happened, the longest waiting site first, as far as there is time: each waits for the disk.
+
+        A site whose events cannot be stored is tried again now and then only, so that it does not slow down the others.
+        """
+        end_s = time.monotonic() + MAX_SAVE_S
+        tries_again = len(self._stores) == 1 or self._turns % RETRY_TURNS == 0
+        for index in list(self._watcher.changed):
+            if tries_again or index not in self.problems:
+                self._attempt(index, self._save)
+                if time.monotonic() > end_s or self._stop.is_set():
+                    return
 
     def _attempt(self, index: int, work: Callable[[int], None]) -> None:
         try:
@@ -93,7 +104,7 @@ class EventThread(Worker):
         self._stores[index].commit(site.drafts, site.states, site.stays)
         self.stored += len(site.drafts)
         site.drafts, site.states, site.stays = [], {}, []
-        self._watcher.changed.discard(index)
+        self._watcher.changed.pop(index, None)
 
     def _due(self) -> Iterator[int]:
         """Yield the sites whose old events are to be deleted: each once in `PRUNE_S`, a few in one turn."""

@@ -22,7 +22,7 @@ class Watcher:
     """Follows the zones and rules of all sites. One thread owns it, and stores what `turn` adds to `sites`.
 
     A turn costs by what moves and what has changed, not by the number of sites. changed: the indices of the sites that
-    have something to store.
+    have something to store, the longest waiting first.
     """
 
     def __init__(self, sites: Sequence[WatchedSite], latest: LatestPoses, now_ns: Callable[[], int]) -> None:
@@ -31,9 +31,9 @@ class Watcher:
         self._latest = latest
         self._now_ns = now_ns
         self._zones = ZoneWatch(len(sites) + 1)  # the last one stands for all that are no longer served
-        self.changed: set[int] = set()
+        self.changed: dict[int, None] = {}
         self.sites = [
-            SiteWatch(site, self._zones, index, now_ns, partial(self.changed.add, index))
+            SiteWatch(site, self._zones, index, now_ns, partial(self.changed.setdefault, index, None))
             for index, site in enumerate(sites)
         ]
         self._edited = deque(range(len(sites)))
