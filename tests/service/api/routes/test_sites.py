@@ -4,6 +4,9 @@ import json
 from threading import Event
 
 import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from dropanchor_schemas import Anchor
 from dropanchor_schemas.answers import SiteList
@@ -104,6 +107,24 @@ def test_zones_rules_events_and_destinations_are_those_of_the_site_in_the_path()
     assert ask(app, "GET", "/api/v1/sites/a/zone-occupancy").json() == {"zones": []}
     assert kind_of(ask(app, "GET", "/api/v1/sites/a/figures")) == "no-history"
     assert kind_of(ask(app, "POST", "/api/v1/sites/a/shares", json={})) == "no-access-control"
+
+
+def test_a_phone_without_a_key_names_its_site_in_the_path() -> None:
+    received: list[tuple[str, str, bytes, str]] = []
+    app, stopping = app_of_sites(make_sites("a", "b"), received=received), Event()
+    experiment = ask(app, "GET", "/api/v1/sites/b/ingest/phyphox?tag=anna").text
+    assert 'address="http://test/api/v1/sites/b/ingest/phyphox?tag=anna"' in experiment
+    with running_server(app, stopping) as port:
+        with connect(f"ws://127.0.0.1:{port}/api/v1/sites/b/ingest/stream?tag=anna", proxy=None) as socket:
+            socket.recv(timeout=10.0)
+            socket.send("{}")
+            socket.recv(timeout=10.0)
+        unnamed = f"ws://127.0.0.1:{port}/api/v1/ingest/stream?tag=anna"
+        with connect(unnamed, proxy=None) as socket, pytest.raises(ConnectionClosed) as closed:
+            socket.recv(timeout=10.0)
+    assert [message[:2] for message in received] == [("b", "anna")]
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.reason == "Say which site this is: add ?site=SITE to the address of the page."
 
 
 def test_an_only_site_has_both_paths() -> None:
