@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from dropanchor_schemas import Anchor
-from dropanchor_schemas.zones import Zone
 from dropanchor_service.events.drafts import destination_test
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence import open_sites
@@ -18,16 +18,17 @@ from dropanchor_service.store import LatestPoses
 from dropanchor_service.zone_events import ZoneEvents
 from support.events import circle
 
-DOCK: Zone = circle()
+Held = tuple[list[str], list[str], int]
+"""The anchors, the zones and the number of events of a site."""
 
 
 def settings_for(folder: Path, only: str | None = None, sites: Sequence[str] = ()) -> Settings:
-    of_sites = {"site": {"id": only}} if only else {"sites": {site: {} for site in sites}}
+    of_sites: dict[str, Any] = {"site": {"id": only}} if only else {"sites": {site: {} for site in sites}}
     return load_settings(options={"data_dir": str(folder), **of_sites}, environment={})
 
 
-def start(settings: Settings, *, fill: bool = False) -> dict[str, tuple[list[str], list[str], int]]:
-    """Open everything as the service does. Return the anchors, the zones and the number of events of each site.
+def start(settings: Settings, *, fill: bool = False) -> dict[str, Held]:
+    """Open everything as the service does. Return what each site has.
 
     fill: give the first site one of each.
     """
@@ -38,7 +39,7 @@ def start(settings: Settings, *, fill: bool = False) -> dict[str, tuple[list[str
         with events:
             if fill:
                 sites[0].store.set_anchor(Anchor(id="7"))
-                events.parts[0].items.zones.put("dock", DOCK)
+                events.parts[0].items.zones.put("dock", circle())
                 events.stores[0].commit([destination_test("mes")], {})
                 recorder, tracks = folders.all[0].recorder, folders.all[0].tracks
                 assert recorder is not None
@@ -55,7 +56,8 @@ def start(settings: Settings, *, fill: bool = False) -> dict[str, tuple[list[str
             }
 
 
-FULL, EMPTY = (["7"], ["dock"], 1), ([], [], 0)
+FULL: Held = (["7"], ["dock"], 1)
+EMPTY: Held = ([], [], 0)
 
 
 def test_a_site_takes_its_files_along_when_it_becomes_one_of_several_and_back(tmp_path: Path) -> None:
