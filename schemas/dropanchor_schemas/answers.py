@@ -85,10 +85,6 @@ class ClientAccess(_Answer):
     scope: Literal["read", "write", "admin"] = Field(
         description="read: read; write: also set anchors and tags; admin: also delete, and replace the site."
     )
-    events: bool = Field(
-        default=True,
-        description="false: this site has no zones, events and deliveries, because the service has several sites.",
-    )
 
 
 class SamplesReceived(_Answer):

@@ -1,4 +1,4 @@
-"""What the service has on disk: site, floor plans, history, recordings and more, as the settings enable them."""
+"""What one site has on disk: its table, floor plans, history, recordings and more, as the settings enable them."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -8,44 +8,38 @@ from typing import Self
 
 from pydantic import ValidationError
 
-from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.basemap.file import UnusableFileError
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Retention, Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
-from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
-from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
-from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
 from dropanchor_service.settings.sources import SettingsError
+from dropanchor_service.site_files import folder_of_site
 from dropanchor_service.store import Sites, SiteStore, TagTable
 
 _log = logging.getLogger(__name__)
 
 
 class Persistence:
-    """Floor plans, what omlox clients have stored, and the history (`tracks`), the recorder and the base map.
+    """Floor plans, what omlox clients have stored, and the history (`tracks`) and the recorder.
 
-    The last three are None when disabled. History and recorder write while this context is open. Creating it raises
-    SettingsError when a file that people have filled cannot be read.
+    The last two are None when disabled. They write while this context is open. Creating it raises SettingsError when a
+    file that people have filled cannot be read.
     """
 
-    def __init__(
-        self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int], metrics: Metrics | None
-    ) -> None:
-        """metrics: where history and recorder are registered; None for one of several sites."""
+    def __init__(self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int]) -> None:
+        """settings: as of an only site; see `settings_of`."""
         self._settings = settings
         self._opened = ExitStack()
         self.plans = _open_plans(settings.data_dir)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         self.omlox = _open_omlox(settings)
-        self.basemap = open_basemap(settings, [site])
         folder = settings.data_dir
         if folder is None:
             return
@@ -58,14 +52,8 @@ class Persistence:
         }
         period_ns = round(settings.recording.pose_period_s * 1e9)
         self.recorder = Recorder(folder, file_limits_of(settings.recording), period_ns, tags, site, now_ns, metadata)
-        if metrics is not None:
-            if self.tracks is not None:
-                metrics.register(HistoryMetrics(self.tracks))
-            metrics.register(RecordingMetrics(self.recorder))
 
     def __enter__(self) -> Self:
-        if self.basemap is not None:
-            self._opened.callback(self.basemap.file.close)
         for writer in (self.tracks, self.recorder):
             if writer is not None:
                 self._opened.enter_context(writer)
@@ -75,11 +63,6 @@ class Persistence:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
-
-    @property
-    def all(self) -> Sequence["Persistence"]:
-        """This one, as `SiteFolders.all` has those of several sites."""
-        return [self]
 
     @property
     def observers(self) -> Observers:
@@ -142,20 +125,24 @@ def open_sites(settings: Settings) -> Sites:
     """Return the sites, as the settings and the data folder have them. Raises SettingsError."""
     if not settings.sites:
         return Sites([(open_site(settings), settings.quota)])
-    stores = [open_site(settings_of_site(settings, name)) for name in settings.sites]
+    stores = [open_site(settings_of(settings, name)) for name in settings.sites]
+    for name, store in zip(settings.sites, stores, strict=True):
+        if store.site.id != name:
+            raise SettingsError(f"data_dir: the folder of the site {name!r} holds the files of {store.site.id!r}")
     quotas = [site.quota(settings.quota) for site in settings.sites.values()]
     return Sites(list(zip(stores, quotas, strict=True)))
 
 
-def settings_of_site(settings: Settings, name: str) -> Settings:
-    """Return the settings of a site of `[sites]` as those of an only site. Its files are in a folder of its own."""
+def settings_of(settings: Settings, name: str) -> Settings:
+    """Return the settings of this site as those of an only site. One of `[sites]` has its files in its own folder."""
+    if not settings.sites:
+        return settings
     site, folder = settings.sites[name], settings.data_dir
     own = {
         "site": site.site.model_copy(update={"id": name}),
         "tags": site.tags,
         "tag_defaults": site.tag_defaults.over(settings.tag_defaults),
-        "data_dir": None if folder is None else folder / "sites" / chunk_from_id(name),
-        "basemap": BasemapSettings(),  # all sites share one
+        "data_dir": None if folder is None else folder_of_site(folder, name),
     }
     return settings.model_copy(update=own)
 

@@ -35,15 +35,14 @@ from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.only_site import OnlySite
-from dropanchor_service.persistence import Persistence, open_sites
+from dropanchor_service.persistence import open_sites
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
+from dropanchor_service.serving import Serving
+from dropanchor_service.settings.many_sites import refuse_too_many_sites
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.settings.several_sites import refuse_for_several_sites
-from dropanchor_service.several_sites import SeveralSites
-from dropanchor_service.site_folders import SiteFolders
+from dropanchor_service.site_files import put_site_files_in_place
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.events import ZenohEvents
@@ -70,7 +69,7 @@ class Service:
 
     def __init__(self, settings: Settings, compiling: AbstractContextManager[None] | None = None) -> None:
         """compiling: entered while the kernels are compiled, so that a signal can interrupt that."""
-        refuse_for_several_sites(settings)
+        refuse_too_many_sites(settings)
         self._settings = settings
         self._credentials = credentials_of(settings)
         refuse_exposure(settings, self._credentials)
@@ -83,12 +82,12 @@ class Service:
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.latest = LatestPoses()
+        put_site_files_in_place(settings)
         self.sites = open_sites(settings)
-        only, now_ns = self.sites.only, self.clock.now_ns
-        self._only = OnlySite(settings, self._credentials, only, self.latest, now_ns, self.metrics) if only else None
-        self._several = None if only else SeveralSites(settings, self._credentials, self.sites, now_ns, self.metrics)
+        now_ns = self.clock.now_ns
+        self._serving = Serving(settings, self._credentials, self.sites, self.latest, now_ns, self.metrics)
         self._publishers = Publishers()
-        tracks = [one.tracks for one in self._persistence.all]
+        tracks = [one.tracks for one in self._serving.folders.all]
         self.answers = answers_of_sites(self.sites, self.latest, now_ns, tracks, self._publishers)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._on_live: OnLive = self._buffer.append
@@ -111,15 +110,14 @@ class Service:
             self._http.start()
             self._opened.callback(self._http.ask_to_stop)
             self._build_ingest(self._compiled_engine())
-            self._opened.enter_context(self._persistence)
+            self._opened.enter_context(self._serving.folders)
             if self._checkpoints is not None:
                 self._checkpoints.load()
                 self._checkpoints.start()
                 self._opened.callback(self._write_last_checkpoint, self._checkpoints)
             self._thread.start()
             self._opened.callback(self._thread.stop)
-            if self._only is not None:
-                self._opened.enter_context(self._only.zone_events)
+            self._opened.enter_context(self._serving.zone_events)
             self._opened.enter_context(self._link)
             self._app.app = self._full_app()
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
@@ -131,14 +129,6 @@ class Service:
             reason = "data_dir is not set" if self._settings.data_dir is None else engine
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
-
-    @property
-    def _persistence(self) -> Persistence | SiteFolders:
-        """What the service has on disk."""
-        if self._several is not None:
-            return self._several.folders
-        assert self._only is not None
-        return self._only.persistence
 
     def _name(self) -> str:
         return f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"
@@ -165,7 +155,7 @@ class Service:
             self.latest,
             self.metrics,
             self.clock,
-            observers=self._persistence.observers,
+            observers=self._serving.folders.observers,
             reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
         )
         self._checkpoints = self._checkpointer(guarded)
@@ -199,8 +189,7 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        stores = self._only or self._persistence
-        found = [*stores.problems(), self._checkpoints.problem if self._checkpoints else None]
+        found = [*self._serving.problems(), self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -236,15 +225,13 @@ class Service:
 
     def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
-        parts: list[AbstractContextManager[object]] = [
+        return [
             self._intake(session),
             ZenohAnswers(session, self.answers, service_id, self.metrics),
             ZenohPoses(session, self.answers, self.metrics),
             ZenohRemoteSettings(session, self.sites, self.metrics),
+            ZenohEvents(session, self._serving.zone_events.stores, self.metrics),
         ]
-        if self._only is not None:
-            parts.append(ZenohEvents(session, self._only.zone_events.store, self.metrics))
-        return parts
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:
         caches = ZenohCaches(session, self.sites, self.metrics, self.clock)
@@ -290,11 +277,6 @@ class Service:
         def ready() -> tuple[bool, Sequence[str]]:
             return not (found := self.problems()), found
 
-        if self._several is not None:
-            return self._several.app(
-                self.answers, ready, self.impairments, self._stopping, self._receive, self._receive_health
-            )
-        assert self._only is not None
-        assert self.answers.only is not None
-        receive, receive_health = (partial(take, self.sites[0].id) for take in (self._receive, self._receive_health))
-        return self._only.app(self.answers.only, ready, self.impairments, self._stopping, receive, receive_health)
+        return self._serving.app(
+            self.answers, ready, self.impairments, self._stopping, self._receive, self._receive_health
+        )

@@ -1,4 +1,4 @@
-"""What several sites have on disk: each its floor plans, history and recordings, and all the base map."""
+"""What the sites have on disk: each its floor plans, history and recordings, and all the base map."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -8,7 +8,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence, open_basemap, settings_of_site
+from dropanchor_service.persistence import Persistence, open_basemap, settings_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
 
@@ -22,9 +22,7 @@ class SiteFolders:
     def __init__(self, settings: Settings, sites: Sites, now_ns: Callable[[], int], metrics: Metrics) -> None:
         self._sites = sites
         self._opened = ExitStack()
-        self.all = [
-            Persistence(settings_of_site(settings, site.id), site.tags, site.store, now_ns, None) for site in sites
-        ]
+        self.all = [Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns) for site in sites]
         self.basemap = open_basemap(settings, [site.store for site in sites])
         if tracks := [one.tracks for one in self.all if one.tracks is not None]:
             metrics.register(HistoryMetrics(*tracks))
@@ -44,7 +42,9 @@ class SiteFolders:
         self._opened.close()
 
     def problems(self) -> Sequence[str]:
-        """Return what cannot be written or read, with the name of its site."""
+        """Return what cannot be written or read, with several sites for each."""
+        if len(self.all) == 1:
+            return self.all[0].problems()
         found = zip(self._sites, self.all, strict=True)
         return [f"site {site.id}: {problem}" for site, one in found for problem in one.problems()]
 
@@ -52,6 +52,8 @@ class SiteFolders:
     def observers(self) -> Observers:
         """The observers that pass messages and poses of the ingest to the site that they are of."""
         to_sites = [one.observers for one in self.all]
+        if len(to_sites) == 1:
+            return to_sites[0]
         has_history = any(one.tracks is not None for one in self.all)
 
         def on_messages(messages: Sequence[tuple[int, bytes, str, int]]) -> None:

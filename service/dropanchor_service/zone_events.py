@@ -1,88 +1,126 @@
-"""Zones, events and their delivery, as the settings want them."""
+"""Zones, events and their delivery, of all sites, as the settings want them."""
 
 import sqlite3
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
-from typing import Self
+from typing import NamedTuple, Self
+from urllib.parse import quote
 
 from dropanchor_service.api.routes.event_parts import EventParts
-from dropanchor_service.delivery.channels import Channels
+from dropanchor_service.delivery.channels import Channels, SharedWays
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.registry import addressees, open_destinations
-from dropanchor_service.delivery.thread import DeliveryThread
+from dropanchor_service.delivery.thread import DeliveryThread, Outbox
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries
+from dropanchor_service.events.site_watch import WatchedSite
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.events.thread import EventThread, Retention
-from dropanchor_service.events.watcher import Fleet, Watcher
+from dropanchor_service.events.watcher import Watcher
 from dropanchor_service.metrics.events import EventMetrics
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.persistence import settings_of
+from dropanchor_service.settings.events import DeliverySettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, TagTable
+from dropanchor_service.store import LatestPoses, ServedSite, Sites, SiteStore
 from dropanchor_service.zones.items import ZoneItems
 
 
+class _Opened(NamedTuple):
+    """What one site has stored."""
+
+    items: ZoneItems
+    outbox: Outbox
+    watched: WatchedSite
+
+
 class ZoneEvents:
-    """Watches and delivers while this context is open. Without a data folder, a restart forgets everything."""
+    """Watches and delivers while this context is open. Without a data folder, a restart forgets everything.
+
+    One thread watches all sites, and one delivers for all. parts: of each site, in the order of their indices.
+    """
 
     def __init__(
-        self,
-        settings: Settings,
-        site: SiteStore,
-        tags: TagTable,
-        latest: LatestPoses,
-        health: HealthTable,
-        now_ns: Callable[[], int],
-        metrics: Metrics,
+        self, settings: Settings, sites: Sites, latest: LatestPoses, now_ns: Callable[[], int], metrics: Metrics
     ) -> None:
         """Raises SettingsError when a file in the data folder cannot be read."""
-        self._opened = ExitStack()
-        folder = settings.data_dir
-        try:
-            items, destinations = ZoneItems.opened(folder), open_destinations(folder)
-            self._database = Database(folder)
-            self.store = EventStore(self._database, site.site.id, partial(addressees, destinations))
-            states = self.store.states()
-        except (OSError, ValueError, sqlite3.Error) as error:
-            raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
-        deliveries, channels = Deliveries(self._database), _channels(settings, site)
+        self._closing = ExitStack()
+        self._sites = sites
+        shared = _shared_ways(settings)
+        opened = [self._open(settings, site, shared, several=len(sites) > 1) for site in sites]
+        outboxes = [one.outbox for one in opened]
+        self.stores = [outbox.store for outbox in outboxes]
         patience = Patience(settings.delivery.retry_s, round(settings.delivery.give_up_hours * 3600e9))
-        self._delivery = DeliveryThread(destinations, deliveries, channels, patience, now_ns)
+        self._delivery = DeliveryThread(outboxes, patience, now_ns)
         self._events = EventThread(
-            Watcher(Fleet(site, tags, latest, health, now_ns), items, states),
-            self.store,
+            Watcher([one.watched for one in opened], latest, now_ns),
+            self.stores,
             Retention(round(settings.events.keep_days * 86_400e9), int(settings.events.most_mib * 2**20)),
             now_ns,
             settings.events.period_ms * 1e-3,
         )
-        self.parts = EventParts(items, self.store, destinations, deliveries, channels, self._delivery.problem_of)
-        metrics.register(EventMetrics(self._events, self.store, deliveries, self._delivery, now_ns))
+        self.parts = [
+            EventParts(
+                one.items,
+                one.outbox.store,
+                one.outbox.destinations,
+                one.outbox.deliveries,
+                one.outbox.channels,
+                partial(self._delivery.problem_of, index),
+            )
+            for index, one in enumerate(opened)
+        ]
+        metrics.register(EventMetrics(self._events, outboxes, self._delivery, now_ns))
+
+    def _open(self, settings: Settings, site: ServedSite, shared: SharedWays, several: bool) -> _Opened:
+        folder = settings_of(settings, site.id).data_dir
+        try:
+            items, destinations = ZoneItems.opened(folder), open_destinations(folder)
+            database = Database(folder)
+            self._closing.callback(database.close)
+            store = EventStore(database, site.id, partial(addressees, destinations))
+            watched = WatchedSite(site.store, site.tags, site.health, items, store.states())
+        except (OSError, ValueError, sqlite3.Error) as error:
+            raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
+        delivery = _with_page_of(settings.delivery, site.id) if several else settings.delivery
+        channels = Channels(delivery, settings.email, settings.mqtt, partial(_name_of, site.store), shared)
+        return _Opened(items, Outbox(destinations, store, Deliveries(database), channels), watched)
 
     def __enter__(self) -> Self:
-        self._opened.callback(self._database.close)
-        self._opened.enter_context(self._delivery)
-        self._opened.enter_context(self._events)
+        self._closing.enter_context(self._delivery)
+        self._closing.enter_context(self._events)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._opened.close()
+        self._closing.close()
 
     def problems(self) -> Sequence[str]:
-        """Return why events cannot be stored; empty when they can."""
-        return [] if self._events.problem is None else [self._events.problem]
+        """Return why events cannot be stored, with several sites for each; empty when they can."""
+        found = sorted(self._events.problems.items())
+        if len(self._sites) == 1:
+            return [problem for _, problem in found]
+        return [f"site {self._sites[index].id}: {problem}" for index, problem in found]
 
 
-def _channels(settings: Settings, site: SiteStore) -> Channels:
-    """Return the ways to destinations. Raises SettingsError."""
-
-    def name_of(tag: str) -> str:
-        name = site.tag_settings(tag).name
-        return f"{name} ({tag})" if name else tag
-
-    delivery = settings.delivery
+def _shared_ways(settings: Settings) -> SharedWays:
+    """Return what the sites share. Raises SettingsError."""
+    authorities = settings.delivery.authorities
     try:
-        return Channels(delivery, settings.email, settings.mqtt, name_of)
+        return SharedWays(authorities)
     except OSError as error:
-        raise SettingsError(f"delivery.authorities: {delivery.authorities} cannot be read: {error}") from error
+        raise SettingsError(f"delivery.authorities: {authorities} cannot be read: {error}") from error
+
+
+def _with_page_of(delivery: DeliverySettings, site: str) -> DeliverySettings:
+    """Return the settings with the address of the page of one of several sites."""
+    if delivery.page is None:
+        return delivery
+    separator = "&" if "?" in delivery.page else "?"
+    return delivery.model_copy(update={"page": f"{delivery.page}{separator}site={quote(site, safe='')}"})
+
+
+def _name_of(site: SiteStore, tag: str) -> str:
+    name = site.tag_settings(tag).name
+    return f"{name} ({tag})" if name else tag

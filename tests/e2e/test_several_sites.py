@@ -99,7 +99,10 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
             assert any("going on from a checkpoint with 2 tags" in line for line in service.log)
             wait_for_ranges(service, RANGES)
             _check_answers(service, session)
+            _check_events(service, session, router_endpoint)
             assert service.stop() == 0
+    assert (tmp_path / "data" / "sites" / "south" / "events.sqlite").exists()
+    assert not (tmp_path / "data" / "sites" / "north" / "events.sqlite").exists()
 
 
 def test_a_site_that_leaves_and_one_that_comes_keep_the_tracks_of_the_others_through_kills(
@@ -143,6 +146,29 @@ def _check_tracks(service: Running) -> None:
     wait_until(lambda: first("north") is not None and first("south") is not None)
     x, y = first("north") or (0.0, 0.0)
     assert first("south") == pytest.approx((x + 100.0, y + 50.0), abs=1e-3)
+
+
+def _check_events(service: Running, session: zenoh.Session, endpoint: str) -> None:
+    """Check that a tag which enters a zone of the south makes an event there, over REST and Zenoh, and no other."""
+    received: list[tuple[str, str]] = []
+
+    def take(put: zenoh.Sample) -> None:
+        received.append((str(put.key_expr), json.loads(put.payload.to_string())["source"]))
+
+    base = "/api/v1/sites/south"
+    zone = {"id": "dock", "shape": {"type": "circle", "x": 110.0, "y": 30.0, "radius_m": 40.0}, "delay_s": 0.0}
+    start = {"start": {"x": 110.0, "y": 30.0, "heading_rad": 1.5707963}}
+    for path, body in (("zones/dock", zone), ("tags/lift/settings", start)):
+        assert service.ask("PUT", f"{base}/{path}", json=body).status_code == 200
+    with (
+        session.declare_subscriber(f"{keys.PREFIX}/*/tag/*/event", take),
+        TagClient("lift", site="south", connect=endpoint) as lift,
+    ):
+        publish(lift, straight_north(20), ALL)
+        wait_until(lambda: received == [(keys.event_key("south", "lift"), "urn:dropanchor:site:south")])
+    (event,) = service.get(f"{base}/events")["events"]
+    assert (event["type"], event["subject"]) == ("dropanchor.zone.enter", "lift")
+    assert service.get("/api/v1/sites/north/events")["events"] == []
 
 
 def _check_answers(service: Running, session: zenoh.Session) -> None:

@@ -13,7 +13,7 @@ from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.registry import addressees, open_destinations
 from dropanchor_service.delivery.sentences import NameOf
-from dropanchor_service.delivery.thread import DeliveryThread
+from dropanchor_service.delivery.thread import DeliveryThread, Outbox
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.deliveries import Deliveries, QueueState
 from dropanchor_service.events.drafts import Draft
@@ -43,7 +43,8 @@ class DeliveryBench:
         settings = DeliverySettings.model_validate({"allow_networks": LOOPBACK, "timeout_s": 2.0} | delivery)
         self.channels = Channels(settings, email or EmailSettings(), mqtt or MqttSettings(), name_of)
         patience = Patience(retry_s=0.2, give_up_ns=round(give_up_s * 1e9))
-        self.thread = DeliveryThread(self.destinations, self.deliveries, self.channels, patience, time.time_ns)
+        outbox = Outbox(self.destinations, self.store, self.deliveries, self.channels)
+        self.thread = DeliveryThread([outbox], patience, time.time_ns)
 
     def put(self, destination: Destination) -> None:
         self.destinations.put(destination.id, destination)

@@ -12,9 +12,10 @@ from dropanchor_schemas.zones import Circle, EventRule, Zone
 from dropanchor_service.estimation.columns import HYPOTHESIS, State, StateReason
 from dropanchor_service.events.database import Database
 from dropanchor_service.events.drafts import Draft
+from dropanchor_service.events.site_watch import WatchedSite
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.events.thread import EventThread, Retention
-from dropanchor_service.events.watcher import Fleet, Watcher
+from dropanchor_service.events.watcher import Watcher
 from dropanchor_service.store import HealthTable
 from dropanchor_service.zones.items import ZoneItems
 from support.api import ApiBench, make_api_bench
@@ -45,9 +46,9 @@ class EventBench:
         """Start the service's part again, from what is stored."""
         self.store = EventStore(self.database, "yard", self._addressees)
         answers = self.poses.answers
-        fleet = Fleet(answers.site, answers.tags, answers.latest, self.health, lambda: self.poses.now_ns)
-        self.watcher = Watcher(fleet, self.items, self.store.states())
-        self.thread = EventThread(self.watcher, self.store, KEEP, lambda: self.poses.now_ns, 0.1)
+        site = WatchedSite(answers.site, answers.tags, self.health, self.items, self.store.states())
+        self.watcher = Watcher([site], answers.latest, lambda: self.poses.now_ns)
+        self.thread = EventThread(self.watcher, [self.store], KEEP, lambda: self.poses.now_ns, 0.1)
 
     def put(self, *zones: Zone, rules: Sequence[EventRule] = ()) -> None:
         for zone in zones:

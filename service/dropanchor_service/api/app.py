@@ -3,43 +3,37 @@
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Event
-from typing import Any
 
-from fastapi import FastAPI
-from fastapi.openapi.utils import get_openapi
+from fastapi import FastAPI, Request
 from prometheus_client import CollectorRegistry
+from starlette.responses import RedirectResponse
+from starlette.routing import Match, Route
+from starlette.types import Scope
 
-from dropanchor_schemas.answers import Problem, SamplesAcknowledged
-from dropanchor_schemas.pose import PoseFrame
-from dropanchor_schemas.samples import SamplesMessage
-from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.answers.answers import Answers
-from dropanchor_service.api.http.access import OPEN_PATHS, Access
-from dropanchor_service.api.http.errors import Kind, add_error_handlers, problems
+from dropanchor_service.api.document import openapi_of
+from dropanchor_service.api.http.access import Access
+from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
 from dropanchor_service.api.http.rates import RateLimiter
-from dropanchor_service.api.http.shared_view import Members
 from dropanchor_service.api.omlox.feed.socket import Doorkeeper
-from dropanchor_service.api.omlox.hub import Hub
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import add_omlox
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
 from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
-from dropanchor_service.api.routes.shares import shares_router
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.routes.sites import sites_router
-from dropanchor_service.api.site_routers import SharedParts, event_routers, site_routers
+from dropanchor_service.api.site_routers import SharedParts, ingest_routers, site_routers
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
-from dropanchor_service.security.share_links import share_links_of
 
 PREFIX = "/api/v1"
 ALL_METHODS = ["DELETE", "GET", "HEAD", "PATCH", "POST", "PUT"]
@@ -80,32 +74,79 @@ def create_app(
     keeps them in memory and watches nothing. plans: floor plans; None keeps them in memory. omlox: what omlox clients
     have said; None for no omlox interface. basemap: None when there is none.
     """
-    events = events or EventParts.in_memory(answers.site.site.id)
-    site_of = SiteOfRequest(
-        [SiteParts(answers, receive, receive_health, plans or PlanStore(None), events, recorder, max_tags)]
+    parts = SiteParts(
+        answers,
+        receive,
+        receive_health,
+        plans or PlanStore(None),
+        events or EventParts.in_memory(answers.site.site.id),
+        recorder,
+        max_tags,
+        omlox,
     )
     shared = SharedParts(stopping, endpoints, credentials, authenticator, rate_limiter, cors_origins, basemap)
-    app = app_without_routes(shared, site_of, answers.tags_in_group)
-    if dashboard is not None:
-        app.router.routes.extend(page_mounts(dashboard))  # before the interfaces: a page needs many files at once
+    return create_app_of([parts], shared, ready=ready, impaired=impaired, registry=registry, dashboard=dashboard)
+
+
+def create_app_of(
+    sites: Sequence[SiteParts],
+    shared: SharedParts,
+    *,
+    ready: Ready,
+    impaired: Impaired,
+    registry: CollectorRegistry,
+    dashboard: Path | None = DASHBOARD,
+) -> FastAPI:
+    """Return the application of one or several sites; see `create_app`. Each has its routes below its id.
+
+    An only site has them also without. With several, the page shows the site in its address, `/?site=…`, and without
+    one the overview of the sites takes its place.
+    """
+    site_of = SiteOfRequest(sites)
+    app = _app_without_routes(shared, site_of)
+    if dashboard is not None:  # before the interfaces: a page needs many files at once
+        app.router.routes.extend([*([] if site_of.only else [OverviewFirst()]), *page_mounts(dashboard)])
+    without_site = site_routers(site_of, shared) if site_of.only else ingest_routers(site_of, shared)
     for router in (
-        *site_routers(site_of, shared),
-        *event_routers(site_of, shared),
-        sites_router(site_of, (*site_routers(site_of, shared), *event_routers(site_of, shared))),
-        shares_router(share_links_of(authenticator)),
+        *without_site,
+        sites_router(site_of, site_routers(site_of, shared)),
         health_router(ready, impaired),
     ):
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))
-    if omlox is not None:
-        hub = Hub(answers, events.items.zones, events.store, omlox, max_tags)
-        add_omlox(app, hub, Doorkeeper(authenticator, rate_limiter, cors_origins), stopping)
+    if all(one.omlox is not None for one in sites):
+        doorkeeper = Doorkeeper(shared.authenticator, shared.rate_limiter, shared.cors_origins)
+        add_omlox(app, site_of, doorkeeper, shared.stopping)
+    if site_of.only is None:
+        _refuse_what_names_no_site(app, len(sites))
     app.openapi = lambda: openapi_of(app)  # type: ignore[method-assign]
     return app
 
 
-def app_without_routes(shared: SharedParts, site_of: SiteOfRequest, members: Members) -> FastAPI:
-    """Return an application with the middleware alone. members: returns the tags of a group."""
+def _refuse_what_names_no_site(app: FastAPI, sites: int) -> None:
+    @app.api_route("/{path:path}", methods=ALL_METHODS, include_in_schema=False)
+    async def refuse(request: Request) -> None:
+        raise ProblemError(
+            Kind.SEVERAL_SITES,
+            f"{request.url.path} names none of the {sites} sites of this service. /api/v1/sites lists them, and "
+            "/api/v1/sites/SITE has what each of them has.",
+        )
+
+
+class OverviewFirst(Route):
+    """Leads from the page without a site to the overview."""
+
+    def __init__(self) -> None:
+        super().__init__("/", lambda _: RedirectResponse("sites/"), methods=["GET"])
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        match, child_scope = super().matches(scope)
+        names_site = match is not Match.NONE and "site" in Request(scope).query_params
+        return (Match.NONE, {}) if names_site else (match, child_scope)
+
+
+def _app_without_routes(shared: SharedParts, site_of: SiteOfRequest) -> FastAPI:
+    """Return an application with the middleware alone."""
     app = FastAPI(
         title="Dropanchor",
         version="1",
@@ -120,7 +161,7 @@ def app_without_routes(shared: SharedParts, site_of: SiteOfRequest, members: Mem
         Access,
         authenticator=shared.authenticator,
         rate_limiter=shared.rate_limiter,
-        members=members,
+        members=site_of.members,
         only_site=only_site,
     )
     app.add_middleware(EscapedPath)
@@ -128,66 +169,3 @@ def app_without_routes(shared: SharedParts, site_of: SiteOfRequest, members: Mem
     allow_origins(app, shared.cors_origins)
     add_error_handlers(app)
     return app
-
-
-def openapi_of(app: FastAPI) -> dict[str, Any]:
-    """Return the OpenAPI document, built once."""
-    if app.openapi_schema is None:
-        document = get_openapi(
-            title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
-        )
-        for model in (
-            PoseFrame,
-            Problem,
-            SamplesAcknowledged,
-            SamplesMessage,
-            TagHealthMessage,
-        ):  # of no route, or not its only model
-            schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
-            document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
-        _add_access(document)
-        app.openapi_schema = document
-    return app.openapi_schema
-
-
-def _add_access(document: dict[str, Any]) -> None:
-    """Add the bearer scheme and the responses of refused requests to every protected operation."""
-    document["components"]["securitySchemes"] = {
-        "bearer": {
-            "type": "http",
-            "scheme": "bearer",
-            "description": "An API key, or a token of the site's OpenID Connect provider.",
-        }
-    }
-    refusals = {str(status): response for status, response in problems(*_REFUSALS).items()}
-    for path, operations in document["paths"].items():
-        for operation in operations.values() if path not in OPEN_PATHS else ():
-            operation["responses"] = dict(sorted((operation["responses"] | refusals).items()))
-            operation["security"] = [{"bearer": []}, {}]
-
-
-_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
-_TAGS = [
-    {"name": "poses", "description": "Where the tags are."},
-    {"name": "tags", "description": "What the tags have sent, and their settings."},
-    {"name": "site", "description": "The site frame, its georeference, and the anchors."},
-    {"name": "plans", "description": "Floor plans below the tags on the map, and their images."},
-    {"name": "basemap", "description": "A map of the surroundings behind a site with latitude and longitude."},
-    {"name": "zones", "description": "Areas of the site, and the rules that make events."},
-    {"name": "events", "description": "What has happened, as CloudEvents."},
-    {"name": "destinations", "description": "Who gets events by webhook, e-mail or MQTT."},
-    {"name": "shares", "description": "Links that show the page, read only, until they expire."},
-    {"name": "ingest", "description": "Samples over HTTP, for tags that do not speak Zenoh."},
-    {"name": "recordings", "description": "MCAP files with raw samples and poses."},
-    {"name": "health", "description": "Health checks for supervisors, and metrics for Prometheus."},
-]
-
-
-def _description() -> str:
-    rows = "\n".join(f"| `{kind.type}` | {kind.status} | {kind.title} |" for kind in Kind)
-    return (
-        "Live positions of a fleet of tags around one UWB anchor. All values are in SI units. The site frame is ENU "
-        "with x pointing east. Times are UTC in nanoseconds.\n\n"
-        "Every error is a problem document (RFC 9457) of one of these types:\n\n"
-        f"| type | status | title |\n|---|---|---|\n{rows}\n"
-    )

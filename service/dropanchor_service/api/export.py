@@ -12,12 +12,9 @@ import dropanchor_schemas
 from dropanchor_schemas.site import Site
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app
-from dropanchor_service.api.http.errors import OMLOX_PREFIX
+from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
-from dropanchor_service.api.omlox.hub import Hub
-from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import described_routes
-from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
 FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
@@ -40,9 +37,7 @@ def text() -> str:
 
 def omlox_document() -> dict[str, Any]:
     """Return the document of the omlox interface."""
-    answers, parts = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses()), EventParts.in_memory("")
-    hub = Hub(answers, parts.items.zones, parts.store, OmloxItems.opened(None), max_tags=0)
-    return document_of(described_routes(hub), f"{OMLOX_PREFIX}v2")
+    return document_of(described_routes(), f"{OMLOX_PREFIX}v2")
 
 
 def main(arguments: list[str]) -> int:

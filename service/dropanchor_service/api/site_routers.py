@@ -24,6 +24,7 @@ from dropanchor_service.api.routes.plans import plans_router
 from dropanchor_service.api.routes.poses import poses_router
 from dropanchor_service.api.routes.recordings import recordings_router
 from dropanchor_service.api.routes.remote_settings import remote_settings_router
+from dropanchor_service.api.routes.shares import shares_router
 from dropanchor_service.api.routes.site import site_router
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.stream import stream_router
@@ -36,6 +37,7 @@ from dropanchor_service.api.routes.zones import zones_router
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.identity import Authenticator
+from dropanchor_service.security.share_links import share_links_of
 
 
 @dataclass(frozen=True)
@@ -88,15 +90,10 @@ def site_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter
         plans_router(site_of),
         plan_images_router(site_of),
         basemap_router(shared.basemap),
-    )
-
-
-def event_routers(site_of: SiteOfRequest, shared: SharedParts) -> tuple[APIRouter, ...]:
-    """Return the routes of zones, events and their delivery, and the figures that tell the time in zones."""
-    return (
         figures_router(site_of),
         zones_router(site_of),
         zone_occupancy_router(site_of),
         events_router(site_of, shared.stopping),
         destinations_router(site_of),
+        shares_router(site_of, share_links_of(shared.authenticator)),
     )

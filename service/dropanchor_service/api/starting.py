@@ -7,9 +7,10 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from dropanchor_service.api.app import ALL_METHODS, DASHBOARD, PREFIX
-from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError, add_error_handlers
+from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import EscapedPath
+from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.routes.dashboard import page_mounts
 from dropanchor_service.api.routes.health import health_router
 
@@ -35,6 +36,7 @@ def create_starting_app(reason: Callable[[], str], dashboard: Path = DASHBOARD) 
     @app.api_route("/metrics", methods=ALL_METHODS)
     @app.api_route("/api/{path:path}", methods=ALL_METHODS)
     @app.api_route(f"{OMLOX_PREFIX}{{path:path}}", methods=ALL_METHODS)
+    @app.api_route(f"/sites/{{site}}{OMLOX_PREFIX}{{path:path}}", methods=ALL_METHODS)
     async def refuse() -> None:
         raise ProblemError(Kind.NOT_READY, reason())
 

@@ -103,7 +103,8 @@ def _refuse_url(url: str, tag: str | None) -> None:
 
 def _show_link(url: str, tag: str, secret: str, phyphox: bool) -> None:
     """Print a QR code and its link. Whoever sees them can send samples of the tag."""
-    link = link_of(url, tag, secret) if phyphox else tag_page_link(url, tag, secret)
+    path = f"{url.rstrip('/')}/api/v1/ingest/phyphox"
+    link = link_of(path, tag, secret) if phyphox else tag_page_link(url, tag, secret)
     segno.make(link, error="l").terminal(out=sys.stderr, border=2, compact=True)
     if phyphox:
         sys.stderr.write(f"In phyphox, tap + and scan the code, or open on the phone: {link}\n")

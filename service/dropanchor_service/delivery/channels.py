@@ -4,6 +4,8 @@ import importlib
 import ssl
 from contextlib import AbstractAsyncContextManager
 from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
 from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
@@ -14,47 +16,74 @@ from dropanchor_service.delivery.signature import SecretError, key_of
 from dropanchor_service.delivery.webhook import open_webhook
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 
+if TYPE_CHECKING:
+    from dropanchor_service.delivery.mqtt import Brokers
+
+
+class SharedWays:
+    """What all sites share: TLS contexts and the connections to the MQTT broker.
+
+    A context takes some 20 ms and memory, so only types in use have one. A library may change it, so each type has its
+    own.
+    """
+
+    def __init__(self, authorities: Path | None) -> None:
+        """authorities: PEM file. Raises OSError when it cannot be read."""
+        self._authorities = authorities
+        if authorities is not None:
+            tls_context(authorities)  # a file that cannot be read is refused at the start
+
+    @cached_property
+    def webhook(self) -> ssl.SSLContext:
+        return tls_context(self._authorities)
+
+    @cached_property
+    def email(self) -> ssl.SSLContext:
+        return tls_context(self._authorities)
+
+    @cached_property
+    def mqtt(self) -> ssl.SSLContext:
+        return tls_context(self._authorities)
+
+    @cached_property
+    def brokers(self) -> "Brokers":
+        from dropanchor_service.delivery.mqtt import Brokers  # an extra
+
+        return Brokers()
+
 
 class Channels:
-    """The ways to all destinations, as the settings want them."""
+    """The ways to the destinations of one site, as the settings want them."""
 
     def __init__(
-        self, delivery: DeliverySettings, email: EmailSettings, mqtt: MqttSettings, name_of: NameOf = str
+        self,
+        delivery: DeliverySettings,
+        email: EmailSettings,
+        mqtt: MqttSettings,
+        name_of: NameOf = str,
+        shared: SharedWays | None = None,
     ) -> None:
-        """name_of: by default, the id of the tag. Raises OSError when the file of authorities cannot be read."""
+        """name_of: by default, the id of the tag. shared: by all sites. Raises OSError; see `SharedWays`."""
         self._delivery = delivery
         self._email = email
         self._mqtt = mqtt
         self._name_of = name_of
-        if delivery.authorities is not None:
-            tls_context(delivery.authorities)  # a file that cannot be read is refused at the start
+        self._shared = shared or SharedWays(delivery.authorities)
 
     def open(self, destination: Destination) -> AbstractAsyncContextManager[Channel]:
         """Return the way to a destination as a context. It must have passed `check_settings`."""
         timeout_s = self._delivery.timeout_s
         match destination:
             case WebhookDestination():
-                return open_webhook(destination, self._webhook_tls, timeout_s, self._delivery.allow_networks)
+                return open_webhook(destination, self._shared.webhook, timeout_s, self._delivery.allow_networks)
             case EmailDestination():
                 page = self._delivery.page
-                return open_mail(destination, self._email, self._email_tls, timeout_s, page, self._name_of)
+                return open_mail(destination, self._email, self._shared.email, timeout_s, page, self._name_of)
             case MqttDestination():
                 from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
 
-                return open_mqtt(destination, self._mqtt, self._mqtt_tls, timeout_s)
-
-    # A context takes some 20 ms, so only types in use have one. A library may change its context, so none is shared.
-    @cached_property
-    def _webhook_tls(self) -> ssl.SSLContext:
-        return tls_context(self._delivery.authorities)
-
-    @cached_property
-    def _email_tls(self) -> ssl.SSLContext:
-        return tls_context(self._delivery.authorities)
-
-    @cached_property
-    def _mqtt_tls(self) -> ssl.SSLContext:
-        return tls_context(self._delivery.authorities)
+                shared = self._shared
+                return open_mqtt(destination, self._mqtt, shared.mqtt, timeout_s, shared.brokers)
 
     def check(self, destination: Destination) -> None:
         """Raise ChannelError when nothing could be delivered. It may resolve a name, and blocks then."""

@@ -20,7 +20,7 @@ from dropanchor_service.delivery.sentences import SOURCE_PREFIX
 from dropanchor_service.settings.events import MqttSettings
 
 CONTENT_TYPE = "application/cloudevents+json; charset=utf-8"
-AT_ONCE = 256  # messages, each about another tag
+AT_ONCE = 256  # messages of one destination, each about another tag, and of all destinations together
 KEEP_ALIVE_S = 30
 QOS = 1
 _TRY_LATER = ("Quota exceeded",)
@@ -106,50 +106,108 @@ class Connection:
         self._answers.clear()
 
 
+class Broker:
+    """The connection that all channels of an event loop share: paho has a thread for each connection.
+
+    It is made with the first event, and again after a failure. users: channels that are open. room: for messages that
+    wait for their answer.
+    """
+
+    def __init__(self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float) -> None:
+        self._settings = settings
+        self._tls = tls
+        self._opening: asyncio.Task[Connection] | None = None
+        self._connection: Connection | None = None
+        self.timeout_s = timeout_s
+        self.users = 0
+        self.room = asyncio.Semaphore(AT_ONCE)
+
+    async def connection(self) -> Connection:
+        """Return the open connection. All who wait for it learn of a failure.
+
+        Raises BrokerGoneError, ChannelError and TimeoutError.
+        """
+        if self._opening is None:
+            self._opening = asyncio.create_task(self._open())
+        opening = self._opening
+        try:
+            return await asyncio.shield(opening)
+        except (BrokerGoneError, ChannelError, TimeoutError):
+            if self._opening is opening:
+                self._opening = None
+            raise
+
+    async def _open(self) -> Connection:
+        connection = Connection(self._settings, self._tls, self.timeout_s)
+        try:
+            async with asyncio.timeout(self.timeout_s):
+                await connection.open()
+        except BaseException:
+            await connection.close()
+            raise
+        self._connection = connection
+        return connection
+
+    async def drop(self, connection: Connection | None) -> None:
+        """Close a connection that has failed, unless somebody has done so."""
+        if connection is not None and connection is self._connection:
+            self._connection = self._opening = None
+            await connection.close()
+
+    async def close(self) -> None:
+        if self._opening is not None:
+            self._opening.cancel()
+            await asyncio.wait([self._opening])
+        await self.drop(self._connection)
+
+
+class Brokers:
+    """The connection of each event loop in which there is a channel: the thread that delivers, and that of requests."""
+
+    def __init__(self) -> None:
+        self._of_loops: dict[asyncio.AbstractEventLoop, Broker] = {}
+
+    @asynccontextmanager
+    async def of_this_loop(
+        self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float
+    ) -> AsyncIterator[Broker]:
+        loop = asyncio.get_running_loop()
+        broker = self._of_loops.setdefault(loop, Broker(settings, tls, timeout_s))
+        broker.users += 1
+        try:
+            yield broker
+        finally:
+            broker.users -= 1
+            if not broker.users:
+                del self._of_loops[loop]
+                await broker.close()
+
+
 class MqttChannel:
-    """Publishes events over one connection, which is made again after a failure."""
+    """Publishes the events of one destination."""
 
     portion = Portion(AT_ONCE)
 
-    def __init__(
-        self, destination: MqttDestination, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float
-    ) -> None:
+    def __init__(self, destination: MqttDestination, broker: Broker) -> None:
         self._topic = destination.topic
-        self._settings = settings
-        self._tls = tls
-        self._timeout_s = timeout_s
-        self._connection: Connection | None = None
+        self._broker = broker
 
     async def send(self, events: Sequence[bytes]) -> Sequence[Outcome]:
         try:
-            async with asyncio.timeout(self._timeout_s):
-                await self._connect()
+            connection = await self._broker.connection()
         except TimeoutError:
-            await self.close()
             return [self._late()] * len(events)
         except (BrokerGoneError, ChannelError) as error:
-            await self.close()
             return [Outcome(Verdict.UNAVAILABLE, str(error))] * len(events)
-        outcomes = await asyncio.gather(*map(self._publish, events))
+        outcomes = await asyncio.gather(*(self._publish(connection, event) for event in events))
         if any(outcome.verdict is Verdict.UNAVAILABLE for outcome in outcomes):
-            await self.close()
+            await self._broker.drop(connection)
         return outcomes
 
-    async def close(self) -> None:
-        connection, self._connection = self._connection, None
-        if connection is not None:
-            await connection.close()
-
-    async def _connect(self) -> None:
-        if self._connection is None:
-            self._connection = Connection(self._settings, self._tls, self._timeout_s)
-            await self._connection.open()
-
-    async def _publish(self, event: bytes) -> Outcome:
-        assert self._connection is not None
+    async def _publish(self, connection: Connection, event: bytes) -> Outcome:
         try:
-            async with asyncio.timeout(self._timeout_s):
-                reason = await self._connection.publish(topic_of(self._topic, event), event)
+            async with self._broker.room, asyncio.timeout(self._broker.timeout_s):
+                reason = await connection.publish(topic_of(self._topic, event), event)
         except TimeoutError:
             return self._late()
         except (BrokerGoneError, ValueError) as error:
@@ -160,19 +218,16 @@ class MqttChannel:
         return Outcome(Verdict.UNAVAILABLE if str(reason) in _TRY_LATER else Verdict.REFUSED, detail)
 
     def _late(self) -> Outcome:
-        return Outcome(Verdict.UNAVAILABLE, f"the broker did not answer within {self._timeout_s:g} s")
+        return Outcome(Verdict.UNAVAILABLE, f"the broker did not answer within {self._broker.timeout_s:g} s")
 
 
 @asynccontextmanager
 async def open_mqtt(
-    destination: MqttDestination, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float
+    destination: MqttDestination, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float, brokers: Brokers
 ) -> AsyncIterator[MqttChannel]:
     """Open the way to a topic. The connection is made with the first event."""
-    channel = MqttChannel(destination, settings, tls, timeout_s)
-    try:
-        yield channel
-    finally:
-        await channel.close()
+    async with brokers.of_this_loop(settings, tls, timeout_s) as broker:
+        yield MqttChannel(destination, broker)
 
 
 def topic_of(template: str, event: bytes) -> str:

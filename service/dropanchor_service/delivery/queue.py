@@ -1,8 +1,10 @@
 """Deliver the queue of one destination: in order per tag, with back-off."""
 
+import asyncio
 import random
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from dropanchor_service.delivery.channel import Channel, Outcome, Verdict
@@ -11,6 +13,7 @@ from dropanchor_service.events.deliveries import Deliveries, Delivery
 WINDOW = 1024  # oldest events of a queue that are searched for one of each tag
 MAX_REFUSALS = 5
 FIRST_RETRY_S = 0.5
+REREAD_S = 1.0  # after a failed read or write
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Counts:
 
 @dataclass
 class Queue:
-    """The queue of one destination. One event loop owns it."""
+    """The queue of one destination. One event loop owns it. news: set when it may hold more than before."""
 
     destination: str
     deliveries: Deliveries
@@ -43,6 +46,7 @@ class Queue:
     due_s: float = 0.0
     problem: str | None = None
     waiting: dict[str, float] = field(default_factory=dict)  # tags whose event was refused → when it is tried again
+    news: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def run_once(self, channel: Channel) -> bool:
         """Send the oldest events that may leave together. Return whether there were any.
@@ -50,7 +54,7 @@ class Queue:
         While the receiver is not available, a single portion or event is tried. Raises sqlite3.Error.
         """
         now_s = time.monotonic()
-        if now_s < self.due_s:
+        if now_s < self.due_s or not self.deliveries.may_wait:
             return False
         self.waiting = {tag: due_s for tag, due_s in self.waiting.items() if due_s > now_s}
         batch = self._batch(channel)
@@ -61,6 +65,15 @@ class Queue:
             return True
         self._note(batch, await channel.send([entry.body for entry in batch]), channel.portion.pause_s)
         return True
+
+    async def rest(self) -> None:
+        """Wait after a run that found nothing to send: for news, or until a pause is over."""
+        self.news.clear()
+        now_s = time.monotonic()
+        pauses = [self.due_s] if self.due_s > now_s else list(self.waiting.values())
+        with suppress(TimeoutError):
+            async with asyncio.timeout(max(min(pauses) - now_s, 0.0) if pauses else None):
+                await self.news.wait()
 
     def _batch(self, channel: Channel) -> list[Delivery]:
         size, is_mixed, _ = channel.portion

@@ -1,49 +1,69 @@
-"""The thread that delivers events to all destinations."""
+"""The thread that delivers the events of all sites to all destinations."""
 
 import asyncio
 import logging
 import sqlite3
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 from dropanchor_schemas.destinations import Destination
-from dropanchor_service.delivery.channel import Channel, ChannelError
+from dropanchor_service.delivery.channel import ChannelError
 from dropanchor_service.delivery.channels import Channels
-from dropanchor_service.delivery.queue import Counts, Patience, Queue
+from dropanchor_service.delivery.queue import REREAD_S, Counts, Patience, Queue
 from dropanchor_service.events.deliveries import Deliveries
+from dropanchor_service.events.store import EventStore
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.runtime.worker import Worker
 from dropanchor_service.store.items import NamedItems
 
-IDLE_S = 0.1
+LOOK_S = 0.1
 STOP_S = 2.0
+
+Name = tuple[int, str]
+"""The index of a site, and the id of one of its destinations."""
+
+
+@dataclass(frozen=True)
+class Outbox:
+    """The destinations of one site, its events and their queues."""
+
+    destinations: NamedItems[Destination]
+    store: EventStore
+    deliveries: Deliveries
+    channels: Channels
 
 
 class DeliveryThread(Worker):
-    """Delivers while this context is open. A slow receiver delays no other."""
+    """Delivers while this context is open. Each queue has a task of its own, so a slow receiver delays no other.
 
-    def __init__(
-        self,
-        destinations: NamedItems[Destination],
-        deliveries: Deliveries,
-        channels: Channels,
-        patience: Patience,
-        now_ns: Callable[[], int],
-    ) -> None:
+    A queue is read when its site has stored events or a pause is over, so queues without events cost nothing.
+    """
+
+    def __init__(self, sites: Sequence[Outbox], patience: Patience, now_ns: Callable[[], int]) -> None:
+        """sites: in the order of their indices."""
         super().__init__("delivery", STOP_S)
         self._log = RareLog(logging.getLogger(__name__))
-        self._destinations = destinations
-        self._deliveries = deliveries
-        self._channels = channels
+        self._sites = sites
         self._patience = patience
         self._now_ns = now_ns
-        self._served: dict[str, Destination] = {}
-        self._queues: dict[str, Queue] = {}
-        self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._edited = deque(range(len(sites)))
+        self._with_news: deque[int] = deque()
+        for index, site in enumerate(sites):
+            site.destinations.on_change(partial(self._edited.append, index))
+            site.store.on_commit(partial(self._with_news.append, index))
+            site.deliveries.on_retry(partial(self._with_news.append, index))
+        self._served: dict[Name, Destination] = {}
+        self._queues: dict[Name, Queue] = {}
+        self._tasks: dict[Name, asyncio.Task[None]] = {}
+        self._ended: deque[asyncio.Task[None]] = deque()
         self.counts = Counts()
 
-    def problem_of(self, destination: str) -> str | None:
+    def problem_of(self, site: int, destination: str) -> str | None:
         """Return what went wrong at the last attempt, None if nothing did."""
-        queue = self._queues.get(destination)
+        queue = self._queues.get((site, destination))
         return None if queue is None else queue.problem
 
     def _run(self) -> None:
@@ -51,46 +71,62 @@ class DeliveryThread(Worker):
 
     async def _deliver_all(self) -> None:
         while not self._stop.is_set():
-            wanted = self._destinations.all
-            for name in [name for name, served in self._served.items() if wanted.get(name) != served]:
-                await self._end(name)
-            for name in wanted.keys() - self._served.keys():
-                self._begin(wanted[name])
-            for task in self._tasks.values():
-                if task.done():
+            for index in _taken(self._edited):
+                await self._follow(index)
+            for index in _taken(self._with_news):
+                for destination in self._sites[index].destinations.all:
+                    if (index, destination) in self._queues:
+                        self._queues[index, destination].news.set()
+            while self._ended:
+                task = self._ended.popleft()
+                if not task.cancelled():
                     task.result()  # raises what ended it: the supervision ends the process
-            await asyncio.sleep(IDLE_S)
+            await asyncio.sleep(LOOK_S)
         for name in list(self._tasks):
             await self._end(name)
 
-    def _begin(self, destination: Destination) -> None:
-        name = destination.id
-        self._served[name] = destination
-        self._queues[name] = Queue(name, self._deliveries, self._patience, self.counts, self._now_ns)
-        self._tasks[name] = asyncio.create_task(self._deliver(destination, self._queues[name]))
+    async def _follow(self, index: int) -> None:
+        """Serve the destinations that a site has now."""
+        wanted = self._sites[index].destinations.all
+        served = {name: destination for (site, name), destination in self._served.items() if site == index}
+        for changed in [name for name, destination in served.items() if wanted.get(name) != destination]:
+            await self._end((index, changed))
+        for new, destination in wanted.items():
+            if (index, new) not in self._served:
+                self._begin((index, new), destination)
 
-    async def _end(self, name: str) -> None:
+    def _begin(self, name: Name, destination: Destination) -> None:
+        site = self._sites[name[0]]
+        self._served[name] = destination
+        queue = self._queues[name] = Queue(destination.id, site.deliveries, self._patience, self.counts, self._now_ns)
+        task = self._tasks[name] = asyncio.create_task(self._deliver(destination, queue, site.channels))
+        task.add_done_callback(self._ended.append)
+
+    async def _end(self, name: Name) -> None:
         task = self._tasks.pop(name)
         task.cancel()
         await asyncio.wait([task])
         del self._queues[name], self._served[name]
 
-    async def _deliver(self, destination: Destination, queue: Queue) -> None:
+    async def _deliver(self, destination: Destination, queue: Queue, channels: Channels) -> None:
         """Empty the queue of one destination, again and again."""
         try:
-            self._channels.check_settings(destination)
+            channels.check_settings(destination)
         except ChannelError as error:
             queue.problem = str(error)
             return
-        async with self._channels.open(destination) as channel:
+        async with channels.open(destination) as channel:
             while True:
-                if not await self._attempt(queue, channel):
-                    await asyncio.sleep(IDLE_S)
+                try:
+                    is_empty = not await queue.run_once(channel)
+                except sqlite3.Error as error:
+                    text = f"the queue cannot be read or written: {error}. It is tried again"
+                    self._log.warning(queue.destination, text)
+                    is_empty, queue.due_s = True, time.monotonic() + REREAD_S
+                if is_empty:
+                    await queue.rest()
 
-    async def _attempt(self, queue: Queue, channel: Channel) -> bool:
-        try:
-            return await queue.run_once(channel)
-        except sqlite3.Error as error:
-            text = f"the queue cannot be read or written: {error}. It is tried again"
-            self._log.warning(queue.destination, text)
-            return False
+
+def _taken(indices: deque[int]) -> set[int]:
+    """Take all indices."""
+    return {indices.popleft() for _ in range(len(indices))}

@@ -216,4 +216,4 @@ def warm_up_zones(progress: CompilationProgress | None = None) -> None:
         rule = TooCloseRule(id="a", type="too_close", distance_m=9.0, delay_s=0.0)
         pairs = PairWatch(rule, Groups())
         for _ in range(2):
-            list(pairs.judge(found, names, 1))
+            list(pairs.judge(*found.single(), names.__getitem__, 1))

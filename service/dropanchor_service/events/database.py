@@ -59,48 +59,52 @@ class EventFileError(sqlite3.Error):
 
 
 class Database:
-    """The open file, or a database in memory when there is no folder for it."""
+    """The open file, or a database in memory when there is no folder for it.
+
+    It is made when it is first used: many sites have no events, and an open file takes memory and three descriptors.
+    """
 
     def __init__(self, folder: Path | None) -> None:
-        """Open or make the file. A damaged file is moved aside. Raises sqlite3.Error or OSError."""
+        """Open the file if there is one. A damaged one is moved aside. Raises sqlite3.Error or OSError."""
         self._lock = RLock()
         self._path = None if folder is None else folder / FILE_NAME
-        try:
-            self._connection = self._opened()
-        except sqlite3.DatabaseError as error:
-            if self._path is None or not is_damage(error):
-                raise
-            name = move_aside(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
-            _log.error("%s is damaged (%s): it was renamed to %s and new events start", self._path, error, name)
-            self._connection = self._opened()
-        self._close = weakref.finalize(self, self._connection.close)
+        self._open: sqlite3.Connection | None = None
+        if self._path is not None and self._path.exists():
+            self._connection()
+
+    @property
+    def is_made(self) -> bool:
+        """Whether it has been used, so that it may hold something."""
+        return self._open is not None
 
     def close(self) -> None:
         with self._lock:
-            self._close()
+            if self._open is not None:
+                self._open.close()
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
         """Write in this context, all or nothing. Raises sqlite3.Error."""
         with self._lock:
-            self._connection.execute("BEGIN IMMEDIATE")
+            connection = self._connection()
+            connection.execute("BEGIN IMMEDIATE")
             try:
-                yield self._connection
-                self._connection.execute("COMMIT")
+                yield connection
+                connection.execute("COMMIT")
             except BaseException:
-                if self._connection.in_transaction:  # a full disk may have ended the transaction already
-                    self._connection.execute("ROLLBACK")
+                if connection.in_transaction:  # a full disk may have ended the transaction already
+                    connection.execute("ROLLBACK")
                 raise
 
     def rows(self, sql: str, *values: Any) -> list[tuple[Any, ...]]:
         """Return the rows of a query. Raises sqlite3.Error."""
         with self._lock:
-            return self._connection.execute(sql, values).fetchall()
+            return self._connection().execute(sql, values).fetchall()
 
     def snapshot(self, *queries: tuple[str, Mapping[str, Any]]) -> list[list[tuple[Any, ...]]]:
         """Return the rows of several queries at one moment. Raises sqlite3.Error."""
         with self._lock:
-            return [self._connection.execute(sql, values).fetchall() for sql, values in queries]
+            return [self._connection().execute(sql, values).fetchall() for sql, values in queries]
 
     def used_bytes(self) -> int:
         """Return the size of the file without its free pages."""
@@ -109,9 +113,23 @@ class Database:
         )
         return int((pages - free) * size)
 
+    def _connection(self) -> sqlite3.Connection:
+        """Return the open connection. Raises sqlite3.Error or OSError."""
+        if self._open is None:
+            try:
+                self._open = self._opened()
+            except sqlite3.DatabaseError as error:
+                if self._path is None or not is_damage(error):
+                    raise
+                name = move_aside(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
+                _log.error("%s is damaged (%s): it was renamed to %s and new events start", self._path, error, name)
+                self._open = self._opened()
+            weakref.finalize(self, self._open.close).atexit = False  # a thread may still be in a statement then
+        return self._open
+
     def _opened(self) -> sqlite3.Connection:
         if self._path is not None:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            _make(self._path.parent)
         connection = sqlite3.connect(self._path or ":memory:", BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             self._prepare(connection)
@@ -140,3 +158,11 @@ class Database:
         connection.execute("PRAGMA journal_size_limit = 67108864")
         if version == 0:
             connection.executescript(f"BEGIN; {_SCHEMA} COMMIT;")
+
+
+def _make(folder: Path) -> None:
+    """Make the folder. Raises sqlite3.Error, as everything does that fails at the first use of a file."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise sqlite3.OperationalError(str(error)) from error

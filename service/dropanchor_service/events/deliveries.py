@@ -1,6 +1,6 @@
 """The persistent queues of destinations. An event leaves its queue when the receiver has accepted it."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from dropanchor_service.events.database import Database
@@ -31,6 +31,16 @@ class Deliveries:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        self._retried: Callable[[], None] = lambda: None
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether there may be events in a queue."""
+        return self._database.is_made
+
+    def on_retry(self, retried: Callable[[], None]) -> None:
+        """Call this after dead letters were put back, on the thread that does it."""
+        self._retried = retried
 
     def oldest(self, destination: str, limit: int, waiting: Collection[str] = ()) -> list[Delivery]:
         """Return the oldest events of the queue, at most `limit`. waiting: tags that are left out."""
@@ -89,7 +99,9 @@ class Deliveries:
         """Put the dead letters of a destination back into its queue. Return how many."""
         sql = "UPDATE deliveries SET dead = NULL, refusals = 0 WHERE destination = ? AND dead IS NOT NULL"
         with self._database.transaction() as connection:
-            return connection.execute(sql, (destination,)).rowcount
+            count = connection.execute(sql, (destination,)).rowcount
+        self._retried()
+        return count
 
     def drop_dead(self, destination: str) -> None:
         """Delete the dead letters of a destination."""
@@ -103,6 +115,8 @@ class Deliveries:
 
     def states(self) -> dict[str, QueueState]:
         """Return the state of every queue that is not empty, by destination."""
+        if not self._database.is_made:
+            return {}
         rows = self._database.rows(
             "SELECT destination, pending, dead, (SELECT t_ns FROM events WHERE sequence = first) FROM ("
             "SELECT destination, count(*) - count(dead) AS pending, count(dead) AS dead, "

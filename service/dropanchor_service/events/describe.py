@@ -1,6 +1,6 @@
 """Describe changes as events."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from dropanchor_schemas.events import EventType
@@ -54,12 +54,12 @@ def pair_event(rule: TooCloseRule, change: PairChange, now_ns: int, name_of: Nam
     return Draft(EventType.TAGS_TOO_CLOSE, tag, data)
 
 
-def tag_event(rule: EventRule, change: TagChange, fleet: FleetState, now_ns: int, name_of: NameOf) -> Draft:
-    """Return the event of a single tag."""
+def tag_event(rule: EventRule, change: TagChange, fleet: FleetState, now_ns: int, names: Sequence[str]) -> Draft:
+    """Return the event of a single tag. names: of the tags of its site."""
     data = _rule_data(rule, now_ns, change.since_ns)
     if rule.type == "battery_low":
-        data["battery_fraction"] = rounded(fleet.battery[change.row])
-    return Draft(_OF_RULES[rule.type], name_of(change.row), data)
+        data["battery_fraction"] = rounded(fleet.battery[change.place])
+    return Draft(_OF_RULES[rule.type], names[change.place], data)
 
 
 def _rule_data(rule: EventRule, now_ns: int, since_ns: int) -> dict[str, Any]:

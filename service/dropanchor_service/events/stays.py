@@ -42,6 +42,8 @@ def times_in_zones(
 
     until_ns: until when a tag that has not left counts; one without a time counts for nothing. Raises sqlite3.Error.
     """
+    if not database.is_made:
+        return {}
     period = {"from": from_ns, "to": to_ns}
     ended, inside = database.snapshot((_ENDED, period), (_INSIDE, period))
     times = {(tag, zone): TimeInZone(inside_ns, stays) for tag, zone, inside_ns, stays in ended}

@@ -15,6 +15,8 @@ from dropanchor_service.events.stays import add_stays, prune_stays
 
 PRUNED = 5_000  # events per transaction
 
+_NEWEST = "SELECT coalesce(max(seq), 0) FROM sqlite_sequence"
+
 _UNKNOWN = {
     name: field.default for name, field in EventData.model_fields.items() if not field.is_required()
 }  # every event has every field
@@ -62,15 +64,19 @@ class EventStore:
         self.database = database
         self.site = site
         self._addressees = addressees
-        self.newest = int(database.rows("SELECT coalesce(max(seq), 0) FROM sqlite_sequence")[0][0])
+        self.newest = int(database.rows(_NEWEST)[0][0]) if database.is_made else 0
         """The sequence of the newest event. Readers poll it."""
         self.dropped_deliveries = 0
+        self._told: list[Callable[[], None]] = []
+
+    def on_commit(self, told: Callable[[], None]) -> None:
+        """Call this after every commit of events, on the thread that makes it."""
+        self._told.append(told)
 
     def commit(self, drafts: Sequence[Draft], states: States, stays: Sequence[Stay] = ()) -> None:
         """Store events, states and ended stays, and queue the events for their destinations."""
         with self.database.transaction() as connection:
-            found = connection.execute("SELECT coalesce(max(seq), 0) FROM sqlite_sequence").fetchone()
-            first = int(found[0]) + 1
+            first = int(connection.execute(_NEWEST).fetchone()[0]) + 1
             rows = [
                 (number, draft.type.value, draft.tag, draft.zone, draft.t_ns, cloud_event(draft, number, self.site))
                 for number, draft in enumerate(drafts, first)
@@ -94,14 +100,20 @@ class EventStore:
             )
             add_stays(connection, stays)
         self.newest = first + len(drafts) - 1
+        for told in self._told if drafts else ():
+            told()
 
     def states(self) -> dict[StateKey, StateValue]:
         """Return all states."""
+        if not self.database.is_made:
+            return {}
         rows = self.database.rows("SELECT source, item, tag, other, flags, since_ns FROM states")
         return {StateKey(*row[:4]): StateValue(*row[4:]) for row in rows}
 
     def occupancy(self) -> list[tuple[str, int]]:
         """Return each zone that is not empty, and how many tags are inside."""
+        if not self.database.is_made:
+            return []
         rows = self.database.rows("SELECT item, count(*) FROM states WHERE source = 'zone' GROUP BY item")
         return [(zone, tags) for zone, tags in rows]
 
@@ -114,12 +126,16 @@ class EventStore:
 
     def after(self, sequence: int, limit: int, selection: Selection = EVERYTHING) -> list[StoredEvent]:
         """Return up to `limit` selected events that follow this sequence, in order."""
+        if not self.database.is_made:
+            return []
         where, values = selection.where()
         sql = f"SELECT sequence, body FROM events WHERE {where} ORDER BY sequence LIMIT ?"
         return [StoredEvent(*row) for row in self.database.rows(sql, sequence, *values, limit)]
 
     def last(self, limit: int, selection: Selection = EVERYTHING) -> list[StoredEvent]:
         """Return the newest selected events, at most `limit`, in order."""
+        if not self.database.is_made:
+            return []
         where, values = selection.where()
         sql = f"SELECT sequence, body FROM events WHERE {where} ORDER BY sequence DESC LIMIT ?"
         return [StoredEvent(*row) for row in reversed(self.database.rows(sql, 0, *values, limit))]
@@ -129,6 +145,8 @@ class EventStore:
 
         What is still queued of them is lost, and counted.
         """
+        if not self.database.is_made:
+            return 0
         oversized = self.database.used_bytes() > max_bytes
         condition = "1" if oversized else "t_ns < ?"
         values = [] if oversized else [keep_from_ns]

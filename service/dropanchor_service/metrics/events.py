@@ -1,14 +1,13 @@
-"""Metrics of events and their delivery."""
+"""Metrics of events and their delivery, of all sites together."""
 
 import sqlite3
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from dropanchor_service.delivery.thread import DeliveryThread
-from dropanchor_service.events.deliveries import Deliveries, QueueState
-from dropanchor_service.events.store import EventStore
+from dropanchor_service.delivery.thread import DeliveryThread, Outbox
+from dropanchor_service.events.deliveries import QueueState
 from dropanchor_service.events.thread import EventThread
 
 
@@ -18,14 +17,12 @@ class EventMetrics(Collector):
     def __init__(
         self,
         thread: EventThread,
-        store: EventStore,
-        deliveries: Deliveries,
+        outboxes: Sequence[Outbox],
         delivery: DeliveryThread,
         now_ns: Callable[[], int],
     ) -> None:
         self._thread = thread
-        self._store = store
-        self._deliveries = deliveries
+        self._outboxes = outboxes
         self._delivery = delivery
         self._now_ns = now_ns
 
@@ -35,7 +32,7 @@ class EventMetrics(Collector):
         yield CounterMetricFamily(
             "dropanchor_events_busy_seconds", "CPU time of finding and storing events.", thread.busy_s
         )
-        yield GaugeMetricFamily("dropanchor_events_failing", "1 while events cannot be stored.", bool(thread.problem))
+        yield GaugeMetricFamily("dropanchor_events_failing", "1 while events cannot be stored.", bool(thread.problems))
         yield CounterMetricFamily("dropanchor_delivery_delivered", "Events delivered.", counts.delivered)
         yield CounterMetricFamily(
             "dropanchor_delivery_failed_attempts", "Attempts to deliver an event that failed.", counts.failed_attempts
@@ -43,13 +40,13 @@ class EventMetrics(Collector):
         yield CounterMetricFamily(
             "dropanchor_delivery_dropped",
             "Events deleted by age or size before their destination had them.",
-            self._store.dropped_deliveries,
+            sum(one.store.dropped_deliveries for one in self._outboxes),
         )
         yield from self._queues()
 
     def _queues(self) -> Iterable[Metric]:
         try:
-            states = list(self._deliveries.states().values())
+            states = [state for one in self._outboxes for state in one.deliveries.states().values()]
         except sqlite3.Error:
             return
         pending, dead = sum(state.pending for state in states), sum(state.dead for state in states)

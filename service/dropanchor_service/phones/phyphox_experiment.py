@@ -9,7 +9,6 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from dropanchor_service.phones.readings import GYROSCOPE, MAGNETOMETER, TOTAL
 
-PATH = "/api/v1/ingest/phyphox"
 MEDIA_TYPE = "application/phyphox"
 VERSION = "1.14"
 RATE_HZ = 100
@@ -23,10 +22,12 @@ _TYPES = {TOTAL: "accelerometer", GYROSCOPE: "gyroscope", MAGNETOMETER: "magneti
 
 
 def link_of(url: str, tag: str, secret: str) -> str:
-    """Return the link that the app opens to load the experiment. url: address of the service. secret: key of the tag,
-    empty without one. The app tries HTTPS first."""
+    """Return the link that the app opens to load the experiment. The app tries HTTPS first.
+
+    url: address to which the app sends. secret: key of the tag, empty without one.
+    """
     parts = urlsplit(url)
-    return f"phyphox://{parts.netloc}{parts.path.rstrip('/')}{PATH}?{_query(tag, secret)}"
+    return f"phyphox://{parts.netloc}{parts.path}?{_query(tag, secret)}"
 
 
 def experiment(url: str, tag: str, secret: str) -> bytes:
@@ -41,7 +42,7 @@ def experiment(url: str, tag: str, secret: str) -> bytes:
     _add_containers(SubElement(root, "data-containers"))
     _add_sensors(SubElement(root, "input"))
     _add_view(SubElement(root, "views"), tag)
-    _add_connection(SubElement(root, "network"), f"{url.rstrip('/')}{PATH}?{_query(tag, secret)}")
+    _add_connection(SubElement(root, "network"), f"{url}?{_query(tag, secret)}")
     indent(root)
     content: bytes = tostring(root, "utf-8", xml_declaration=True)
     return content

@@ -13,7 +13,6 @@ from dropanchor_service.api import export as openapi
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
-from dropanchor_service.persistence import Persistence
 from dropanchor_service.reference import (
     metrics_page,
     omlox_page,
@@ -23,7 +22,8 @@ from dropanchor_service.reference import (
     states_page,
 )
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.store import HealthTable, LatestPoses, Sites, SiteStore
+from dropanchor_service.site_folders import SiteFolders
+from dropanchor_service.store import LatestPoses, Sites, SiteStore
 from dropanchor_service.store.clock_offsets import NoClockOffsets
 from dropanchor_service.zone_events import ZoneEvents
 
@@ -67,14 +67,12 @@ def _registry(folder: Path) -> CollectorRegistry:
     """Return a registry with everything that a service with a data folder registers."""
     metrics, latest = Metrics(), LatestPoses()
     settings = Settings(data_dir=folder)
-    site = SiteStore(settings.site, {})
-    sites = Sites([(site, settings.quota)])
-    tags = sites[0].tags
-    Persistence(settings, tags, site, lambda: 0, metrics)
+    sites = Sites([(SiteStore(settings.site, {}), settings.quota)])
+    SiteFolders(settings, sites, lambda: 0, metrics)
     metrics.register(FleetGauges(sites, latest, lambda: 0, lambda: 0))
     metrics.register(HealthGauges(sites, lambda: 0, NoClockOffsets()))
     metrics.register(OperationGauges(list, list, folder, lambda: {"http": datetime.fromtimestamp(0, UTC)}))
-    ZoneEvents(Settings(), site, tags, latest, HealthTable(), lambda: 0, metrics)
+    ZoneEvents(Settings(), sites, latest, lambda: 0, metrics)
     return metrics.registry
 
 

@@ -67,16 +67,19 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
     return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
 
 
-def authenticator_of(settings: Settings) -> Authenticator | None:
-    """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError."""
+def authenticator_of(settings: Settings, only_site: str | None = None) -> Authenticator | None:
+    """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError.
+
+    only_site: its id; None: there are several.
+    """
     providers = _providers_of(settings)
     folder = settings.data_dir or settings.security.folder
     if not providers:
         return None
-    if folder is None or len(settings.sites) > 1:  # share links are of an only site, so far
+    if folder is None:
         return Authenticator(providers)
     try:
-        return Authenticator({share_links.SOURCE: ShareLinks(folder), **providers})
+        return Authenticator({share_links.SOURCE: ShareLinks(folder, only_site=only_site), **providers})
     except (OSError, ShareLinkError) as error:
         raise SettingsError(f"share links: {error}") from error
 

@@ -3,7 +3,7 @@
 import json
 import secrets
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -19,7 +19,7 @@ SOURCE = "share link"
 PREFIX = "dropanchor_share_"
 KEY_FILE, TABLE_FILE = "share_key", "share_links.json"
 KEY_BYTES = 32
-MAX_LINKS = 1000
+MAX_LINKS = 1000  # of a site
 LISTED_S = 30 * 86_400  # how long an expired link stays in the list
 NS = 1_000_000_000
 
@@ -33,27 +33,35 @@ class ShareLinkError(ValueError):
 
 
 class TooManyLinksError(Exception):
-    """There are MAX_LINKS links."""
+    """The site has MAX_LINKS links."""
 
 
 class ShareLinks:
-    """The links whose key and list are in a folder. A link works while it is in the list and has not expired."""
+    """The links of all sites, whose key and list are in a folder.
+
+    A link works in its site alone, while it is in the list and has not expired.
+    """
 
     may_block = False
 
-    def __init__(self, folder: Path, clock: Callable[[], float] = time.time) -> None:
-        """Read the key and the list, or create the key. clock: Unix time. Raises ShareLinkError and OSError."""
+    def __init__(self, folder: Path, clock: Callable[[], float] = time.time, only_site: str | None = None) -> None:
+        """Read the key and the list, or create the key. Raises ShareLinkError and OSError.
+
+        clock: Unix time. only_site: that of links which do not say of which they are, as earlier versions made them.
+        """
         self._clock = clock
+        self._only_site = only_site
         self._file = folder / TABLE_FILE
         self._key = _key_in(folder / KEY_FILE)
         self._lock = Lock()
         self._links = self._read()
 
-    def all(self) -> Mapping[str, Share]:
-        return self._links
+    def of_site(self, site: str) -> Sequence[Share]:
+        """Return the links of a site, the first to expire first."""
+        return sorted((link for link in self._links.values() if link.site == site), key=lambda one: one.expires_ns)
 
-    def add(self, request: ShareRequest) -> tuple[Share, str]:
-        """Create a link and return it with its token. Raises TooManyLinksError and OSError."""
+    def add(self, site: str, request: ShareRequest) -> tuple[Share, str]:
+        """Create a link of a site and return it with its token. Raises TooManyLinksError and OSError."""
         now_s = self._clock()
         link = Share(
             id=secrets.token_hex(8),
@@ -62,19 +70,20 @@ class ShareLinks:
             expires_ns=int(now_s + request.valid_s) * NS,
             tag=request.tag,
             group=request.group,
+            site=site,
         )
         with self._lock:
             listed = {key: old for key, old in self._links.items() if old.expires_ns / NS > now_s - LISTED_S}
-            if len(listed) >= MAX_LINKS:
+            if sum(other.site == site for other in listed.values()) >= MAX_LINKS:
                 raise TooManyLinksError
             self._write(listed | {link.id: link})
         claims = {"jti": link.id, "aud": _AUDIENCE, "exp": link.expires_ns // NS, "tag": link.tag, "group": link.group}
         return link, PREFIX + jwt.encode(claims, self._key, _ALGORITHM)
 
-    def revoke(self, identifier: str) -> bool:
-        """Remove a link, which ends its streams. Return whether there was one. Raises OSError."""
+    def revoke(self, site: str, identifier: str) -> bool:
+        """Remove a link of a site, which ends its streams. Return whether there was one. Raises OSError."""
         with self._lock:
-            if identifier not in self._links:
+            if identifier not in self._links or self._links[identifier].site != site:
                 return False
             self._write({key: link for key, link in self._links.items() if key != identifier})
         return True
@@ -99,19 +108,25 @@ class ShareLinks:
             raise UnauthenticatedError("the share link has expired")
         if link is None:
             raise UnauthenticatedError("the share link was revoked")
+        if link.site is None:
+            raise UnauthenticatedError("the share link does not say of which site it is: create another one")
         limit = None if link.tag is None and link.group is None else Limit(link.tag, link.group)
-        return Identity(SOURCE, link.id, Scope.READ, link.expires_ns / NS, limit=limit)
+        return Identity(SOURCE, link.id, None, link.expires_ns / NS, limit=limit, of_sites={link.site: Scope.READ})
 
     def is_still_valid(self, identity: Identity) -> bool:
         return identity.name in self._links and self._clock() < (identity.expires_s or 0.0)
 
     def _read(self) -> Mapping[str, Share]:
         try:
-            return _TABLE.validate_json(self._file.read_bytes())
+            found = _TABLE.validate_json(self._file.read_bytes())
+            return {name: self._with_site(link) for name, link in found.items()}
         except FileNotFoundError:
             return {}
         except ValidationError as error:
             raise ShareLinkError(f"{self._file} is damaged: delete it, which ends all share links") from error
+
+    def _with_site(self, link: Share) -> Share:
+        return link if link.site is not None else link.model_copy(update={"site": self._only_site})
 
     def _write(self, links: Mapping[str, Share]) -> None:
         content = json.dumps(_TABLE.dump_python(dict(links), mode="json"), indent=2, ensure_ascii=False)

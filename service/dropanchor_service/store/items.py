@@ -1,6 +1,6 @@
 """Named items that are edited over REST, such as zones: kept in memory and saved in a file."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from threading import Lock
 from typing import Any, Generic, TypeVar
@@ -39,7 +39,12 @@ class NamedItems(Generic[Item]):
         self._items: dict[str, Item] = {}
         if path is not None and path.exists():
             self._items = adapter.validate_json(path.read_bytes())
+        self._told: list[Callable[[], None]] = []
         self.version = 1
+
+    def on_change(self, told: Callable[[], None]) -> None:
+        """Call this after every change, on the thread that makes it."""
+        self._told.append(told)
 
     @property
     def all(self) -> Mapping[str, Item]:
@@ -73,6 +78,8 @@ class NamedItems(Generic[Item]):
             write_atomically(self._path, [self._adapter.dump_json(items, indent=2)], self._mode)
         self._items = items
         self.version += 1
+        for told in self._told:
+            told()
 
 
 def adapter_of(model: Any) -> TypeAdapter[dict[str, Any]]:

@@ -58,12 +58,16 @@ class SiteStore:
         self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
         self._index_anchors()
         self._groups = groups_of(self._document.tags, self.default_settings)
-        self._changed: Callable[[], None] = lambda: None
+        self._told: list[Callable[[], None]] = []
         self.version = 1
 
-    def on_change(self, changed: Callable[[], None]) -> None:
+    def on_change(self, told: Callable[[], None]) -> None:
         """Call this after every change, on the thread that makes it."""
-        self._changed = changed
+        self._told.append(told)
+
+    def _tell(self) -> None:
+        for told in self._told:
+            told()
 
     @property
     def site(self) -> Site:
@@ -100,7 +104,7 @@ class SiteStore:
         self._anchors = {anchor.number: (index, anchor) for index, anchor in enumerate(anchors)}
         self._index_anchors()
         self.version += 1
-        self._changed()
+        self._tell()
 
     def bind_first(self, anchor: str) -> bool:
         """Put `anchor` at the origin if the site has no anchor yet. Return whether it did."""
@@ -222,7 +226,7 @@ class SiteStore:
         self._groups = groups_of(document.tags, self.default_settings)
         self._index_anchors()
         self.version += 1
-        self._changed()
+        self._tell()
 
     def _index_anchors(self) -> None:
         for anchor in self.site.anchors:

@@ -1,4 +1,6 @@
-"""Publishes events over Zenoh as soon as they are stored."""
+"""Publishes the events of all sites over Zenoh as soon as they are stored."""
+
+from collections.abc import Sequence
 
 import orjson
 import zenoh
@@ -13,18 +15,23 @@ AT_ONCE = 1000
 
 
 class ZenohEvents(PeriodicPublisher):
-    """Publishes while it is open, in the order of the events. It begins with the next event."""
+    """Publishes while it is open, in the order of the events of each site. It begins with the next event."""
 
-    def __init__(self, session: zenoh.Session, store: EventStore, metrics: Metrics) -> None:
+    def __init__(self, session: zenoh.Session, stores: Sequence[EventStore], metrics: Metrics) -> None:
         super().__init__("zenoh events", PERIOD_S, metrics)
         self._session = session
-        self._store = store
-        self._published = store.newest
+        self._stores = stores
+        self._published = [store.newest for store in stores]
 
     def publish(self) -> None:
         """Put the events that have been stored since the last call."""
-        while self._store.newest > self._published and not self._stop.is_set():
-            for event in self._store.after(self._published, AT_ONCE):
-                key = event_key(self._store.site, orjson.loads(event.body)["subject"])
+        for index, store in enumerate(self._stores):
+            if store.newest > self._published[index]:
+                self._publish(index, store)
+
+    def _publish(self, index: int, store: EventStore) -> None:
+        while store.newest > self._published[index] and not self._stop.is_set():
+            for event in store.after(self._published[index], AT_ONCE):
+                key = event_key(store.site, orjson.loads(event.body)["subject"])
                 self._session.put(key, event.body, encoding=zenoh.Encoding.APPLICATION_JSON)
-                self._published = event.sequence
+                self._published[index] = event.sequence

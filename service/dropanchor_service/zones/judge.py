@@ -41,10 +41,11 @@ class Poses(NamedTuple):
 
 
 class Zones(NamedTuple):
-    """Zones, in columns.
+    """Zones of one or several sites, in columns: those of one site after those of the other.
 
     vertices: n × 2, of one zone after the other. first: index of the first vertex of each zone, and the end. boxes:
-    (x min, y min, x max, y max). dwell_ns: -1: no rule. speed: m/s, infinite: no rule.
+    (x min, y min, x max, y max). dwell_ns: -1: no rule. speed: m/s, infinite: no rule. sites: index of the first zone
+    of each site, and the end.
     """
 
     vertices: Array
@@ -53,15 +54,17 @@ class Zones(NamedTuple):
     delay_ns: Array
     dwell_ns: Array
     speed: Array
+    sites: Array
 
 
 class Memory(NamedTuple):
-    """What is known of the tags (rows) and zones (columns).
+    """What is known of the tags (rows) and the zones of their sites (columns).
 
-    judged_ns: by row, the time of the last pose. concerned: whether the zone concerns the tag. stays: STAY. touched:
-    whether a STAY is not zero; most are zero and need not be read.
+    sites: by row, the index of the tag's site. judged_ns: by row, the time of the last pose. concerned: whether the
+    zone concerns the tag. stays: STAY. touched: whether a STAY is not zero; most are zero and need not be read.
     """
 
+    sites: Array
     judged_ns: Array
     concerned: Array
     stays: Array
@@ -77,24 +80,26 @@ def judge(poses: Poses, zones: Zones, memory: Memory, begin: int, changes: Any) 
     boxes, count = zones.boxes, 0
     low, high = np.empty(2), np.empty(2)
     for i in range(begin, len(poses.rows)):
-        if count + PER_PAIR * len(boxes) > len(changes):
-            return count, i
         row, now = poses.rows[i], poses.t_ns[i]
+        first, end = zones.sites[memory.sites[row]], zones.sites[memory.sites[row] + 1]
+        if count + PER_PAIR * (end - first) > len(changes):
+            return count, i
         continues = 0 < now - memory.judged_ns[row] <= MAX_GAP_NS
         memory.judged_ns[row] = now
         modes = poses.modes[poses.first[i] : poses.first[i + 1]]
         weight = _extent(modes, low, high)
         low_x, low_y, high_x, high_y = low[0], low[1], high[0], high[1]
-        for z in range(len(boxes)):
+        for z in range(first, end):
             is_far = low_x > boxes[z, 2] or high_x < boxes[z, 0] or low_y > boxes[z, 3] or high_y < boxes[z, 1]
-            if (is_far and not memory.touched[row, z]) or not memory.concerned[row, z]:
+            column = z - first
+            if (is_far and not memory.touched[row, column]) or not memory.concerned[row, column]:
                 continue
             inside = 0.0 if is_far else _inside(modes, boxes[z], zones.vertices, zones.first[z], zones.first[z + 1])
-            stay, before = memory.stays[row, z], count
+            stay, before = memory.stays[row, column], count
             count = _follow(stay, zones, z, inside, weight, now, continues, poses.speeds[i], changes, count)
             for k in range(before, count):
                 changes[k].pose, changes[k].zone = i, z
-            memory.touched[row, z] = stay.flags != 0 or stay.pending_ns != 0
+            memory.touched[row, column] = stay.flags != 0 or stay.pending_ns != 0
     return count, len(poses.rows)
 
 
@@ -215,8 +220,3 @@ def _note(changes: Any, count: int, kind: int, since_ns: int, p: float) -> int:
     """Add a change, whose pose and zone the caller knows. Return the new number of changes."""
     changes[count].kind, changes[count].since_ns, changes[count].p = kind, since_ns, p
     return count + 1
-
-
-def empty_stays(rows: int, zones: int) -> Array:
-    """Return STAY of so many tags and zones, none of which is inside. The memory is used when it is written."""
-    return np.zeros((rows, zones), STAY)

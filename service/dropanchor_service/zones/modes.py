@@ -21,6 +21,11 @@ class PlacedPoses:
     modes: Array
     first: Array
 
+    def single(self) -> tuple[Array, Array]:
+        """Return the rows of the tags that have one place, and its MODE."""
+        single = self.poses["state"] != State.AMBIGUOUS
+        return self.poses["row"][single], self.modes[self.first[:-1][single]]
+
 
 def placed(poses: Array, age_s: Array, latest: LatestPoses) -> PlacedPoses:
     """Return the poses that are current, finite and in the site frame, with their modes.

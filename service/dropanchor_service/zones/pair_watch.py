@@ -1,18 +1,17 @@
 """Find tags that are too close to each other."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numba import njit
 
 from dropanchor_schemas.zones import TooCloseRule
-from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.concerned import concerned
 from dropanchor_service.zones.judge import ENTER_P, EXIT_P, NEAR
-from dropanchor_service.zones.modes import PlacedPoses
 from dropanchor_service.zones.probability import p_inside
 from dropanchor_service.zones.shapes import disc
 
@@ -80,13 +79,16 @@ class PairWatch:
     def restore(self, pair: Pair, since_ns: int) -> None:
         self._close[pair] = since_ns
 
-    def judge(self, placed: PlacedPoses, names: Sequence[str], now_ns: int) -> Iterator[PairChange]:
-        """Judge the current poses of all tags, and yield what has changed. names: by row."""
-        single = placed.poses["state"] != State.AMBIGUOUS
-        poses, modes = placed.poses[single], placed.modes[placed.first[:-1][single]]
-        mask = concerned([self.rule], self._groups, [names[row] for row in poses["row"].tolist()])[:, 0]
+    def judge(self, rows: Array, modes: Array, name_of: Callable[[int], str], now_ns: int) -> Iterator[PairChange]:
+        """Judge the current places of all tags that have one, and yield what has changed.
+
+        modes: MODE of each row. name_of: tag by row.
+        """
+        if len(rows) < 2 and not self._pending:
+            return
+        mask = concerned([self.rule], self._groups, [name_of(row) for row in rows.tolist()])[:, 0]
         order = np.flatnonzero(mask)[np.argsort(modes["x"][mask], kind="stable")]
-        rows, modes = poses["row"][order], modes[order]
+        rows, modes = rows[order], modes[order]
         places, covs = np.column_stack([modes["x"], modes["y"]]), np.ascontiguousarray(modes["cov"])
         weights = np.ascontiguousarray(modes["weight"])
         index = {row: place for place, row in enumerate(rows.tolist())}
@@ -100,7 +102,7 @@ class PairWatch:
             if weights[i] * weights[j] - p_of(pair) >= EXIT_P:
                 del self._close[pair]
                 yield PairChange(pair, False, now_ns, 0.0, math.nan)
-        seen = {self._named(pair, rows, names) for pair in self._sure(places, weights, covs).tolist()}
+        seen = {_in_order(pair, rows, name_of) for pair in self._sure(places, weights, covs).tolist()}
         self._pending = {pair: self._pending.get(pair, now_ns) for pair in seen if pair not in self._close}
         for pair, since_ns in [item for item in self._pending.items() if now_ns - item[1] >= delay_ns]:
             self._close[pair] = since_ns
@@ -120,7 +122,8 @@ class PairWatch:
         self.is_full = count == MAX_PAIRS
         return known[pairs[:count]]
 
-    def _named(self, pair: Sequence[int], rows: Array, names: Sequence[str]) -> Pair:
-        """Return the rows of a pair, in the order of the names of its tags."""
-        one, other = int(rows[pair[0]]), int(rows[pair[1]])
-        return (one, other) if names[one] < names[other] else (other, one)
+
+def _in_order(pair: Sequence[int], rows: Array, name_of: Callable[[int], str]) -> Pair:
+    """Return the rows of a pair, in the order of the names of its tags."""
+    one, other = int(rows[pair[0]]), int(rows[pair[1]])
+    return (one, other) if name_of(one) < name_of(other) else (other, one)

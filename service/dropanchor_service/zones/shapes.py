@@ -66,4 +66,20 @@ def table_of(zones: Sequence[Zone]) -> Zones:
         np.array([zone.delay_s * 1e9 for zone in zones], np.int64),
         np.array([-1 if zone.dwell_s is None else zone.dwell_s * 1e9 for zone in zones], np.int64),
         np.array([math.inf if zone.speed_mps is None else zone.speed_mps for zone in zones], np.float64),
+        np.array([0, len(zones)], np.int64),
+    )
+
+
+def joined(tables: Sequence[Zones]) -> Zones:
+    """Return the columns of the zones of several sites, from those of each."""
+    corners = np.cumsum([0, *(len(table.vertices) for table in tables)])
+    firsts = [table.first[:-1] + begin for table, begin in zip(tables, corners[:-1], strict=True)]
+    return Zones(
+        np.concatenate([table.vertices for table in tables]),
+        np.concatenate([*firsts, corners[-1:]]),
+        np.concatenate([table.boxes for table in tables]),
+        np.concatenate([table.delay_ns for table in tables]),
+        np.concatenate([table.dwell_ns for table in tables]),
+        np.concatenate([table.speed for table in tables]),
+        np.cumsum([0, *(len(table.boxes) for table in tables)]),
     )

@@ -1,4 +1,4 @@
-"""Follow a condition of single tags, such as a low battery, by row."""
+"""Follow a condition of the single tags of a site, such as a low battery, by their place among them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -18,13 +18,16 @@ RECHARGED = 0.05  # above its limit, a battery can be low again
 class TagChange(NamedTuple):
     """The condition began (`is_on`) or ended."""
 
-    row: int
+    place: int
     is_on: bool
     since_ns: int
 
 
 class FleetState(NamedTuple):
-    """The state of all tags by row. state: State at this time, -1 without a pose. battery: fraction, NaN: unknown."""
+    """The state of all tags of a site by place.
+
+    state: State at this time, -1 without a pose. battery: fraction, NaN: unknown.
+    """
 
     state: Array
     battery: Array
@@ -43,12 +46,12 @@ class TagWatch:
         self._pending_ns = np.zeros(0, np.int64)
         self._delay_ns = 0 if isinstance(rule, BatteryLowRule) else round(rule.after_s * 1e9)
 
-    def restore(self, row: int) -> None:
-        self._grow(row + 1)
-        self._on[row] = True
+    def restore(self, place: int) -> None:
+        self._grow(place + 1)
+        self._on[place] = True
 
     def judge(self, fleet: FleetState, names: Sequence[str], now_ns: int) -> list[TagChange]:
-        """Return what has changed. names: by row."""
+        """Return what has changed. names: by place."""
         n = len(names)
         self._grow(n)
         starts, ends = self._conditions(fleet)
@@ -58,9 +61,9 @@ class TagWatch:
         pending[begins & (pending == 0)] = now_ns
         begun = np.flatnonzero(begins & (now_ns - pending >= self._delay_ns))
         ended = np.flatnonzero(on & ends)
-        changes = [TagChange(row, True, int(pending[row])) for row in begun.tolist()]
+        changes = [TagChange(place, True, int(pending[place])) for place in begun.tolist()]
         on[begun], on[ended], pending[begun] = True, False, 0
-        return changes + [TagChange(row, False, now_ns) for row in ended.tolist()]
+        return changes + [TagChange(place, False, now_ns) for place in ended.tolist()]
 
     def _conditions(self, fleet: FleetState) -> tuple[Array, Array]:
         """Return for which tags the condition holds, and for which it surely does not."""
@@ -72,7 +75,7 @@ class TagWatch:
             case AmbiguousRule():
                 return fleet.state == State.AMBIGUOUS, fleet.state == State.TRACKING
 
-    def _grow(self, rows: int) -> None:
-        if rows > len(self._on):
-            self._on = enlarged(self._on, 2 * rows)
-            self._pending_ns = enlarged(self._pending_ns, 2 * rows)
+    def _grow(self, tags: int) -> None:
+        if tags > len(self._on):
+            self._on = enlarged(self._on, 2 * tags)
+            self._pending_ns = enlarged(self._pending_ns, 2 * tags)

@@ -7,18 +7,18 @@ import pytest
 from dropanchor_schemas.site import Georeference, Site
 from dropanchor_service.basemap.file import UnreadableTileError
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_service.site_folders import SiteFolders
+from dropanchor_service.store import Sites, SiteStore
 from support.basemap_files import basemap_file, image_tile
 
 BERLIN = Site(georeference=Georeference(lat=52.5, lon=13.4))
 
 
-def opened(tiles: Path, site: Site = BERLIN) -> Persistence:
+def opened(tiles: Path, site: Site = BERLIN) -> SiteFolders:
     settings = Settings.model_validate({"basemap": {"tiles": str(tiles)}})
-    return Persistence(settings, TagTable(), SiteStore(site, {}), lambda: 0, Metrics())
+    return SiteFolders(settings, Sites([(SiteStore(site, {}), settings.quota)]), lambda: 0, Metrics())
 
 
 def test_a_file_that_is_missing_or_none_stops_the_start(tmp_path: Path) -> None:
@@ -37,9 +37,9 @@ def test_a_file_that_is_missing_or_none_stops_the_start(tmp_path: Path) -> None:
 def test_a_site_without_latitude_and_longitude_is_warned_and_goes_on(
     tmp_path: Path, site: Site, warns: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
-    with opened(basemap_file(tmp_path / "map.pmtiles", {(0, 0, 0): image_tile((1, 2, 3))}), site) as persistence:
-        assert persistence.basemap is not None
-        assert persistence.basemap.file.tile(0, 0, 0) is not None
+    with opened(basemap_file(tmp_path / "map.pmtiles", {(0, 0, 0): image_tile((1, 2, 3))}), site) as folders:
+        assert folders.basemap is not None
+        assert folders.basemap.file.tile(0, 0, 0) is not None
     assert ("the site has no latitude and longitude" in caplog.text) is warns
     with pytest.raises(UnreadableTileError):
-        persistence.basemap.file.tile(0, 0, 0)
+        folders.basemap.file.tile(0, 0, 0)

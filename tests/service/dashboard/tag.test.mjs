@@ -139,3 +139,16 @@ test("an offset is corrected only where it is certain and large, and jumps only 
   clock.note(0, 5_024_000, 8_000);
   assert.equal(clock.correction_us, 5_000_000);
 });
+
+test("a page with ?site= sends to this site, and keeps its samples apart from those of another", async () => {
+  const link = "../../../service/dropanchor_service/dashboard/tag/link.js";
+  globalThis.document = { baseURI: "http://yard/below/tag/" };
+  const open = async (search) => {
+    globalThis.location = { search, hash: "" };
+    return await import(`${link}${search}`);
+  };
+  const [only, south] = [await open(""), await open("?site=Lager+S%C3%BCd")];
+  assert.equal(only.ingest("stream?tag=a").href, "http://yard/below/api/v1/ingest/stream?tag=a");
+  assert.equal(south.ingest("stream?tag=a").href, "http://yard/below/api/v1/sites/Lager%20S%C3%BCd/ingest/stream?tag=a");
+  assert.deepEqual([only.storeOf("a"), south.storeOf("a")], ["a", "Lager%20S%C3%BCd/a"]);
+});

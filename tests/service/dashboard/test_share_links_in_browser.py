@@ -57,7 +57,7 @@ def test_a_link_of_a_group_is_created_copied_used_and_revoked(chromium: Browser,
                 guest.page.keyboard.press("Escape")
                 guest.page.screenshot(path=tmp_path / "guest.png")
                 boss.page.get_by_role("button", name="Revoke Visitors").click()
-                wait_until(lambda: not links.all())
+                wait_until(lambda: not links.of_site("default"))
                 bench.move("van", x=5.0)
                 expect(guest.page.locator("#ended")).to_contain_text("It was revoked", timeout=15_000)
                 expect(guest.page.locator("#locked")).to_be_hidden()
@@ -68,7 +68,7 @@ def test_an_expired_link_says_when_it_expired_and_every_text_is_from_the_catalog
     chromium: Browser, tmp_path: Path
 ) -> None:
     old = ShareLinks(tmp_path, lambda: 1_700_000_000.0)
-    _, secret = old.add(ShareRequest(tag="cart"))
+    _, secret = old.add("default", ShareRequest(tag="cart"))
     bench = live_api_bench()
     app = bench.app(DASHBOARD, authenticator=Authenticator({share_links.SOURCE: ShareLinks(tmp_path)}))
     with running_server(app, bench.stopping) as port:

@@ -9,8 +9,9 @@ from typing import Any
 from dropanchor_schemas.zones import Circle, Polygon, Zone
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.events.site_watch import WatchedSite
 from dropanchor_service.events.thread import EventThread, Retention
-from dropanchor_service.events.watcher import Fleet, Watcher
+from dropanchor_service.events.watcher import Watcher
 from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.store import HealthTable
 from service.dashboard.place import Place, live_api_bench
@@ -55,8 +56,8 @@ def zone_place() -> ZonePlace:
     """Return a place that nobody serves yet."""
     bench = live_api_bench()
     parts = EventParts.in_memory("yard")
-    fleet = Fleet(bench.answers.site, bench.answers.tags, bench.answers.latest, HealthTable(), time.time_ns)
-    watch = EventThread(Watcher(fleet, parts.items, {}), parts.store, KEEP, time.time_ns, 0.1)
+    site = WatchedSite(bench.answers.site, bench.answers.tags, HealthTable(), parts.items)
+    watch = EventThread(Watcher([site], bench.answers.latest, time.time_ns), [parts.store], KEEP, time.time_ns, 0.1)
     return ZonePlace(bench, "", parts, watch)
 
 

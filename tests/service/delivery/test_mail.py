@@ -128,10 +128,10 @@ def test_an_unavailable_server_gets_everything_later_in_one_mail(answer: str) ->
         bench.happen("a", "b", "a")
         wait_until(lambda: server.attempts >= 3)
         assert bench.counts() == (3, 0)
-        assert answer[:3] in (bench.thread.problem_of("mes") or "")
+        assert answer[:3] in (bench.thread.problem_of(0, "mes") or "")
         server.answer = "250 OK"
         wait_until(lambda: bench.counts() == (0, 0))
-        assert bench.thread.problem_of("mes") is None
+        assert bench.thread.problem_of(0, "mes") is None
     assert [line for line in server.text().splitlines() if line.endswith("dock.")] == [
         f"{tag} entered Loading dock." for tag in "aba"
     ]
@@ -142,7 +142,7 @@ def test_events_wait_while_there_is_no_server() -> None:
     bench = bench_of(server)
     with delivering(bench):
         bench.happen("a")
-        wait_until(lambda: "the mail server cannot be used" in (bench.thread.problem_of("mes") or ""))
+        wait_until(lambda: "the mail server cannot be used" in (bench.thread.problem_of(0, "mes") or ""))
         with running_mail_server(server):
             wait_until(lambda: bench.counts() == (0, 0))
     assert len(server.mails) == 1
@@ -168,7 +168,7 @@ def test_a_recipient_that_is_refused_is_a_problem_although_the_others_get_the_ma
     with running_mail_server(server), delivering(bench, to=("gone@example.com", "shift@example.com")):
         bench.happen("a")
         wait_until(lambda: bench.counts() == (0, 0))
-        wait_until(lambda: "gone@example.com was refused" in (bench.thread.problem_of("mes") or ""))
+        wait_until(lambda: "gone@example.com was refused" in (bench.thread.problem_of(0, "mes") or ""))
     assert len(server.mails) == 1
 
 
@@ -183,7 +183,7 @@ def test_mails_leave_encrypted_with_the_password_in_the_file(tls: str, tmp_path:
     bench = bench_of(server, tls, authorities=authority, user="yard", password_file=password)
     with running_mail_server(server, **{tls: context}), delivering(bench):
         bench.happen("a")
-        wait_until(lambda: "refuses the login" in (bench.thread.problem_of("mes") or ""))
+        wait_until(lambda: "refuses the login" in (bench.thread.problem_of(0, "mes") or ""))
         password.write_text("right\n")
         wait_until(lambda: bench.counts() == (0, 0))
     assert server.was_encrypted == [True]
@@ -196,7 +196,7 @@ def test_a_server_whose_certificate_is_not_trusted_gets_nothing(tls: str, tmp_pa
     bench = bench_of(server, tls)
     with running_mail_server(server, **{tls: context}), delivering(bench):
         bench.happen("a")
-        wait_until(lambda: "certificate" in (bench.thread.problem_of("mes") or "").lower())
+        wait_until(lambda: "certificate" in (bench.thread.problem_of(0, "mes") or "").lower())
         assert bench.counts() == (1, 0)
     assert server.attempts == 0
 
@@ -206,7 +206,7 @@ def test_a_server_without_tls_gets_nothing_when_tls_is_wanted() -> None:
     bench = bench_of(server, "starttls")
     with running_mail_server(server), delivering(bench):
         bench.happen("a")
-        wait_until(lambda: "STARTTLS" in (bench.thread.problem_of("mes") or ""))
+        wait_until(lambda: "STARTTLS" in (bench.thread.problem_of(0, "mes") or ""))
     assert server.attempts == 0
 
 

@@ -1,6 +1,8 @@
 """Events reach a real MQTT broker over TLS: acknowledged, in order per tag, and through its restart."""
 
 import subprocess
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +14,8 @@ from paho.mqtt.client import Client
 
 from dropanchor_schemas.destinations import MqttDestination
 from dropanchor_service.delivery import queue
+from dropanchor_service.delivery.queue import Patience
+from dropanchor_service.delivery.thread import DeliveryThread, Outbox
 from dropanchor_service.settings.events import MqttSettings
 from support.certificate import self_signed
 from support.delivery import DeliveryBench, in_order
@@ -98,11 +102,11 @@ def test_a_broker_that_restarts_gets_everything(tmp_path: Path) -> None:
             broker.stop()
             for _ in range(5):
                 bench.happen("a", "b")
-            wait_until(lambda: bench.thread.problem_of("mes") is not None)
+            wait_until(lambda: bench.thread.problem_of(0, "mes") is not None)
             assert bench.counts() == (10, 0)
             broker.start()
             wait_until(lambda: bench.counts() == (0, 0))
-            assert bench.thread.problem_of("mes") is None
+            assert bench.thread.problem_of(0, "mes") is None
 
 
 def test_a_broker_without_the_right_to_publish_makes_dead_letters(tmp_path: Path) -> None:
@@ -121,7 +125,7 @@ def test_a_wrong_password_is_said_and_mended_without_a_restart(tmp_path: Path) -
         put(bench)
         with bench.thread:
             bench.happen("a")
-            wait_until(lambda: "refuses the connection" in (bench.thread.problem_of("mes") or ""))
+            wait_until(lambda: "refuses the connection" in (bench.thread.problem_of(0, "mes") or ""))
             (tmp_path / "password").write_text("yard")
             wait_until(lambda: bench.counts() == (0, 0))
 
@@ -136,5 +140,31 @@ def test_a_broker_whose_certificate_is_not_trusted_gets_nothing(tmp_path: Path) 
         put(bench)
         with bench.thread:
             bench.happen("a")
-            wait_until(lambda: "certificate" in (bench.thread.problem_of("mes") or "").lower())
+            wait_until(lambda: "certificate" in (bench.thread.problem_of(0, "mes") or "").lower())
             assert bench.counts() == (1, 0)
+
+
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # paho leaves the socket to the collector
+def test_the_destinations_of_all_sites_share_one_connection_and_one_thread(tmp_path: Path) -> None:
+    with secured_broker(tmp_path) as broker, listening(broker) as got:
+        benches = [bench_of(broker) for _ in range(5)]
+        shared, outboxes = benches[0].channels, []
+        for bench in benches:
+            put(bench)
+            outboxes.append(Outbox(bench.destinations, bench.store, bench.deliveries, shared))
+        before = threading.active_count()
+        with DeliveryThread(outboxes, Patience(0.2, 10**15), time.time_ns):
+            for bench in benches:
+                bench.happen("a", "b")
+            wait_until(lambda: len(got) == 10 and all(bench.counts() == (0, 0) for bench in benches))
+            connections = sum("paho" in thread.name for thread in threading.enumerate())
+            assert connections == 2, [thread.name for thread in threading.enumerate()]  # one listens for the test
+            broker.stop()
+            for bench in benches:
+                bench.happen("c")
+            wait_until(lambda: all(bench.counts() == (1, 0) for bench in benches))
+            broker.start()
+            wait_until(lambda: all(bench.counts() == (0, 0) for bench in benches))
+        wait_until(lambda: threading.active_count() <= before)

@@ -56,10 +56,10 @@ def test_an_unavailable_receiver_gets_everything_later_in_order(status: int) -> 
             bench.happen("a", "b")
         wait_until(lambda: len(receiver.requests) >= 3)
         assert bench.counts() == (10, 0)
-        assert str(status) in (bench.thread.problem_of("mes") or "")
+        assert str(status) in (bench.thread.problem_of(0, "mes") or "")
         receiver.status = 200
         wait_until(lambda: bench.counts() == (0, 0))
-        assert bench.thread.problem_of("mes") is None
+        assert bench.thread.problem_of(0, "mes") is None
     assert len(receiver.accepted) == 10
     assert in_order(receiver.accepted)
 
@@ -95,7 +95,7 @@ def test_a_receiver_that_does_not_answer_delays_no_other() -> None:
             bench.happen("a")
         wait_until(lambda: bench.counts() == (0, 0))
         assert bench.counts("slow") == (10, 0)
-        wait_until(lambda: bench.thread.problem_of("slow") == "there was no answer within 0.3 s")
+        wait_until(lambda: bench.thread.problem_of(0, "slow") == "there was no answer within 0.3 s")
 
 
 def test_a_redirect_is_not_followed() -> None:
@@ -111,7 +111,7 @@ def test_a_name_that_turns_inside_later_is_refused_at_every_delivery(monkeypatch
     monkeypatch.setattr("dropanchor_service.delivery.webhook.resolved", lambda _: ["10.0.0.1"])
     with delivering(bench, receiver):
         bench.happen("a")
-        wait_until(lambda: "10.0.0.1, which is not public" in (bench.thread.problem_of("mes") or ""))
+        wait_until(lambda: "10.0.0.1, which is not public" in (bench.thread.problem_of(0, "mes") or ""))
     assert receiver.requests == []
 
 

@@ -58,10 +58,10 @@ def test_events_wait_for_a_disk_that_fails(tmp_path: Path, monkeypatch: pytest.M
     with monkeypatch.context() as patched:
         patched.setattr(bench.store, "commit", fail)
         assert bench.stay(3.0, "a", x=0.0) == []
-        assert bench.thread.problem == "events cannot be stored: database or disk is full"
+        assert bench.thread.problems == {0: "events cannot be stored: database or disk is full"}
         assert bench.stay(3.0, "a", x=30.0) == []
     assert bench.stay(0.2, "a", x=30.0) == ["zone.enter a", "zone.exit a"]
-    assert bench.thread.problem is None
+    assert bench.thread.problems == {}
 
 
 def test_a_failed_transaction_leaves_nothing_behind(tmp_path: Path) -> None:

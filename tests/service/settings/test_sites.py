@@ -1,4 +1,4 @@
-"""Several sites have a table each, and what works for one site only is refused with a sentence."""
+"""Several sites have a table each, and a table that contradicts another is refused with a sentence."""
 
 from pathlib import Path
 
@@ -6,8 +6,8 @@ import pytest
 
 from dropanchor_schemas import Anchor
 from dropanchor_service.persistence import open_sites
+from dropanchor_service.settings.many_sites import MOST_WITH_FILES, refuse_too_many_sites
 from dropanchor_service.settings.quota import Quota
-from dropanchor_service.settings.several_sites import MOST_WITH_FILES, refuse_for_several_sites
 from dropanchor_service.settings.sources import SettingsError, load_settings
 
 FILE = """
@@ -77,28 +77,13 @@ def test_a_table_that_contradicts_another_is_refused(tmp_path: Path, text: str, 
     assert sentence in str(refused.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("[mqtt]\ntls = false", "mqtt is for one site so far, and there are 2: leave out [mqtt]"),
-        ("[events]\nperiod_ms = 300", "events is for one site so far, and there are 2: leave out [events]"),
-    ],
-)
-def test_what_works_for_one_site_only_is_refused_for_several(tmp_path: Path, text: str, sentence: str) -> None:
-    sites = "\n[sites.a]\n[sites.b]"
-    with pytest.raises(SettingsError) as refused:
-        refuse_for_several_sites(load_settings(file_with(tmp_path, text + sites), environment={}))
-    assert sentence in str(refused.value)
-    refuse_for_several_sites(load_settings(file_with(tmp_path, f"{text}\n[sites.a]"), environment={}))
-
-
 def test_a_history_and_recordings_are_for_a_limited_number_of_sites(tmp_path: Path) -> None:
     text = f'data_dir = "{tmp_path}"\n[recording]\nenabled = true\n'
     sites = [f"[sites.s{number}]\n" for number in range(MOST_WITH_FILES + 1)]
-    refuse_for_several_sites(load_settings(file_with(tmp_path, text + "".join(sites[1:])), environment={}))
+    refuse_too_many_sites(load_settings(file_with(tmp_path, text + "".join(sites[1:])), environment={}))
     with pytest.raises(SettingsError) as refused:
-        refuse_for_several_sites(load_settings(file_with(tmp_path, text + "".join(sites)), environment={}))
+        refuse_too_many_sites(load_settings(file_with(tmp_path, text + "".join(sites)), environment={}))
     for key in ("history", "recording"):
         assert f"{key} is for up to 100 sites, and there are 101: set {key}.enabled = false" in str(refused.value)
     off = text.replace("true", "false") + "[history]\nenabled = false\n"
-    refuse_for_several_sites(load_settings(file_with(tmp_path, off + "".join(sites)), environment={}))
+    refuse_too_many_sites(load_settings(file_with(tmp_path, off + "".join(sites)), environment={}))

@@ -9,10 +9,10 @@ from starlette.requests import HTTPConnection, Request
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, problem_response
+from dropanchor_service.api.http.errors import Kind, problem_response
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.shared_view import Members, narrowed
-from dropanchor_service.api.http.site_in_path import divided
+from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX, divided, is_omlox
 from dropanchor_service.security import share_links
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
 from dropanchor_service.security.identity import Scope as AccessScope
@@ -161,7 +161,9 @@ def secret_of(request: Request) -> str:
 
 def _is_protected(path: str) -> bool:
     """Return whether a path needs credentials. The dashboard's files do not: they hold no data of the site."""
-    return (path.startswith(("/api/", OMLOX_PREFIX)) or path == "/metrics") and path not in OPEN_PATHS
+    if is_omlox(path):
+        return divided(path)[1] not in OPEN_PATHS
+    return (path.startswith("/api/") or path == "/metrics") and path not in OPEN_PATHS
 
 
 def required_scope(method: str, path: str) -> AccessScope:

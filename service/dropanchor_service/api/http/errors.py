@@ -11,11 +11,10 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import Match
 
+from dropanchor_service.api.http.site_in_path import is_omlox
+
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:dropanchor:problem:"
-
-OMLOX_PREFIX = "/omlox/"
-"""Begin of the paths whose errors have the members of omlox errors, too."""
 
 _METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 _MAX_PARTS = 20
@@ -112,7 +111,7 @@ def problem_response(
     """Return a problem of this kind. status: overrides the status of the kind. members: extension members."""
     status = kind.status if status is None else status
     path = _path(request)
-    if path.startswith(OMLOX_PREFIX):
+    if is_omlox(path):
         status = 400 if status == 422 else status  # the standard knows no 422
         members = {"code": status, "message": detail} | dict(members or {})
     problem = {"type": kind.type, "title": kind.title, "status": status, "detail": detail, "instance": path}

@@ -10,8 +10,8 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from dropanchor_service.api.http.errors import OMLOX_PREFIX, Kind, ProblemError, problem_response
-from dropanchor_service.api.http.site_in_path import divided
+from dropanchor_service.api.http.errors import Kind, ProblemError, problem_response
+from dropanchor_service.api.http.site_in_path import divided, is_omlox
 
 
 class BodyLimit:
@@ -61,9 +61,9 @@ class EscapedPath:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        raw = scope.get("raw_path") or b""
-        if raw.startswith((b"/api/", OMLOX_PREFIX.encode())):
-            scope = {**scope, "path": raw.decode("latin-1")}
+        raw = (scope.get("raw_path") or b"").decode("latin-1")
+        if raw.startswith("/api/") or is_omlox(raw):
+            scope = {**scope, "path": raw}
         await self._app(scope, receive, send)
 
 

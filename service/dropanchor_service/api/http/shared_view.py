@@ -5,6 +5,7 @@ from urllib.parse import parse_qsl, unquote, urlencode
 
 from starlette.types import Scope
 
+from dropanchor_service.api.http.site_in_path import divided
 from dropanchor_service.security.identity import Limit
 
 _PREFIX = "/api/v1/"
@@ -13,24 +14,24 @@ _BY_GROUP = {f"{_PREFIX}{name}" for name in ("figures", "heat-map", "poses", "st
 _BY_TAG = {f"{_PREFIX}{name}" for name in ("figures", "heat-map", "poses", "stream", "tags", "tracks")}
 _OF_ONE_TAG = f"{_PREFIX}tags/"
 
-Members = Callable[[str], list[str]]
-"""Returns the tags of a group."""
+Members = Callable[[str | None, str], list[str]]
+"""Returns the tags of a group of a site; None: of the only one."""
 
 
 def narrowed(scope: Scope, limit: Limit, members: Members) -> bool:
     """Narrow the query of a request to the tags of a link. Return False when the link does not allow the request."""
-    path: str = scope["path"]
+    site, path = divided(scope["path"])
     if path in _OF_THE_SITE:
         return True
     if path.startswith(_OF_ONE_TAG):
         tag = unquote(path.removeprefix(_OF_ONE_TAG).split("/")[0])
-        return tag == limit.tag if limit.group is None else tag in members(limit.group)
+        return tag == limit.tag if limit.group is None else tag in members(site, limit.group)
     if limit.group is not None and path in _BY_GROUP:
         _set_query(scope, "group", limit.group)
         return True
     if path not in _BY_TAG:
         return False
-    tags = [limit.tag] if limit.group is None else [tag for tag in members(limit.group) if "," not in tag]
+    tags = [limit.tag] if limit.group is None else [tag for tag in members(site, limit.group) if "," not in tag]
     if not tags:
         return False  # an empty list of tags would stand for all of them
     _set_query(scope, "tags", ",".join(map(str, tags)))

@@ -3,51 +3,59 @@
 from collections.abc import Sequence
 from functools import cache
 from threading import Event
+from typing import Any
 
-from fastapi import APIRouter, Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI, Request
 from starlette.responses import Response
 
-from dropanchor_service.answers.answers import to_json
-from dropanchor_service.api.http.errors import OMLOX_PREFIX
+from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
 from dropanchor_service.api.omlox.feed.socket import Doorkeeper, feed_router
-from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.hub_of_request import hubs_of
 from dropanchor_service.api.omlox.parameters import refuse_pages
 from dropanchor_service.api.omlox.routes.fences import fences_router
 from dropanchor_service.api.omlox.routes.providers import providers_router
 from dropanchor_service.api.omlox.routes.trackables import trackables_router
 from dropanchor_service.api.omlox.routes.zones import zones_router
+from dropanchor_service.api.routes.parameters import json_response
+from dropanchor_service.api.routes.site_of_request import SITE_PREFIX, SiteOfRequest
 
 VERSIONS = ("v2", "v1")
 """Older clients use v1, of which this is a part, too."""
 
 
-def add_omlox(app: FastAPI, hub: Hub, doorkeeper: Doorkeeper, stopping: Event) -> None:
-    """Add the interface to the application, with a document of its own. stopping: ends the WebSockets when set."""
-    described, feed = described_routes(hub, doorkeeper.origins), feed_router(hub, doorkeeper, stopping)
+def add_omlox(app: FastAPI, site_of: SiteOfRequest, doorkeeper: Doorkeeper, stopping: Event) -> None:
+    """Add the interface to the application, with a document of its own: of each site below its id, and of an only one.
+
+    stopping: ends the WebSockets when set.
+    """
+    app.state.omlox_hubs = hubs_of(site_of)
+    described, feed = described_routes(doorkeeper.origins), feed_router(doorkeeper, stopping)
     for version in VERSIONS:
-        prefix = f"{OMLOX_PREFIX}{version}"
-        for router in (described, feed, _document_router(described, prefix)):
-            app.include_router(router, prefix=prefix, include_in_schema=False)
+        path = f"{OMLOX_PREFIX}{version}"
+        for prefix in (SITE_PREFIX + path, *([path] if site_of.only else [])):
+            for router in (described, feed, _document_router(described)):
+                app.include_router(router, prefix=prefix, include_in_schema=False)
 
 
-def described_routes(hub: Hub, origins: Sequence[str] = ()) -> APIRouter:
+def described_routes(origins: Sequence[str] = ()) -> APIRouter:
     """Return the routes that the document describes. origins: of web pages that may change something."""
     router = APIRouter(dependencies=[Depends(refuse_pages(origins))])
-    for part in (trackables_router(hub), providers_router(hub), zones_router(hub), fences_router(hub)):
+    for part in (trackables_router(), providers_router(), zones_router(), fences_router()):
         router.include_router(part)
     return router
 
 
-def _document_router(described: APIRouter, prefix: str) -> APIRouter:
+def _document_router(described: APIRouter) -> APIRouter:
     router = APIRouter()
 
     @cache
-    def document() -> bytes:
-        return to_json(document_of(described, prefix))
+    def document() -> dict[str, Any]:
+        return document_of(described, "")
 
     @router.get("/openapi.json")
-    def get_document() -> Response:
-        return Response(document(), media_type="application/json")
+    def get_document(request: Request) -> Response:
+        url = request.scope["path"].removesuffix("/openapi.json")
+        return json_response(document() | {"servers": [{"url": url}]})
 
     return router

@@ -21,8 +21,8 @@ def access_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response({"scope": "admin"}) | problems(Kind.INVALID_REQUEST),
     )
     async def get_access(request: Request) -> Response:
+        site_of(request)  # an unknown one is refused
         scope: Scope = getattr(request.state, "scope", Scope.ADMIN)  # without authentication everybody may do all
-        has_events = site_of.parts(request).events is not None
-        return json_response({"scope": scope.word} | ({} if has_events else {"events": False}))
+        return json_response({"scope": scope.word})
 
     return router

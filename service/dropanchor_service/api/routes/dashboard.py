@@ -13,7 +13,7 @@ from starlette.routing import Match, Mount
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import Scope
 
-from dropanchor_service.api.http.errors import OMLOX_PREFIX
+from dropanchor_service.api.http.site_in_path import is_omlox
 from dropanchor_service.api.routes.page_bundle import PROGRAMS, bundle, last_change
 
 _HEADERS = {
@@ -78,7 +78,8 @@ class DashboardMount(Mount):
         super().__init__("/", app=_Files(folder, html=True), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        if scope["type"] != "http" or scope["path"].startswith(("/api/", OMLOX_PREFIX, "/metrics")):
+        path = scope["path"]
+        if scope["type"] != "http" or path.startswith(("/api/", "/metrics")) or is_omlox(path):
             return Match.NONE, {}
         is_read = scope["method"] in ("GET", "HEAD")
         match, child_scope = super().matches(scope)

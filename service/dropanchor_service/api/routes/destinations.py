@@ -50,7 +50,7 @@ def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response({"destinations": [examples.DESTINATION_STATE]}) | problems(*_READ),
     )
     def list_destinations(request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         with reading():
             queues = parts.deliveries.states()
         states = [_state(parts, one, queues.get(one.id, QueueState())) for one in parts.destinations.all.values()]
@@ -64,7 +64,7 @@ def _add_read_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.DESTINATION_STATE) | problems(*_ONE),
     )
     def get_destination(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         return _response(parts, found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION))
 
 
@@ -85,7 +85,7 @@ def _add_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         allows: Conditions,
         request: Request,
     ) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         usable = _usable(parts, body)
         put(parts.destinations, destination, body.id, usable, allows)
         return _response(parts, usable)
@@ -98,7 +98,7 @@ def _add_change_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=problems(Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED, *_ONE),
     )
     def delete_destination(destination: DestinationId, allows: Conditions, request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         response = delete(parts.destinations, destination, allows, Kind.UNKNOWN_DESTINATION)
         with reading():
             parts.deliveries.drop(destination)
@@ -114,7 +114,7 @@ def _add_test_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.DESTINATION_TEST) | problems(Kind.DESTINATION_REFUSED, *_ONE),
     )
     async def test_destination(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         known = found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         try:
             parts.channels.check_settings(known)
@@ -135,7 +135,7 @@ def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.DEAD_LETTERS) | problems(*_ONE),
     )
     def list_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             dead = parts.deliveries.dead(destination)
@@ -150,7 +150,7 @@ def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response({"retried": 1}) | problems(*_ONE),
     )
     def retry_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             return json_response({"retried": parts.deliveries.retry(destination)})
@@ -164,7 +164,7 @@ def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=problems(*_ONE),
     )
     def delete_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
             parts.deliveries.drop_dead(destination)

@@ -75,7 +75,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         responses=example_response(examples.EVENTS) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
     )
     def list_events(query: Annotated[EventQuery, Query()], request: Request) -> Response:
-        store = site_of.parts(request).zone_events.store
+        store = site_of.parts(request).events.store
         selection, after = query.selection(query.since), query.position()
         with reading():
             if query.since is None and after is None:
@@ -105,7 +105,7 @@ def _add_stream_route(router: APIRouter, site_of: SiteOfRequest, stopping: Threa
     ) -> Response:
         if last_event_id is not None and re.fullmatch(SEQUENCE, last_event_id):
             query = query.model_copy(update={"after": last_event_id})
-        store = site_of.parts(request).zone_events.store
+        store = site_of.parts(request).events.store
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(_stream(store, query, stopping), media_type=MEDIA_TYPE, headers=headers)
 

@@ -74,7 +74,7 @@ def figures_router(site_of: SiteOfRequest) -> APIRouter:
     )
     def get_figures(query: Annotated[FiguresQuery, Query()], request: Request) -> Response:
         parts = site_of.parts(request)
-        found = _figures(parts.answers, parts.zone_events, query)
+        found = _figures(parts.answers, parts.events, query)
         if query.format == "json":
             return json_response(found)
         headers = {"cache-control": "no-store", "content-disposition": 'attachment; filename="figures.csv"'}

@@ -61,7 +61,7 @@ def _add_experiment_routes(router: APIRouter) -> None:
     )
     async def get_phyphox_experiment(request: Request, query: Annotated[OfApp, Query()]) -> Response:
         tag = tag_of(request, query)
-        content = experiment(str(request.base_url), tag, secret_of(request))
+        content = experiment(_address(request), tag, secret_of(request))
         named = {"content-disposition": 'attachment; filename="tag.phyphox"'}
         return Response(content, media_type=MEDIA_TYPE, headers=_NEVER_STORE | named)
 
@@ -73,10 +73,16 @@ def _add_experiment_routes(router: APIRouter) -> None:
         responses=_file(SVG, "The QR code.") | problems(Kind.INVALID_REQUEST),
     )
     async def get_phyphox_code(request: Request, query: Annotated[OfTag, Query()]) -> Response:
-        link = link_of(str(request.base_url), tag_of(request, query), secret_of(request))
+        link = link_of(_address(request), tag_of(request, query), secret_of(request))
         written = io.BytesIO()
         segno.make(link, error="l").save(written, kind="svg", scale=4, border=4, dark="black", light="white")
         return Response(written.getvalue(), media_type=SVG, headers=_NEVER_STORE)
+
+
+def _address(request: Request) -> str:
+    """Return where the app sends readings, below the site if the request names one."""
+    path = request.scope["path"].removesuffix("/code")
+    return f"{str(request.base_url).rstrip('/')}{path}"
 
 
 def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:

@@ -18,7 +18,7 @@ from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify, key_command, speaks_in
 from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError, is_of_another_page
-from dropanchor_service.api.http.errors import ProblemError
+from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest import count_samples
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
@@ -164,7 +164,8 @@ class _Stream:
         try:
             site = self._site_of.parts(socket)
         except ProblemError as error:
-            raise _ClosedError(UNREADABLE, error.detail) from error
+            unnamed = "Say which site this is: add ?site=SITE to the address of the page."
+            raise _ClosedError(UNREADABLE, unnamed if error.kind is Kind.SEVERAL_SITES else error.detail) from error
         if identity is not None and not speaks_in(identity, site.id, self._site_of.only is None):
             raise _ClosedError(FORBIDDEN, f"This key may not send samples to the site {site.id!r}. {self._make_a_key}")
         return site

@@ -1,13 +1,16 @@
 """The routes of share links."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any
+from urllib.parse import quote
 
-from fastapi import APIRouter, Body, Path
+from fastapi import APIRouter, Body, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.shares import NewShare, Share, ShareList, ShareRequest
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
+from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.security.share_links import MAX_LINKS, ShareLinks, TooManyLinksError
 
 _EXAMPLE: dict[str, Any] = {
@@ -17,6 +20,7 @@ _EXAMPLE: dict[str, Any] = {
     "expires_ns": 1_800_604_800_000_000_000,
     "tag": None,
     "group": "forklifts",
+    "site": "default",
 }
 _SECRET = "dropanchor_share_eyJhbGciOi.eyJqdGkiOi.c2lnbmF0dXJl"
 _DESCRIPTION = """\
@@ -25,16 +29,16 @@ scope `read`. A link of a tag or a group reads these tags, the site and nothing 
 in its data folder."""
 
 
-def shares_router(links: ShareLinks | None) -> APIRouter:
+def shares_router(site_of: SiteOfRequest, links: ShareLinks | None) -> APIRouter:
     """Return the routes. links: None without access control, with which everybody sees everything anyway."""
     router = APIRouter(tags=["shares"], dependencies=[NO_QUERY])
-    _add_list_route(router, links)
-    _add_create_route(router, links)
-    _add_revoke_route(router, links)
+    _add_list_route(router, site_of, links)
+    _add_create_route(router, site_of, links)
+    _add_revoke_route(router, site_of, links)
     return router
 
 
-def _add_list_route(router: APIRouter, links: ShareLinks | None) -> None:
+def _add_list_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
     @router.get(
         "/shares",
         operation_id="list_shares",
@@ -42,12 +46,13 @@ def _add_list_route(router: APIRouter, links: ShareLinks | None) -> None:
         response_model=ShareList,
         responses=example_response({"available": True, "shares": [_EXAMPLE]}) | problems(Kind.INVALID_REQUEST),
     )
-    async def list_shares() -> Response:
-        shares: list[Share] = [] if links is None else sorted(links.all().values(), key=lambda one: one.expires_ns)
+    async def list_shares(request: Request) -> Response:
+        site = site_of.parts(request).id
+        shares: Sequence[Share] = [] if links is None else links.of_site(site)
         return json_response({"available": links is not None, "shares": [share.model_dump() for share in shares]})
 
 
-def _add_create_route(router: APIRouter, links: ShareLinks | None) -> None:
+def _add_create_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
     @router.post(
         "/shares",
         operation_id="create_share",
@@ -58,7 +63,10 @@ def _add_create_route(router: APIRouter, links: ShareLinks | None) -> None:
         responses=example_response(_EXAMPLE | {"secret": _SECRET, "path": f"/#group=forklifts&share={_SECRET}"}, 201)
         | problems(Kind.NO_ACCESS_CONTROL, Kind.ITEMS_FULL, Kind.INVALID_REQUEST, Kind.BODY_TOO_LARGE, Kind.NOT_SAVED),
     )
-    def create_share(request: Annotated[ShareRequest, Body(examples=[{"name": "Visitors"}])]) -> Response:
+    def create_share(
+        body: Annotated[ShareRequest, Body(examples=[{"name": "Visitors"}])], request: Request
+    ) -> Response:
+        site = site_of.parts(request).id
         if links is None:
             raise ProblemError(
                 Kind.NO_ACCESS_CONTROL,
@@ -67,14 +75,17 @@ def _add_create_route(router: APIRouter, links: ShareLinks | None) -> None:
             )
         try:
             with saving():
-                share, secret = links.add(request)
+                share, secret = links.add(site, body)
         except TooManyLinksError as error:
             raise ProblemError(Kind.ITEMS_FULL, f"There are {MAX_LINKS} share links: revoke some.") from error
-        view = f"{request.view}&" if request.view else ""
-        return json_response(share.model_dump() | {"secret": secret, "path": f"/#{view}share={secret}"}, status=201)
+        page = "/" if site_of.only else f"/?site={quote(site, safe='')}"
+        view = f"{body.view}&" if body.view else ""
+        return json_response(
+            share.model_dump() | {"secret": secret, "path": f"{page}#{view}share={secret}"}, status=201
+        )
 
 
-def _add_revoke_route(router: APIRouter, links: ShareLinks | None) -> None:
+def _add_revoke_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLinks | None) -> None:
     @router.delete(
         "/shares/{share}",
         operation_id="revoke_share",
@@ -82,8 +93,11 @@ def _add_revoke_route(router: APIRouter, links: ShareLinks | None) -> None:
         status_code=204,
         responses=problems(Kind.UNKNOWN_SHARE, Kind.INVALID_REQUEST, Kind.NOT_SAVED),
     )
-    def revoke_share(share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])]) -> None:
+    def revoke_share(
+        share: Annotated[str, Path(description="The id of the link.", examples=[_EXAMPLE["id"]])], request: Request
+    ) -> None:
+        site = site_of.parts(request).id
         with saving():
-            is_known = links is not None and links.revoke(share)
+            is_known = links is not None and links.revoke(site, share)
         if not is_known:
             raise ProblemError(Kind.UNKNOWN_SHARE, "There is no such share link. GET /api/v1/shares lists them.")

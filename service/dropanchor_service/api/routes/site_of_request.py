@@ -59,6 +59,11 @@ class SiteOfRequest:
             raise ProblemError(Kind.UNKNOWN_SITE, f"There is no site {name!r}. /api/v1/sites lists the sites.")
         return found
 
+    def members(self, site: str | None, group: str) -> list[str]:
+        """Return the tags of a group of a site; None: of the only one."""
+        found = self.only if site is None else self.of_site(site)
+        return [] if found is None else found.answers.tags_in_group(group)
+
     def of_site(self, site: str) -> SiteParts | None:
         """Return the parts of the site with this id, or None."""
         return self._parts.get(site)

@@ -1,8 +1,9 @@
 """What the routes of one site work on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from dropanchor_service.answers.answers import Answers
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.plans.store import PlanStore
@@ -13,23 +14,18 @@ from dropanchor_service.recording.recorder import Recorder
 class SiteParts:
     """receive, receive_health: take samples and health that come over HTTP. recorder: None without a folder for files.
 
-    events: zones, events and destinations; None where there are no routes of them. plans: floor plans. max_tags: how
-    many tags the site admits.
+    plans: floor plans. events: zones, events and destinations. max_tags: how many tags the site admits. omlox: what
+    omlox clients have said; None for no omlox interface.
     """
 
     answers: Answers
     receive: Receive
     receive_health: Receive
-    plans: PlanStore = field(default_factory=lambda: PlanStore(None))
-    events: EventParts | None = None
+    plans: PlanStore
+    events: EventParts
     recorder: Recorder | None = None
     max_tags: int = 20_000
-
-    @property
-    def zone_events(self) -> EventParts:
-        """The zones, events and destinations of a site that has routes of them."""
-        assert self.events is not None
-        return self.events
+    omlox: OmloxItems | None = None
 
     @property
     def id(self) -> str:

@@ -24,7 +24,7 @@ def zone_occupancy_router(site_of: SiteOfRequest) -> APIRouter:
         responses=example_response(examples.OCCUPANCY) | problems(Kind.INVALID_REQUEST, Kind.EVENTS_UNREADABLE),
     )
     def get_zone_occupancy(request: Request) -> Response:
-        parts = site_of.parts(request).zone_events
+        parts = site_of.parts(request).events
         with reading():
             counts = parts.store.occupancy()
         known = parts.items.zones.all

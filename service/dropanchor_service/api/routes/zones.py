@@ -20,7 +20,7 @@ def zones_router(site_of: SiteOfRequest) -> APIRouter:
 
 def _zones(site_of: SiteOfRequest) -> Resource[Zone]:
     return Resource(
-        lambda request: site_of.parts(request).zone_events.items.zones,
+        lambda request: site_of.parts(request).events.items.zones,
         path="zones",
         name="zone",
         list_summary="List the zones",
@@ -37,7 +37,7 @@ def _zones(site_of: SiteOfRequest) -> Resource[Zone]:
 
 def _rules(site_of: SiteOfRequest) -> Resource[EventRule]:
     return Resource(
-        lambda request: site_of.parts(request).zone_events.items.rules,
+        lambda request: site_of.parts(request).events.items.rules,
         path="event-rules",
         name="rule",
         list_summary="List the rules without a zone",

@@ -45,7 +45,7 @@ export class Alerts {
     this.#addButtons("new-rule", (type) => this.#begin(this.ruleEditor, NEW_RULES[type]));
     for (const part of [store, this.destinationEditor, this.ruleEditor, zones.store]) part.addEventListener("change", () => this.#update());
     for (const editor of [this.destinationEditor, this.ruleEditor]) editor.addEventListener("saved", () => store.refresh());
-    connection.addEventListener("status", () => (connection.status === "live" && connection.hasEvents ? store.start() : store.stop()));
+    connection.addEventListener("status", () => (connection.status === "live" ? store.start() : store.stop()));
   }
 
   #addForms() {

@@ -41,8 +41,6 @@ export class Connection extends EventTarget {
   status = "connecting";
   /** What the service does while it is starting. */
   progress = "";
-  /** Whether the site has what an only site has: zones, events, deliveries and share links. */
-  hasEvents = true;
   /** performance.now() at which the connection was lost. */
   lostAt = NaN;
   /** For tests and the console: number of frames so far, and the time that the last one took. */
@@ -86,7 +84,6 @@ export class Connection extends EventTarget {
   /** @param {AbortSignal} signal */
   async #follow(signal) {
     try {
-      if (chosenSite !== null) this.hasEvents = (await getJson(api("access"))).events !== false;
       const response = await request(api(`stream?max_hz=${this.#max_hz}`), { signal });
       this.#opened();
       for await (const { name, data } of eventsOf(response)) {

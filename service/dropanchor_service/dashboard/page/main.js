@@ -111,7 +111,6 @@ connection.addEventListener("change", receiver((frame, now_ms) => fleet.apply(fr
 connection.addEventListener("settings", () => roster.refresh());
 roster.addEventListener("removed", () => connection.retry());
 connection.addEventListener("status", () => {
-  byId("zones").hidden = past.bar.figuresButton.hidden = !connection.hasEvents;
   if (connection.status === "live" || past.active) return;
   fleet.current = false;
   byId("spoken").textContent = "";
@@ -176,7 +175,7 @@ const share = new SharePanel(byId("share"), choice);
 byId("options").addEventListener("click", () => {
   byId("link").textContent = location.href;
   /** @type {HTMLAnchorElement} */ (byId("kiosk-link")).href = kioskAddress(location);
-  if (connection.hasEvents) share.open();
+  share.open();
 });
 installLanguages(/** @type {HTMLSelectElement} */ (byId("language")));
 for (const kind of /** @type {const} */ (["length", "velocity"])) installUnitChoice(/** @type {HTMLSelectElement} */ (byId(kind)), kind);

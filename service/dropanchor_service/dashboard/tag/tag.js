@@ -2,6 +2,7 @@
 
 import { Bluetooth } from "./bluetooth.js";
 import { Clock } from "./clock.js";
+import { ingest, storeOf } from "./link.js";
 import { Motion } from "./motion.js";
 import { packed } from "./packed.js";
 import { Queue, Store } from "./queue.js";
@@ -25,7 +26,7 @@ export class ThisTag {
 
   /** @param {string} name @param {string} key empty for a service without keys @param {Store} store */
   constructor(name, key, store) {
-    const url = new URL(`../api/v1/ingest/stream?tag=${encodeURIComponent(name)}`, document.baseURI);
+    const url = ingest(`stream?tag=${encodeURIComponent(name)}`);
     url.protocol = url.protocol.replace("http", "ws");
     this.name = name;
     this.clock = new Clock();
@@ -43,7 +44,7 @@ export class ThisTag {
 
   /** @param {string} name @param {string} key */
   static async open(name, key) {
-    const tag = new ThisTag(name, key, await Store.open(name));
+    const tag = new ThisTag(name, key, await Store.open(storeOf(name)));
     await tag.queue.load();
     return tag;
   }

@@ -46,7 +46,7 @@ export class Zones {
     this.store.addEventListener("change", () => this.#update());
     this.editor.addEventListener("change", () => this.#update());
     this.log.addEventListener("change", () => this.#happened());
-    connection.addEventListener("status", () => this.#connected(connection.status === "live" && connection.hasEvents));
+    connection.addEventListener("status", () => this.#connected(connection.status === "live"));
   }
 
   /** Take a click on the map while a zone is drawn. Return whether it was for that. @param {number} px @param {number} py */

@@ -126,7 +126,8 @@ def test_the_openapi_document_is_current_and_is_what_the_service_returns() -> No
 
 
 def test_every_operation_has_a_name_a_tag_a_summary_and_its_problems() -> None:
-    paths = make_api_bench().app().openapi()["paths"]
+    document = make_api_bench().app().openapi()
+    paths, shared = document["paths"], document["components"]["responses"]
     operations = [operation for path in paths.values() for operation in path.values()]
     names = [operation["operationId"] for operation in operations]
     assert len(set(names)) == len(names) >= 16
@@ -136,7 +137,9 @@ def test_every_operation_has_a_name_a_tag_a_summary_and_its_problems() -> None:
         for status, response in operation["responses"].items():
             if status == "499":  # Sensor Logger shows plain text
                 continue
-            assert (status >= "400") == ("application/problem+json" in response.get("content", {}))
+            described = shared[response["$ref"].split("/")[-1]] if "$ref" in response else response
+            assert (status >= "400") == ("application/problem+json" in described.get("content", {}))
+            assert (status >= "400") == ("$ref" in response)  # each refusal stands in the document once
 
 
 def test_every_kind_of_problem_is_documented() -> None:

@@ -7,7 +7,6 @@ from uuid import uuid4
 import pytest
 
 from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence import Persistence
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
@@ -186,7 +185,7 @@ def test_a_damaged_file_ends_the_start_with_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "omlox_trackables.json").write_text("{")
     site = SiteStore(YARD, {})
     with pytest.raises(SettingsError, match="omlox"):
-        Persistence(Settings(data_dir=tmp_path), TagTable(), site, lambda: 0, Metrics())
+        Persistence(Settings(data_dir=tmp_path), TagTable(), site, lambda: 0)
 
 
 def nested(levels: int) -> str:

@@ -173,7 +173,7 @@ def test_only_the_key_of_the_service_signs_links(shared: Shared, tmp_path: Path)
 def test_links_survive_a_restart_and_damage_is_reported(shared: Shared, tmp_path: Path) -> None:
     secret = shared.create()["secret"]
     again = ShareLinks(tmp_path, lambda: shared.now_s)
-    assert again.identify(secret).scope is Scope.READ
+    assert again.identify(secret).of_sites == {"default": Scope.READ}
     (tmp_path / TABLE_FILE).write_text("{")
     with pytest.raises(ShareLinkError, match="delete it"):
         ShareLinks(tmp_path)

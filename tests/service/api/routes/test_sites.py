@@ -4,12 +4,16 @@ import json
 from threading import Event
 
 import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from dropanchor_schemas import Anchor
 from dropanchor_schemas.answers import SiteList
 from dropanchor_service.api.http.access import required_scope
 from dropanchor_service.security.identity import Scope
 from support.api import ask, kind_of, make_api_bench
+from support.delivery import SECRET
 from support.http_server import running_server
 from support.sites import T_NS, app_of_sites, make_sites
 
@@ -57,10 +61,12 @@ def test_with_several_sites_a_path_without_one_is_refused_with_a_sentence() -> N
         ("GET", "/api/v1/stream"),
         ("GET", "/api/v1/recordings"),
         ("PUT", "/api/v1/zones/1"),
+        ("GET", "/api/v1/shares"),
+        ("GET", "/omlox/v2/zones"),
     ):
         refused = ask(app, method, path)
         assert kind_of(refused) == "several-sites"
-        assert refused.json()["detail"].startswith(f"{path} is for one site so far, and this service has 2.")
+        assert refused.json()["detail"].startswith(f"{path} names none of the 2 sites of this service.")
     assert kind_of(ask(app, "GET", "/api/v1/sites/c/poses")) == "unknown-site"
     assert kind_of(ask(app, "POST", "/api/v1/ingest/samples?tag=cart", json={})) == "several-sites"
     assert ask(app, "GET", "/api/v1/health/live").status_code == 200
@@ -87,11 +93,45 @@ def test_the_list_of_sites_counts_states_and_tags_that_need_a_person() -> None:
     ]
 
 
+def test_zones_rules_events_and_destinations_are_those_of_the_site_in_the_path() -> None:
+    app = app_of_sites(make_sites("a", "b"))
+    zone = {"id": "dock", "shape": {"type": "circle", "x": 0.0, "y": 0.0, "radius_m": 5.0}}
+    rule = {"id": "low", "type": "battery_low"}
+    hook = {"id": "mes", "type": "webhook", "url": "http://93.184.216.34/x", "secret": SECRET}
+    for path, body in (("zones/dock", zone), ("event-rules/low", rule), ("destinations/mes", hook)):
+        assert ask(app, "PUT", f"/api/v1/sites/a/{path}", json=body).status_code == 200, path
+        assert ask(app, "GET", f"/api/v1/sites/a/{path}").status_code == 200
+        assert ask(app, "GET", f"/api/v1/sites/b/{path}").status_code == 404
+        assert ask(app, "DELETE", f"/api/v1/sites/b/{path}").status_code == 404
+    assert ask(app, "GET", "/api/v1/sites/b/events").json() == {"events": [], "next": None}
+    assert ask(app, "GET", "/api/v1/sites/a/zone-occupancy").json() == {"zones": []}
+    assert kind_of(ask(app, "GET", "/api/v1/sites/a/figures")) == "no-history"
+    assert kind_of(ask(app, "POST", "/api/v1/sites/a/shares", json={})) == "no-access-control"
+
+
+def test_a_phone_without_a_key_names_its_site_in_the_path() -> None:
+    received: list[tuple[str, str, bytes, str]] = []
+    app, stopping = app_of_sites(make_sites("a", "b"), received=received), Event()
+    experiment = ask(app, "GET", "/api/v1/sites/b/ingest/phyphox?tag=anna").text
+    assert 'address="http://test/api/v1/sites/b/ingest/phyphox?tag=anna"' in experiment
+    with running_server(app, stopping) as port:
+        with connect(f"ws://127.0.0.1:{port}/api/v1/sites/b/ingest/stream?tag=anna", proxy=None) as socket:
+            socket.recv(timeout=10.0)
+            socket.send("{}")
+            socket.recv(timeout=10.0)
+        unnamed = f"ws://127.0.0.1:{port}/api/v1/ingest/stream?tag=anna"
+        with connect(unnamed, proxy=None) as socket, pytest.raises(ConnectionClosed) as closed:
+            socket.recv(timeout=10.0)
+    assert [message[:2] for message in received] == [("b", "anna")]
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.reason == "Say which site this is: add ?site=SITE to the address of the page."
+
+
 def test_an_only_site_has_both_paths() -> None:
     bench = make_api_bench()
     bench.answers.tags.register("a")
     app = bench.app()
-    for path in ("tags", "anchors", "site", "newcomers"):
+    for path in ("tags", "anchors", "site", "newcomers", "zones", "events", "shares"):
         with_site = ask(app, "GET", f"/api/v1/sites/default/{path}").json()
         assert with_site == ask(app, "GET", f"/api/v1/{path}").json()
     assert kind_of(ask(app, "GET", "/api/v1/sites/other/tags")) == "unknown-site"

@@ -31,6 +31,7 @@ class PositionFeed:
         """Yield the payload of each message that is due. Raises ProblemError."""
         projection = self._project()
         self._version, poses = self._hub.answers.latest.since(self._version)
+        poses = self._hub.answers.tags.own(poses)
         for begin in range(0, len(poses), MAX_OBJECTS):
             locations = self._hub.places.of_poses(poses[begin : begin + MAX_OBJECTS], projection)
             found = self._objects([location for location in locations if self._wants(location)], projection)

@@ -24,6 +24,7 @@ from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.omlox.feed.messages import Code, FeedError, Request, params_of, request_of
 from dropanchor_service.api.omlox.feed.topics import Feed, feed_of
 from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.hub_of_request import hub_of
 from dropanchor_service.api.omlox.routes.providers import TAKES_NO_POSITIONS
 from dropanchor_service.api.routes.stream import stopped_within
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
@@ -33,7 +34,7 @@ PAUSE_PER_WORK = 3.0  # so a connection takes at most a quarter of a core
 CONNECTIONS_PER_CLIENT = 16
 MAX_SUBSCRIPTIONS = 32  # of one connection
 
-RESTART, FORBIDDEN, TOO_MANY = 1012, 4403, 4429
+RESTART, FORBIDDEN, UNKNOWN_SITE, TOO_MANY = 1012, 4403, 4404, 4429
 _AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …` of the handshake, or as params.token of every "
     "message."
@@ -58,7 +59,7 @@ class Subscription:
     identity: Identity | None
 
 
-def feed_router(hub: Hub, doorkeeper: Doorkeeper, stopping: Event) -> APIRouter:
+def feed_router(doorkeeper: Doorkeeper, stopping: Event) -> APIRouter:
     """Return the router of the WebSocket. stopping: ends the connections when set."""
     router, connections = APIRouter(), OpenConnections(CONNECTIONS_PER_CLIENT)
     numbers = itertools.count(1)
@@ -72,7 +73,9 @@ def feed_router(hub: Hub, doorkeeper: Doorkeeper, stopping: Event) -> APIRouter:
             return
         try:
             with connections.one_more(client):
-                await Connection(socket, hub, doorkeeper, numbers).serve(stopping)
+                await Connection(socket, hub_of(socket), doorkeeper, numbers).serve(stopping)
+        except ProblemError:
+            await socket.close(UNKNOWN_SITE, "There is no site with this id.")
         except TooManyConnectionsError:
             await socket.close(TOO_MANY, f"This client has {CONNECTIONS_PER_CLIENT} connections: end one first.")
 

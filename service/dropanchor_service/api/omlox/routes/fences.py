@@ -9,6 +9,7 @@ from starlette.responses import Response
 from dropanchor_service.api.http.errors import Kind
 from dropanchor_service.api.omlox.geojson import fence_feature, location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.hub_of_request import SiteHub
 from dropanchor_service.api.omlox.models import (
     Feature,
     FeatureCollection,
@@ -50,15 +51,15 @@ EXAMPLE = {
 }
 
 
-def fences_router(hub: Hub) -> APIRouter:
+def fences_router() -> APIRouter:
     router = APIRouter(prefix="/fences", tags=["fences"], strict_content_type=LENIENT)
-    _add_list_routes(router, hub)
-    _add_create_route(router, hub)
-    _add_collection_delete(router, hub)
-    _add_object_routes(router, hub)
-    _add_change_route(router, hub)
-    _add_routes_for_places_inside(router, hub)
-    _add_routes_for_objects_inside(router, hub)
+    _add_list_routes(router)
+    _add_create_route(router)
+    _add_collection_delete(router)
+    _add_object_routes(router)
+    _add_change_route(router)
+    _add_routes_for_places_inside(router)
+    _add_routes_for_objects_inside(router)
     return router
 
 
@@ -69,9 +70,9 @@ def fences_around(tags: Sequence[Tag], hub: Hub, query: SpatialQuery) -> Respons
     return json_response([hub.fences.answer(zone, projection) for zone in zones])
 
 
-def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+def _add_list_routes(router: APIRouter) -> None:
     @router.get("", operation_id="list_fence_ids", summary="List the ids of the fences", responses=errors())
-    def list_ids() -> list[str]:
+    def list_ids(hub: SiteHub) -> list[str]:
         return [str(hub.fences.id_of(zone.id)) for zone in hub.fences.all()]
 
     @router.get(
@@ -81,12 +82,12 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Fence] | FeatureCollection,
         responses=errors(*_PLACED),
     )
-    def list_fences(query: Annotated[PlaceQuery, Query()]) -> Response:
+    def list_fences(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
         projection = query.projection(hub)
         return many([hub.fences.answer(zone, projection) for zone in hub.fences.all()], query, fence_feature)
 
 
-def _add_create_route(router: APIRouter, hub: Hub) -> None:
+def _add_create_route(router: APIRouter) -> None:
     @router.post(
         "",
         operation_id="create_fence",
@@ -97,6 +98,7 @@ def _add_create_route(router: APIRouter, hub: Hub) -> None:
         responses=errors(Kind.SHAPE_REFUSED, Kind.EXISTS_ALREADY, *_SAVED),
     )
     def create_fence(
+        hub: SiteHub,
         fence: Annotated[Fence, Body(examples=[EXAMPLE])],
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
     ) -> Response:
@@ -108,7 +110,7 @@ def _add_create_route(router: APIRouter, hub: Hub) -> None:
         return json_response(hub.fences.answer(zone, projection), status=201)
 
 
-def _add_collection_delete(router: APIRouter, hub: Hub) -> None:
+def _add_collection_delete(router: APIRouter) -> None:
     @router.delete(
         "",
         operation_id="delete_fences",
@@ -116,13 +118,13 @@ def _add_collection_delete(router: APIRouter, hub: Hub) -> None:
         status_code=204,
         responses=errors(Kind.NOT_SAVED),
     )
-    def delete_fences() -> Response:
+    def delete_fences(hub: SiteHub) -> Response:
         for zone in hub.fences.all():
             hub.fences.delete(zone)
         return Response(status_code=204)
 
 
-def _add_object_routes(router: APIRouter, hub: Hub) -> None:
+def _add_object_routes(router: APIRouter) -> None:
     @router.get(
         "/{fence_id}",
         operation_id="get_fence",
@@ -130,7 +132,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         response_model=Fence | Feature,
         responses=errors(_UNKNOWN, *_PLACED),
     )
-    def get_fence(fence_id: FenceId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    def get_fence(hub: SiteHub, fence_id: FenceId, query: Annotated[PlaceQuery, Query()]) -> Response:
         return one(hub.fences.answer(hub.fences.find(fence_id), query.projection(hub)), query, fence_feature)
 
     @router.delete(
@@ -141,12 +143,12 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         status_code=204,
         responses=errors(_UNKNOWN, Kind.NOT_SAVED),
     )
-    def delete_fence(fence_id: FenceId) -> Response:
+    def delete_fence(hub: SiteHub, fence_id: FenceId) -> Response:
         hub.fences.delete(hub.fences.find(fence_id))
         return Response(status_code=204)
 
 
-def _add_change_route(router: APIRouter, hub: Hub) -> None:
+def _add_change_route(router: APIRouter) -> None:
     @router.put(
         "/{fence_id}",
         operation_id="put_fence",
@@ -156,6 +158,7 @@ def _add_change_route(router: APIRouter, hub: Hub) -> None:
         responses=errors(_UNKNOWN, Kind.SHAPE_REFUSED, Kind.ID_DIFFERS, *_SAVED),
     )
     def put_fence(
+        hub: SiteHub,
         fence_id: FenceId,
         fence: Annotated[Fence, Body(examples=[EXAMPLE])],
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
@@ -166,7 +169,7 @@ def _add_change_route(router: APIRouter, hub: Hub) -> None:
         return Response(status_code=204)
 
 
-def _add_routes_for_places_inside(router: APIRouter, hub: Hub) -> None:
+def _add_routes_for_places_inside(router: APIRouter) -> None:
     @router.get(
         "/{fence_id}/locations",
         operation_id="list_fence_locations",
@@ -174,7 +177,7 @@ def _add_routes_for_places_inside(router: APIRouter, hub: Hub) -> None:
         response_model=list[Location] | FeatureCollection,
         responses=errors(*_INSIDE, *_PLACED),
     )
-    def list_locations(fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+    def list_locations(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
         tags = _tags_in(hub, fence_id, query)
         return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
 
@@ -185,12 +188,12 @@ def _add_routes_for_places_inside(router: APIRouter, hub: Hub) -> None:
         response_model=list[TrackableMotion] | FeatureCollection,
         responses=errors(*_INSIDE, *_PLACED),
     )
-    def list_motions(fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
+    def list_motions(hub: SiteHub, fence_id: FenceId, query: Annotated[InsideQuery, Query()]) -> Response:
         assets = hub.assets.of_tags(_tags_in(hub, fence_id, query))
         return many(hub.motions(assets, query.projection(hub)), query, motion_feature)
 
 
-def _add_routes_for_objects_inside(router: APIRouter, hub: Hub) -> None:
+def _add_routes_for_objects_inside(router: APIRouter) -> None:
     @router.get(
         "/{fence_id}/providers",
         operation_id="list_fence_providers",
@@ -198,7 +201,7 @@ def _add_routes_for_objects_inside(router: APIRouter, hub: Hub) -> None:
         response_model=list[LocationProvider],
         responses=errors(*_INSIDE),
     )
-    def list_providers(fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    def list_providers(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
         return json_response(hub.providers(_tags_in(hub, fence_id, query)))
 
     @router.get(
@@ -208,7 +211,7 @@ def _add_routes_for_objects_inside(router: APIRouter, hub: Hub) -> None:
         response_model=list[Trackable],
         responses=errors(*_INSIDE),
     )
-    def list_trackables(fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    def list_trackables(hub: SiteHub, fence_id: FenceId, query: Annotated[SpatialQuery, Query()]) -> Response:
         return json_response(hub.trackables(hub.assets.of_tags(_tags_in(hub, fence_id, query))))
 
 

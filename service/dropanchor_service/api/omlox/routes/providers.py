@@ -9,6 +9,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.geojson import location_feature
 from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.hub_of_request import SiteHub
 from dropanchor_service.api.omlox.models import (
     Feature,
     FeatureCollection,
@@ -44,21 +45,21 @@ TAKES_NO_POSITIONS = (
 )
 
 
-def providers_router(hub: Hub) -> APIRouter:
+def providers_router() -> APIRouter:
     router = APIRouter(prefix="/providers", tags=["providers"], strict_content_type=LENIENT)
-    _add_list_routes(router, hub)
-    _add_create_route(router, hub)
+    _add_list_routes(router)
+    _add_create_route(router)
     _add_refused_routes(router)
-    _add_object_routes(router, hub)
-    _add_delete_route(router, hub)
-    _add_location_route(router, hub)
-    _add_related_routes(router, hub)
+    _add_object_routes(router)
+    _add_delete_route(router)
+    _add_location_route(router)
+    _add_related_routes(router)
     return router
 
 
-def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+def _add_list_routes(router: APIRouter) -> None:
     @router.get("", operation_id="list_provider_ids", summary="List the ids of the tags", responses=errors())
-    def list_ids() -> list[str]:
+    def list_ids(hub: SiteHub) -> list[str]:
         return [tag.name for tag in hub.answers.tags.listed()]
 
     @router.get(
@@ -68,7 +69,7 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[LocationProvider],
         responses=errors(),
     )
-    def list_providers() -> Response:
+    def list_providers(hub: SiteHub) -> Response:
         return json_response(hub.providers(hub.answers.tags.listed()))
 
     @router.get(
@@ -78,11 +79,11 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Location] | FeatureCollection,
         responses=errors(Kind.NOT_GEOREFERENCED),
     )
-    def list_locations(query: Annotated[PlaceQuery, Query()]) -> Response:
+    def list_locations(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
         return many(hub.places.of_tags(hub.answers.tags.listed(), query.projection(hub)), query, location_feature)
 
 
-def _add_create_route(router: APIRouter, hub: Hub) -> None:
+def _add_create_route(router: APIRouter) -> None:
     @router.post(
         "",
         operation_id="create_provider",
@@ -91,7 +92,7 @@ def _add_create_route(router: APIRouter, hub: Hub) -> None:
         response_model=LocationProvider,
         responses=errors(Kind.EXISTS_ALREADY, *_SAVED),
     )
-    def create_provider(provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]) -> Response:
+    def create_provider(hub: SiteHub, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]) -> Response:
         known = hub.answers.tags.find(provider.id)
         if known is not None and not hub.answers.tags.is_deleted(known.row):
             raise exists_already("tag", provider.id)
@@ -120,7 +121,7 @@ def _add_refused_routes(router: APIRouter) -> None:
             )
 
 
-def _add_object_routes(router: APIRouter, hub: Hub) -> None:
+def _add_object_routes(router: APIRouter) -> None:
     @router.get(
         "/{provider_id}",
         operation_id="get_provider",
@@ -128,7 +129,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         response_model=LocationProvider,
         responses=errors(_UNKNOWN),
     )
-    def get_provider(provider_id: ProviderId) -> Response:
+    def get_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
         return json_response(hub.providers([known_tag(hub.answers, provider_id)])[0])
 
     @router.put(
@@ -139,7 +140,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         responses=errors(_UNKNOWN, Kind.ID_DIFFERS, *_SAVED),
     )
     def put_provider(
-        provider_id: ProviderId, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]
+        hub: SiteHub, provider_id: ProviderId, provider: Annotated[LocationProvider, Body(examples=[EXAMPLE])]
     ) -> Response:
         known_tag(hub.answers, provider_id)
         require_id(provider_id, provider.id)
@@ -147,7 +148,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         return Response(status_code=204)
 
 
-def _add_delete_route(router: APIRouter, hub: Hub) -> None:
+def _add_delete_route(router: APIRouter) -> None:
     @router.delete(
         "/{provider_id}",
         operation_id="delete_provider",
@@ -156,7 +157,7 @@ def _add_delete_route(router: APIRouter, hub: Hub) -> None:
         status_code=204,
         responses=errors(_UNKNOWN, Kind.CHANGED_MEANWHILE, Kind.NOT_SAVED),
     )
-    def delete_provider(provider_id: ProviderId) -> Response:
+    def delete_provider(hub: SiteHub, provider_id: ProviderId) -> Response:
         tag = known_tag(hub.answers, provider_id)
         forget(hub.items.providers, tag.name)
         forget(hub.items.tag_trackables, tag.name)
@@ -166,7 +167,7 @@ def _add_delete_route(router: APIRouter, hub: Hub) -> None:
         return Response(status_code=204)
 
 
-def _add_location_route(router: APIRouter, hub: Hub) -> None:
+def _add_location_route(router: APIRouter) -> None:
     @router.get(
         "/{provider_id}/location",
         operation_id="get_provider_location",
@@ -174,7 +175,7 @@ def _add_location_route(router: APIRouter, hub: Hub) -> None:
         response_model=Location | Feature,
         responses=errors(_UNKNOWN, Kind.NO_LOCATION, Kind.NOT_GEOREFERENCED),
     )
-    def get_location(provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    def get_location(hub: SiteHub, provider_id: ProviderId, query: Annotated[PlaceQuery, Query()]) -> Response:
         tag = known_tag(hub.answers, provider_id)
         locations = hub.places.of_tags([tag], query.projection(hub))
         if not locations:
@@ -182,7 +183,7 @@ def _add_location_route(router: APIRouter, hub: Hub) -> None:
         return one(locations[0], query, location_feature)
 
 
-def _add_related_routes(router: APIRouter, hub: Hub) -> None:
+def _add_related_routes(router: APIRouter) -> None:
     @router.get(
         "/{provider_id}/trackables",
         operation_id="list_provider_trackables",
@@ -190,7 +191,7 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Trackable],
         responses=errors(_UNKNOWN),
     )
-    def list_trackables(provider_id: ProviderId) -> Response:
+    def list_trackables(hub: SiteHub, provider_id: ProviderId) -> Response:
         return json_response(hub.trackables(hub.assets.of_tags([known_tag(hub.answers, provider_id)])))
 
     @router.get(
@@ -200,7 +201,7 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Fence],
         responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
     )
-    def list_fences(provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    def list_fences(hub: SiteHub, provider_id: ProviderId, query: Annotated[SpatialQuery, Query()]) -> Response:
         return fences_around([known_tag(hub.answers, provider_id)], hub, query)
 
 

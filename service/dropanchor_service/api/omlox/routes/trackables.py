@@ -9,6 +9,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.omlox.assets import Asset
 from dropanchor_service.api.omlox.geojson import location_feature, motion_feature
 from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.hub_of_request import SiteHub
 from dropanchor_service.api.omlox.models import (
     Feature,
     FeatureCollection,
@@ -40,15 +41,15 @@ _SAVED = (Kind.ITEMS_FULL, Kind.PROVIDER_ASSIGNED, Kind.BODY_TOO_LARGE, Kind.NOT
 EXAMPLE = {"type": "virtual", "name": "Forklift 3", "location_providers": ["tag-1"], "properties": {"fleet": "north"}}
 
 
-def trackables_router(hub: Hub) -> APIRouter:
+def trackables_router() -> APIRouter:
     router = APIRouter(prefix="/trackables", tags=["trackables"], strict_content_type=LENIENT)
-    _add_list_routes(router, hub)
-    _add_collection_changes(router, hub)
-    _add_object_routes(router, hub)
-    _add_change_route(router, hub)
-    _add_location_routes(router, hub)
-    _add_motion_route(router, hub)
-    _add_related_routes(router, hub)
+    _add_list_routes(router)
+    _add_collection_changes(router)
+    _add_object_routes(router)
+    _add_change_route(router)
+    _add_location_routes(router)
+    _add_motion_route(router)
+    _add_related_routes(router)
     return router
 
 
@@ -60,9 +61,9 @@ def found(hub: Hub, identifier: TrackableId) -> Asset:
     return asset
 
 
-def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+def _add_list_routes(router: APIRouter) -> None:
     @router.get("", operation_id="list_trackable_ids", summary="List the ids of the trackables", responses=errors())
-    def list_ids() -> list[str]:
+    def list_ids(hub: SiteHub) -> list[str]:
         return [str(asset.trackable.id) for asset in hub.assets.all()]
 
     @router.get(
@@ -72,7 +73,7 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Trackable],
         responses=errors(),
     )
-    def list_trackables() -> Response:
+    def list_trackables(hub: SiteHub) -> Response:
         return json_response(hub.trackables(hub.assets.all()))
 
     @router.get(
@@ -82,11 +83,11 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[TrackableMotion] | FeatureCollection,
         responses=errors(*_PLACED),
     )
-    def list_motions(query: Annotated[PlaceQuery, Query()]) -> Response:
+    def list_motions(hub: SiteHub, query: Annotated[PlaceQuery, Query()]) -> Response:
         return many(hub.motions(hub.assets.all(), query.projection(hub)), query, motion_feature)
 
 
-def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
+def _add_collection_changes(router: APIRouter) -> None:
     @router.post(
         "",
         operation_id="create_trackable",
@@ -97,6 +98,7 @@ def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
         responses=errors(Kind.EXISTS_ALREADY, *_SAVED),
     )
     def create_trackable(
+        hub: SiteHub,
         trackable: Annotated[Trackable, Body(examples=[EXAMPLE])],
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
     ) -> Response:
@@ -110,14 +112,14 @@ def _add_collection_changes(router: APIRouter, hub: Hub) -> None:
         status_code=204,
         responses=errors(Kind.NOT_SAVED),
     )
-    def delete_trackables() -> Response:
+    def delete_trackables(hub: SiteHub) -> Response:
         for asset in hub.assets.all():
             if asset.own_tag is None:
                 remove(hub, asset)
         return Response(status_code=204)
 
 
-def _add_object_routes(router: APIRouter, hub: Hub) -> None:
+def _add_object_routes(router: APIRouter) -> None:
     @router.get(
         "/{trackable_id}",
         operation_id="get_trackable",
@@ -125,7 +127,7 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         response_model=Trackable,
         responses=errors(_UNKNOWN),
     )
-    def get_trackable(trackable_id: TrackableId) -> Response:
+    def get_trackable(hub: SiteHub, trackable_id: TrackableId) -> Response:
         return json_response(hub.trackables([found(hub, trackable_id)])[0])
 
     @router.delete(
@@ -136,12 +138,12 @@ def _add_object_routes(router: APIRouter, hub: Hub) -> None:
         status_code=204,
         responses=errors(_UNKNOWN, Kind.STANDS_FOR_A_TAG, Kind.NOT_SAVED),
     )
-    def delete_trackable(trackable_id: TrackableId) -> Response:
+    def delete_trackable(hub: SiteHub, trackable_id: TrackableId) -> Response:
         remove(hub, found(hub, trackable_id))
         return Response(status_code=204)
 
 
-def _add_change_route(router: APIRouter, hub: Hub) -> None:
+def _add_change_route(router: APIRouter) -> None:
     @router.put(
         "/{trackable_id}",
         operation_id="put_trackable",
@@ -151,6 +153,7 @@ def _add_change_route(router: APIRouter, hub: Hub) -> None:
         responses=errors(_UNKNOWN, Kind.ID_DIFFERS, Kind.STANDS_FOR_A_TAG, Kind.CHANGED_MEANWHILE, *_SAVED),
     )
     def put_trackable(
+        hub: SiteHub,
         trackable_id: TrackableId,
         trackable: Annotated[Trackable, Body(examples=[EXAMPLE])],
         query: Annotated[ChangeQuery, Query()],  # noqa: ARG001 - accepted, as the standard says
@@ -158,7 +161,7 @@ def _add_change_route(router: APIRouter, hub: Hub) -> None:
         return json_response(hub.trackables([change(hub, found(hub, trackable_id), trackable)])[0])
 
 
-def _add_location_routes(router: APIRouter, hub: Hub) -> None:
+def _add_location_routes(router: APIRouter) -> None:
     @router.get(
         "/{trackable_id}/location",
         operation_id="get_trackable_location",
@@ -166,7 +169,7 @@ def _add_location_routes(router: APIRouter, hub: Hub) -> None:
         response_model=Location | Feature,
         responses=errors(_UNKNOWN, Kind.NO_LOCATION, *_PLACED),
     )
-    def get_location(trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    def get_location(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
         tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
         best = best_of(hub.places.of_tags(tags, query.projection(hub)))
         if best is None:
@@ -180,12 +183,12 @@ def _add_location_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Location] | FeatureCollection,
         responses=errors(_UNKNOWN, *_PLACED),
     )
-    def list_locations(trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    def list_locations(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
         tags = hub.assets.tags_of(found(hub, trackable_id).trackable)
         return many(hub.places.of_tags(tags, query.projection(hub)), query, location_feature)
 
 
-def _add_motion_route(router: APIRouter, hub: Hub) -> None:
+def _add_motion_route(router: APIRouter) -> None:
     @router.get(
         "/{trackable_id}/motion",
         operation_id="get_motion",
@@ -193,7 +196,7 @@ def _add_motion_route(router: APIRouter, hub: Hub) -> None:
         response_model=TrackableMotion | Feature,
         responses=errors(_UNKNOWN, Kind.NO_LOCATION, *_PLACED),
     )
-    def get_motion(trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
+    def get_motion(hub: SiteHub, trackable_id: TrackableId, query: Annotated[PlaceQuery, Query()]) -> Response:
         asset = found(hub, trackable_id)
         motions = hub.motions([asset], query.projection(hub))
         if not motions:
@@ -201,7 +204,7 @@ def _add_motion_route(router: APIRouter, hub: Hub) -> None:
         return one(motions[0], query, motion_feature)
 
 
-def _add_related_routes(router: APIRouter, hub: Hub) -> None:
+def _add_related_routes(router: APIRouter) -> None:
     @router.get(
         "/{trackable_id}/providers",
         operation_id="list_trackable_providers",
@@ -209,7 +212,7 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[LocationProvider],
         responses=errors(_UNKNOWN),
     )
-    def list_providers(trackable_id: TrackableId) -> Response:
+    def list_providers(hub: SiteHub, trackable_id: TrackableId) -> Response:
         return json_response(hub.providers(hub.assets.tags_of(found(hub, trackable_id).trackable)))
 
     @router.get(
@@ -219,5 +222,5 @@ def _add_related_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Fence],
         responses=errors(_UNKNOWN, Kind.EVENTS_UNREADABLE),
     )
-    def list_fences(trackable_id: TrackableId, query: Annotated[SpatialQuery, Query()]) -> Response:
+    def list_fences(hub: SiteHub, trackable_id: TrackableId, query: Annotated[SpatialQuery, Query()]) -> Response:
         return fences_around(hub.assets.tags_of(found(hub, trackable_id).trackable), hub, query)

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from dropanchor_service.api.http.errors import Kind, ProblemError
-from dropanchor_service.api.omlox.hub import Hub
+from dropanchor_service.api.omlox.hub_of_request import SiteHub
 from dropanchor_service.api.omlox.models import Zone
 from dropanchor_service.api.omlox.parameters import ZoneId, errors
 from dropanchor_service.api.omlox.zones import zone_answers
@@ -15,16 +15,16 @@ from dropanchor_service.api.routes.parameters import json_response
 ForeignId = Annotated[str | None, Query(description="Return only the zone of the anchor with this id.")]
 
 
-def zones_router(hub: Hub) -> APIRouter:
+def zones_router() -> APIRouter:
     router = APIRouter(prefix="/zones", tags=["zones"])
-    _add_list_routes(router, hub)
-    _add_object_route(router, hub)
+    _add_list_routes(router)
+    _add_object_route(router)
     return router
 
 
-def _add_list_routes(router: APIRouter, hub: Hub) -> None:
+def _add_list_routes(router: APIRouter) -> None:
     @router.get("", operation_id="list_zone_ids", summary="List the ids of the zones", responses=errors())
-    def list_ids(foreign_id: ForeignId = None) -> list[str]:
+    def list_ids(hub: SiteHub, foreign_id: ForeignId = None) -> list[str]:
         return [zone["id"] for zone in zone_answers(hub.answers.site.site, foreign_id)]
 
     @router.get(
@@ -34,11 +34,11 @@ def _add_list_routes(router: APIRouter, hub: Hub) -> None:
         response_model=list[Zone],
         responses=errors(),
     )
-    def list_zones(foreign_id: ForeignId = None) -> Response:
+    def list_zones(hub: SiteHub, foreign_id: ForeignId = None) -> Response:
         return json_response(list(zone_answers(hub.answers.site.site, foreign_id)))
 
 
-def _add_object_route(router: APIRouter, hub: Hub) -> None:
+def _add_object_route(router: APIRouter) -> None:
     @router.get(
         "/{zone_id}",
         operation_id="get_zone",
@@ -46,7 +46,7 @@ def _add_object_route(router: APIRouter, hub: Hub) -> None:
         response_model=Zone,
         responses=errors(Kind.UNKNOWN_ZONE),
     )
-    def get_zone(zone_id: ZoneId) -> Response:
+    def get_zone(hub: SiteHub, zone_id: ZoneId) -> Response:
         for zone in zone_answers(hub.answers.site.site):
             if zone["id"] == str(zone_id):
                 return json_response(zone)

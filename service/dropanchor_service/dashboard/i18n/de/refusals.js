@@ -16,6 +16,7 @@ export default {
   "say.why_link_damaged": "Der Freigabelink ist beschädigt oder stammt von einem anderen Dienst",
   "say.why_link_expired": "Der Freigabelink ist abgelaufen",
   "say.why_link_revoked": "Der Freigabelink wurde widerrufen",
+  "say.why_link_siteless": "Der Freigabelink sagt nicht, zu welchem Standort er gehört. Legen Sie einen neuen an",
   "say.link_limited": "Dieser Freigabelink zeigt seine Tags und sonst nichts.",
   "say.wait": "Warten Sie {seconds} s bis zur nächsten Anfrage. /api/v1/poses und /api/v1/stream geben alle Tags auf einmal.",
   "say.no_access_control": "Ohne Zugriffskontrolle sehen alle alles: Senden Sie die Adresse der Seite. Um weniger zu zeigen, setzen Sie `security.folder` und `data_dir`.",

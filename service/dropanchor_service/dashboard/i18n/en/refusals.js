@@ -16,6 +16,7 @@ export default {
   "say.why_link_damaged": "the share link is damaged, or another service made it",
   "say.why_link_expired": "the share link has expired",
   "say.why_link_revoked": "the share link was revoked",
+  "say.why_link_siteless": "the share link does not say of which site it is: create another one",
   "say.link_limited": "This share link shows its tags and nothing else.",
   "say.wait": "Wait {seconds} s before the next request. /api/v1/poses and /api/v1/stream return all tags at once.",
   "say.no_access_control": "Without access control everybody sees everything: send the address of the page. To share less, set `security.folder` and `data_dir`.",

@@ -1,4 +1,4 @@
-"""What a service with several sites has, so far: access, and for each site its folder and its routes."""
+"""What all sites have besides the ingest: access, and for each its folder, its zones and events, and its routes."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -7,40 +7,47 @@ from threading import Event
 from fastapi import FastAPI
 
 from dropanchor_service.answers.of_sites import AnswersOfSites
+from dropanchor_service.api.app import create_app_of
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.api.routes.site_parts import SiteParts
-from dropanchor_service.api.several_sites import create_app_of_sites
 from dropanchor_service.api.site_routers import SharedParts
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.security.credentials import authenticator_of
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.site_folders import SiteFolders
-from dropanchor_service.store import Sites
+from dropanchor_service.store import LatestPoses, Sites
 from dropanchor_service.zenoh_io.endpoints import endpoints_of
+from dropanchor_service.zone_events import ZoneEvents
 
 ReceiveOfSite = Callable[[str, str, bytes, str], None]
 """Takes a payload in as if it had come over Zenoh: the ids of site and tag, the payload, its encoding."""
 
 
-class SeveralSites:
-    """The parts of a service with several sites. Creating it raises SettingsError."""
+class Serving:
+    """The parts of a service with one or several sites. Creating it raises SettingsError."""
 
     def __init__(
         self,
         settings: Settings,
         credentials: SecurityFolder | None,
         sites: Sites,
+        latest: LatestPoses,
         now_ns: Callable[[], int],
         metrics: Metrics,
     ) -> None:
         self._settings = settings
         self._credentials = credentials
-        self._authenticator = authenticator_of(settings)
+        self._authenticator = authenticator_of(settings, None if sites.only is None else sites.only.id)
         self._sites = sites
         self._metrics = metrics
         self.folders = SiteFolders(settings, sites, now_ns, metrics)
+        self.zone_events = ZoneEvents(settings, sites, latest, now_ns, metrics)
+
+    def problems(self) -> Sequence[str]:
+        """Return what does not work although the service can do its main work."""
+        return [*self.folders.problems(), *self.zone_events.problems()]
 
     def app(
         self,
@@ -51,7 +58,7 @@ class SeveralSites:
         receive: ReceiveOfSite,
         receive_health: ReceiveOfSite,
     ) -> FastAPI:
-        """Return the application; see `create_app_of_sites`."""
+        """Return the application; see `create_app_of`."""
         http = self._settings.http
         shared = SharedParts(
             stopping,
@@ -68,9 +75,13 @@ class SeveralSites:
                 partial(receive, site.id),
                 partial(receive_health, site.id),
                 plans=folder.plans,
+                events=events,
                 recorder=folder.recorder,
                 max_tags=site.quota.max_tags,
+                omlox=folder.omlox,
             )
-            for site, of_site, folder in zip(self._sites, answers, self.folders.all, strict=True)
+            for site, of_site, folder, events in zip(
+                self._sites, answers, self.folders.all, self.zone_events.parts, strict=True
+            )
         ]
-        return create_app_of_sites(parts, shared, ready=ready, impaired=impaired, registry=self._metrics.registry)
+        return create_app_of(parts, shared, ready=ready, impaired=impaired, registry=self._metrics.registry)

@@ -1,0 +1,207 @@
+"""What happens to the tags of one site becomes events, states and stays."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from dropanchor_schemas.zones import BatteryLowRule, TooCloseRule
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.events.describe import pair_event, tag_event, zone_event
+from dropanchor_service.events.drafts import Draft, StateKey, States, StateValue, Stay
+from dropanchor_service.store import HealthTable, SiteStore, TagTable
+from dropanchor_service.zones.items import ZoneItems
+from dropanchor_service.zones.judge import INSIDE
+from dropanchor_service.zones.pair_watch import PairWatch
+from dropanchor_service.zones.tag_watch import FleetState, TagWatch
+from dropanchor_service.zones.zone_watch import ZoneChange, ZoneWatch
+
+ACTIVE = StateValue(1, 0)
+
+
+@dataclass(frozen=True)
+class WatchedSite:
+    """What the watcher reads of a site.
+
+    states: what was stored, so that nothing that is known becomes an event again.
+    """
+
+    store: SiteStore
+    tags: TagTable
+    health: HealthTable
+    items: ZoneItems
+    states: Mapping[StateKey, StateValue] = field(default_factory=dict)
+
+
+class SiteWatch:
+    """Follows the states and rules of one site. Its zones are in the `ZoneWatch` of all sites.
+
+    drafts, states, stays: what has happened and is not stored yet.
+    """
+
+    def __init__(
+        self,
+        site: WatchedSite,
+        zones: ZoneWatch,
+        index: int,
+        now_ns: Callable[[], int],
+        on_change: Callable[[], None],
+    ) -> None:
+        """index: of the site. on_change: called when there is something to store."""
+        self._site = site
+        self._tags = site.tags
+        self._zones = zones
+        self._index = index
+        self._now_ns = now_ns
+        self._on_change = on_change
+        self._states = dict(site.states)
+        self._versions: object = None
+        self._pairs: dict[str, PairWatch] = {}
+        self._tag_rules: dict[str, TagWatch] = {}
+        self._rows: list[int] = []
+        self._names: list[str] = []
+        self._places: dict[int, int] = {}  # of each row among those of the site
+        self._waiting: dict[str, list[StateKey]] = defaultdict(list)  # states of tags that have no row yet
+        for key in self._states:
+            for tag in {key.tag, key.other} - {""}:
+                self._waiting[tag].append(key)
+        self.drafts: list[Draft] = []
+        self.states: States = {}
+        self.stays: list[Stay] = []
+
+    @property
+    def has_pairs(self) -> bool:
+        return bool(self._pairs)
+
+    @property
+    def has_tag_rules(self) -> bool:
+        return bool(self._tag_rules)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there are more pairs of tags too close to each other than a rule can follow."""
+        return any(watch.is_full for watch in self._pairs.values())
+
+    def follow_edits(self) -> None:
+        """Take over the zones, rules and groups if they have changed."""
+        groups, items = self._site.store.groups, self._site.items
+        versions = (*items.versions, groups)
+        if versions == self._versions:
+            return
+        zones, rules = items.zones.all, items.rules.all
+        for key in [key for key in self._states if key.item not in (zones if key.source == "zone" else rules)]:
+            self._forget(key)
+        self._zones.set_zones(list(zones.values()), groups, self._index)
+        self._pairs = {n: PairWatch(rule, groups) for n, rule in rules.items() if isinstance(rule, TooCloseRule)}
+        self._tag_rules = {n: TagWatch(r, groups) for n, r in rules.items() if not isinstance(r, TooCloseRule)}
+        self._versions = versions
+        for key in list(self._states):
+            if key.source == "rule":
+                self._restore(key)
+            else:
+                self._forget_unconcerned(key)
+
+    def add_tags(self, tags: Sequence[tuple[int, str]]) -> None:
+        """Follow these new tags: row and name."""
+        for row, name in tags:
+            self._places[row] = len(self._rows)
+            self._rows.append(row)
+            self._names.append(name)
+        for _, name in tags if self._waiting else ():
+            for key in self._waiting.pop(name, ()):
+                self._restore(key)
+
+    def forget_tag(self, name: str) -> None:
+        """End the stays of a tag that was deleted."""
+        for key in [key for key in self._states if key.source == "zone" and key.tag == name]:
+            self._forget(key)
+
+    def note(self, change: ZoneChange) -> None:
+        """Note what has happened to a tag in a zone."""
+        key = StateKey("zone", change.zone.id, self._name_of(change.row))
+        if change.flags & INSIDE:
+            self._set(key, StateValue(change.flags, change.entered_ns))
+        else:
+            self._end(key, change.left_ns)
+        event = zone_event(change, self._name_of)
+        if event is not None:
+            self.drafts.append(event)
+
+    def judge_pairs(self, rows: Array, modes: Array, now_ns: int) -> None:
+        """Judge the rules for pairs. modes: MODE of each row of this site that has one place."""
+        for watch in self._pairs.values():
+            for change in watch.judge(rows, modes, self._name_of, now_ns):
+                key = StateKey("rule", watch.rule.id, *map(self._name_of, change.rows))
+                self._set(key, StateValue(1, change.since_ns) if change.is_close else None)
+                if change.is_close:
+                    self.drafts.append(pair_event(watch.rule, change, now_ns, self._name_of))
+
+    def judge_tags(self, states: Array, now_ns: int) -> None:
+        """Judge the rules for single tags. states: by row of any site."""
+        fleet = FleetState(states[self._rows], self._batteries())
+        for watch in self._tag_rules.values():
+            for change in watch.judge(fleet, self._names, now_ns):
+                key = StateKey("rule", watch.rule.id, self._names[change.place])
+                self._set(key, ACTIVE if change.is_on else None)
+                if change.is_on:
+                    self.drafts.append(tag_event(watch.rule, change, fleet, now_ns, self._names))
+
+    def _batteries(self) -> Array:
+        if not any(isinstance(watch.rule, BatteryLowRule) for watch in self._tag_rules.values()):
+            return np.full(len(self._rows), np.nan)
+        return np.fromiter(self._each_battery(), np.float64, len(self._rows))
+
+    def _each_battery(self) -> Iterator[float]:
+        for row in self._rows:
+            record = self._site.health.of(row)
+            yield np.nan if record is None else record.values.get("battery_fraction", np.nan)
+
+    def _name_of(self, row: int) -> str:
+        return self._tags.at(row).name
+
+    def _set(self, key: StateKey, value: StateValue | None) -> None:
+        self.states[key] = value
+        if value is None:
+            self._states.pop(key, None)
+        else:
+            self._states[key] = value
+        self._on_change()
+
+    def _end(self, key: StateKey, left_ns: int) -> None:
+        """End a state. That of a tag in a zone becomes a stay."""
+        value = self._states.get(key)
+        if value is not None and key.source == "zone":
+            self.stays.append(Stay(key.tag, key.item, value.since_ns, max(left_ns, value.since_ns)))
+        self._set(key, None)
+
+    def _forget(self, key: StateKey) -> None:
+        """End a state for another reason than the tag's way: a tag counts in its zone until it was last seen there."""
+        row = self._row_of(key.tag) if key.source == "zone" else None
+        seen_ns = 0 if row is None else self._zones.forget(key.item, row)
+        self._end(key, seen_ns or self._now_ns())
+
+    def _row_of(self, name: str) -> int | None:
+        """Return the row of a tag that is followed, None for another."""
+        tag = self._tags.find(name)
+        return tag.row if tag is not None and tag.row < len(self._zones) else None
+
+    def _forget_unconcerned(self, key: StateKey) -> None:
+        row = self._row_of(key.tag)
+        if row is not None and not self._zones.concerns(key.item, row):
+            self._forget(key)
+
+    def _restore(self, key: StateKey) -> None:
+        """Give a state back to what watches it, once its tags have rows."""
+        value, rows = self._states.get(key), [self._row_of(name) for name in (key.tag, key.other) if name]
+        known = [row for row in rows if row is not None]
+        if value is None or len(known) < len(rows):
+            return
+        pair, single = self._pairs.get(key.item), self._tag_rules.get(key.item)
+        if key.source == "zone":
+            self._zones.restore(key.item, known[0], value.flags, value.since_ns)
+            self._forget_unconcerned(key)
+        elif pair is not None and len(known) == 2:
+            pair.restore((known[0], known[1]), value.since_ns)
+        elif single is not None and len(known) == 1:
+            single.restore(self._places[known[0]])

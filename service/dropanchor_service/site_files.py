@@ -1,0 +1,115 @@
+"""Where the files of each site lie, and how they move when an only site becomes one of several, and back."""
+
+import json
+import logging
+from contextlib import suppress
+from pathlib import Path
+
+from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
+from dropanchor_service.settings.model import Settings
+from dropanchor_service.settings.sources import SettingsError
+
+OWNER_FILE = "site"  # names the site whose files lie in the data folder itself
+_OF_SITE = (
+    "site.json",
+    "plans",
+    "plans.json",
+    "history.sqlite*",
+    "recordings",
+    "events.sqlite*",
+    "zones.json",
+    "event_rules.json",
+    "destinations.json",
+    "webhooks.json",
+    "omlox_*.json",
+)
+
+_log = logging.getLogger(__name__)
+
+
+def folder_of_site(data_dir: Path, site: str) -> Path:
+    """Return the folder of one of `[sites]`. An only site has its files in the data folder itself."""
+    return data_dir / "sites" / chunk_from_id(site)
+
+
+def put_site_files_in_place(settings: Settings) -> None:
+    """Move the files of a site to where these settings look for them. Raises SettingsError.
+
+    Each file is renamed, and what a kill leaves behind is moved at the next start.
+    """
+    folder = settings.data_dir
+    if folder is None:
+        return
+    try:
+        if settings.sites:
+            _give_own_folder(folder, list(settings.sites))
+        else:
+            _take_back(folder, settings.site.id)
+    except OSError as error:
+        raise SettingsError(f"data_dir: the files of a site in {folder} cannot be moved: {error}") from error
+
+
+def _give_own_folder(folder: Path, served: list[str]) -> None:
+    """Move the files of a site that was the only one into its own folder."""
+    if not _files_in(folder):
+        return
+    owner = _owner_of(folder) or (served[0] if len(served) == 1 else None)
+    if owner is None:
+        raise SettingsError(
+            f"data_dir: {folder} holds the files of an only site, and nothing says which of the sites it is: move them "
+            f"into {folder_of_site(folder, served[0])}, or into the folder of another site"
+        )
+    _move(folder, folder_of_site(folder, owner), owner, folder)
+    (folder / OWNER_FILE).unlink(missing_ok=True)
+
+
+def _take_back(folder: Path, site: str) -> None:
+    """Move the files of one of several sites into the data folder, now that it is the only one."""
+    own, owner = folder_of_site(folder, site), _owner_of(folder)
+    if _files_in(own):
+        if owner not in (None, site):
+            _move(folder, folder_of_site(folder, owner), owner, folder)
+        _move(own, folder, site, folder)
+        with suppress(OSError):  # it may hold files of others
+            own.rmdir()
+        owner = site
+    if owner != site and not (folder / "site.json").exists():
+        with suppress(OSError):  # the first change that cannot be saved is reported
+            _write_owner(folder, site)
+
+
+def _move(source: Path, target: Path, site: str, folder: Path) -> None:
+    """Rename the files of a site. folder: the data folder, which says meanwhile whose files lie in it."""
+    found = _files_in(source)
+    for path in found:
+        if (target / path.name).exists():
+            raise SettingsError(
+                f"data_dir: both {source} and {target} hold {path.name} of the site {site!r}: move one of them away"
+            )
+    if not found:
+        return
+    _write_owner(folder, site)
+    target.mkdir(parents=True, exist_ok=True)
+    for path in found:
+        path.rename(target / path.name)
+    for changed in (target, source):
+        sync_folder(changed)
+    _log.info("the files of the site %s were moved from %s to %s", site, source, target)
+
+
+def _owner_of(folder: Path) -> str | None:
+    """Return the site whose files lie in the data folder, None if nothing says so."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        return str(json.loads((folder / "site.json").read_bytes())["site"]["id"])
+    with suppress(OSError, ValueError):
+        return (folder / OWNER_FILE).read_text(encoding="utf-8").strip() or None
+    return None
+
+
+def _write_owner(folder: Path, site: str) -> None:
+    write_atomically(folder / OWNER_FILE, [f"{site}\n".encode()])
+
+
+def _files_in(folder: Path) -> list[Path]:
+    return [path for pattern in _OF_SITE for path in sorted(folder.glob(pattern)) if path.suffix != ".part"]
