@@ -6,6 +6,7 @@ import zenoh
 from dropanchor_schemas.keys import event_key
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
 PERIOD_S = 0.1
@@ -15,8 +16,10 @@ AT_ONCE = 1000
 class ZenohEvents(PeriodicPublisher):
     """Publishes while it is open, in the order of the events. It begins with the next event."""
 
-    def __init__(self, session: zenoh.Session, store: EventStore, metrics: Metrics) -> None:
-        super().__init__("zenoh events", PERIOD_S, metrics)
+    def __init__(
+        self, session: zenoh.Session, store: EventStore, metrics: Metrics, may_publish: MayServe = always
+    ) -> None:
+        super().__init__("zenoh events", PERIOD_S, metrics, may_publish)
         self._session = session
         self._store = store
         self._published = store.newest

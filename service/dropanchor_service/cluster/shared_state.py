@@ -1,0 +1,80 @@
+"""What the owner keeps in the database, so that its successor can go on: the checkpoint, and changes of the sites.
+
+Each write holds only while nobody has a higher epoch.
+"""
+
+from collections.abc import Callable
+
+from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, decoded, encoded
+from dropanchor_service.cluster.database import Connection, DatabaseError, sentence_of
+from dropanchor_service.cluster.leases import Claim
+
+_CHECKPOINT = """
+    UPDATE dropanchor_checkpoint SET layout = %s, written = clock_timestamp(), content = %b
+    WHERE bucket = %s AND epoch = %s
+"""
+_DOCUMENT = """
+    INSERT INTO dropanchor_site (bucket, site, epoch, document) VALUES (%s, %s, %s, %b)
+    ON CONFLICT (bucket, site) DO UPDATE SET document = excluded.document, epoch = excluded.epoch
+    WHERE dropanchor_site.epoch <= excluded.epoch
+"""
+
+
+class CheckpointRow:
+    """The checkpoint of a bucket, in the database. Not thread-safe.
+
+    connect: raises DatabaseError. template: any snapshot of the layout, for its dtypes.
+    """
+
+    def __init__(self, connect: Callable[[], Connection], bucket: str, layout: str, template: Snapshot) -> None:
+        self.layout = layout
+        self._connect = connect
+        self._bucket = bucket
+        self._template = template
+        self._connection: Connection | None = None
+        self._claim = Claim(0, b"", {})
+
+    def own(self, claim: Claim) -> None:
+        """Go on from what the claim has, and write with its epoch."""
+        self._claim = claim
+
+    def write(self, snapshot: Snapshot) -> int:
+        """Write the checkpoint; see `Checkpoints`."""
+        content = b"".join(encoded(snapshot, self.layout))
+        try:
+            if self._connection is None or self._connection.closed:
+                self._connection = self._connect()
+            values = [self.layout, content, self._bucket, self._claim.epoch]
+            written = self._connection.execute(_CHECKPOINT, values, binary=True).rowcount
+        except DatabaseError as error:
+            self.close()
+            raise CheckpointError(f"the database does not take it: {sentence_of(error)}") from error
+        if written != 1:
+            raise CheckpointError(f"another process owns the bucket {self._bucket}, or its row is gone")
+        return len(content)
+
+    def newest(self) -> tuple[Snapshot | None, list[str]]:
+        """Return the snapshot that the claim came with; see `Checkpoints`."""
+        if not self._claim.checkpoint:
+            return None, []
+        try:
+            return decoded(self._claim.checkpoint, self.layout, self._template), []
+        except CheckpointError as error:
+            return None, [f"the checkpoint of the bucket {self._bucket} is not used: {error}"]
+
+    def close(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+
+def save_document(connect: Callable[[], Connection], bucket: str, epoch: int, site: str, document: bytes) -> None:
+    """Save a site, as its `site.json`. Raises OSError, so that whoever changed it hears of it."""
+    try:
+        with connect() as connection:
+            connection.execute("SET synchronous_commit = on")
+            if connection.execute(_DOCUMENT, [bucket, site, epoch, document]).rowcount == 1:
+                return
+    except DatabaseError as error:
+        raise OSError(f"the database of the cluster does not take it: {sentence_of(error)}") from error
+    raise OSError(f"another process owns the bucket {bucket}")
