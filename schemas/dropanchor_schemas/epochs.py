@@ -2,7 +2,7 @@
 
 
 class EpochFence:
-    """Remembers the highest epoch that was seen of each site. Not thread-safe.
+    """Remembers the highest epoch that was seen of each site, or of each tag. Not thread-safe.
 
     When one process of a cluster takes a site over from another one, the former may have poses on their way, or wake up
     much later and send some. These have a lower epoch.
@@ -11,9 +11,9 @@ class EpochFence:
     def __init__(self) -> None:
         self._highest: dict[str, int] = {}
 
-    def accepts(self, site: str, epoch: int) -> bool:
-        """Return whether a pose with this epoch is of the newest owner of the site that is known here."""
-        if epoch < self._highest.get(site, 0):
+    def accepts(self, key: str, epoch: int) -> bool:
+        """Return whether a pose with this epoch is of the newest known owner. key: the site, or the tag."""
+        if epoch < self._highest.get(key, 0):
             return False
-        self._highest[site] = epoch
+        self._highest[key] = epoch
         return True

@@ -93,12 +93,10 @@ def owners_of_all_buckets() -> str:
     return f"{PREFIX}/@owner/**"
 
 
-def epoch_from_key(key: str) -> int:
-    """Return the epoch in the key of an owner. Raises InvalidKeyError if the key has another form."""
+def epoch_from_key(key: str) -> int | None:
+    """Return the epoch in the key of an owner, None if the key has another form."""
     epoch = key.rpartition("/")[2]
-    if not (epoch.isascii() and epoch.isdigit()):
-        raise InvalidKeyError(f"{key!r} is not {PREFIX}/@owner/<bucket>/<epoch>")
-    return int(epoch)
+    return int(epoch) if epoch.isascii() and epoch.isdigit() else None
 
 
 def all_tags(site: str, leaf: str) -> str:

@@ -49,7 +49,7 @@ class PostgreSql:
         """Start the server, and wait until it answers."""
         options = ("-c", "listen_addresses=127.0.0.1", "-c", "unix_socket_directories=", "-c", "fsync=off")
         words = [str(_program("postgres")), "-D", str(self.folder), "-p", str(self.port), *options]
-        self.process = subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, **_as_user())
+        self.process = subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, user=_user())
         wait_until(self._answers)
 
     def stop(self) -> None:
@@ -88,7 +88,7 @@ def running_postgresql() -> Iterator[PostgreSql]:
             "-E",
             "UTF8",
         ]
-        subprocess.run(words, check=True, capture_output=True, **_as_user())
+        subprocess.run(words, check=True, capture_output=True, user=_user())
         server = PostgreSql(Path(folder), free_port())
         try:
             server.start()
@@ -103,5 +103,6 @@ def _program(name: str) -> Path:
     return folder / name
 
 
-def _as_user() -> dict[str, str]:
-    return {"user": USER} if os.geteuid() == 0 else {}
+def _user() -> str | None:
+    """Return the user to run as, None for the one of this process."""
+    return USER if os.geteuid() == 0 else None

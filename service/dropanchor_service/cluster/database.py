@@ -8,7 +8,7 @@ from psycopg.conninfo import make_conninfo
 Connection = psycopg.Connection[tuple[Any, ...]]
 DatabaseError = psycopg.Error
 
-_OPTIONS = {
+_OPTIONS: dict[str, Any] = {
     "client_encoding": "utf8",
     "connect_timeout": 2,
     "tcp_user_timeout": 3000,

@@ -8,7 +8,8 @@ from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import Connection, DatabaseError, make_tables, sentence_of
 from dropanchor_service.cluster.leases import Claim, Claimant
-from dropanchor_service.cluster.watch import Lease, Watch, obstacle
+from dropanchor_service.cluster.sentences import database_away, standby_of, unable
+from dropanchor_service.cluster.watch import Watch, obstacle
 
 LOOK_S = 0.1
 NOTE_S = 1.0  # between two notes in the database that this standby is there
@@ -42,10 +43,7 @@ class Standby:
                     return self._watched(connection, on_look)
             except DatabaseError as error:
                 self._watch.look_away()
-                self._say(
-                    f"This process is a standby of {self._bucket} and cannot take over: the database does not answer "
-                    f"({sentence_of(error)})."
-                )
+                self._say(database_away(self._bucket, sentence_of(error)))
                 time.sleep(RETRY_S)
 
     def _watched(self, connection: Connection, on_look: Callable[[], None]) -> tuple[Claim, float]:
@@ -57,30 +55,19 @@ class Standby:
                 claim = leases.claim(connection, lease, self._who)
                 if claim is not None:
                     _log.info(
-                        "this process owns %s now, epoch %d (before: %s)", self._bucket, claim.epoch, _owner(lease)
+                        "this process owns %s now, epoch %d (before: %s)",
+                        self._bucket,
+                        claim.epoch,
+                        lease.owner or "nobody",
                     )
                     return claim, now_s
-            self._say(self._sentence(lease, why_not))
+            self._say(standby_of(lease) if why_not is None else unable(lease, why_not))
             if now_s - self._noted_s > NOTE_S:
                 self._noted_s = now_s
                 leases.note_standby(connection, self._bucket, self._who.name, why_not)
             time.sleep(LOOK_S)
 
-    def _sentence(self, lease: Lease, why_not: str | None) -> str:
-        address = f" at {lease.address}" if lease.address else ""
-        owner = f"the owner is {lease.owner}{address}, epoch {lease.epoch}" if lease.owner else "it has no owner"
-        if why_not is None:
-            return f"This process is a standby of {self._bucket}: {owner}."
-        return (
-            f"This process is a standby of {self._bucket} and cannot take over: {why_not}. `dropanchor cluster accept "
-            f"{self._bucket}` lets it ({owner})."
-        )
-
     def _say(self, sentence: str) -> None:
         if sentence != self.sentence:
             self.sentence = sentence
             _log.info("%s", sentence)
-
-
-def _owner(lease: Lease) -> str:
-    return lease.owner or "nobody"

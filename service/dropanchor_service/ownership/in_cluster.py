@@ -11,6 +11,7 @@ import zenoh
 from pydantic import ValidationError
 
 from dropanchor_service.checkpoints.snapshot import ServiceState
+from dropanchor_service.cluster import sentences
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import Connection, connect
 from dropanchor_service.cluster.leases import Claimant
@@ -95,10 +96,8 @@ class ClusterOwnership(Ownership):
         if self._tenure is None:
             return "" if self._standby is None else self._standby.sentence
         if self._tenure.standing is Standing.IN_DOUBT:
-            return f"This process is silent, because another one may own {self._bucket}."
-        if self.gone:
-            return f"This process no longer serves {self._bucket}: {self.gone}."
-        return f"This process takes {self._bucket} over."
+            return sentences.in_doubt(self._bucket)
+        return sentences.gone(self._bucket, self.gone) if self.gone else sentences.takes_over(self._bucket)
 
     @property
     def gone(self) -> str:

@@ -1,14 +1,12 @@
 """The liveliness token of the owner of a bucket, and those of other owners."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from types import TracebackType
 from typing import Any, Self
 
 import zenoh
 
 from dropanchor_schemas import keys
-from dropanchor_schemas.keys import InvalidKeyError
 
 
 class ZenohOwner:
@@ -44,6 +42,6 @@ class ZenohOwner:
             declared.undeclare()
 
     def _on_token(self, message: zenoh.Sample) -> None:
-        if message.kind == zenoh.SampleKind.PUT:
-            with suppress(InvalidKeyError):
-                self._on_epoch(keys.epoch_from_key(str(message.key_expr)))
+        epoch = keys.epoch_from_key(str(message.key_expr))
+        if message.kind == zenoh.SampleKind.PUT and epoch is not None:
+            self._on_epoch(epoch)
