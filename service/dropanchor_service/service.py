@@ -44,6 +44,7 @@ from dropanchor_service.settings.several_sites import refuse_for_several_sites
 from dropanchor_service.several_sites import SeveralSites
 from dropanchor_service.site_folders import SiteFolders
 from dropanchor_service.store import LatestPoses
+from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.events import ZenohEvents
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
@@ -116,7 +117,7 @@ class Service:
             self._progress.page = f"{self.url}/"
             with self._compiling:
                 self._build_ingest(compiled_engine(self._settings, self._progress))
-                self._ownership.stand_by(self.url, lambda: self._link.problem is None)
+                self._ownership.stand_by(self.url, self._shared(), lambda: self._link.problem is None)
             self._opened.enter_context(self._ownership)
             self._opened.enter_context(self._persistence)
             if self._checkpoints is not None:
@@ -146,6 +147,11 @@ class Service:
             return self._several.folders
         assert self._only is not None
         return self._only.persistence
+
+    def _shared(self) -> dict[str, Shared]:
+        """Return what people change over REST and the owner of the sites shares with its successor, by name."""
+        of_only = {} if self._only is None else self._only.zone_events.shared
+        return {**of_only, **{f"{site.id}/site.json": site.store for site in self.sites}}
 
     def _name(self) -> str:
         return f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"

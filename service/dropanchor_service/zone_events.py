@@ -1,7 +1,7 @@
 """Zones, events and their delivery, as the settings want them."""
 
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import Self
@@ -21,6 +21,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import HealthTable, LatestPoses, SiteStore, TagTable
+from dropanchor_service.store.shared import Shared
 from dropanchor_service.zones.items import ZoneItems
 
 
@@ -68,6 +69,16 @@ class ZoneEvents:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+    @property
+    def shared(self) -> Mapping[str, Shared]:
+        """What people change, by the names of its files."""
+        items = self.parts.items
+        return {
+            "zones.json": items.zones,
+            "event_rules.json": items.rules,
+            "destinations.json": self.parts.destinations,
+        }
 
     def problems(self) -> Sequence[str]:
         """Return why events cannot be stored; empty when they can."""

@@ -41,12 +41,12 @@ CREATE TABLE IF NOT EXISTS dropanchor_checkpoint (
     content bytea NOT NULL DEFAULT ''
 );
 ALTER TABLE dropanchor_checkpoint ALTER content SET STORAGE EXTERNAL;
-CREATE TABLE IF NOT EXISTS dropanchor_site (
+CREATE TABLE IF NOT EXISTS dropanchor_document (
     bucket text,
-    site text,
+    name text,
     epoch bigint NOT NULL,
-    document bytea NOT NULL,
-    PRIMARY KEY (bucket, site)
+    content bytea NOT NULL,
+    PRIMARY KEY (bucket, name)
 );
 CREATE TABLE IF NOT EXISTS dropanchor_standby (
     bucket text,

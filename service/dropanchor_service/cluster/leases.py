@@ -24,6 +24,9 @@ _FENCE = """
     INSERT INTO dropanchor_checkpoint (bucket, epoch) VALUES (%(bucket)s, %(next)s)
     ON CONFLICT (bucket) DO UPDATE SET epoch = excluded.epoch RETURNING content
 """
+_FENCE_DOCUMENTS = """
+    UPDATE dropanchor_document SET epoch = %(next)s WHERE bucket = %(bucket)s RETURNING name, content
+"""
 _RENEW = """
     UPDATE dropanchor_lease SET renewals = renewals + 1, renewed = clock_timestamp() WHERE bucket = %s AND epoch = %s
 """
@@ -56,7 +59,7 @@ class Claimant:
 
 @dataclass(frozen=True)
 class Claim:
-    """What a new owner has. checkpoint: its bytes, empty without one. documents: of sites, by their ids."""
+    """What a new owner has. checkpoint: its bytes, empty without one. documents: what people have changed, by name."""
 
     epoch: int
     checkpoint: bytes
@@ -91,7 +94,7 @@ def seen_or_new(connection: Connection, bucket: str) -> Lease:
 def claim(connection: Connection, seen: Lease, who: Claimant) -> Claim | None:
     """Take over a bucket with the next epoch, unless its lease is no longer the one that was seen; then return None.
 
-    From then on the former owner can write neither its checkpoint nor its sites.
+    From then on the former owner can write neither its checkpoint nor its documents.
     """
     values = {
         "bucket": seen.bucket,
@@ -110,8 +113,7 @@ def claim(connection: Connection, seen: Lease, who: Claimant) -> Claim | None:
             return None
         row = connection.execute(_FENCE, values, binary=True).fetchone()
         assert row is not None
-        fence_sites = "UPDATE dropanchor_site SET epoch = %(next)s WHERE bucket = %(bucket)s RETURNING site, document"
-        documents = {site: bytes(text) for site, text in connection.execute(fence_sites, values, binary=True)}
+        documents = {name: bytes(text) for name, text in connection.execute(_FENCE_DOCUMENTS, values, binary=True)}
     return Claim(seen.epoch + 1, bytes(row[0]), documents)
 
 

@@ -1,4 +1,4 @@
-"""What the owner keeps in the database, so that its successor can go on: the checkpoint, and changes of the sites.
+"""What the owner keeps in the database, so that its successor can go on: the checkpoint, and what people change.
 
 Each write holds only while nobody has a higher epoch.
 """
@@ -14,9 +14,9 @@ _CHECKPOINT = """
     WHERE bucket = %s AND epoch = %s
 """
 _DOCUMENT = """
-    INSERT INTO dropanchor_site (bucket, site, epoch, document) VALUES (%s, %s, %s, %b)
-    ON CONFLICT (bucket, site) DO UPDATE SET document = excluded.document, epoch = excluded.epoch
-    WHERE dropanchor_site.epoch <= excluded.epoch
+    INSERT INTO dropanchor_document (bucket, name, epoch, content) VALUES (%s, %s, %s, %b)
+    ON CONFLICT (bucket, name) DO UPDATE SET content = excluded.content, epoch = excluded.epoch
+    WHERE dropanchor_document.epoch <= excluded.epoch
 """
 
 
@@ -68,12 +68,12 @@ class CheckpointRow:
             self._connection = None
 
 
-def save_document(connect: Callable[[], Connection], bucket: str, epoch: int, site: str, document: bytes) -> None:
-    """Save a site, as its `site.json`. Raises OSError, so that whoever changed it hears of it."""
+def save_document(connect: Callable[[], Connection], bucket: str, epoch: int, name: str, content: bytes) -> None:
+    """Save a document. Raises OSError, so that whoever changed it hears of it."""
     try:
         with connect() as connection:
             connection.execute("SET synchronous_commit = on")
-            if connection.execute(_DOCUMENT, [bucket, site, epoch, document]).rowcount == 1:
+            if connection.execute(_DOCUMENT, [bucket, name, epoch, content]).rowcount == 1:
                 return
     except DatabaseError as error:
         raise OSError(f"the database of the cluster does not take it: {sentence_of(error)}") from error

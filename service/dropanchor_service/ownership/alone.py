@@ -1,6 +1,6 @@
 """What a process asks about its sites, and the answers of one that is alone."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Self
 
@@ -11,6 +11,7 @@ from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.format import Checkpoints
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.settings.model import Settings
+from dropanchor_service.store.shared import Shared
 
 ZenohParts = list[AbstractContextManager[object]]
 
@@ -51,10 +52,11 @@ class Ownership:
             return None
         return CheckpointFolder(self._folder / "checkpoints", state.layout, state.template)
 
-    def stand_by(self, page: str, hears_others: Callable[[], bool]) -> None:
+    def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
         """Return when this process serves the sites.
 
-        page: its address. hears_others: whether there is a connection to the router.
+        page: its address. shared: what people change over REST, by name. hears_others: whether there is a connection to
+        the router.
         """
 
     def may_serve(self) -> bool:

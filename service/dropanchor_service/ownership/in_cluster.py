@@ -3,7 +3,7 @@
 import hashlib
 import logging
 import socket
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Self
 
@@ -25,6 +25,7 @@ from dropanchor_service.ownership.alone import Ownership, ZenohParts
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import Sites
+from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.owner_token import ZenohOwner
 
 OF_THE_SITES = {
@@ -64,7 +65,7 @@ class ClusterOwnership(Ownership):
         self._row = CheckpointRow(self._connect, self._bucket, state.layout, state.template)
         return self._row
 
-    def stand_by(self, page: str, hears_others: Callable[[], bool]) -> None:
+    def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
         assert self._row is not None
         _log.info("standing by at %s, for %s", page, self._bucket)
         self._standby = Standby(self._connect, self._bucket, self._who, self._row.layout)
@@ -74,13 +75,12 @@ class ClusterOwnership(Ownership):
         self._row.own(claim)
         for site in self._sites:
             site.store.epoch = claim.epoch
-            save = partial(save_document, self._connect, self._bucket, claim.epoch, site.id)
+        for document, kept in shared.items():
+            save = partial(save_document, self._connect, self._bucket, claim.epoch, document)
             try:
-                site.store.share(claim.documents.get(site.id), save)
+                kept.share(claim.documents.get(document), save)
             except (OSError, ValidationError) as error:
-                raise SettingsError(
-                    f"cluster: the site {site.id} of {self._bucket} cannot be shared: {error}"
-                ) from error
+                raise SettingsError(f"cluster: {document} of {self._bucket} cannot be shared: {error}") from error
 
     def __enter__(self) -> Self:
         self._renewal.__enter__()

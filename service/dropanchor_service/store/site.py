@@ -12,10 +12,9 @@ from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.store.groups import Groups, groups_of
 from dropanchor_service.store.preconditions import Precondition, always, require
+from dropanchor_service.store.shared import Save
 
 FILE_NAME = "site.json"
-
-Save = Callable[[bytes], None]
 
 _log = logging.getLogger(__name__)
 
@@ -74,11 +73,7 @@ class SiteStore:
             self._has_file = True
 
     def share(self, saved: bytes | None, save: Save) -> None:
-        """Go on from what another process has saved of this site, and save further changes where it did.
-
-        saved: None if nobody has saved the site yet. save: raises OSError. Call this before the first message. Raises
-        OSError or pydantic's ValidationError.
-        """
+        """Go on from what another process has saved of this site; see `Shared`. Call this before the first message."""
         self._save_bytes = save
         if saved is not None:
             self._anchors = {}

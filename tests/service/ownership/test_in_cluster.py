@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from dropanchor_schemas.zones import Zone
+from dropanchor_service.api.routes import event_examples
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.cluster.leases import Claimant
@@ -16,6 +18,7 @@ from dropanchor_service.ownership.in_cluster import digest_of_sites
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_service.store import Sites, SiteStore
+from dropanchor_service.zones.items import ZoneItems
 from support.postgresql import needs_postgresql, running_postgresql
 from support.sites import make_sites
 
@@ -118,6 +121,20 @@ def test_a_site_goes_on_from_what_another_process_saved_and_saves_there(tmp_path
     assert not any(tmp_path.iterdir())
 
 
+def test_zones_go_on_from_what_another_process_saved(tmp_path: Path) -> None:
+    saved: list[bytes] = []
+    zone = Zone.model_validate(event_examples.ZONE)
+    owner, successor = ZoneItems.opened(None).zones, ZoneItems.opened(tmp_path).zones
+    owner.share(None, saved.append)
+    assert saved == []  # there is none yet
+    owner.put("dock", zone)
+    successor.share(saved[-1], saved.append)
+    assert dict(successor.all) == {"dock": zone}
+    successor.remove("dock")
+    assert len(saved) == 2
+    assert not any(tmp_path.iterdir())
+
+
 def test_what_a_process_saved_alone_is_saved_for_all_when_it_becomes_the_first_owner(tmp_path: Path) -> None:
     alone = SiteStore(make_sites("yard")[0].store.site, {}, tmp_path)
     alone.bind_first("7")
@@ -130,5 +147,5 @@ def test_a_process_that_is_alone_always_serves_and_says_nothing() -> None:
     alone = ownership_of(
         Settings(), Sites([(SiteStore(Settings().site, {}), Settings().quota)]), Metrics(), lambda: None
     )
-    alone.stand_by("http://127.0.0.1:8080", lambda: False)
+    alone.stand_by("http://127.0.0.1:8080", {}, lambda: False)
     assert (alone.may_serve(), alone.sentence, alone.gone, alone.impairments()) == (True, "", "", [])
