@@ -80,7 +80,9 @@ class Renewal(Worker):
             self._tenure.lose(f"{found.owner or 'nobody'} owns {self._bucket} now, epoch {found.epoch}")
 
     def _release(self) -> None:
-        """Give the bucket back, if it is still this process's."""
+        """Give the bucket back, if it is still this process's, unless the thread waits for the database."""
+        if self.is_alive:
+            return
         if self._connection is not None and not self._tenure.why_lost:
             with suppress(DatabaseError):
                 leases.release(self._connection, self._bucket, self._tenure.epoch)

@@ -4,6 +4,7 @@ Each write holds only while nobody has a higher epoch.
 """
 
 from collections.abc import Callable
+from threading import Lock
 
 from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, decoded, encoded
 from dropanchor_service.cluster.database import Connection, DatabaseError, sentence_of
@@ -21,7 +22,7 @@ _DOCUMENT = """
 
 
 class CheckpointRow:
-    """The checkpoint of a bucket, in the database. Not thread-safe.
+    """The checkpoint of a bucket, in the database.
 
     connect: raises DatabaseError. template: any snapshot of the layout, for its dtypes.
     """
@@ -33,6 +34,7 @@ class CheckpointRow:
         self._template = template
         self._connection: Connection | None = None
         self._claim = Claim(0, b"", {})
+        self._lock = Lock()
 
     def own(self, claim: Claim) -> None:
         """Go on from what the claim has, and write with its epoch."""
@@ -40,14 +42,21 @@ class CheckpointRow:
 
     def write(self, snapshot: Snapshot) -> int:
         """Write the checkpoint; see `Checkpoints`."""
-        content = b"".join(encoded(snapshot, self.layout))
+        if not self._lock.acquire(blocking=False):
+            raise CheckpointError("the database has not answered the write before this one")
+        try:
+            return self._write(b"".join(encoded(snapshot, self.layout)))
+        finally:
+            self._lock.release()
+
+    def _write(self, content: bytes) -> int:
         try:
             if self._connection is None or self._connection.closed:
                 self._connection = self._connect()
             values = [self.layout, content, self._bucket, self._claim.epoch]
             written = self._connection.execute(_CHECKPOINT, values, binary=True).rowcount
         except DatabaseError as error:
-            self.close()
+            self._disconnect()
             raise CheckpointError(f"the database does not take it: {sentence_of(error)}") from error
         if written != 1:
             raise CheckpointError(f"another process owns the bucket {self._bucket}, or its row is gone")
@@ -63,6 +72,11 @@ class CheckpointRow:
             return None, [f"the checkpoint of the bucket {self._bucket} is not used: {error}"]
 
     def close(self) -> None:
+        """Disconnect, unless a write waits for the database."""
+        if not self._lock.locked():
+            self._disconnect()
+
+    def _disconnect(self) -> None:
         if self._connection is not None:
             self._connection.close()
             self._connection = None

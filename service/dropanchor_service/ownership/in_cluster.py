@@ -113,9 +113,9 @@ class ClusterOwnership(Ownership):
             self._token.announce()
 
     def impairments(self) -> Sequence[str]:
-        error = self._renewal.database_error
-        if error is None or self._tenure is None:
+        if self._tenure is None or self._tenure.age_s <= self._who.lease_s:
             return []
+        error = self._renewal.database_error or f"for {self._tenure.age_s:.0f} s"
         return [
             f"the database of the cluster does not answer ({error}): this process goes on as the owner of "
             f"{self._bucket}, epoch {self._tenure.epoch}, until another one takes over"
