@@ -125,8 +125,7 @@ class CheckpointThread(Worker):
             self._metrics.checkpoints.labels("failed").inc()
             self._log.exception("checkpoint", error)
             return
-        finally:
-            self._took_s = time.monotonic() - began_s
+        self._took_s = time.monotonic() - began_s  # of a write that failed it says nothing: it may have waited in vain
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)
