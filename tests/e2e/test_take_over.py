@@ -21,6 +21,7 @@ from dropanchor_service.api.routes import event_examples
 from dropanchor_service.commands.serve import EXIT_GONE
 from support.live_tags import LiveTags, distance, is_current, samples_of
 from support.postgresql import PostgreSql, needs_postgresql, running_postgresql
+from support.relay import running_relay
 from support.service import Running, command, environment, running_service
 from support.zenoh_router import connected_session, wait_until
 
@@ -70,18 +71,25 @@ class Cluster:
         self._router = router
         self._opened = opened
         self.database = database
+        self._tags = tags
         for name in "ab":
             (folder / name).mkdir()
-            cluster = (f'url = "{database.url}"', 'bucket = "yard"', f'name = "{name}"', f"lease_s = {LEASE_S}")
-            self.config = tags.write_settings(folder / name, "[cluster]", *cluster)
+            self.config = self._write_settings(name, database.port)
 
-    def start(self, name: str) -> Running:
-        options = ("--config", str(self._folder / name / "live.toml"), "--data-dir", str(self._folder / name / "data"))
+    def _write_settings(self, name: str, port: int) -> Path:
+        url = self.database.url.replace(str(self.database.port), str(port))
+        cluster = (f'url = "{url}"', 'bucket = "yard"', f'name = "{name}"', f"lease_s = {LEASE_S}")
+        return self._tags.write_settings(self._folder / name, "[cluster]", *cluster)
+
+    def start(self, name: str, port: int | None = None) -> Running:
+        """Start a service. port: where it reaches the database, if not at its own."""
+        config = self._write_settings(name, port or self.database.port)
+        options = ("--config", str(config), "--data-dir", str(self._folder / name / "data"))
         service = running_service(*options, "--zenoh-connect", self._router, ready=False)
         return self._opened.enter_context(service)
 
     def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        words = command("cluster", *arguments, "--config", str(self.config))
+        words = command("cluster", *arguments, "--url", self.database.url)
         return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=60)
 
 
@@ -127,6 +135,7 @@ def test_each_failure_of_an_owner_leaves_one_owner_and_loses_no_sample(
         wait_until(lambda: is_current(a, TAGS))
 
         a.put("/api/v1/zones/dock", event_examples.ZONE)
+        a.put("/api/v1/anchors/9", {"id": "9", "x": 50.0})
 
         measured("database away for 5 s", a, lambda: _database_away(database, a, b))
         assert not [pose for pose in reader.poses if pose.epoch != 1]
@@ -140,22 +149,30 @@ def test_each_failure_of_an_owner_leaves_one_owner_and_loses_no_sample(
         measured("moved", a, lambda: _moved(cluster))
         wait_until_gone(b)
 
-        b = cluster.start("b")
+        network = opened.enter_context(running_relay(database.port))
+        b = cluster.start("b", network.port)
         wait_for(b, "standby of yard: the owner is a, epoch 3")
         measured("owner killed", b, a.process.kill)
+
+        a = cluster.start("a")
+        wait_for(a, "standby of yard: the owner is b, epoch 4")
+        measured("owner cut off from the database", a, network.silent.set)
+        wait_until_gone(b)
+
         tags.finish()
-        wait_until(lambda: samples_of(b) == tags.samples)
-        answers = {pose["tag"]: pose for pose in b.get("/api/v1/poses")["poses"]}
+        wait_until(lambda: samples_of(a) == tags.samples)
+        answers = {pose["tag"]: pose for pose in a.get("/api/v1/poses")["poses"]}
         expected = tags.expected(cluster.config)
         status = cluster.run("status").stdout
-        zones = [zone["id"] for zone in b.get("/api/v1/zones")["zones"]]
+        anchors = sorted(anchor["id"] for anchor in a.get("/api/v1/site")["anchors"])
+        zones = [zone["id"] for zone in a.get("/api/v1/zones")["zones"]]
     dropped = sum(not pose.is_accepted for pose in reader.poses)
     lines = [f"{what}: {silence_s:.2f} s without a pose" for what, silence_s in silences.items()]
     with capsys.disabled():
         sys.stdout.write("\n".join(["", *lines, f"poses of former owners that were dropped: {dropped}", ""]))
-    assert zones == ["dock"]
-    assert "yard: epoch 4\n  owner: b" in status
-    assert {pose["epoch"] for pose in answers.values()} == {4}
+    assert (anchors, zones) == (["1", "9"], ["dock"])
+    assert "yard: epoch 5\n  owner: a" in status
+    assert {pose["epoch"] for pose in answers.values()} == {5}
     assert max(distance(pose, answers[tag]) for tag, pose in expected.items()) < 0.01
     accepted = [pose.epoch for pose in reader.poses if pose.is_accepted]
     assert accepted == sorted(accepted)
