@@ -82,9 +82,9 @@ def make_tables(connection: Connection) -> None:
             connection.execute(_TABLES)
 
 
-def sentence_of(error: BaseException) -> str:
+def sentence_of(error: DatabaseError) -> str:
     """Return an error of the database in one line, without a full stop."""
-    text = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+    text = " ".join((error.diag.message_primary or str(error)).split()).rstrip(".") or type(error).__name__
     if isinstance(error, psycopg.errors.UndefinedColumn | psycopg.errors.UndefinedTable):
         return f"its tables are not those of this version ({text})"
     return text

@@ -132,9 +132,9 @@ def note_standby(connection: Connection, bucket: str, name: str, obstacle: str |
     connection.execute(_STANDBY, [bucket, name, obstacle or ""])
 
 
-def ask_to_move(connection: Connection, bucket: str) -> None:
-    """Let the next standby take the bucket over at once."""
-    connection.execute("UPDATE dropanchor_lease SET is_moving = true WHERE bucket = %s", [bucket])
+def set_moving(connection: Connection, bucket: str, is_moving: bool) -> None:
+    """Let the next standby take the bucket over at once, or no longer."""
+    connection.execute("UPDATE dropanchor_lease SET is_moving = %s WHERE bucket = %s", [is_moving, bucket])
 
 
 def accept_any(connection: Connection, bucket: str) -> None:

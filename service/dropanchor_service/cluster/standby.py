@@ -34,7 +34,10 @@ class Standby:
         self.sentence = "The service is starting."
 
     def wait(self, on_look: Callable[[], None]) -> tuple[Claim, float]:
-        """Return what was claimed, and when that was asked for, by the clock of leases. on_look: called each time."""
+        """Return what was claimed, and when that was asked for, by the clock of leases.
+
+        on_look: called about once a second.
+        """
         while True:
             on_look()
             try:
@@ -48,22 +51,18 @@ class Standby:
 
     def _watched(self, connection: Connection, on_look: Callable[[], None]) -> tuple[Claim, float]:
         while True:
-            on_look()
             lease, now_s = leases.seen_or_new(connection, self._bucket), boot_s()
             why_not = obstacle(lease, self._who.sites, self._layout)
             if self._watch.may_claim(lease, now_s) and why_not is None:
                 claim = leases.claim(connection, lease, self._who)
                 if claim is not None:
-                    _log.info(
-                        "this process owns %s now, epoch %d (before: %s)",
-                        self._bucket,
-                        claim.epoch,
-                        lease.owner or "nobody",
-                    )
+                    before = lease.owner or "nobody"
+                    _log.info("this process owns %s now, epoch %d (before: %s)", self._bucket, claim.epoch, before)
                     return claim, now_s
             self._say(standby_of(lease) if why_not is None else unable(lease, why_not))
             if now_s - self._noted_s > NOTE_S:
                 self._noted_s = now_s
+                on_look()
                 leases.note_standby(connection, self._bucket, self._who.name, why_not)
             time.sleep(LOOK_S)
 

@@ -79,7 +79,7 @@ def _move(connection: Connection, found: BucketStatus) -> int:
         return _refuse(
             f"no standby of {found.lease.bucket} can take over: {'; '.join(found.standbys) or 'there is none'}"
         )
-    leases.ask_to_move(connection, found.lease.bucket)
+    leases.set_moving(connection, found.lease.bucket, True)
     end_s = time.monotonic() + MOVE_S
     while time.monotonic() < end_s:
         lease = leases.read(connection, found.lease.bucket)
@@ -87,6 +87,7 @@ def _move(connection: Connection, found: BucketStatus) -> int:
             print(f"{lease.bucket} is owned by {lease.owner} now, epoch {lease.epoch}")
             return 0
         time.sleep(POLL_S)
+    leases.set_moving(connection, found.lease.bucket, False)
     return _refuse(
         f"no standby took {found.lease.bucket} over within {MOVE_S:.0f} s; `dropanchor cluster status` says why"
     )

@@ -9,6 +9,7 @@ import pytest
 
 from dropanchor_service.checkpoints.format import CheckpointError, Snapshot
 from dropanchor_service.cluster import leases
+from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import DatabaseError, connect, sentence_of
 from dropanchor_service.cluster.leases import Claim, Claimant
 from dropanchor_service.cluster.owner import Renewal
@@ -20,6 +21,15 @@ from support.zenoh_router import wait_until
 
 pytestmark = needs_postgresql
 A, B = Claimant("a", "https://a.example", "s", 2.0), Claimant("b", "", "s", 2.0)
+
+FULL_DISK = """
+CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS
+    $$ BEGIN RAISE EXCEPTION 'the disk is full' USING ERRCODE = 'disk_full'; END $$;
+CREATE TRIGGER full_disk BEFORE UPDATE ON dropanchor_lease
+    FOR EACH ROW WHEN (OLD.bucket = 'full') EXECUTE FUNCTION full_disk();
+CREATE TRIGGER full_disk BEFORE UPDATE ON dropanchor_checkpoint
+    FOR EACH ROW WHEN (OLD.bucket = 'full') EXECUTE FUNCTION full_disk();
+"""
 
 
 def claimed(database: PostgreSql, bucket: str, who: Claimant = A) -> Claim:
@@ -125,11 +135,29 @@ def test_a_lease_that_was_moved_is_left_only_when_the_successor_is_there(databas
     tenure = Tenure(claim.epoch, 2.0, lambda: 0.0, lambda: True, asked_s=0.0)
     with Renewal(partial(connect, database.url, "a"), "moved", 0.2, tenure):
         with connect(database.url, "b") as connection:
-            leases.ask_to_move(connection, "moved")
+            leases.set_moving(connection, "moved", True)
         successor = claimed(database, "moved", B)
         wait_until(lambda: tenure.standing is Standing.LEAVING)
         tenure.saw_epoch(successor.epoch)
         wait_until(lambda: tenure.standing is Standing.LOST)
+
+
+def test_an_owner_whose_database_is_full_goes_on_and_says_so(database: PostgreSql) -> None:
+    claim = claimed(database, "full")
+    kept = row(database, "full", claim)
+    tenure = Tenure(claim.epoch, 0.5, boot_s, lambda: True, asked_s=boot_s())
+    with database.connect() as connection, Renewal(partial(connect, database.url, "a"), "full", 0.5, tenure) as renewal:
+        connection.execute(FULL_DISK)
+        wait_until(lambda: tenure.standing is Standing.ALONE)
+        assert renewal.database_error == "the disk is full"
+        with pytest.raises(CheckpointError, match="the database does not take it: the disk is full"):
+            kept.write(snapshot(1.0))
+        connection.execute(
+            "DROP TRIGGER full_disk ON dropanchor_lease; DROP TRIGGER full_disk ON dropanchor_checkpoint"
+        )
+        wait_until(lambda: tenure.standing is Standing.OWNER)
+    assert kept.write(snapshot(1.0)) > 0
+    kept.close()
 
 
 def test_tables_of_another_version_are_named(database: PostgreSql) -> None:

@@ -9,6 +9,7 @@ import pytest
 from dropanchor_schemas.zones import Zone
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.cluster import leases
+from dropanchor_service.cluster import standby as standby_module
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.cluster.leases import Claimant
 from dropanchor_service.cluster.standby import Standby
@@ -78,7 +79,10 @@ def looks(count: int) -> Callable[[], None]:
 
 
 @needs_postgresql
-def test_a_standby_with_other_sites_or_another_layout_says_so_and_waits_until_it_is_accepted() -> None:
+def test_a_standby_with_other_sites_or_another_layout_says_so_and_waits_until_it_is_accepted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(standby_module, "NOTE_S", 0.0)
     with running_postgresql() as database, database.connect() as connection:
         reach = partial(connect, database.url, "b")
         first = Standby(reach, "yard", Claimant("a", "https://a.example", "sites", 0.5), "layout")
