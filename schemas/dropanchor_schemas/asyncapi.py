@@ -32,6 +32,8 @@ _PARAMETERS = {
     "tag": "Id of the tag.",
     "anchor": "Id of the anchor.",
     "service": "Id of the running service; it is new at every start.",
+    "bucket": "Id of the sites that one process of a cluster owns together.",
+    "epoch": "Number of the lease: it grows with each owner.",
 }
 _ESCAPING = "1 to 64 printable characters. All characters except A-Z a-z 0-9 . _ - are percent-escaped as UTF-8."
 
@@ -126,6 +128,12 @@ def _channels_of_service() -> Channels:
             "Liveliness token of the service.",
             {"kind": "liveliness"},
         ),
+        "ownerAlive": (
+            _readable(keys.owner_key("{bucket}", 0)).replace("/0", "/{epoch}"),
+            [],
+            "Liveliness token of the owner of a bucket, in a cluster. An owner that sees a higher epoch ends.",
+            {"kind": "liveliness"},
+        ),
     }
 
 
@@ -151,7 +159,7 @@ def _channel(address: str, messages: list[str], description: str, zenoh: dict[st
 def _operations() -> dict[str, Any]:
     """Return the operations of the service: it receives the tags' messages and sends poses."""
     received = ("samples", "tagAlive", "health")
-    sent = ("settings", "pose", "poses", "event", "anchor", "serviceAlive")
+    sent = ("settings", "pose", "poses", "event", "anchor", "serviceAlive", "ownerAlive")
     return {
         f"{action}{name[0].upper()}{name[1:]}": {"action": action, "channel": {"$ref": f"#/channels/{name}"}}
         for action, names in (("receive", received), ("send", sent))

@@ -79,6 +79,26 @@ def service_alive_key(site: str, service: str) -> str:
     return f"{_site_prefix(site)}/service/{chunk_from_id(service)}/alive"
 
 
+def owner_key(bucket: str, epoch: int) -> str:
+    """Return the key of the liveliness token of the process that owns a bucket of sites. No site can be `@owner`."""
+    return f"{_owner_prefix(bucket)}/{epoch}"
+
+
+def all_owners(bucket: str) -> str:
+    """Return the key expression of the tokens of all owners of a bucket, of whatever epoch."""
+    return f"{_owner_prefix(bucket)}/*"
+
+
+def owners_of_all_buckets() -> str:
+    return f"{PREFIX}/@owner/**"
+
+
+def epoch_from_key(key: str) -> int | None:
+    """Return the epoch in the key of an owner, None if the key has another form."""
+    epoch = key.rpartition("/")[2]
+    return int(epoch) if epoch.isascii() and epoch.isdigit() else None
+
+
 def all_tags(site: str, leaf: str) -> str:
     """Return the key expression of `leaf` (such as "samples" or "pose") of every tag of the site."""
     return f"{_site_prefix(site)}/tag/*/{leaf}"
@@ -136,6 +156,10 @@ def _chunks(key: str) -> list[str]:
     if len(chunks) != 6 or "/".join(chunks[:2]) != PREFIX or chunks[3] != "tag":
         raise InvalidKeyError(f"{key!r} is not {PREFIX}/<site>/tag/<tag>/<leaf>")
     return chunks
+
+
+def _owner_prefix(bucket: str) -> str:
+    return f"{PREFIX}/@owner/{chunk_from_id(bucket)}"
 
 
 def _site_prefix(site: str) -> str:

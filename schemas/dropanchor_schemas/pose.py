@@ -98,6 +98,12 @@ class Pose(_Answer):
         description="Whether the tag's liveliness token is present, its WebSocket is open, or it has sent something "
         "over HTTP in the last 30 s."
     )
+    epoch: int = Field(
+        default=0,
+        ge=0,
+        description="Grows each time that another process of a cluster takes the site over; 0 without a cluster. Drop "
+        "poses with a lower epoch than you have seen: they are of a process that no longer serves the site.",
+    )
 
 
 class TimedPose(Pose):
@@ -121,6 +127,7 @@ class PoseFrame(_Answer):
     t_ns: int = Field(
         description="UTC, ns: the time of the frame. The pose of tag i is age_s[i] older, unless the tag is a replay."
     )
+    epoch: int = Field(default=0, ge=0, description="As in a pose; of all tags of the frame.")
     tags: list[str]
     online: list[bool]
     state: list[TrackingState]

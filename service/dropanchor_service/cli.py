@@ -16,6 +16,7 @@ _COMMANDS = {
     "demo": "run the service with simulated tags and watch them in a browser",
     "serve": "run the service",
     "router": "run a separate Zenoh router",
+    "cluster": "show which machine serves what, and move it",
     "security": "create the credentials of a site",
     "tag": "issue and revoke the certificates of tags",
     "compile": "compile the estimator ahead of the first start",
@@ -35,6 +36,7 @@ _EXTRAS = {
     "scipy": "evaluation",
     "sympy": "evaluation",
     "foxglove": "foxglove",
+    "psycopg": "postgresql",
     "rosbags": "ros2",
     "xxhash": "ros2",
 }

@@ -13,21 +13,19 @@ from typing import Self
 import zenoh
 from fastapi import FastAPI
 
-from dropanchor_schemas.keys import health_key, samples_key
 from dropanchor_service.answers.of_sites import answers_of_sites
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
-from dropanchor_service.api.starting import CurrentApp, create_starting_app
-from dropanchor_service.checkpoints.files import CheckpointFolder
+from dropanchor_service.api.starting import CurrentApp, Gate, create_starting_app
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.checkpoints.thread import CheckpointThread
-from dropanchor_service.engines.choose import create_engine
-from dropanchor_service.engines.compile_apart import compile_apart
-from dropanchor_service.engines.warm_up import CompilationProgress, warm_up_answers, warm_up_ingest, warm_up_zones
+from dropanchor_service.engines.compiled import compiled_engine
+from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
+from dropanchor_service.ingest.from_http import FromHttp
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
@@ -35,6 +33,7 @@ from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
+from dropanchor_service.ownership.choose import ownership_of
 from dropanchor_service.persistence import open_sites
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
@@ -44,6 +43,7 @@ from dropanchor_service.settings.many_sites import refuse_too_many_sites
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.site_files import put_site_files_in_place
 from dropanchor_service.store import LatestPoses
+from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.caches import ZenohCaches
 from dropanchor_service.zenoh_io.events import ZenohEvents
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
@@ -55,9 +55,6 @@ from dropanchor_service.zenoh_io.remote_settings import ZenohRemoteSettings
 
 HTTP_STOP_S = 1.5
 
-OnLive = Callable[[str, bytes, str, int], None]
-"""Takes a live message: key, payload, encoding, UTC of its arrival in ns."""
-
 _log = logging.getLogger(__name__)
 
 
@@ -67,8 +64,15 @@ class Service:
     Creating or entering it raises SettingsError, ListenError or ZenohError, each with a message for the user.
     """
 
-    def __init__(self, settings: Settings, compiling: AbstractContextManager[None] | None = None) -> None:
-        """compiling: entered while the kernels are compiled, so that a signal can interrupt that."""
+    def __init__(
+        self,
+        settings: Settings,
+        compiling: AbstractContextManager[None] | None = None,
+        standing_by: Callable[[], None] = lambda: None,
+    ) -> None:
+        """compiling: entered while the kernels are compiled, and while this process is a standby, so that a signal can
+        interrupt that. standing_by: called now and then by a standby.
+        """
         refuse_too_many_sites(settings)
         self._settings = settings
         self._credentials = credentials_of(settings)
@@ -84,13 +88,13 @@ class Service:
         self.latest = LatestPoses()
         put_site_files_in_place(settings)
         self.sites = open_sites(settings)
+        self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by)
         now_ns = self.clock.now_ns
         self._serving = Serving(settings, self._credentials, self.sites, self.latest, now_ns, self.metrics)
         self._publishers = Publishers()
         tracks = [one.tracks for one in self._serving.folders.all]
         self.answers = answers_of_sites(self.sites, self.latest, now_ns, tracks, self._publishers)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
-        self._on_live: OnLive = self._buffer.append
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self._register_gauges()
 
@@ -109,7 +113,11 @@ class Service:
             self._opened.callback(self._http.join, HTTP_STOP_S)
             self._http.start()
             self._opened.callback(self._http.ask_to_stop)
-            self._build_ingest(self._compiled_engine())
+            self._progress.page = f"{self.url}/"
+            with self._compiling:
+                self._build_ingest(compiled_engine(self._settings, self._progress))
+                self._ownership.stand_by(self.url, self._shared(), lambda: self._link.problem is None)
+            self._opened.enter_context(self._ownership)
             self._opened.enter_context(self._serving.folders)
             if self._checkpoints is not None:
                 self._checkpoints.load()
@@ -119,7 +127,7 @@ class Service:
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._serving.zone_events)
             self._opened.enter_context(self._link)
-            self._app.app = self._full_app()
+            self._app.app = Gate(self._ownership.may_serve, self._full_app(), self._app.app)
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
@@ -130,19 +138,12 @@ class Service:
             _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
 
+    def _shared(self) -> dict[str, Shared]:
+        """Return what people change over REST and the owner of the sites shares with its successor, by name."""
+        return {**self._serving.zone_events.shared, **{f"{site.id}/site.json": site.store for site in self.sites}}
+
     def _name(self) -> str:
         return f"{len(self.sites)} sites" if self.sites.only is None else f"site {self.sites.only.id}"
-
-    def _compiled_engine(self) -> Engine:
-        """Return the engine. Compile whatever the service will run, so that no sample waits for it."""
-        self._progress.page = f"{self.url}/"
-        with self._compiling:
-            if self._settings.engine == "fleet":
-                compile_apart(self._progress)
-            warm_up_ingest(self._progress)
-            warm_up_answers(self._progress)
-            warm_up_zones(self._progress)
-            return create_engine(self._settings, self._progress)
 
     def _build_ingest(self, engine: Engine) -> None:
         guarded = GuardedEngine(engine, self.sites, self.metrics)
@@ -158,6 +159,7 @@ class Service:
             observers=self._serving.folders.observers,
             reorder_ns=round(self._settings.ingest.reorder_ms * 1e6),
         )
+        self._from_http = FromHttp(self.sites, self._ingest.health, self.clock, self._buffer.append)
         self._checkpoints = self._checkpointer(guarded)
         self._thread = IngestThread(
             self._ingest,
@@ -165,6 +167,7 @@ class Service:
             self.metrics,
             self._settings.ingest.period_ms * 1e-3,
             self._checkpoints.between_turns if self._checkpoints else lambda: None,
+            self._ownership.may_serve,
         )
 
     def __exit__(
@@ -189,13 +192,19 @@ class Service:
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
-        found = [*self._serving.problems(), self._checkpoints.problem if self._checkpoints else None]
+        of_cluster = self._ownership.impairments()
+        found = [*of_cluster, *self._serving.problems(), self._checkpoints.problem if self._checkpoints else None]
         return [problem for problem in found if problem is not None]
 
     @property
     def has_died(self) -> bool:
-        """Whether a thread that must run has died. The process has to be restarted then."""
-        return bool(self._dead_threads())
+        """Whether a thread that must run has died, or the sites are another process's. It has to be restarted then."""
+        return bool(self._dead_threads() or self.gone)
+
+    @property
+    def gone(self) -> str:
+        """Why this process may no longer serve its sites; empty while it may."""
+        return self._ownership.gone
 
     @property
     def makes_progress(self) -> bool:
@@ -209,32 +218,35 @@ class Service:
         return sorted({*self._supervision.dead_threads, *(name for name, is_alive in threads.items() if not is_alive)})
 
     def _checkpointer(self, engine: GuardedEngine) -> CheckpointThread | None:
-        """Return the thread that writes checkpoints; None without a folder or with an engine that keeps no state."""
-        folder = self._settings.data_dir
-        if folder is None or not engine.keeps_state:
+        """Return the thread that writes checkpoints; None without a place or with an engine that keeps no state."""
+        if not engine.keeps_state:
             return None
         state = ServiceState(self.sites, self.latest, engine, self._publishers)
-        kept = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
-        return CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
+        kept = self._ownership.checkpoints(state)
+        return None if kept is None else CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:
-        if self._thread.is_alive or "ingest" in self._supervision.dead_threads:
+        if self.gone:
+            checkpoints.stop_without_writing()
+        elif self._thread.is_alive or "ingest" in self._supervision.dead_threads:
             _log.error("the ingest thread did not stop cleanly: the previous checkpoint stays the newest one")
         else:
             checkpoints.stop()
 
     def _zenoh_parts(self, session: zenoh.Session) -> list[AbstractContextManager[object]]:
         service_id = f"{socket.gethostname()}-{os.getpid()}"[-64:]
+        may_serve = self._ownership.may_serve
         return [
+            *self._ownership.zenoh_parts(session),
             self._intake(session),
-            ZenohAnswers(session, self.answers, service_id, self.metrics),
-            ZenohPoses(session, self.answers, self.metrics),
-            ZenohRemoteSettings(session, self.sites, self.metrics),
-            ZenohEvents(session, self._serving.zone_events.stores, self.metrics),
+            ZenohAnswers(session, self.answers, service_id, self.metrics, may_serve),
+            ZenohPoses(session, self.answers, self.metrics, may_serve),
+            ZenohRemoteSettings(session, self.sites, self.metrics, may_serve),
+            ZenohEvents(session, self._serving.zone_events.stores, self.metrics, may_serve),
         ]
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:
-        caches = ZenohCaches(session, self.sites, self.metrics, self.clock)
+        caches = ZenohCaches(session, self.sites, self.metrics, self.clock, self._ownership.caught_up)
         catch_up = CatchUp(
             self._buffer,
             expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all() if self.sites.is_served(tag)],
@@ -242,34 +254,16 @@ class Service:
             ask=caches.ask,
             new_publisher_limit=caches.new_publisher_limit,
         )
-        self._on_live = catch_up.on_live
-        return ZenohIntake(
-            session,
-            self.sites,
-            self._ingest,
-            catch_up,
-            caches,
-            self.metrics,
-            self.clock,
-        )
-
-    def _receive(self, site: str, tag: str, payload: bytes, encoding: str) -> None:
-        """Take samples that came over HTTP the way of live messages, which may have to wait for cached ones."""
-        self._note_http_message(site, tag)
-        self._on_live(samples_key(site, tag), payload, encoding, self.clock.now_ns())
-
-    def _receive_health(self, site: str, tag: str, payload: bytes, encoding: str) -> None:
-        self._note_http_message(site, tag)
-        self._ingest.health.put(health_key(site, tag), payload, encoding, self.clock.now_ns())
-
-    def _note_http_message(self, site: str, tag: str) -> None:
-        served = self.sites.find(site)
-        assert served is not None
-        served.tags.presence.note_http_message(tag)
+        self._from_http.on_live = catch_up.on_live
+        return ZenohIntake(session, self.sites, self._ingest, catch_up, caches, self.metrics, self.clock)
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         """Return the thread of the HTTP server. Until the service is ready, it serves the page with the progress."""
-        self._app = CurrentApp(create_starting_app(lambda: self._progress.sentence))
+
+        def reason() -> str:
+            return self._ownership.sentence or self._progress.sentence
+
+        self._app = CurrentApp(create_starting_app(reason, gauges=self._ownership.gauges))
         self._address = bound.getsockname()
         return HttpThread(build_server(self._app, self._stopping, certificate=self._certificate), bound)
 
@@ -277,6 +271,5 @@ class Service:
         def ready() -> tuple[bool, Sequence[str]]:
             return not (found := self.problems()), found
 
-        return self._serving.app(
-            self.answers, ready, self.impairments, self._stopping, self._receive, self._receive_health
-        )
+        takes = (self._from_http.samples, self._from_http.health)
+        return self._serving.app(self.answers, ready, self.impairments, self._stopping, *takes)

@@ -1,7 +1,7 @@
 """Zones, events and their delivery, of all sites, as the settings want them."""
 
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from typing import NamedTuple, Self
@@ -25,6 +25,7 @@ from dropanchor_service.settings.events import DeliverySettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import LatestPoses, ServedSite, Sites, SiteStore
+from dropanchor_service.store.shared import Shared
 from dropanchor_service.zones.items import ZoneItems
 
 
@@ -95,6 +96,19 @@ class ZoneEvents:
 
     def __exit__(self, *_: object) -> None:
         self._closing.close()
+
+    @property
+    def shared(self) -> Mapping[str, Shared]:
+        """What people change, by the names of its files."""
+        return {
+            f"{site.id}/{name}": items
+            for site, parts in zip(self._sites, self.parts, strict=True)
+            for name, items in (
+                ("zones.json", parts.items.zones),
+                ("event_rules.json", parts.items.rules),
+                ("destinations.json", parts.destinations),
+            )
+        }
 
     def problems(self) -> Sequence[str]:
         """Return why events cannot be stored, with several sites for each; empty when they can."""

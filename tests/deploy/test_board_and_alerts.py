@@ -10,8 +10,10 @@ from typing import Any
 import promql_parser as promql
 import pytest
 import yaml
+from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
+from dropanchor_service.metrics.cluster import ClusterGauges
 from support.service import ROOT, running_service
 
 DEPLOY = ROOT / "deploy"
@@ -36,10 +38,13 @@ def expressions() -> list[str]:
 
 @pytest.fixture(scope="module")
 def exposed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, set[str]]]:
-    """Return what a running service exposes: metric → label → values."""
+    """Return what a running service exposes, and one in a cluster: metric → label → values."""
     folder = tmp_path_factory.mktemp("data")
     with running_service("--engine", "paper", "--data-dir", str(folder)) as service:
         text = service.ask("GET", "/metrics").text
+    of_cluster = CollectorRegistry()
+    of_cluster.register(ClusterGauges("yard", lambda: (1, 0.0)))
+    text += generate_latest(of_cluster).decode()
     found: dict[str, dict[str, set[str]]] = {}
     for family in text_string_to_metric_families(text):
         for sample in family.samples:

@@ -58,11 +58,14 @@ def test_the_addresses_are_the_keys_of_the_contract() -> None:
         "yard", "forklift-7"
     )
     assert channels["anchor"]["address"].format(site="yard", anchor="7") == keys.anchor_key("yard", "7")
+    assert channels["ownerAlive"]["address"].format(bucket="yard", epoch=7) == keys.owner_key("yard", 7)
     assert {name for channel in channels.values() for name in channel["parameters"]} == {
         "site",
         "tag",
         "anchor",
         "service",
+        "bucket",
+        "epoch",
     }
 
 

@@ -37,7 +37,7 @@ sys.meta_path.insert(0, Absent())
 
 
 def test_the_service_with_the_engine_fleet_starts_without_them() -> None:
-    ended = python("-c", without(*EXTRA, "filterpy") + SERVICE_AND_ENGINE, timeout_s=COMPILING_S)
+    ended = python("-c", without(*EXTRA, "filterpy", "psycopg") + SERVICE_AND_ENGINE, timeout_s=COMPILING_S)
     assert ended.returncode == 0, ended.stderr
 
 
@@ -58,6 +58,7 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
         ("foxglove", "foxglove", ["foxglove"]),
         ("rosbags", "ros2", ["ros2", "--tag=cart"]),
         ("xxhash", "ros2", ["ros2", "--tag=cart"]),
+        ("psycopg", "postgresql", ["cluster", "status"]),
     ],
 )
 def test_a_command_that_needs_an_extra_says_how_to_install_it(missing: str, extra: str, command: list[str]) -> None:

@@ -127,7 +127,7 @@ def _read(running: Running) -> None:
     assert running.process.stderr is not None
     for line in running.process.stderr:
         running.log.append(line)
-        found = re.search(r"ready at (https?://\S+?),", line)
+        found = re.search(r"(?:ready|standing by) at (https?://\S+?),", line)
         if found:
             running.url = found[1]
 

@@ -173,7 +173,9 @@ class Answers:
         """Return the `PoseFrame` of these POSE rows: columns, cheap for many tags many times a second."""
         columns = columns_of(poses, self.site, self.tags, now_ns)
         values = {name: field.frame_values(columns) for name, field in FRAME_FIELDS.items()}
-        frame = {"t_ns": now_ns} | {name: column for name, column in values.items() if column is not None}
+        frame = {"t_ns": now_ns, "epoch": columns.epoch} | {
+            name: column for name, column in values.items() if column is not None
+        }
         modes = map(orjson.Fragment, self._hypotheses_json(columns.poses))
         ambiguous = columns.poses["state"] == State.AMBIGUOUS
         frame["hypotheses"] = [next(modes) if is_ambiguous else None for is_ambiguous in ambiguous.tolist()]

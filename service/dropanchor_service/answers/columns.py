@@ -27,7 +27,7 @@ class PoseColumns:
     """Columns with one entry per pose. An unknown float is NaN.
 
     poses: POSE; the other columns are derived from it. hint: index into `hint_texts`. anchor_ids: by the index that
-    the poses hold. lat, lon: degrees, None without a georeference.
+    the poses hold. lat, lon: degrees, None without a georeference. epoch: of the process, see `SiteStore`.
     """
 
     poses: Array
@@ -42,6 +42,7 @@ class PoseColumns:
     angle_rad: Array
     lat: Array | None
     lon: Array | None
+    epoch: int
 
 
 def columns_of(
@@ -79,6 +80,7 @@ def columns_of(
         angle_rad=ellipse[2],
         lat=lat,
         lon=lon,
+        epoch=site.epoch,
     )
 
 

@@ -131,6 +131,10 @@ def _tags(columns: PoseColumns) -> Sequence[str]:
     return columns.tags
 
 
+def _epochs(columns: PoseColumns) -> Sequence[int]:
+    return [columns.epoch] * len(columns.poses)
+
+
 def _times(columns: PoseColumns) -> Sequence[int]:
     return columns.poses["t_ns"].tolist()  # type: ignore[no-any-return]
 
@@ -162,10 +166,11 @@ _TABLE: Final = {
     "lat": number(lambda columns: columns.lat, FINE_DECIMALS, FINE_DECIMALS),
     "lon": number(lambda columns: columns.lon, FINE_DECIMALS, FINE_DECIMALS),
     "online": choice(lambda columns: ([False, True], columns.online)),
+    "epoch": PoseField(lambda columns: JsonPart([columns.epoch]), _epochs, _epochs),
 }
 
 POSE_FIELDS: Final = {name: _TABLE[name] for name in Pose.model_fields}
 _IN_FRAMES: Final = {"tags": _TABLE["tag"]} | _TABLE
 FRAME_FIELDS: Final = {
-    name: _IN_FRAMES[name] for name in PoseFrame.model_fields if name != "t_ns"
-}  # it has its own time
+    name: _IN_FRAMES[name] for name in PoseFrame.model_fields if name not in ("t_ns", "epoch")
+}  # of these it has one for all

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fastapi import FastAPI
+from prometheus_client.registry import Collector, CollectorRegistry
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from dropanchor_service.api.app import ALL_METHODS, DASHBOARD, PREFIX
@@ -12,7 +13,7 @@ from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import EscapedPath
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.routes.dashboard import page_mounts
-from dropanchor_service.api.routes.health import health_router
+from dropanchor_service.api.routes.health import health_router, metrics_router
 
 
 class CurrentApp:
@@ -25,13 +26,35 @@ class CurrentApp:
         await self.app(scope, receive, send)
 
 
-def create_starting_app(reason: Callable[[], str], dashboard: Path = DASHBOARD) -> FastAPI:
-    """Return the application. It holds no data of the site, so it needs no credentials. reason: what is still done."""
+class Gate:
+    """An ASGI application that passes requests to one of two others. is_open: asked for each request."""
+
+    def __init__(self, is_open: Callable[[], bool], app: ASGIApp, otherwise: ASGIApp) -> None:
+        self._is_open = is_open
+        self._app = app
+        self._otherwise = otherwise
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await (self._app if self._is_open() else self._otherwise)(scope, receive, send)
+
+
+def create_starting_app(
+    reason: Callable[[], str], dashboard: Path = DASHBOARD, gauges: Collector | None = None
+) -> FastAPI:
+    """Return the application. It holds no data of the site, so it needs no credentials.
+
+    reason: why the service does not serve yet. gauges: metrics that it has all the same.
+    """
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, redirect_slashes=False)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
     add_error_handlers(app)
     app.include_router(health_router(lambda: (False, [reason()]), list), prefix=PREFIX)
+
+    if gauges is not None:
+        registry = CollectorRegistry()
+        registry.register(gauges)
+        app.include_router(metrics_router(registry))
 
     @app.api_route("/metrics", methods=ALL_METHODS)
     @app.api_route("/api/{path:path}", methods=ALL_METHODS)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from dropanchor_schemas.site import Anchor
-from dropanchor_service.checkpoints.files import Snapshot, layout_of
+from dropanchor_service.checkpoints.format import Snapshot, layout_of
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers

@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 
-from dropanchor_service.checkpoints.files import CheckpointError, CheckpointFolder, Snapshot
+from dropanchor_service.checkpoints.format import CheckpointError, Checkpoints, Snapshot
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
@@ -20,11 +20,11 @@ _log = logging.getLogger(__name__)
 class CheckpointThread(Worker):
     """Writes checkpoints on a thread of its own. The ingest thread calls `between_turns`."""
 
-    def __init__(self, state: ServiceState, folder: CheckpointFolder, metrics: Metrics, period_s: float) -> None:
+    def __init__(self, state: ServiceState, kept: Checkpoints, metrics: Metrics, period_s: float) -> None:
         super().__init__("checkpoints", _TURN_S)
         self._log = RareLog(_log)
         self._state = state
-        self._folder = folder
+        self._kept = kept
         self._metrics = metrics
         self._period_s = period_s
         self._requested = threading.Event()
@@ -38,7 +38,7 @@ class CheckpointThread(Worker):
 
     def load(self) -> None:
         """Restore the newest checkpoint, if there is one, and log the result. Call it before the first message."""
-        snapshot, complaints = self._folder.newest()
+        snapshot, complaints = self._kept.newest()
         for complaint in complaints:
             _log.warning("%s", complaint)
         if snapshot is None:
@@ -64,6 +64,10 @@ class CheckpointThread(Worker):
         self._requested.set()
         self.between_turns()
         self._write()
+
+    def stop_without_writing(self) -> None:
+        """Stop, and leave the newest checkpoint as it is."""
+        super().stop()
 
     @property
     def age_s(self) -> float:
@@ -110,14 +114,18 @@ class CheckpointThread(Worker):
             return
         began_s = time.monotonic()
         try:
-            size = self._folder.write(snapshot)
+            size = self._kept.write(snapshot)
+        except CheckpointError as error:
+            self._error = str(error)
+            self._metrics.checkpoints.labels("failed").inc()
+            self._log.warning("checkpoint", str(error))
+            return
         except Exception as error:
             self._error = error.strerror or str(error) if isinstance(error, OSError) else str(error)
             self._metrics.checkpoints.labels("failed").inc()
             self._log.exception("checkpoint", error)
             return
-        finally:
-            self._took_s = time.monotonic() - began_s
+        self._took_s = time.monotonic() - began_s  # of a write that failed it says nothing: it may have waited in vain
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)

@@ -10,6 +10,7 @@ from urllib.parse import quote
 import foxglove
 from foxglove.channels import FrameTransformsChannel, LocationFixesChannel, PoseInFrameChannel, SceneUpdateChannel
 
+from dropanchor_schemas.epochs import EpochFence
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.bridges.foxglove_scene import is_placed, location_fixes, pose_in_frame, scene, transforms
 from dropanchor_service.commands.options import positive
@@ -128,6 +129,7 @@ class LiveScene:
         self._anchors: Sequence[Json] = ()
         self._heights: dict[str, float] = {}
         self._sent: dict[str, tuple[int, str, bool]] = {}
+        self._fence = EpochFence()
         self._full_s = self._site_s = 0.0
         self._told = False
 
@@ -143,10 +145,11 @@ class LiveScene:
         if time.monotonic() >= self._site_s:
             self.refresh_site()
         found = asked(self._arguments, "GET", f"/poses{self._query}")
+        poses = [pose for pose in found["poses"] if self._fence.accepts(pose["tag"], pose.get("epoch", 0))]
         full = time.monotonic() >= self._full_s
         if full:
             self._full_s = time.monotonic() + FULL_S
-        self._publish([pose for pose in found["poses"] if self._is_new(pose) or full], found["t_ns"], full)
+        self._publish([pose for pose in poses if self._is_new(pose) or full], found["t_ns"], full)
 
     def _is_new(self, pose: Json) -> bool:
         content = (pose["t_ns"], pose["state"], pose["online"])

@@ -13,6 +13,7 @@ from threading import Event, Thread
 from typing import Any
 from urllib.parse import quote
 
+from dropanchor_schemas.epochs import EpochFence
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.bridges.frames import tag_frame_id
 from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
@@ -199,6 +200,7 @@ class PoseOutput:
         self._odometry = node.publisher(f"{arguments.namespace}/odometry", messages.odometry)
         self._tf = None if arguments.no_tf else node.publisher("tf", messages.tf)
         self._t_ns = 0
+        self._fence = EpochFence()
         self._height_m = 0.0
         self._settings_s = 0.0
         self._away = False
@@ -229,6 +231,8 @@ class PoseOutput:
             if time.monotonic() >= self._settings_s:
                 self._height_m = asked(self._arguments, "GET", f"/tags/{tag}")["settings"]["height_m"]
                 self._settings_s = time.monotonic() + _SETTINGS_S
+            if not self._fence.accepts(tag, pose.get("epoch", 0)):
+                continue
             if pose["t_ns"] != self._t_ns and is_usable(pose):
                 self._t_ns = pose["t_ns"]
                 self._publish(pose)

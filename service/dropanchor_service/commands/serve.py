@@ -41,6 +41,7 @@ GC_THRESHOLD = 10_000, 20, 20
 SWITCH_INTERVAL_S = 0.0005  # threads yield the interpreter soon, so that queries do not wait for the engine
 EXIT_ERROR = 2
 EXIT_DIED = 1
+EXIT_GONE = 75  # EX_TEMPFAIL of sysexits.h: another process serves the sites, and a restart begins as a standby
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,14 +49,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the service. Return 0 if it was stopped, 1 if it died, 2 if it could not start."""
+    """Run the service. Return 0 if it was stopped, 1 if it died, 2 if it could not start, 75 if another took over."""
     logs.configure(arguments.log_level)
     open_files.raise_limit()
     gc.set_threshold(*GC_THRESHOLD)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     systemd = Systemd()
+
+    def standing_by() -> None:
+        systemd.ready()
+        systemd.progress()
+
     try:
-        with interrupts() as interrupt, Service(settings_of(arguments), compiling=interrupt.raising()) as service:
+        with (
+            interrupts() as interrupt,
+            Service(settings_of(arguments), interrupt.raising(), standing_by) as service,
+        ):
             systemd.ready()
             show_addresses(service.url, sys.stdout)
             heap = HeapTrimmer()
@@ -66,6 +75,9 @@ def run(arguments: argparse.Namespace) -> int:
     except (SettingsError, ListenError, ZenohError) as error:
         sys.stderr.write(f"dropanchor serve: {error}\n")
         return EXIT_ERROR
+    if not stopped and service.gone:
+        sys.stderr.write(f"dropanchor serve: {service.gone}. Started again, this process is a standby\n")
+        return EXIT_GONE
     return 0 if stopped else EXIT_DIED
 
 

@@ -8,6 +8,7 @@ from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.runtime.worker import Worker
 
 IDLE_S = 0.25
@@ -20,7 +21,7 @@ MIN_MEASURED = 50  # messages of a turn whose duration predicts that of the next
 
 
 class IngestThread(Worker):
-    """Takes a turn every `period_s` while messages arrive.
+    """Takes a turn every `period_s` while messages arrive, and while `may_turn`.
 
     between_turns: called after each turn, on the same thread.
     """
@@ -32,6 +33,7 @@ class IngestThread(Worker):
         metrics: Metrics,
         period_s: float,
         between_turns: Callable[[], None] = lambda: None,
+        may_turn: MayServe = always,
     ) -> None:
         super().__init__("ingest")
         self._log = RareLog(logging.getLogger(__name__))
@@ -40,6 +42,7 @@ class IngestThread(Worker):
         self._metrics = metrics
         self._period_s = period_s
         self._between_turns = between_turns
+        self._may_turn = may_turn
         self._turned_s = time.monotonic()
         self._limit = MIN_MESSAGES
 
@@ -62,6 +65,9 @@ class IngestThread(Worker):
 
     def _turn(self) -> None:
         self._turned_s = time.monotonic()
+        if not self._may_turn():
+            self._stop.wait(IDLE_S)
+            return
         try:
             taken = self._ingest.turn(self._limit)
             if taken >= MIN_MEASURED:

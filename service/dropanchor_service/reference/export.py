@@ -10,6 +10,7 @@ from prometheus_client.registry import CollectorRegistry
 
 import dropanchor_service
 from dropanchor_service.api import export as openapi
+from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
@@ -72,6 +73,7 @@ def _registry(folder: Path) -> CollectorRegistry:
     metrics.register(FleetGauges(sites, latest, lambda: 0, lambda: 0))
     metrics.register(HealthGauges(sites, lambda: 0, NoClockOffsets()))
     metrics.register(OperationGauges(list, list, folder, lambda: {"http": datetime.fromtimestamp(0, UTC)}))
+    metrics.register(ClusterGauges("", lambda: (1, 0.0)))
     ZoneEvents(Settings(), sites, latest, lambda: 0, metrics)
     return metrics.registry
 

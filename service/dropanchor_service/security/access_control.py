@@ -122,7 +122,8 @@ def _tag(holder: Holder, shared: str | None) -> list[Section]:
 
 def _service(site: str | None) -> list[Section]:
     everything = keys.everything_of_all_sites() if site is None else keys.everything(site)
-    return [_rule("the service", "both", _EVERYTHING, [everything, f"{_all_tags(site, 'samples')}/@adv/**"])]
+    below = [everything, f"{_all_tags(site, 'samples')}/@adv/**", keys.owners_of_all_buckets()]
+    return [_rule("the service", "both", _EVERYTHING, below)]
 
 
 def _reader(site: str | None, who: str) -> list[Section]:

@@ -13,6 +13,7 @@ from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.settings.basemap import BasemapSettings
+from dropanchor_service.settings.cluster import ClusterSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
@@ -262,6 +263,7 @@ class Settings(_Section):
     email: EmailSettings = EmailSettings()
     mqtt: MqttSettings = MqttSettings()
     basemap: BasemapSettings = BasemapSettings()
+    cluster: ClusterSettings = ClusterSettings()
     site: Site = Site()
     tags: dict[SettingsId, TagSettings] = {}
     tag_defaults: TagSettings = Field(

@@ -9,6 +9,7 @@ from pydantic import BaseModel, TypeAdapter
 
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.store.preconditions import Precondition, always, require
+from dropanchor_service.store.shared import Save
 
 Item = TypeVar("Item", bound=BaseModel)
 
@@ -32,9 +33,10 @@ class NamedItems(Generic[Item]):
         Raises OSError or pydantic's ValidationError when the file cannot be read.
         """
         self._adapter = adapter
-        self._path = path
+        self._save: Save | None = None
+        if path is not None:
+            self._save = lambda content: write_atomically(path, [content], mode)
         self._limit = limit
-        self._mode = mode
         self._lock = Lock()
         self._items: dict[str, Item] = {}
         if path is not None and path.exists():
@@ -45,6 +47,14 @@ class NamedItems(Generic[Item]):
     def on_change(self, told: Callable[[], None]) -> None:
         """Call this after every change, on the thread that makes it."""
         self._told.append(told)
+
+    def share(self, saved: bytes | None, save: Save) -> None:
+        """Go on from what another process has saved; see `Shared`."""
+        self._save = save
+        if saved is not None:
+            self._apply(self._adapter.validate_json(saved))
+        elif self._items:
+            self._replace(self._items)
 
     @property
     def all(self) -> Mapping[str, Item]:
@@ -74,8 +84,11 @@ class NamedItems(Generic[Item]):
 
     def _replace(self, items: dict[str, Item]) -> None:
         """Save first, then apply: a restart never loses an acknowledged change."""
-        if self._path is not None:
-            write_atomically(self._path, [self._adapter.dump_json(items, indent=2)], self._mode)
+        if self._save is not None:
+            self._save(self._adapter.dump_json(items, indent=2))
+        self._apply(items)
+
+    def _apply(self, items: dict[str, Item]) -> None:
         self._items = items
         self.version += 1
         for told in self._told:

@@ -12,6 +12,7 @@ from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.store.groups import Groups, groups_of
 from dropanchor_service.store.preconditions import Precondition, always, require
+from dropanchor_service.store.shared import Save
 
 FILE_NAME = "site.json"
 
@@ -33,8 +34,11 @@ class SiteStore:
     """The current site and tag settings, written by the API and the ingest thread, read by any thread.
 
     The ingest thread writes when it places the first anchor that a tag ranges to. `version` grows with every change,
-    so that one comparison detects a change.
+    so that one comparison detects a change. epoch: grows when another process of a cluster takes the site over; 0
+    without a cluster.
     """
+
+    epoch = 0
 
     def __init__(
         self,
@@ -51,15 +55,31 @@ class SiteStore:
         """
         self._lock = Lock()
         self.default_settings = tag_defaults or TagSettings()
-        self._path = None if folder is None else folder / FILE_NAME
         self._document = SiteDocument(site=site, tags=tags)
-        if self._path is not None and self._path.exists():
-            self._document = SiteDocument.model_validate_json(self._path.read_bytes())
+        self._save_bytes: Save | None = None
+        self._has_file = False
+        if folder is not None:
+            self._open_file(folder / FILE_NAME)
         self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
         self._index_anchors()
         self._groups = groups_of(self._document.tags, self.default_settings)
         self._told: list[Callable[[], None]] = []
         self.version = 1
+
+    def _open_file(self, path: Path) -> None:
+        self._save_bytes = lambda content: write_atomically(path, [content])
+        if path.exists():
+            self._document = SiteDocument.model_validate_json(path.read_bytes())
+            self._has_file = True
+
+    def share(self, saved: bytes | None, save: Save) -> None:
+        """Go on from what another process has saved of this site; see `Shared`. Call this before the first message."""
+        self._save_bytes = save
+        if saved is not None:
+            self._anchors = {}
+            self._apply(SiteDocument.model_validate_json(saved))
+        elif self._has_file:
+            self._save(self._document)
 
     def on_change(self, told: Callable[[], None]) -> None:
         """Call this after every change, on the thread that makes it."""
@@ -218,8 +238,8 @@ class SiteStore:
         self._apply(document)
 
     def _save(self, document: SiteDocument) -> None:
-        if self._path is not None:
-            write_atomically(self._path, [document.model_dump_json(indent=2).encode()])
+        if self._save_bytes is not None:
+            self._save_bytes(document.model_dump_json(indent=2).encode())
 
     def _apply(self, document: SiteDocument) -> None:
         self._document = document

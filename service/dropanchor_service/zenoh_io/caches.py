@@ -51,12 +51,15 @@ class ZenohCaches:
         sites: Sites,
         metrics: Metrics,
         clock: UtcClock,
+        on_first_round: Callable[[], None] = lambda: None,
     ) -> None:
+        """on_first_round: called once all caches have been asked, on the thread of this."""
         self._rare = RareLog(_log)
         self._session = session
         self._sites = sites
         self._metrics = metrics
         self._clock = clock
+        self._on_first_round = on_first_round
         self._later: deque[tuple[float, str, int]] = deque()  # queries to repeat: when, key, missing
         self._returned: deque[tuple[float, str, int]] = deque()  # tags online again: when to look, key, last heard ns
         self._silent_tags = SilentTags(sites.rows)
@@ -151,6 +154,7 @@ class ZenohCaches:
                 self._on_reply(reply)
         finally:
             self._finish(partial(self._catch_up.on_first_round_answer, limit), asked_s)
+            self._on_first_round()
 
     def _ask(self, key: str, missing: int) -> None:
         limit = MIN_MESSAGES + missing if missing else self._limit(self._last_heard_ns(key))

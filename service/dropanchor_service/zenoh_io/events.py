@@ -8,6 +8,7 @@ import zenoh
 from dropanchor_schemas.keys import event_key
 from dropanchor_service.events.store import EventStore
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
 PERIOD_S = 0.1
@@ -17,8 +18,10 @@ AT_ONCE = 1000
 class ZenohEvents(PeriodicPublisher):
     """Publishes while it is open, in the order of the events of each site. It begins with the next event."""
 
-    def __init__(self, session: zenoh.Session, stores: Sequence[EventStore], metrics: Metrics) -> None:
-        super().__init__("zenoh events", PERIOD_S, metrics)
+    def __init__(
+        self, session: zenoh.Session, stores: Sequence[EventStore], metrics: Metrics, may_publish: MayServe = always
+    ) -> None:
+        super().__init__("zenoh events", PERIOD_S, metrics, may_publish)
         self._session = session
         self._stores = stores
         self._published = [store.newest for store in stores]

@@ -10,6 +10,7 @@ from dropanchor_schemas import keys
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
 PERIOD_S = 0.05  # the shortest time between two poses of a tag
@@ -26,8 +27,10 @@ class ZenohPoses(PeriodicPublisher):
     own, which show whether anybody wants its poses.
     """
 
-    def __init__(self, session: zenoh.Session, sites: AnswersOfSites, metrics: Metrics) -> None:
-        super().__init__("poses", PERIOD_S, metrics)
+    def __init__(
+        self, session: zenoh.Session, sites: AnswersOfSites, metrics: Metrics, may_publish: MayServe = always
+    ) -> None:
+        super().__init__("poses", PERIOD_S, metrics, may_publish)
         self._session = session
         self._sites = sites
         self._of_site: dict[str, zenoh.Publisher] = {}  # by key expression

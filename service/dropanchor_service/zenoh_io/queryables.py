@@ -17,6 +17,7 @@ from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.answers.pose_at_time import NoPoseThenError
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.store.tags import Tag
 
 MAX_TAGS_FROM_DISK = 100  # in one query
@@ -30,14 +31,22 @@ class QueryError(Exception):
 
 
 class ZenohAnswers:
-    """Answers queries while it is open, one after another, in a thread of Zenoh."""
+    """Answers queries while it is open, one after another, in a thread of Zenoh. While it may not, it says nothing."""
 
-    def __init__(self, session: zenoh.Session, sites: AnswersOfSites, service_id: str, metrics: Metrics) -> None:
+    def __init__(
+        self,
+        session: zenoh.Session,
+        sites: AnswersOfSites,
+        service_id: str,
+        metrics: Metrics,
+        may_answer: MayServe = always,
+    ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._session = session
         self._sites = sites
         self._service_id = service_id
         self._metrics = metrics
+        self._may_answer = may_answer
         self._declared: list[Any] = []
 
     def __enter__(self) -> Self:
@@ -101,6 +110,8 @@ class ZenohAnswers:
     def _answering(self, find: Callable[[zenoh.KeyExpr, str], Iterator[Reply]]) -> Callable[[zenoh.Query], None]:
         def answer(query: zenoh.Query) -> None:
             with query:
+                if not self._may_answer():
+                    return
                 try:
                     for key, payload in find(query.key_expr, str(query.parameters)):
                         query.reply(key, payload, encoding=zenoh.Encoding.APPLICATION_JSON)

@@ -8,6 +8,7 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.site import RemoteSettings
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.store import Sites
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
@@ -17,8 +18,8 @@ PERIOD_S = 0.2
 class ZenohRemoteSettings(PeriodicPublisher):
     """Publishes changes while it is open. A program that was away asks for its settings itself."""
 
-    def __init__(self, session: zenoh.Session, sites: Sites, metrics: Metrics) -> None:
-        super().__init__("remote settings", PERIOD_S, metrics)
+    def __init__(self, session: zenoh.Session, sites: Sites, metrics: Metrics, may_publish: MayServe = always) -> None:
+        super().__init__("remote settings", PERIOD_S, metrics, may_publish)
         self._session = session
         self._stores = [site.store for site in sites]
         self._published = [store.document.remote for store in self._stores]

@@ -148,5 +148,6 @@ def test_a_frame_has_one_entry_per_tag_in_every_column() -> None:
     answers.latest.write(np.concatenate([make_pose(row, x=np.nan) for row in range(3)]), NO_MODES)
     frame = json.loads(to_json(answers.frame_of(answers.rows(), answers.now_ns())))
     assert frame.pop("t_ns") == answers.now_ns()
+    assert frame.pop("epoch") == 0
     assert {len(column) for column in frame.values()} == {3}
     assert frame["x"] == frame["lat"] == [None] * 3

@@ -2,7 +2,8 @@
 
 import pytest
 
-from dropanchor_service.api.starting import create_starting_app
+from dropanchor_service.api.starting import Gate, create_starting_app
+from dropanchor_service.metrics.cluster import ClusterGauges
 from support.api import ask, kind_of
 
 REASON = "The service compiles the estimator on this machine: 7 s so far."
@@ -37,3 +38,15 @@ def test_everything_else_says_what_the_service_still_does(method: str, path: str
     response = ask(APP, method, path)
     assert (response.status_code, kind_of(response)) == (503, "not-ready")
     assert response.json()["detail"] == REASON
+    assert response.headers["retry-after"] == "1"
+
+
+def test_a_standby_shows_its_own_metrics_and_the_gate_opens_and_closes_with_each_request() -> None:
+    standby = create_starting_app(lambda: REASON, gauges=ClusterGauges("yard", lambda: None))
+    assert 'dropanchor_cluster_owner{bucket="yard"} 0.0' in ask(standby, "GET", "/metrics").text
+    owner = create_starting_app(lambda: "", gauges=ClusterGauges("yard", lambda: (4, 0.3)))
+    answers = iter([False, True, False])
+    gate = Gate(lambda: next(answers), owner, standby)
+    texts = [ask(gate, "GET", "/metrics").text for _ in range(3)]  # type: ignore[arg-type]
+    assert ['dropanchor_cluster_epoch{bucket="yard"} 4.0' in text for text in texts] == [False, True, False]
+    assert 'dropanchor_cluster_lease_age_seconds{bucket="yard"} 0.3' in texts[1]

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot, layout_of
+from dropanchor_service.checkpoints.files import CheckpointFolder
+from dropanchor_service.checkpoints.format import Snapshot, layout_of
 from dropanchor_service.estimation.columns import HYPOTHESIS
 from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE
 

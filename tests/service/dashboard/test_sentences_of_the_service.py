@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -14,6 +15,8 @@ from dropanchor_service.answers import hints
 from dropanchor_service.answers.care import care_of
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.cluster import sentences as of_cluster
+from dropanchor_service.cluster.watch import Lease, obstacle
 from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
@@ -68,6 +71,18 @@ def refused_shapes() -> Iterator[str]:
         yield f"{refused.value}."
 
 
+def sentences_of_a_cluster() -> Iterator[str]:
+    lease = Lease("yard", epoch=4, owner="a", sites="s", layout="l")
+    yield from map(of_cluster.standby_of, (lease, replace(lease, owner=""), replace(lease, address="https://a:8080")))
+    for other in (obstacle(lease, "other", "l"), obstacle(lease, "s", "m")):
+        assert other is not None
+        yield of_cluster.unable(lease, other)
+    yield of_cluster.database_away("yard", "connection refused")
+    yield of_cluster.takes_over("yard")
+    yield of_cluster.in_doubt("yard")
+    yield of_cluster.gone("yard", "an owner with the higher epoch 5 is alive")
+
+
 def progress() -> Iterator[str]:
     compilation = CompilationProgress()
     yield compilation.sentence
@@ -93,7 +108,7 @@ def in_german(**texts: list[str]) -> list[str]:
 
 
 def test_every_sentence_and_every_code_has_a_german_translation() -> None:
-    sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *progress()})
+    sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *sentences_of_a_cluster(), *progress()})
     codes = [*REASONS, *Reason, *KINDS]
     same = {"imu"}
     untranslated = [

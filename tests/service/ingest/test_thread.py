@@ -63,3 +63,15 @@ def test_a_thread_that_is_not_running_or_stuck_is_a_problem(monkeypatch: pytest.
     wait_until(lambda: "stuck" in (thread.problem or ""))
     release.set()
     thread.stop()
+
+
+def test_no_turn_is_taken_while_the_process_may_not_serve() -> None:
+    bench, may_turn = IngestBench(), threading.Event()
+    thread = IngestThread(bench.ingest, bench.buffer, bench.metrics, 0.001, may_turn=may_turn.is_set)
+    thread.start()
+    bench.put("a", frame(4.0))
+    assert not may_turn.wait(0.3)
+    assert (bench.buffer.depth, thread.problem) == (1, None)
+    may_turn.set()
+    wait_until(lambda: bench.x_of("a") == [4.0])
+    thread.stop()

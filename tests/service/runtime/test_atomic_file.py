@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from dropanchor_schemas.site import Anchor, Site
-from dropanchor_service.checkpoints.files import CheckpointFolder, Snapshot
+from dropanchor_service.checkpoints.files import CheckpointFolder
+from dropanchor_service.checkpoints.format import Snapshot
 from dropanchor_service.recording.mcap_file import McapFile
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.api_keys import ApiKeys

@@ -56,6 +56,7 @@ class World:
                 self.service, keys.all_tags(SITE, "samples"), self.samples, recovery=recovery
             ),
             self.service.liveliness().declare_subscriber(keys.everything(SITE), self.alive, history=True),
+            self.service.liveliness().declare_subscriber(keys.all_owners("yard"), self.alive, history=True),
             self.service.declare_subscriber(keys.all_tags(SITE, "health"), self.health),
             self.service.declare_subscriber(keys.all_tags(SITE, "settings"), self.settings),
             self.service.declare_queryable(keys.all_tags(SITE, "settings"), _answers(b"settings", SETTINGS_OF_B)),
@@ -116,7 +117,7 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
     a.put(keys.poses_key(SITE), b"forged")
     tokens = [
         a.liveliness().declare_token(key)
-        for key in (keys.tag_alive_key(SITE, "ghost"), keys.service_alive_key(SITE, "ghost"))
+        for key in (keys.tag_alive_key(SITE, "ghost"), keys.service_alive_key(SITE, "ghost"), keys.owner_key("yard", 9))
     ]
     subscribers = [
         a.declare_subscriber(OF_B, stolen),
@@ -141,6 +142,7 @@ def start_attacks(world: World) -> dict[str, Callable[[], bool]]:
         "puts its own pose": lambda: poses.has(POSE_OF_A, b"forged"),
         "puts the frame of all poses": lambda: poses.has(keys.poses_key(SITE), b"forged"),
         "pretends that another tag is alive": lambda: alive.has(keys.tag_alive_key(SITE, "ghost")),
+        "pretends to own a bucket": lambda: alive.has(keys.owner_key("yard", 9)),
         "pretends to be a service": lambda: alive.has(keys.service_alive_key(SITE, "ghost")),
         "receives samples of b": lambda: stolen.has(OF_B),
         "receives poses of b": lambda: stolen.has(POSE_OF_B),
@@ -178,13 +180,18 @@ def test_a_tag_speaks_only_for_itself_and_without_access_control_every_attack_su
                 assert ok, f"this attack never succeeds, so the guarded test proves nothing: {name}"
 
 
-def test_a_tag_reads_its_own_pose_and_its_cache_answers_the_service(tmp_path: Path) -> None:
+def test_a_tag_reads_its_own_pose_its_cache_answers_the_service_and_services_see_who_owns_a_bucket(
+    tmp_path: Path,
+) -> None:
     site = secured_site(tmp_path / "security", "a", "b")
     with ExitStack() as stack:
         stack.enter_context(site.router())
         world = World(site, stack)
         world.exchange()
         assert query_payloads(world.a, POSE_OF_A) == [b"from the service"]
+        with site.session("service") as successor:
+            world.keep(successor.liveliness().declare_token(keys.owner_key("yard", 2)))
+            wait_until(lambda: world.alive.has(keys.owner_key("yard", 2)))
         assert len(query_payloads(world.service, f"{CACHES}?_max=10", **ALL_REPLIES)) == 1
 
 

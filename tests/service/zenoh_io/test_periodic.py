@@ -6,6 +6,7 @@ import threading
 import pytest
 
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 from support.zenoh_router import wait_until
 
@@ -13,8 +14,8 @@ from support.zenoh_router import wait_until
 class FailsFirst(PeriodicPublisher):
     """Fails at the first call."""
 
-    def __init__(self, metrics: Metrics) -> None:
-        super().__init__("numbers", 0.001, metrics)
+    def __init__(self, metrics: Metrics, may_publish: MayServe = always) -> None:
+        super().__init__("numbers", 0.001, metrics, may_publish)
         self.calls: list[int] = []
 
     def publish(self) -> None:
@@ -31,6 +32,19 @@ def test_an_error_is_counted_and_logged_and_does_not_end_the_calls(caplog: pytes
     assert [record.getMessage() for record in caplog.records] == [
         "publication of numbers: OSError: the network is down"
     ]
+
+
+def test_nothing_is_published_while_the_process_may_not_serve() -> None:
+    asked: list[bool] = []
+
+    def may_publish() -> bool:
+        asked.append(len(asked) >= 3)
+        return asked[-1]
+
+    with FailsFirst(Metrics(), may_publish) as publisher:
+        wait_until(lambda: len(asked) > 5)
+    assert asked[:4] == [False, False, False, True]
+    assert len(publisher.calls) == asked.count(True)
 
 
 def test_its_thread_ends_with_the_context() -> None:

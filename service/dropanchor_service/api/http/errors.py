@@ -111,6 +111,8 @@ def problem_response(
     """Return a problem of this kind. status: overrides the status of the kind. members: extension members."""
     status = kind.status if status is None else status
     path = _path(request)
+    if kind is Kind.NOT_READY:
+        headers = {"retry-after": "1", **(headers or {})}
     if is_omlox(path):
         status = 400 if status == 422 else status  # the standard knows no 422
         members = {"code": status, "message": detail} | dict(members or {})

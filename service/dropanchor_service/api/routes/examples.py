@@ -28,6 +28,7 @@ POSE: dict[str, Any] = {
     "lat": 52.512345678,
     "lon": 13.412345678,
     "online": True,
+    "epoch": 0,
 }
 EXPLANATION: dict[str, Any] = {
     "pose": POSE,
@@ -55,6 +56,7 @@ EXPLANATION: dict[str, Any] = {
 POSE_LIST: dict[str, Any] = {"t_ns": 1_800_000_000_042_000_000, "poses": [POSE]}
 POSE_FRAME: dict[str, Any] = {
     "t_ns": 1_800_000_000_042_000_000,
+    "epoch": 0,
     "tags": ["tag-1", "tag-2"],
     "online": [True, True],
     "state": ["tracking", "initialising"],

@@ -1,6 +1,7 @@
 /** The connection to the service: the stream of poses, and the site. It reconnects by itself. */
 
 import { request, KeyRequiredError, StartingError } from "./access.js";
+import { EpochFence } from "./epochs.js";
 import { eventsOf } from "./events.js";
 
 /** Frames per second; fewer for a large fleet, whose frames are large. */
@@ -46,6 +47,7 @@ export class Connection extends EventTarget {
   /** For tests and the console: number of frames so far, and the time that the last one took. */
   stats = { frames: 0, ms: 0 };
   #stream = new AbortController();
+  #fence = new EpochFence();
   #attempt = 0;
   #max_hz = HZ;
   #timer = 0;
@@ -104,7 +106,9 @@ export class Connection extends EventTarget {
   /** @param {string} kind @param {string} data */
   #dispatch(kind, data) {
     const begun = performance.now();
-    this.dispatchEvent(new CustomEvent(kind, { detail: JSON.parse(data) }));
+    const frame = JSON.parse(data);
+    this.#fence.check(frame); // otherwise the stream fails, and the page asks again for one of the owner
+    this.dispatchEvent(new CustomEvent(kind, { detail: frame }));
     this.stats = { frames: this.stats.frames + 1, ms: performance.now() - begun };
   }
 

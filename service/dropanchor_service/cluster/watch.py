@@ -1,0 +1,65 @@
+"""When a standby may take over. Pure: no I/O, and no clock but the one that is passed in."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Lease:
+    """A row of the table of leases.
+
+    owner: empty when nobody owns the bucket. sites: digest of the owner's settings of its sites. layout: of the newest
+    checkpoint; empty when there is none. renewals: count of the current owner. is_moving: the next standby may take
+    over at once. was_moved: the owner became it that way. takes_any: the next owner may have other sites or another
+    layout. lease_s: of the owner. age_s: since the last renewal, by the clock of the database; for people.
+    """
+
+    bucket: str
+    epoch: int = 0
+    owner: str = ""
+    address: str = ""
+    sites: str = ""
+    layout: str = ""
+    renewals: int = 0
+    is_moving: bool = False
+    was_moved: bool = False
+    takes_any: bool = False
+    lease_s: float = 0.0
+    age_s: float = 0.0
+
+
+class Watch:
+    """Watches a lease by what changes in it, not by the time in it: clocks of machines may be hours apart.
+
+    A lease has ended when it has not changed for as long as it lasts, while this process looked all the time.
+    """
+
+    def __init__(self, lease_s: float) -> None:
+        self._lease_s = lease_s
+        self._seen: tuple[int, int] | None = None  # epoch and renewals
+        self._since_s = 0.0
+        self._looked_s = 0.0
+
+    def may_claim(self, lease: Lease, now_s: float) -> bool:
+        """Look at the lease, and return whether a standby may claim it. now_s: of a clock that nobody sets."""
+        seen = (lease.epoch, lease.renewals)
+        looked_away = now_s - self._looked_s > self._lease_s
+        if seen != self._seen or looked_away:
+            self._seen, self._since_s = seen, now_s
+        self._looked_s = now_s
+        ended = now_s - self._since_s > max(self._lease_s, lease.lease_s)
+        return lease.owner == "" or lease.is_moving or ended
+
+    def look_away(self) -> None:
+        """Begin anew: while the database was away, the owner could not renew its lease either."""
+        self._seen = None
+
+
+def obstacle(lease: Lease, sites: str, layout: str) -> str | None:
+    """Return why a standby with these sites and this layout of checkpoints cannot take over, None if it can."""
+    if lease.takes_any:
+        return None
+    if lease.sites not in ("", sites):
+        return "its settings of sites and tags are not those of the owner"
+    if lease.layout not in ("", layout):
+        return f"the checkpoint has the layout {lease.layout}, but this version uses {layout}"
+    return None

@@ -1,0 +1,147 @@
+"""A process in a cluster: first a standby, then the owner of its bucket, until another process is."""
+
+import hashlib
+import logging
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Self
+
+import zenoh
+from pydantic import ValidationError
+
+from dropanchor_service.checkpoints.snapshot import ServiceState
+from dropanchor_service.cluster import sentences
+from dropanchor_service.cluster.boot_clock import boot_s
+from dropanchor_service.cluster.database import Connection, connect
+from dropanchor_service.cluster.leases import Claimant
+from dropanchor_service.cluster.owner import Renewal
+from dropanchor_service.cluster.shared_state import CheckpointRow, save_document
+from dropanchor_service.cluster.standby import Standby
+from dropanchor_service.cluster.tenure import Standing, Tenure
+from dropanchor_service.metrics.cluster import ClusterGauges
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.ownership.alone import Ownership, ZenohParts
+from dropanchor_service.settings.model import Settings
+from dropanchor_service.settings.sources import SettingsError
+from dropanchor_service.store import Sites
+from dropanchor_service.store.shared import Shared
+from dropanchor_service.zenoh_io.owner_token import ZenohOwner
+
+OF_THE_SITES = {
+    *("engine", "site", "sites", "tags", "tag_defaults", "unknown_tags", "unproven_tags", "max_tags", "paper"),
+}
+"""Settings that must be equal in all processes that can own a bucket."""
+
+_log = logging.getLogger(__name__)
+
+
+class ClusterOwnership(Ownership):
+    """See `Ownership`. Creating it raises SettingsError."""
+
+    def __init__(self, settings: Settings, sites: Sites, metrics: Metrics, on_look: Callable[[], None]) -> None:
+        super().__init__(settings)
+        _refuse_unfit(settings)
+        cluster = settings.cluster
+        assert cluster.url is not None
+        assert cluster.bucket is not None
+        name = cluster.name or socket.gethostname()
+        self._bucket = cluster.bucket
+        self._sites = sites
+        self._on_look = on_look
+        self._connect: Callable[[], Connection] = partial(connect, cluster.url, name)
+        self._who = Claimant(name, cluster.address or "", digest_of_sites(settings), cluster.lease_s)
+        self._standby: Standby | None = None
+        self._tenure: Tenure | None = None
+        self._token: ZenohOwner | None = None
+        self._row: CheckpointRow | None = None
+        metrics.register(self.gauges)
+
+    @property
+    def gauges(self) -> ClusterGauges:
+        return ClusterGauges(self._bucket, self._state)
+
+    def checkpoints(self, state: ServiceState) -> CheckpointRow:
+        self._row = CheckpointRow(self._connect, self._bucket, state.layout, state.template)
+        return self._row
+
+    def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
+        assert self._row is not None
+        _log.info("standing by at %s, for %s", page, self._bucket)
+        self._standby = Standby(self._connect, self._bucket, self._who, self._row.layout)
+        claim, asked_s = self._standby.wait(self._on_look)
+        self._tenure = Tenure(claim.epoch, self._who.lease_s, boot_s, hears_others, asked_s)
+        self._renewal = Renewal(self._connect, self._bucket, self._who.lease_s, self._tenure)
+        self._row.own(claim)
+        for site in self._sites:
+            site.store.epoch = claim.epoch
+        for document, kept in shared.items():
+            save = partial(save_document, self._connect, self._bucket, claim.epoch, document)
+            try:
+                kept.share(claim.documents.get(document), save)
+            except (OSError, ValidationError) as error:
+                raise SettingsError(f"cluster: {document} of {self._bucket} cannot be shared: {error}") from error
+
+    def __enter__(self) -> Self:
+        self._renewal.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renewal.__exit__(None, None, None)
+        if self._row is not None:
+            self._row.close()
+
+    @property
+    def sentence(self) -> str:
+        if self._tenure is None:
+            return "" if self._standby is None else self._standby.sentence
+        if self._tenure.standing is Standing.IN_DOUBT:
+            return sentences.in_doubt(self._bucket)
+        return sentences.gone(self._bucket, self.gone) if self.gone else sentences.takes_over(self._bucket)
+
+    @property
+    def gone(self) -> str:
+        if self._tenure is None or self._tenure.standing is not Standing.LOST:
+            return ""
+        return self._tenure.why_lost
+
+    def may_serve(self) -> bool:
+        return self._tenure is not None and self._tenure.may_serve
+
+    def caught_up(self) -> None:
+        if self._token is not None:
+            self._token.announce()
+
+    def impairments(self) -> Sequence[str]:
+        if self._tenure is None or self._tenure.age_s <= self._who.lease_s:
+            return []
+        error = self._renewal.database_error or f"for {self._tenure.age_s:.0f} s"
+        return [
+            f"the database of the cluster does not answer ({error}): this process goes on as the owner of "
+            f"{self._bucket}, epoch {self._tenure.epoch}, until another one takes over"
+        ]
+
+    def zenoh_parts(self, session: zenoh.Session) -> ZenohParts:
+        assert self._tenure is not None
+        self._token = ZenohOwner(session, self._bucket, self._tenure.epoch, self._tenure.saw_epoch)
+        return [self._token]
+
+    def _state(self) -> tuple[int, float] | None:
+        return None if self._tenure is None else (self._tenure.epoch, self._tenure.age_s)
+
+
+def digest_of_sites(settings: Settings) -> str:
+    """Return a digest of the settings that all owners of a bucket must share."""
+    return hashlib.blake2b(settings.model_dump_json(include=OF_THE_SITES).encode(), digest_size=8).hexdigest()
+
+
+def _refuse_unfit(settings: Settings) -> None:
+    if not settings.zenoh.connect and settings.zenoh.config_file is None:
+        raise SettingsError(
+            "cluster.url: the processes need one router that outlives them: start `dropanchor router`, and set "
+            "zenoh.connect (--zenoh-connect)"
+        )
+    if settings.engine != "fleet":
+        raise SettingsError(
+            f"cluster.url: the engine {settings.engine} keeps no state that another process could go on from; use fleet"
+        )
