@@ -10,7 +10,7 @@ from dropanchor_service.api import create_app
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence
+from dropanchor_service.persistence import Persistence, open_database
 from dropanchor_service.phones.intake import Receive
 from dropanchor_service.security.credentials import authenticator_of
 from dropanchor_service.security.folder import SecurityFolder
@@ -39,7 +39,8 @@ class OnlySite:
         self._credentials = credentials
         self._authenticator = authenticator_of(settings)
         self._metrics = metrics
-        self.persistence = Persistence(settings, site.tags, site.store, now_ns, metrics)
+        database = open_database(settings, now_ns)
+        self.persistence = Persistence(settings, site.tags, site.store, now_ns, metrics, database)
         self.zone_events = ZoneEvents(settings, site.store, site.tags, latest, site.health, now_ns, metrics)
 
     def problems(self) -> Sequence[str]:

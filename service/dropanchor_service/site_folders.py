@@ -8,7 +8,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence, open_basemap, settings_of_site
+from dropanchor_service.persistence import Persistence, open_basemap, open_database, settings_of_site
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
 
@@ -22,8 +22,10 @@ class SiteFolders:
     def __init__(self, settings: Settings, sites: Sites, now_ns: Callable[[], int], metrics: Metrics) -> None:
         self._sites = sites
         self._opened = ExitStack()
+        database = open_database(settings, now_ns)
         self.all = [
-            Persistence(settings_of_site(settings, site.id), site.tags, site.store, now_ns, None) for site in sites
+            Persistence(settings_of_site(settings, site.id), site.tags, site.store, now_ns, None, database)
+            for site in sites
         ]
         self.basemap = open_basemap(settings, [site.store for site in sites])
         if tracks := [one.tracks for one in self.all if one.tracks is not None]:

@@ -14,9 +14,10 @@ import pytest
 from dropanchor_service.answers.columns import ellipse_95
 from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.history.heat_cells import CELL
+from dropanchor_service.history.sqlite.store import FILE_NAME
+from dropanchor_service.history.sqlite.track_file import TrackWriter
+from dropanchor_service.history.storage import Retention
 from dropanchor_service.history.summary_table import DAY, LENGTHS_NS, MAX_CELLS
-from dropanchor_service.history.track_file import TrackWriter
-from dropanchor_service.history.tracks import FILE_NAME, Retention
 from support.api import T_NS, ApiBench, make_api_bench
 from support.http_server import running_server
 

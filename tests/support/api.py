@@ -21,7 +21,9 @@ from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
-from dropanchor_service.history.tracks import Retention, Tracks
+from dropanchor_service.history.sqlite.store import SqliteStorage
+from dropanchor_service.history.storage import Retention
+from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Authenticator
@@ -104,7 +106,9 @@ def make_api_bench(
     """
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
     tags = TagTable()
-    tracks = Tracks(folder, retention, tags, store, lambda: bench.now_ns) if folder and retention else None
+    tracks = None
+    if folder and retention:
+        tracks = Tracks(SqliteStorage(folder, retention, lambda: bench.now_ns), retention, tags, store)
     bench = ApiBench(Answers(store, tags, LatestPoses(), tracks=tracks, pending_tags=PendingTags(10)))
     bench.answers.now_ns = lambda: bench.now_ns
     return bench

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 
-MOST_WITH_FILES = 100  # that write a history or record at once: each has files and a thread of its own
+MOST_WITH_FILES = 100  # that write a history or record at once: each has a thread of its own, and perhaps files
 _OF_EVENTS = ("events", "delivery", "email", "mqtt")
 
 
@@ -25,7 +25,7 @@ def refuse_for_several_sites(settings: Settings) -> None:
 def _refuse_many_files(settings: Settings) -> None:
     """Raise SettingsError when more sites than can have one would have a history, or a recording from the start."""
     with_files = {
-        "history": settings.data_dir is not None and settings.history.enabled,
+        "history": settings.history.enabled and (settings.data_dir or settings.history.url) is not None,
         "recording": settings.recording.enabled,
     }
     found = [

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import Array, Frame, State
-from dropanchor_service.history.covering import TooMuchError
+from dropanchor_service.history.errors import TooMuchError
 from dropanchor_service.history.heat_cells import CELL, HEAD, Heat, merged
 from dropanchor_service.history.heat_map import HeatMap, heat_map_of
+from dropanchor_service.history.sqlite.track_file import FileReader, TrackWriter
 from dropanchor_service.history.summary_table import DAY, LENGTHS_NS
-from dropanchor_service.history.track_file import TrackReader, TrackWriter
 from service.history.test_overview import HOUR, SECOND, drive, store, summarise
 
 START_NS = 1_800_000_000 * SECOND // LENGTHS_NS[DAY] * LENGTHS_NS[DAY]
@@ -25,7 +25,7 @@ def days(made: Array) -> Array:
 
 
 def heat_map(path: Path, from_s: float, to_s: float, tags: list[str] | None = None, cell_m: float = 0.5) -> HeatMap:
-    return TrackReader(path).heat_map(tags, START_NS + round(from_s * SECOND), START_NS + round(to_s * SECOND), cell_m)
+    return FileReader(path).heat_map(tags, START_NS + round(from_s * SECOND), START_NS + round(to_s * SECOND), cell_m)
 
 
 def seconds_at(found: HeatMap, x: float, y: float) -> float:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame, State
-from dropanchor_service.history.covering import TooMuchError, UnfinishedSummaryError
+from dropanchor_service.history.errors import TooMuchError, UnfinishedSummaryError
 from dropanchor_service.history.overview import Overview
+from dropanchor_service.history.sqlite.track_file import FileReader, TrackWriter
 from dropanchor_service.history.summaries import Between
 from dropanchor_service.history.summary_table import LENGTHS_NS
-from dropanchor_service.history.track_file import TrackReader, TrackWriter
 
 SECOND = 1_000_000_000
 T_NS = 1_800_000_000 * SECOND // LENGTHS_NS[1] * LENGTHS_NS[1]
@@ -45,7 +45,7 @@ def summarise(writer: TrackWriter) -> None:
 
 
 def overview(path: Path, from_s: float, to_s: float, tags: list[str] | None = None, max_points: int = 100) -> Overview:
-    return TrackReader(path).overview(tags, T_NS + round(from_s * SECOND), T_NS + round(to_s * SECOND), max_points)
+    return FileReader(path).overview(tags, T_NS + round(from_s * SECOND), T_NS + round(to_s * SECOND), max_points)
 
 
 def figures(found: Overview, tag: str) -> dict[str, float]:
@@ -184,7 +184,7 @@ def test_one_pose_that_is_no_place_breaks_the_line_at_every_level(
 def test_only_the_named_tags_are_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store(path, **{f"t{i}": drive(np.arange(0.0, HOUR, 10.0)) for i in range(5)}).close()
     for most in (0, 100):
-        monkeypatch.setattr("dropanchor_service.history.bulk_reading.MAX_NAMED", most)
+        monkeypatch.setattr("dropanchor_service.history.sqlite.rows.MAX_NAMED", most)
         found = overview(path, 0, HOUR, ["t1", "t3", "nobody"])
         assert {found.names[row["tag"]] for row in found.figures} == {"t1", "t3"}
     assert len(overview(path, 0, HOUR, ["nobody"]).points) == 0

@@ -1,0 +1,110 @@
+"""Run Debian's PostgreSQL on a socket in a folder, without fsync, and make databases in it."""
+
+import os
+import pwd
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import psycopg
+import pytest
+
+from support.zenoh_router import wait_until
+
+_DEBIAN = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+_INITDB = str(_DEBIAN[-1]) if _DEBIAN else shutil.which("initdb")
+WHY_NOT = "PostgreSQL is not installed: apt-get install postgresql"
+needs_postgresql = pytest.mark.skipif(_INITDB is None, reason=WHY_NOT)
+_USER = "postgres"  # whom Debian's package makes: PostgreSQL refuses to run as root
+_QUICK = ("fsync=off", "shared_buffers=32MB", "listen_addresses=", "autovacuum=off")
+_numbers = count()
+
+
+@dataclass
+class Postgresql:
+    """A server. The role `dropanchor` may do everything."""
+
+    folder: Path
+    options: tuple[str, ...] = ()
+    process: "subprocess.Popen[bytes] | None" = None
+
+    def start(self) -> None:
+        options = [word for option in (*_QUICK, *self.options) for word in ("-c", option)]
+        command = [_program("postgres"), "-D", f"{self.folder}/data", "-k", str(self.folder), *options]
+        log = self.folder / "log"
+        with log.open("ab") as file:
+            self.process = subprocess.Popen(command, stderr=file, stdout=file, user=_user(), group=_group())
+        wait_until(self._answers)
+
+    def stop(self) -> None:
+        """Stop the server at once, and end its connections."""
+        if self.process is not None:
+            self.process.send_signal(signal.SIGINT)
+            self.process.wait()
+            self.process = None
+
+    def url(self, database: str = "postgres", user: str = "dropanchor") -> str:
+        return f"postgresql://{user}@/{database}?host={self.folder}"
+
+    def new_database(self) -> str:
+        """Return the URL of an empty database."""
+        name = f"d{next(_numbers)}"
+        self.run(self.url(), f"CREATE DATABASE {name}")
+        return self.url(name)
+
+    def run(self, url: str, *statements: str) -> list[tuple[Any, ...]]:
+        """Run SQL and return the rows of the last statement."""
+        with psycopg.connect(url, autocommit=True) as connection:
+            for statement in statements:
+                cursor = connection.execute(statement)
+            return cursor.fetchall() if cursor.description else []
+
+    def _answers(self) -> bool:
+        try:
+            return self.run(self.url(), "SELECT 1") == [(1,)]
+        except psycopg.OperationalError:
+            return False
+
+
+@contextmanager
+def running_postgresql(*options: str) -> Iterator[Postgresql]:
+    """Run a server in a short folder, because the path of a socket has at most 107 bytes."""
+    folder = Path(tempfile.mkdtemp(prefix="dropanchor-pg-"))
+    server = Postgresql(folder, options)
+    try:
+        if _user() is not None:
+            shutil.chown(folder, _USER)
+        make = [_program("initdb"), "-D", f"{folder}/data", "--no-sync", "-A", "trust", "-U", "dropanchor"]
+        subprocess.run(
+            [*make, "--locale=C", "-E", "UTF8"],
+            check=True,
+            capture_output=True,
+            user=_user(),
+            group=_group(),
+            cwd=folder,
+        )
+        server.start()
+        yield server
+    finally:
+        server.stop()
+        shutil.rmtree(folder)
+
+
+def _program(name: str) -> str:
+    assert _INITDB is not None, WHY_NOT
+    return str(Path(_INITDB).with_name(name))
+
+
+def _user() -> int | None:
+    return pwd.getpwnam(_USER).pw_uid if os.geteuid() == 0 else None
+
+
+def _group() -> int | None:
+    return pwd.getpwnam(_USER).pw_gid if os.geteuid() == 0 else None
