@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame, State
+from dropanchor_service.history.reader import TrackReader
 from dropanchor_service.history.sqlite.track_file import FileReader, TrackFileError, TrackWriter
+from support.history_places import Place
 
 SECOND = 1_000_000_000
 T_NS = 1_800_000_000 * SECOND
@@ -23,14 +25,14 @@ def poses(*offsets_s: float, x: float = 0.0) -> Array:
     return made
 
 
-def times(reader: FileReader, tag: str, from_s: float = -LONG, to_s: float = LONG, **options: object) -> list[float]:
+def times(reader: TrackReader, tag: str, from_s: float = -LONG, to_s: float = LONG, **options: object) -> list[float]:
     window = max(0, T_NS + round(from_s * SECOND)), min(2**62, T_NS + round(to_s * SECOND))
     found = reader.poses(tag, *window, **{"limit": 1000, **options})  # type: ignore[arg-type]
     return [(t_ns - T_NS) / SECOND for t_ns in found.poses["t_ns"].tolist()]
 
 
-def test_poses_are_read_in_order_of_time_with_their_anchors(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
+def test_poses_are_read_in_order_of_time_with_their_anchors(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     writer.insert(poses(25, 0, 3, 1), ["a", "a", "b", "a"], ["7", None, "7", "Süd"])
     assert times(reader, "a") == [0, 1, 25]
     assert times(reader, "b") == [3]
@@ -43,8 +45,8 @@ def test_poses_are_read_in_order_of_time_with_their_anchors(tmp_path: Path) -> N
     writer.close()
 
 
-def test_a_pose_keeps_its_state_and_its_frame(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
+def test_a_pose_keeps_its_state_and_its_frame(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     made = poses(0, 1)
     made["state"], made["frame"] = [State.TRACKING, State.DEGRADED], [Frame.RELATIVE, Frame.SITE]
     writer.insert(made, ["a", "a"], [None, None])
@@ -54,8 +56,8 @@ def test_a_pose_keeps_its_state_and_its_frame(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_a_window_includes_its_ends_and_can_be_read_from_either(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
+def test_a_window_includes_its_ends_and_can_be_read_from_either(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     writer.insert(poses(*range(100)), ["a"] * 100, [None] * 100)
     assert times(reader, "a", 9, 12) == [9, 10, 11, 12]
     assert times(reader, "a", 9, 40, limit=3) == [9, 10, 11]
@@ -84,8 +86,8 @@ def test_inserts_of_any_size_use_few_different_statements(tmp_path: Path, monkey
     assert [len(times(reader, str(number), limit=2000)) for number in range(len(counts))] == counts
 
 
-def test_a_pose_of_the_same_time_is_replaced(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
+def test_a_pose_of_the_same_time_is_replaced(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     for x in (1.0, 2.0):
         writer.insert(poses(0, x=x), ["a"], [None])
     assert reader.poses("a", T_NS, T_NS, 10).poses["x"].tolist() == [2.0]
