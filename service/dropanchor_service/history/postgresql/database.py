@@ -19,6 +19,7 @@ from dropanchor_service.history.storage import Usage
 
 MOST_WRITING, MOST_READING = 2, 4  # connections of a service
 MAINTAIN_S = 60.0
+LOCK_TIMEOUT = "5s"
 _DEFAULTS = {
     "application_name": "dropanchor",
     "connect_timeout": 5,
@@ -30,7 +31,7 @@ _DEFAULTS = {
 # A parallel query or one compiled for its rows would take longer, and the arrays of `pose_columns` need one order.
 _SESSION = f"""
 SET search_path = {SCHEMA}; SET TimeZone = UTC; SET jit = off; SET max_parallel_workers_per_gather = 0;
-SET lock_timeout = '5s'; SET statement_timeout = '60s'
+SET statement_timeout = '60s'; SET lock_timeout =
 """
 _SHORTER = "SELECT id, keep_ns FROM sites WHERE keep_ns < (SELECT max(keep_ns) FROM sites)"
 
@@ -119,7 +120,7 @@ class Database:
     def _connect(self) -> Connection:
         password = {} if self._password_file is None else {"password": _password_in(self._password_file)}
         connection = psycopg.connect(make_conninfo(**self._parameters | password), autocommit=True)
-        connection.execute(_SESSION)
+        connection.execute(f"{_SESSION} '{LOCK_TIMEOUT}'")
         return connection
 
 

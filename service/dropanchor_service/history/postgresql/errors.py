@@ -48,4 +48,6 @@ def sentence(error: psycopg.Error) -> str:
 def _reason(error: psycopg.Error) -> str:
     text = error.diag.message_primary or str(error)
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    return lines[0] if lines else type(error).__name__
+    if not lines:
+        return type(error).__name__
+    return lines[0].removeprefix("connection failed: ").removeprefix("connection is bad: ")

@@ -57,5 +57,5 @@ class PostgresqlStorage:
         kept = np.flatnonzero(poses["t_ns"] >= oldest_ns).tolist()
         if kept:
             self._writer.insert(poses[kept], [tags[place] for place in kept], [anchors[place] for place in kept])
-        self._database.maintain()
         self._writer.summarise(MAX_SUMMARISE_S)
+        self._database.maintain()
