@@ -12,6 +12,8 @@ from dropanchor_service.persistence import Persistence, open_basemap, open_datab
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
 
+MOST_NAMED = 3  # sites that share a problem, such as a database that is away
+
 
 class SiteFolders:
     """The `Persistence` of each site, in the order of their indices. They write while this context is open.
@@ -46,9 +48,12 @@ class SiteFolders:
         self._opened.close()
 
     def problems(self) -> Sequence[str]:
-        """Return what cannot be written or read, with the name of its site."""
-        found = zip(self._sites, self.all, strict=True)
-        return [f"site {site.id}: {problem}" for site, one in found for problem in one.problems()]
+        """Return what cannot be written or read, with the names of its sites."""
+        of_problem: dict[str, list[str]] = {}
+        for site, one in zip(self._sites, self.all, strict=True):
+            for problem in one.problems():
+                of_problem.setdefault(problem, []).append(site.id)
+        return [f"{_named(sites)}: {problem}" for problem, sites in of_problem.items()]
 
     @property
     def observers(self) -> Observers:
@@ -74,3 +79,10 @@ class SiteFolders:
 
     def _records(self) -> bool:
         return any(one.recorder is not None and one.recorder.running is not None for one in self.all)
+
+
+def _named(sites: Sequence[str]) -> str:
+    """Return the names of the sites that share a problem, of many the first ones."""
+    first = ", ".join(sites[:MOST_NAMED])
+    more = f" and {len(sites) - MOST_NAMED} more" if len(sites) > MOST_NAMED else ""
+    return f"site{'s' if len(sites) > 1 else ''} {first}{more}"
