@@ -42,16 +42,19 @@ class Connections:
 
     def close(self) -> None:
         """Close those that nobody uses."""
-        while self._idle:
-            self._idle.pop().close()
+        while (connection := self._popped()) is not None:
+            connection.close()
 
     def _idle_one(self) -> Connection | None:
-        while self._idle:
-            connection = self._idle.pop()
-            if not _has_news(connection):
-                return connection
+        while (connection := self._popped()) is not None and _has_news(connection):
             connection.close()
-        return None
+        return connection
+
+    def _popped(self) -> Connection | None:
+        try:
+            return self._idle.pop()
+        except IndexError:
+            return None
 
     def _take_back(self, connection: Connection) -> None:
         if connection.info.transaction_status == TransactionStatus.IDLE:

@@ -14,12 +14,14 @@ from psycopg.conninfo import conninfo_to_dict, make_conninfo
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.connections import Connections
 from dropanchor_service.history.postgresql.days import DAY_NS, drop_day, existing_days, used_bytes
+from dropanchor_service.history.postgresql.errors import sentence
 from dropanchor_service.history.postgresql.schema import SCHEMA, is_prepared, prepare
 from dropanchor_service.history.storage import Usage
 
 MOST_WRITING, MOST_READING = 2, 4  # connections of a service
 MAINTAIN_S = 60.0
 LOCK_TIMEOUT = "5s"
+AWAY_S = 10.0  # for so long readers take the last refusal for theirs, unless the writer connects
 _DEFAULTS = {
     "application_name": "dropanchor",
     "connect_timeout": 5,
@@ -53,6 +55,7 @@ class Database:
         self._now_ns = now_ns
         self._writing = Connections(self._connect_to_write, MOST_WRITING)
         self._reading = Connections(self._connect_to_read, MOST_READING)
+        self._away: tuple[float, str] | None = None  # when no connection could be made, and why
         self._maintaining = Lock()
         self._maintained_s = -MAINTAIN_S
         self.usage = Usage()
@@ -108,6 +111,8 @@ class Database:
         return connection
 
     def _connect_to_read(self) -> Connection:
+        if self._away is not None and time.monotonic() - self._away[0] < AWAY_S:
+            raise HistoryError(self._away[1])  # the writer tries: who answers current poses must not wait for it
         connection = self._connect()
         try:
             if not is_prepared(connection):
@@ -119,7 +124,12 @@ class Database:
 
     def _connect(self) -> Connection:
         password = {} if self._password_file is None else {"password": _password_in(self._password_file)}
-        connection = psycopg.connect(make_conninfo(**self._parameters | password), autocommit=True)
+        try:
+            connection = psycopg.connect(make_conninfo(**self._parameters | password), autocommit=True)
+        except psycopg.Error as error:
+            self._away = (time.monotonic(), sentence(error))
+            raise
+        self._away = None
         connection.execute(f"{_SESSION} '{LOCK_TIMEOUT}'")
         return connection
 
