@@ -8,6 +8,8 @@ from psycopg import errors
 
 from dropanchor_service.history.errors import HistoryError
 
+_REFUSALS = ("authentication failed", "no password supplied", "no pg_hba.conf entry")
+
 
 @contextmanager
 def explained() -> Iterator[None]:
@@ -37,7 +39,7 @@ def sentence(error: psycopg.Error) -> str:
             return "another program holds a lock in the database for a long time"
         case errors.QueryCanceled():
             return "the database took too long to answer"
-        case _ if "authentication failed" in reason or "no password supplied" in reason:
+        case _ if any(words in reason for words in _REFUSALS):
             return f"the database refuses the login, check `url` and `password_file` in [history]: {reason}"
         case psycopg.OperationalError():
             return f"the database cannot be reached: {reason}"
