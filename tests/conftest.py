@@ -1,5 +1,6 @@
 """Set-up and fixtures for the whole suite."""
 
+import gc
 import signal
 from collections.abc import Iterator
 
@@ -21,6 +22,13 @@ FIRST = ("benchmarks", "schemas", "tag_client")
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=_rank)
+
+
+def pytest_collection_finish() -> None:
+    """Keep the tests and their imports out of every later garbage collection: a quarter of the API tests' time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
 
 
 def _rank(item: pytest.Item) -> int:

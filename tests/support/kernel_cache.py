@@ -41,6 +41,17 @@ def compile_once() -> None:
         subprocess.run([sys.executable, "-m", "dropanchor_service", "compile"], env=environment(), check=True)
 
 
+def compile_smoothers() -> None:
+    """Add the kernels that only smoothing needs. Otherwise several tests compile them, each for half a minute."""
+    from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
+    from support.fleet_runs import traced
+
+    engine, _, _ = traced(seed=1)
+    for lag in (None, 1.0):
+        smoothed_poses(engine, 0, lag)
+
+
 if __name__ == "__main__":
     use_cache_of_these_sources()
     compile_once()
+    compile_smoothers()

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from dropanchor_service.engines.warm_up import PROGRESS_S, CompilationProgress
-from dropanchor_service.runtime.kernel_cache import VARIABLE
+from dropanchor_service.runtime.kernel_cache import VARIABLE, sources_stamp
 
 _log = logging.getLogger(__name__)
 
@@ -54,11 +54,15 @@ def _is_writable(folder: Path) -> bool:
 
 
 def _mark() -> Path | None:
-    """Return the file that says that the cache is full. numba compiles again for another version or processor."""
+    """Return the file that says that the cache is full.
+
+    numba compiles again for another version or processor, and for sources that were moved or written anew.
+    """
     folder = os.environ.get(VARIABLE)
     if folder is None:
         return None
     import numba
     from llvmlite.binding import get_host_cpu_name
 
-    return Path(folder) / f"complete-{numba.__version__}-{platform.python_version()}-{get_host_cpu_name()}"
+    name = f"complete-{numba.__version__}-{platform.python_version()}-{get_host_cpu_name()}-{sources_stamp()}"
+    return Path(folder) / name

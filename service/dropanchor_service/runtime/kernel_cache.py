@@ -21,8 +21,17 @@ _log = logging.getLogger(__name__)
 
 def sources_digest(packages: Sequence[str] = KERNEL_SOURCES) -> str:
     """Return a digest of all sources in these packages, by default of all that define kernels."""
-    sources = sorted(source for name in packages for source in (Path(__file__).parents[1] / name).rglob("*.py"))
-    return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
+    return hashlib.sha256(b"".join(source.read_bytes() for source in _sources(packages))).hexdigest()[:16]
+
+
+def sources_stamp() -> str:
+    """Return a digest of where the sources of the kernels are and when each was written."""
+    stamps = [(str(source), source.stat().st_mtime_ns) for source in _sources(KERNEL_SOURCES)]
+    return hashlib.sha256(repr(stamps).encode()).hexdigest()[:8]
+
+
+def _sources(packages: Sequence[str]) -> list[Path]:
+    return sorted(source for name in packages for source in (Path(__file__).parents[1] / name).rglob("*.py"))
 
 
 def use_kernel_cache() -> None:

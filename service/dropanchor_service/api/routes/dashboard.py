@@ -14,6 +14,7 @@ from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import Scope
 
 from dropanchor_service.api.http.errors import OMLOX_PREFIX
+from dropanchor_service.api.routes.page_bundle import PROGRAMS, bundle, last_change
 
 _HEADERS = {
     "cache-control": "no-cache",
@@ -25,7 +26,11 @@ _HEADERS = {
 
 
 class _Files(StaticFiles):
-    """Files that stay in memory. A page loads more than a hundred, and threads that read them took most of the time."""
+    """Files that stay in memory, and programs that are one file with all their modules."""
+
+    def __init__(self, folder: Path, html: bool = False) -> None:
+        super().__init__(directory=folder, html=html)
+        self._folder = folder.resolve()
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
@@ -35,7 +40,11 @@ class _Files(StaticFiles):
     def file_response(
         self, full_path: PathLike, stat_result: os.stat_result, scope: Scope, status_code: int = 200
     ) -> Response:
-        content, etag = _content(os.fspath(full_path), stat_result.st_mtime_ns)
+        name = os.path.relpath(full_path, self._folder)
+        if name in PROGRAMS:
+            content, etag = _bundled(self._folder, name, last_change(self._folder))
+        else:
+            content, etag = _content(os.fspath(full_path), stat_result.st_mtime_ns)
         response = Response(content, status_code, {"etag": etag}, guess_type(full_path)[0] or "text/plain")
         is_known = self.is_not_modified(response.headers, Headers(scope=scope))
         return NotModifiedResponse(response.headers) if is_known else response
@@ -43,13 +52,21 @@ class _Files(StaticFiles):
 
 @lru_cache(maxsize=512)
 def _content(path: str, changed_ns: int) -> tuple[bytes, str]:  # noqa: ARG001 - a changed file is read again
-    content = Path(path).read_bytes()
+    return _with_etag(Path(path).read_bytes())
+
+
+@lru_cache(maxsize=32)
+def _bundled(folder: Path, program: str, changed_ns: int) -> tuple[bytes, str]:  # noqa: ARG001 - as above
+    return _with_etag(bundle(folder, program).encode())
+
+
+def _with_etag(content: bytes) -> tuple[bytes, str]:
     return content, f'"{sha256(content).hexdigest()[:32]}"'
 
 
 def page_mounts(dashboard: Path) -> list[Mount]:
     """Return the routes of the pages: the dashboard, and the interactive documentation with its program."""
-    swagger_ui = _Files(directory=str(files("fastapi_swagger.resources")))
+    swagger_ui = _Files(Path(str(files("fastapi_swagger.resources"))))
     return [Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui"), DashboardMount(dashboard)]
 
 
@@ -58,7 +75,7 @@ class DashboardMount(Mount):
 
     def __init__(self, folder: Path) -> None:
         """Serve the files in `folder`. Raises RuntimeError when it does not exist."""
-        super().__init__("/", app=_Files(directory=folder, html=True), name="dashboard")
+        super().__init__("/", app=_Files(folder, html=True), name="dashboard")
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         if scope["type"] != "http" or scope["path"].startswith(("/api/", OMLOX_PREFIX, "/metrics")):

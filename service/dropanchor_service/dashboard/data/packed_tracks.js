@@ -40,7 +40,9 @@ export const NUMBERS = /** @type {const} */ ([
   "x", "y", "heading_rad", "speed_mps", "sigma_pos_m", "semi_major_m", "semi_minor_m", "angle_rad",
 ]);
 export const FIGURES = /** @type {const} */ (["poses", "tracked_s", "distance_m", "mean_speed_mps", "max_speed_mps"]);
-export const [TRACKING, DOUBTFUL, UNKNOWN] = [0, 1, 2];
+export const TRACKING = 0;
+export const DOUBTFUL = 1;
+export const UNKNOWN = 2;
 const BETWEEN = ["tracking", "doubtful", "unknown"];
 
 /** Pack tracks. A place in a frame of the tag's own is no place of the map: it is unknown. @param {readonly TagTrack[]} tracks @returns {Packed} */

@@ -17,7 +17,7 @@ export const language = chosen("lang", CODES) ?? CODES.find((code) => code === w
 export const locale = wanted.find((tag) => baseOf(tag) === language && tag !== language) ?? REGIONS[language];
 
 /** @type {{default: Record<string, Message>}} */
-const { default: messages } = await import(`./${language}/messages.js`);
+const { default: messages } = await import(new URL(`./${language}/messages.js`, import.meta.url).href);
 const plurals = new Intl.PluralRules(locale);
 /** @type {Map<number, Intl.NumberFormat>} */
 const formats = new Map();
