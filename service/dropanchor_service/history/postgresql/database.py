@@ -35,6 +35,7 @@ _SESSION = f"""
 SET search_path = {SCHEMA}; SET TimeZone = UTC; SET jit = off; SET max_parallel_workers_per_gather = 0;
 SET statement_timeout = '60s'; SET lock_timeout =
 """
+_LIMITS = "SELECT (extract(epoch FROM now()) * 1e9)::bigint, max(keep_ns), max(max_bytes) FROM sites"
 _SHORTER = "SELECT id, keep_ns FROM sites WHERE keep_ns < (SELECT max(keep_ns) FROM sites)"
 
 
@@ -89,9 +90,11 @@ class Database:
             self._maintained_s = time.monotonic()
 
     def _maintain(self, connection: Connection) -> None:
-        now_ns, days = self._now_ns(), existing_days(connection)
-        found = connection.execute("SELECT max(keep_ns), max(max_bytes) FROM sites").fetchone()
-        keep_ns, max_bytes = found or (0, 0)
+        found = connection.execute(_LIMITS).fetchone()
+        assert found is not None
+        server_ns, keep_ns, max_bytes = found
+        now_ns = min(self._now_ns(), server_ns)  # a service whose clock is ahead must not drop what others keep
+        days = existing_days(connection)
         while days and (days[0] + 1) * DAY_NS <= now_ns - keep_ns:
             drop_day(connection, days.pop(0))
         self.usage.bytes = used_bytes(connection)

@@ -19,9 +19,12 @@ _ATTACH = "ALTER TABLE {table} ATTACH PARTITION {part} FOR VALUES FROM ({start})
 
 def make_days(connection: Connection, days: Iterable[int]) -> None:
     """Make the partitions of these days, counted from 1970, unless they exist."""
+    new = set(days).difference(existing_days(connection))
+    if not new:
+        return
     with connection.transaction():
         lock(connection, 0)
-        for day in set(days).difference(existing_days(connection)):
+        for day in new.difference(existing_days(connection)):
             for table in _TABLES:
                 parts = {"table": Identifier(table), "part": Identifier(_part(table, day))}
                 # A table that is attached later blocks no reader, unlike one that is made as a partition.
