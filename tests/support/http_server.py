@@ -25,7 +25,7 @@ def running_server(
     try:
         yield socket.getsockname()[1]
     finally:
-        server.should_exit = True
+        server.ask_to_stop()
         thread.join(timeout=60)
         assert not thread.is_alive()
         socket.close()

@@ -61,6 +61,8 @@ class ZenohPoses(PeriodicPublisher):
         self._put_frame()
 
     def _put_tags(self) -> None:
+        if self._sites.latest.version == self._tag_version:
+            return
         if not _has_subscribers(self._tag_publisher):
             self._tag_version = self._sites.latest.version
             return
@@ -72,11 +74,11 @@ class ZenohPoses(PeriodicPublisher):
                     self._put(keys.pose_key(site, tag), pose)
 
     def _put_frame(self) -> None:
-        if time.monotonic() < self._frame_due_s or not _has_subscribers(self._frame_publisher):
-            return
-        if self._sites.latest.version == self._frame_version:
+        if self._sites.latest.version == self._frame_version or time.monotonic() < self._frame_due_s:
             return
         self._frame_due_s = time.monotonic() + FRAME_PERIOD_S
+        if not _has_subscribers(self._frame_publisher):
+            return
         self._frame_version, changed = self._sites.latest.since(self._frame_version)
         for answers, _ in self._sites.divided(changed):
             key = keys.poses_key(answers.site.site.id)

@@ -6,7 +6,7 @@ import threading
 import time
 from typing import Any
 
-import uvicorn
+from dropanchor_service.api.http.server import Server
 
 HANDSHAKE_S = 10.0
 
@@ -23,7 +23,7 @@ class _Loop(asyncio.SelectorEventLoop):
 class HttpThread:
     """Serves on a socket that is already bound."""
 
-    def __init__(self, server: uvicorn.Server, bound: socket.socket) -> None:
+    def __init__(self, server: Server, bound: socket.socket) -> None:
         self._server = server
         self._bound = bound
         self._thread = threading.Thread(target=self._run, name="http", daemon=True)
@@ -36,7 +36,7 @@ class HttpThread:
 
     def ask_to_stop(self) -> None:
         """Tell the server to shut down, without waiting."""
-        self._server.should_exit = True
+        self._server.ask_to_stop()
 
     def join(self, timeout_s: float) -> None:
         if self._thread.ident is not None:

@@ -65,7 +65,7 @@ def serving(folder: Path, protocol: type[GuardedProtocol] = GuardedProtocol) -> 
     try:
         yield found
     finally:
-        server.should_exit = True
+        server.ask_to_stop()
         thread.join(TIMEOUT_S)
         assert not thread.is_alive()
 
@@ -84,7 +84,7 @@ def stuck_client(served: TlsServer) -> Iterator[None]:
 
 def test_a_server_stops_in_time_with_a_client_that_does_not_read_its_last_response(tmp_path: Path) -> None:
     with serving(tmp_path) as served, stuck_client(served):
-        served.server.should_exit = True
+        served.server.ask_to_stop()
         began_s = time.monotonic()
         wait_until(lambda: not served.protocols, timeout_s=5.0)
         assert time.monotonic() - began_s < 5.0
