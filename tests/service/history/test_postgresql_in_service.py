@@ -33,10 +33,10 @@ def database(postgresql: Postgresql) -> Iterator[Database]:
 
 
 def driven(bench: ApiBench) -> ApiBench:
-    """Write two hours of two tags, and the summaries."""
-    for second in range(0, 7200, 5):
-        bench.now_ns = T_NS - 7200 * SECOND + second * SECOND
-        state = State.AMBIGUOUS if 3000 < second < 3030 else State.TRACKING
+    """Write an hour of two tags, and the summaries."""
+    for second in range(0, 3600, 5):
+        bench.now_ns = T_NS - HOUR_NS + second * SECOND
+        state = State.AMBIGUOUS if 1500 < second < 1530 else State.TRACKING
         bench.move("a", "b", x=[second / 100, -3.0], y=2.0, speed=[0.2, 0.0], state=state, range=12.5, anchor=[0, -1])
     bench.now_ns = T_NS
     for _ in range(3):
@@ -55,7 +55,7 @@ def driven(bench: ApiBench) -> ApiBench:
         "tags/a/track?limit=100",
         "tags/a/track?format=csv",
         "tags/b/track/file?format=gpx",
-        f"tags/a/pose?at={T_NS - HOUR_NS + SECOND}",
+        f"tags/a/pose?at={T_NS - HOUR_NS // 2 + SECOND}",
         "tags/nobody/track",
     ],
 )
@@ -67,7 +67,7 @@ def test_a_database_answers_what_a_file_answers(benches: tuple[ApiBench, ApiBenc
 
 @pytest.fixture(scope="module")
 def benches(postgresql: Postgresql, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[ApiBench, ApiBench]]:
-    """The same two hours in a file and in a database."""
+    """The same hour in a file and in a database."""
     site = Site(anchors=[Anchor(id="17")], georeference=Georeference(lat=48.1, lon=11.6))
     in_file = make_api_bench(site, tmp_path_factory.mktemp("file"), EVERY_POSE)
     with opened(postgresql.new_database(), T_NS) as database:
