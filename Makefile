@@ -12,7 +12,7 @@ PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/p
 
 RESULTS := service/docs/results
 
-.PHONY: help demo test check bench results install kernels chromium mosquitto clean
+.PHONY: help demo test check bench results install kernels chromium mosquitto postgresql clean
 .DEFAULT_GOAL := help
 
 help:
@@ -54,7 +54,16 @@ mosquitto:
 		apt-get update -qq && apt-get install -y -qq mosquitto >/dev/null; } || \
 		echo 'The MQTT tests need the package mosquitto: without it they are skipped.' >&2
 
-test: install chromium mosquitto
+# A cluster of Debian's own, which the package would make and start, is not needed.
+postgresql:
+	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { \
+		echo '== installing PostgreSQL for the tests of the history in a database'; \
+		mkdir -p /etc/postgresql-common/createcluster.d && \
+		echo 'create_main_cluster = false' >/etc/postgresql-common/createcluster.d/dropanchor.conf && \
+		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
+		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
+
+test: install chromium mosquitto postgresql
 	@echo '== running all tests'
 	@$(BIN)/python -m pytest $(PARALLEL) $(PYTEST)
 
@@ -68,7 +77,7 @@ check: install
 	@$(BIN)/python -m dropanchor_service.reference.export --check
 	@$(BIN)/python -m dropanchor_service.evaluation.results --check
 
-bench: install chromium
+bench: install chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
 results: bench

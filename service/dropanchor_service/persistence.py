@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from pydantic import ValidationError
 
@@ -12,15 +12,22 @@ from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.basemap.file import UnusableFileError
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.tracks import Retention, Tracks
+from dropanchor_service.history.errors import HistoryError
+from dropanchor_service.history.sqlite.store import SqliteStorage
+from dropanchor_service.history.storage import Retention, Storage
+from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
-from dropanchor_service.settings.model import HistorySettings, RecordingSettings, Settings
+from dropanchor_service.settings.history import HistorySettings, RecordingSettings
+from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.site_files import folder_of_site
 from dropanchor_service.store import Sites, SiteStore, TagTable
+
+if TYPE_CHECKING:
+    from dropanchor_service.history.postgresql.database import Database
 
 _log = logging.getLogger(__name__)
 
@@ -32,19 +39,27 @@ class Persistence:
     file that people have filled cannot be read.
     """
 
-    def __init__(self, settings: Settings, tags: TagTable, site: SiteStore, now_ns: Callable[[], int]) -> None:
-        """settings: as of an only site; see `settings_of`."""
+    def __init__(
+        self,
+        settings: Settings,
+        tags: TagTable,
+        site: SiteStore,
+        now_ns: Callable[[], int],
+        database: "Database | None" = None,
+    ) -> None:
+        """settings: as of an only site; see `settings_of`. database: of the history; None where it is in a file."""
         self._settings = settings
         self._opened = ExitStack()
         self.plans = _open_plans(settings.data_dir)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
         self.omlox = _open_omlox(settings)
+        storage = _open_storage(settings, site, now_ns, database)
+        if storage is not None:
+            self.tracks = Tracks(storage, retention_of(settings.history), tags, site)
         folder = settings.data_dir
         if folder is None:
             return
-        if settings.history.enabled:
-            self.tracks = Tracks(folder, retention_of(settings.history), tags, site, now_ns)
         metadata = {
             "engine": settings.engine,
             "paper": settings.paper.model_dump_json(),
@@ -75,13 +90,44 @@ class Persistence:
             if recorder is not None:
                 recorder.record_poses(poses)
 
-        return NO_OBSERVERS if recorder is None else Observers(recorder.record_messages, on_poses)
+        if tracks is None and recorder is None:
+            return NO_OBSERVERS
+        return Observers(NO_OBSERVERS.messages if recorder is None else recorder.record_messages, on_poses)
 
     def problems(self) -> Sequence[str]:
         """Return the problems of the history and the recorder: failing writes and damaged files."""
         of_tracks = [] if self.tracks is None else self.tracks.problems
         of_recorder = None if self.recorder is None else self.recorder.writer.problem
         return [*of_tracks, *([] if of_recorder is None else [of_recorder])]
+
+
+def open_database(settings: Settings, now_ns: Callable[[], int]) -> "Database | None":
+    """Return the database of the history, None where it is in files. Nothing connects yet. Raises SettingsError."""
+    history = settings.history
+    if history.url is None or not history.enabled:
+        return None
+    try:
+        from dropanchor_service.history.postgresql.database import Database
+    except ImportError as error:
+        sentence = "history.url needs the extra `postgresql`: pip install 'dropanchor-service[postgresql]'"
+        raise SettingsError(sentence) from error
+    try:
+        return Database(history.url, history.password_file, now_ns)
+    except HistoryError as error:
+        raise SettingsError(f"history.url: {error}") from error
+
+
+def _open_storage(
+    settings: Settings, site: SiteStore, now_ns: Callable[[], int], database: "Database | None"
+) -> Storage | None:
+    retention = retention_of(settings.history)
+    if not settings.history.enabled:
+        return None
+    if database is not None:
+        from dropanchor_service.history.postgresql.store import PostgresqlStorage
+
+        return PostgresqlStorage(database, site.site.id, retention, now_ns)
+    return None if settings.data_dir is None else SqliteStorage(settings.data_dir, retention, now_ns)
 
 
 def retention_of(settings: HistorySettings) -> Retention:

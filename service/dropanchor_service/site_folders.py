@@ -8,9 +8,11 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence, open_basemap, settings_of
+from dropanchor_service.persistence import Persistence, open_basemap, open_database, settings_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
+
+MOST_NAMED = 3  # sites that share a problem, such as a database that is away
 
 
 class SiteFolders:
@@ -22,7 +24,10 @@ class SiteFolders:
     def __init__(self, settings: Settings, sites: Sites, now_ns: Callable[[], int], metrics: Metrics) -> None:
         self._sites = sites
         self._opened = ExitStack()
-        self.all = [Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns) for site in sites]
+        database = open_database(settings, now_ns)
+        self.all = [
+            Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns, database) for site in sites
+        ]
         self.basemap = open_basemap(settings, [site.store for site in sites])
         if tracks := [one.tracks for one in self.all if one.tracks is not None]:
             metrics.register(HistoryMetrics(*tracks))
@@ -42,11 +47,14 @@ class SiteFolders:
         self._opened.close()
 
     def problems(self) -> Sequence[str]:
-        """Return what cannot be written or read, with several sites for each."""
+        """Return what cannot be written or read, with several sites with their names."""
         if len(self.all) == 1:
             return self.all[0].problems()
-        found = zip(self._sites, self.all, strict=True)
-        return [f"site {site.id}: {problem}" for site, one in found for problem in one.problems()]
+        of_problem: dict[str, list[str]] = {}
+        for site, one in zip(self._sites, self.all, strict=True):
+            for problem in one.problems():
+                of_problem.setdefault(problem, []).append(site.id)
+        return [f"{_named(sites)}: {problem}" for problem, sites in of_problem.items()]
 
     @property
     def observers(self) -> Observers:
@@ -74,3 +82,10 @@ class SiteFolders:
 
     def _records(self) -> bool:
         return any(one.recorder is not None and one.recorder.running is not None for one in self.all)
+
+
+def _named(sites: Sequence[str]) -> str:
+    """Return the names of the sites that share a problem, of many the first ones."""
+    first = ", ".join(sites[:MOST_NAMED])
+    more = f" and {len(sites) - MOST_NAMED} more" if len(sites) > MOST_NAMED else ""
+    return f"site{'s' if len(sites) > 1 else ''} {first}{more}"

@@ -9,6 +9,7 @@ SOURCES = {
     "capacity": _WHOLE,
     "delivery": ("delivery",),
     "engines": ("estimation",),
+    "history": ("history",),
     "idle": _WHOLE,
     "overload": _WHOLE,
     "page": ("dashboard",),

@@ -16,8 +16,9 @@ from playwright.sync_api import Browser
 from benchmarks import report
 from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.estimation.columns import POSE, Array, State
-from dropanchor_service.history.track_file import TrackWriter
-from dropanchor_service.history.tracks import FILE_NAME, Retention
+from dropanchor_service.history.sqlite.store import FILE_NAME
+from dropanchor_service.history.sqlite.track_file import TrackWriter
+from dropanchor_service.history.storage import Retention
 from service.dashboard.place import Place, live_api_bench
 from support.browser import WatchedPage, running_chromium, watched_page
 from support.http_server import running_server

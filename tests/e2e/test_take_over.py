@@ -20,7 +20,7 @@ from dropanchor_schemas.epochs import EpochFence
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.commands.serve import EXIT_GONE
 from support.live_tags import LiveTags, distance, is_current, samples_of
-from support.postgresql import PostgreSql, needs_postgresql, running_postgresql
+from support.postgresql import Postgresql, needs_postgresql, running_postgresql
 from support.relay import running_relay
 from support.service import Running, command, environment, running_service
 from support.zenoh_router import connected_session, wait_until
@@ -66,7 +66,7 @@ class Reader:
 class Cluster:
     """Services that are named a and b, with the sites of the tags."""
 
-    def __init__(self, folder: Path, database: PostgreSql, router: str, tags: LiveTags, opened: ExitStack) -> None:
+    def __init__(self, folder: Path, database: Postgresql, router: str, tags: LiveTags, opened: ExitStack) -> None:
         self._folder = folder
         self._router = router
         self._opened = opened
@@ -77,7 +77,7 @@ class Cluster:
             self.config = self._write_settings(name, database.port)
 
     def _write_settings(self, name: str, port: int) -> Path:
-        url = self.database.url.replace(str(self.database.port), str(port))
+        url = self.database.url().replace(str(self.database.port), str(port))
         cluster = (f'url = "{url}"', 'bucket = "yard"', f'name = "{name}"', f"lease_s = {LEASE_S}")
         return self._tags.write_settings(self._folder / name, "[cluster]", *cluster)
 
@@ -89,7 +89,7 @@ class Cluster:
         return self._opened.enter_context(service)
 
     def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        words = command("cluster", *arguments, "--url", self.database.url)
+        words = command("cluster", *arguments, "--url", self.database.url())
         return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=60)
 
 
@@ -178,7 +178,7 @@ def test_each_failure_of_an_owner_leaves_one_owner_and_loses_no_sample(
     assert accepted == sorted(accepted)
 
 
-def _database_away(database: PostgreSql, owner: Running, standby: Running) -> None:
+def _database_away(database: Postgresql, owner: Running, standby: Running) -> None:
     database.stop()
     wait_for(owner, '"ready"', "goes on as the owner of yard, epoch 1, until another one takes over")
     wait_for(standby, "cannot reach the database")

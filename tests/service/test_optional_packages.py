@@ -43,7 +43,7 @@ def test_the_service_with_the_engine_fleet_starts_without_them() -> None:
 
 def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_installed() -> None:
     """numba imports the package scipy itself, to compare versions, but nothing in it."""
-    loaded = "import sys; print(*{'filterpy', 'matplotlib', 'scipy.linalg', 'sympy'} & set(sys.modules))"
+    loaded = "import sys; print(*{'filterpy', 'matplotlib', 'psycopg', 'scipy.linalg', 'sympy'} & set(sys.modules))"
     ended = python("-c", SERVICE_AND_ENGINE + loaded, timeout_s=COMPILING_S)
     assert (ended.returncode, ended.stdout.split()) == (0, [])
 

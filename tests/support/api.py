@@ -21,7 +21,11 @@ from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
-from dropanchor_service.history.tracks import Retention, Tracks
+from dropanchor_service.history.postgresql.database import Database
+from dropanchor_service.history.postgresql.store import PostgresqlStorage
+from dropanchor_service.history.sqlite.store import SqliteStorage
+from dropanchor_service.history.storage import Retention, Storage
+from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.security.identity import Authenticator
@@ -95,16 +99,24 @@ class ApiBench:
 
 
 def make_api_bench(
-    site: Site | None = None, folder: Path | None = None, retention: Retention | None = None
+    site: Site | None = None,
+    folder: Path | None = None,
+    retention: Retention | None = None,
+    database: Database | None = None,
 ) -> ApiBench:
     """Return a bench around a site, by default with one anchor.
 
     folder: where the site and the history are stored. retention: with it there is a history, which has no thread:
-    `ApiBench.write_history` writes it.
+    `ApiBench.write_history` writes it. database: where the history is, in place of the folder.
     """
     store = SiteStore(site or Site(anchors=[Anchor(id="17")]), {}, folder)
     tags = TagTable()
-    tracks = Tracks(folder, retention, tags, store, lambda: bench.now_ns) if folder and retention else None
+    storage: Storage | None = None
+    if retention and database:
+        storage = PostgresqlStorage(database, store.site.id, retention, lambda: bench.now_ns)
+    elif retention and folder:
+        storage = SqliteStorage(folder, retention, lambda: bench.now_ns)
+    tracks = Tracks(storage, retention, tags, store) if retention and storage else None
     bench = ApiBench(Answers(store, tags, LatestPoses(), tracks=tracks, pending_tags=PendingTags(10)))
     bench.answers.now_ns = lambda: bench.now_ns
     return bench

@@ -1,108 +1,120 @@
-"""Run Debian's PostgreSQL on loopback, in a folder of its own."""
+"""Run Debian's PostgreSQL on loopback, without fsync, and make databases in it."""
 
 import os
 import pwd
 import shutil
 import signal
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from typing import Any
 
 import psycopg
 import pytest
 
 from support.zenoh_router import free_port, wait_until
 
-USER = "postgres"  # the server refuses to run as root
-
-
-@cache
-def _programs() -> Path | None:
-    """Return the folder with `initdb` and `postgres`, None if they are not installed."""
-    found = [*sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)]
-    on_path = shutil.which("initdb")
-    return next((folder for folder in [*found, *([Path(on_path).parent] if on_path else [])]), None)
-
-
-needs_postgresql = pytest.mark.skipif(
-    _programs() is None, reason="PostgreSQL is not installed: apt-get install postgresql"
+_DEBIAN = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+_INITDB = str(_DEBIAN[-1]) if _DEBIAN else shutil.which("initdb")
+WHY_NOT = "PostgreSQL is not installed: apt-get install postgresql"
+needs_postgresql = pytest.mark.skipif(_INITDB is None, reason=WHY_NOT)
+_USER = "postgres"  # whom Debian's package makes: PostgreSQL refuses to run as root
+_QUICK = (
+    "fsync=off",
+    "shared_buffers=32MB",
+    "listen_addresses=127.0.0.1",
+    "unix_socket_directories=",
+    "autovacuum=off",
 )
+_numbers = count()
 
 
 @dataclass
-class PostgreSql:
-    """A server. url: of its database `postgres`."""
+class Postgresql:
+    """A server. The role `dropanchor` may do everything."""
 
     folder: Path
-    port: int
+    options: tuple[str, ...] = ()
+    port: int = field(default_factory=free_port)
     process: "subprocess.Popen[bytes] | None" = None
 
-    @property
-    def url(self) -> str:
-        return f"postgresql://{USER}@127.0.0.1:{self.port}/postgres"
-
     def start(self) -> None:
-        """Start the server, and wait until it answers."""
-        options = ("-c", "listen_addresses=127.0.0.1", "-c", "unix_socket_directories=", "-c", "fsync=off")
-        words = [str(_program("postgres")), "-D", str(self.folder), "-p", str(self.port), *options]
-        self.process = subprocess.Popen(words, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, user=_user())
+        options = [word for option in (*_QUICK, *self.options) for word in ("-c", option)]
+        command = [_program("postgres"), "-D", f"{self.folder}/data", "-p", str(self.port), *options]
+        log = self.folder / "log"
+        with log.open("ab") as file:
+            self.process = subprocess.Popen(command, stderr=file, stdout=file, user=_user(), group=_group())
         wait_until(self._answers)
 
     def stop(self) -> None:
-        """Stop the server as a crash does."""
+        """Stop the server at once, and end its connections."""
         if self.process is not None:
-            self.process.send_signal(signal.SIGQUIT)
-            self.process.wait(30)
+            self.process.send_signal(signal.SIGINT)
+            self.process.wait()
             self.process = None
 
-    def connect(self) -> "psycopg.Connection[tuple[object, ...]]":
-        return psycopg.connect(self.url, autocommit=True)
+    def url(self, database: str = "postgres", user: str = "dropanchor") -> str:
+        return f"postgresql://{user}@127.0.0.1:{self.port}/{database}"
+
+    def new_database(self) -> str:
+        """Return the URL of an empty database."""
+        name = f"d{next(_numbers)}"
+        self.run(self.url(), f"CREATE DATABASE {name}")
+        return self.url(name)
+
+    def connect(self, url: str | None = None) -> "psycopg.Connection[tuple[Any, ...]]":
+        return psycopg.connect(url or self.url(), autocommit=True)
+
+    def run(self, url: str, *statements: str) -> list[tuple[Any, ...]]:
+        """Run SQL and return the rows of the last statement."""
+        with self.connect(url) as connection:
+            for statement in statements:
+                cursor = connection.execute(statement)
+            return cursor.fetchall() if cursor.description else []
 
     def _answers(self) -> bool:
         try:
-            self.connect().close()
+            return self.run(self.url(), "SELECT 1") == [(1,)]
         except psycopg.OperationalError:
             return False
-        return True
 
 
 @contextmanager
-def running_postgresql() -> Iterator[PostgreSql]:
-    """Run a server with an empty database until the block ends."""
-    with TemporaryDirectory(prefix="postgresql-") as folder:
-        if os.geteuid() == 0:
-            os.chown(folder, pwd.getpwnam(USER).pw_uid, -1)
-        words = [
-            str(_program("initdb")),
-            "-D",
-            folder,
-            "-U",
-            USER,
-            "--auth=trust",
-            "--no-sync",
-            "--locale=C",
-            "-E",
-            "UTF8",
-        ]
-        subprocess.run(words, check=True, capture_output=True, user=_user())
-        server = PostgreSql(Path(folder), free_port())
-        try:
-            server.start()
-            yield server
-        finally:
-            server.stop()
+def running_postgresql(*options: str) -> Iterator[Postgresql]:
+    """Run a server until the block ends."""
+    folder = Path(tempfile.mkdtemp(prefix="dropanchor-pg-"))
+    server = Postgresql(folder, options)
+    try:
+        if _user() is not None:
+            shutil.chown(folder, _USER)
+        make = [_program("initdb"), "-D", f"{folder}/data", "--no-sync", "-A", "trust", "-U", "dropanchor"]
+        subprocess.run(
+            [*make, "--locale=C", "-E", "UTF8"],
+            check=True,
+            capture_output=True,
+            user=_user(),
+            group=_group(),
+            cwd=folder,
+        )
+        server.start()
+        yield server
+    finally:
+        server.stop()
+        shutil.rmtree(folder)
 
 
-def _program(name: str) -> Path:
-    folder = _programs()
-    assert folder is not None
-    return folder / name
+def _program(name: str) -> str:
+    assert _INITDB is not None, WHY_NOT
+    return str(Path(_INITDB).with_name(name))
 
 
-def _user() -> str | None:
-    """Return the user to run as, None for the one of this process."""
-    return USER if os.geteuid() == 0 else None
+def _user() -> int | None:
+    return pwd.getpwnam(_USER).pw_uid if os.geteuid() == 0 else None
+
+
+def _group() -> int | None:
+    return pwd.getpwnam(_USER).pw_gid if os.geteuid() == 0 else None

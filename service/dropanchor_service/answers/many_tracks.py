@@ -17,7 +17,7 @@ _BETWEEN = [BetweenName[between.name].value for between in Between]
 def many_tracks(
     tracks: Tracks, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int
 ) -> dict[str, Any]:
-    """Return the `Tracks` of these tags, or of all. Raises sqlite3.Error and TooMuchError."""
+    """Return the `Tracks` of these tags, or of all. Raises HistoryError and TooMuchError."""
     found = tracks.overview(tags, from_ns, to_ns, max_points)
     columns = _columns(found.points["point"], found.points["since_previous"])
     begins = np.searchsorted(found.points["tag"], found.figures["tag"])

@@ -1,6 +1,5 @@
 """Answer from the history on disk: a page of a track, or the pose at a time long ago."""
 
-import sqlite3
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
 from dropanchor_service.answers.times import isos_utc
 from dropanchor_service.estimation.columns import Array, Frame
+from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.records import StoredPoses
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.site import SiteStore
@@ -36,7 +36,7 @@ class TrackPage:
 
 
 def track_page(tracks: Tracks, site: SiteStore, tag: str, from_ns: int, to_ns: int, limit: int) -> TrackPage:
-    """Return the first `limit` poses from `from_ns` to `to_ns`, both included. Raises sqlite3.Error."""
+    """Return the first `limit` poses from `from_ns` to `to_ns`, both included. Raises HistoryError."""
     found = tracks.poses(tag, from_ns, to_ns, limit + 1)
     next_ns = int(found.poses["t_ns"][limit]) if len(found.poses) > limit else None
     return TrackPage(_columns(StoredPoses(found.poses[:limit], found.anchors[:limit]), site), next_ns)
@@ -52,7 +52,7 @@ def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_n
         after = tracks.poses(tag, t_ns, t_ns + FAR_NS, 1)
         if len(memory) == len(before.poses) == len(after.poses) == 0 and not tracks.has_tag(tag):
             return None
-    except sqlite3.Error as error:
+    except HistoryError as error:
         raise NoPoseThenError(f"the history cannot be read ({error})") from error
     earlier = [*_indexed(before, site), *memory[memory["t_ns"] <= t_ns][-1:]]
     later = [*_indexed(after, site), *memory[memory["t_ns"] >= t_ns][:1]]

@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from dropanchor_service.history.damaged_file import is_damage, move_aside
+from dropanchor_service.history.sqlite.damaged_file import is_damage, move_aside
 
 FILE_NAME = "events.sqlite"
 VERSION = 3

@@ -1,16 +1,15 @@
 """Read for how long tags were where over a period of any length, as squares of one size."""
 
 import math
-import sqlite3
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.bulk_reading import summaries_of_poses
 from dropanchor_service.history.covering import Cover, Window
 from dropanchor_service.history.heat_cells import NO_HEAT, SIZES, SMALLEST_M, Heat, heat_in, heat_of_each, joined
+from dropanchor_service.history.stored import StoredTracks
 from dropanchor_service.history.summary_table import DAY
 from dropanchor_service.store.records import take
 
@@ -33,27 +32,23 @@ class HeatMap:
     left_out_s: float
 
 
-def read_heat_map(
-    connection: sqlite3.Connection, tags: Sequence[str] | None, from_ns: int, to_ns: int, cell_m: float
-) -> HeatMap:
+def read_heat_map(stored: StoredTracks, tags: Sequence[str] | None, from_ns: int, to_ns: int, cell_m: float) -> HeatMap:
     """Return where the tags, or all, were between two times, both included, in squares of at least `cell_m`.
 
-    Raises sqlite3.Error and TooMuchError.
+    Raises the errors of `StoredTracks` and TooMuchError.
     """
-    known = {name: number for number, name in connection.execute("SELECT id, name FROM tags")}
+    known = {name: number for number, name in stored.tag_names().items()}
     wanted = None if tags is None else sorted(known[tag] for tag in set(tags) & known.keys())
     if wanted == [] or not known:
         return heat_map_of(NO_HEAT, cell_m)
-    parts = _parts(connection, wanted, len(known if wanted is None else wanted), from_ns, to_ns)
+    parts = _parts(stored, wanted, len(known if wanted is None else wanted), from_ns, to_ns)
     return heat_map_of(joined(list(parts)), cell_m)
 
 
-def _parts(
-    connection: sqlite3.Connection, tags: Sequence[int] | None, count: int, from_ns: int, to_ns: int
-) -> Iterator[Heat]:
-    for piece in Cover(connection, "heat", ("heads", "cells"), count).pieces(DAY, from_ns, to_ns):
+def _parts(stored: StoredTracks, tags: Sequence[int] | None, count: int, from_ns: int, to_ns: int) -> Iterator[Heat]:
+    for piece in Cover(stored, "heat", count).pieces(DAY, from_ns, to_ns):
         if isinstance(piece, Window):
-            for poses in summaries_of_poses(connection, piece.from_ns, piece.to_ns, tags):
+            for poses in stored.summaries_of_poses(piece.from_ns, piece.to_ns, tags):
                 yield heat_of_each(poses["tag"], poses["first"])
         else:
             yield heat_in(piece, tags)

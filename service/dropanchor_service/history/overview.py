@@ -4,20 +4,20 @@ A short period is read pose by pose, a longer one from the summaries. Where a su
 only a part of its stretch, the next finer level and in the end the poses take its place.
 """
 
-import sqlite3
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.bulk_reading import summaries_in, summaries_of_poses
 from dropanchor_service.history.covering import Cover, Window
+from dropanchor_service.history.stored import StoredTracks
 from dropanchor_service.history.summaries import (
     SUMMARY,
     TRACK_POINT,
     in_order,
     points_of,
+    summaries_in,
     summary_per_tag,
     thinned,
 )
@@ -41,19 +41,19 @@ EMPTY = Overview({}, np.empty(0, SUMMARY), np.empty(0, TRACK_POINT))
 
 
 def read_overview(
-    connection: sqlite3.Connection, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int
+    stored: StoredTracks, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int
 ) -> Overview:
     """Return the figures of each tag, and at most `max_points` points, between two times, both included.
 
-    tags: None for all tags. Raises sqlite3.Error and TooMuchError.
+    tags: None for all tags. Raises the errors of `StoredTracks` and TooMuchError.
     """
-    every = dict(connection.execute("SELECT id, name FROM tags"))
+    every = stored.tag_names()
     wanted = None if tags is None else set(tags)
     names = every if wanted is None else {number: name for number, name in every.items() if name in wanted}
     if not names:
         return EMPTY
     level = _level(len(names), to_ns - from_ns)
-    found = _summaries(connection, None if tags is None else sorted(names), len(names), level, from_ns, to_ns)
+    found = _summaries(stored, None if tags is None else sorted(names), len(names), level, from_ns, to_ns)
     summaries = in_order(np.concatenate([np.empty(0, SUMMARY), *found]))
     allowed = min(max_points, max(2, MAX_POINTS // len(names)))
     points = thinned(points_of(summaries), allowed)
@@ -68,12 +68,12 @@ def _level(tags: int, span_ns: int) -> int:
 
 
 def _summaries(
-    connection: sqlite3.Connection, tags: Sequence[int] | None, count: int, level: int, from_ns: int, to_ns: int
+    stored: StoredTracks, tags: Sequence[int] | None, count: int, level: int, from_ns: int, to_ns: int
 ) -> Iterator[Array]:
     """Yield SUMMARY arrays of disjoint stretches that cover the time: of each pose at level -1, else longer ones."""
-    for piece in Cover(connection, "summaries", ("tags",), count).pieces(level, from_ns, to_ns):
+    for piece in Cover(stored, "summaries", count).pieces(level, from_ns, to_ns):
         if isinstance(piece, Window):
-            for poses in summaries_of_poses(connection, piece.from_ns, piece.to_ns, tags):
+            for poses in stored.summaries_of_poses(piece.from_ns, piece.to_ns, tags):
                 yield poses if level < FINE else summary_per_tag(in_order(poses))
         else:
             yield summaries_in([blob for (blob,) in piece], tags)

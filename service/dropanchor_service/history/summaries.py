@@ -4,6 +4,7 @@ Two neighbouring stretches have the summary of the whole: their sums, and what l
 and the first pose of the other. A single pose is the summary of its instant.
 """
 
+from collections.abc import Sequence
 from enum import IntEnum
 
 import numpy as np
@@ -51,6 +52,12 @@ def summary_of_each(tags: Array, points: Array) -> Array:
     summaries["tag"], summaries["first"], summaries["last"], summaries["poses"] = tags, points, points, 1
     summaries["max_speed"] = np.where(_tracked(points), np.abs(points["speed"]), np.nan)
     return summaries
+
+
+def summaries_in(blobs: Sequence[bytes], tags: Sequence[int] | None) -> Array:
+    """Return the SUMMARY records in these blobs, only those of the tags with these numbers."""
+    summaries = np.frombuffer(b"".join(blobs), SUMMARY)
+    return summaries if tags is None else take(summaries, np.isin(summaries["tag"], tags))
 
 
 def in_order(summaries: Array) -> Array:

@@ -19,7 +19,8 @@ class HistoryMetrics(Collector):
 
     def collect(self) -> Iterable[Metric]:
         tracks = self._tracks
-        written, used = sum(one.written for one in tracks), sum(one.used_bytes for one in tracks)
+        written, usages = sum(one.written for one in tracks), {id(one.usage): one.usage for one in tracks}
+        used = sum(usage.bytes for usage in usages.values())
         yield CounterMetricFamily("dropanchor_history_poses", "Poses written to the history.", written)
         yield GaugeMetricFamily("dropanchor_history_bytes", "Bytes that the history uses.", used)
         yield CounterMetricFamily(

@@ -3,6 +3,7 @@
 import logging
 import sqlite3
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
@@ -10,6 +11,7 @@ from typing import Generic, TypeVar
 from dropanchor_service.runtime.logs import RareLog
 
 RETRY_S = 1.0
+STUCK_S = 30.0
 
 Item = TypeVar("Item")
 Write = Callable[[Sequence[Item]], None]
@@ -37,7 +39,8 @@ class BackgroundWriter(Generic[Item]):
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self.dropped = 0
         self.errors = 0
-        self.problem: str | None = None
+        self._problem: str | None = None
+        self._began_s: float | None = None  # while `write` runs
 
     def start(self) -> None:
         self._thread.start()
@@ -47,6 +50,14 @@ class BackgroundWriter(Generic[Item]):
         self._stop.set()
         self._flush_now.set()
         self._thread.join(timeout_s)
+
+    @property
+    def problem(self) -> str | None:
+        """Why nothing can be written now: the last error, or a write that does not return."""
+        began_s = self._began_s
+        if began_s is not None and time.monotonic() - began_s > STUCK_S:
+            return f"{self._name} cannot be written: a write has taken more than {STUCK_S:.0f} s"
+        return self._problem
 
     @property
     def is_alive(self) -> bool:
@@ -85,6 +96,7 @@ class BackgroundWriter(Generic[Item]):
         """
         count = len(self._queue)
         taken = [self._queue[index] for index in range(count)]
+        self._began_s = time.monotonic()
         try:
             self._write([item for item, _, _ in taken])
         except (OSError, sqlite3.Error) as error:
@@ -96,7 +108,9 @@ class BackgroundWriter(Generic[Item]):
             self._log.exception(self._name, error)
             self.dropped += sum(entry[2] for entry in taken)
         else:
-            self.problem = None
+            self._problem = None
+        finally:
+            self._began_s = None
         with self._lock:
             for _ in range(count):
                 self._bytes -= self._queue.popleft()[1]
@@ -104,4 +118,4 @@ class BackgroundWriter(Generic[Item]):
 
     def _record_error(self, error: Exception) -> None:
         self.errors += 1
-        self.problem = f"{self._name} cannot be written: {error}"
+        self._problem = f"{self._name} cannot be written: {error}"

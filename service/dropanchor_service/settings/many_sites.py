@@ -3,7 +3,7 @@
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 
-MOST_WITH_FILES = 100  # that write a history or record at once: each has files and a thread of its own
+MOST_WITH_FILES = 100  # that write a history or record at once: each has a thread of its own, and perhaps files
 
 
 def refuse_too_many_sites(settings: Settings) -> None:
@@ -11,7 +11,7 @@ def refuse_too_many_sites(settings: Settings) -> None:
     if len(settings.sites) <= MOST_WITH_FILES:
         return
     with_files = {
-        "history": settings.data_dir is not None and settings.history.enabled,
+        "history": settings.history.enabled and (settings.data_dir or settings.history.url) is not None,
         "recording": settings.recording.enabled,
     }
     found = [

@@ -15,6 +15,7 @@ from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameter
 from dropanchor_service.settings.basemap import BasemapSettings
 from dropanchor_service.settings.cluster import ClusterSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
+from dropanchor_service.settings.history import HistorySettings, RecordingSettings
 from dropanchor_service.settings.ids import SettingsId
 from dropanchor_service.settings.quota import Quota, UnknownTags
 from dropanchor_service.settings.sites import ScopeName, SiteSettings
@@ -147,44 +148,6 @@ class IngestSettings(_Section):
     buffer_mib: Annotated[float, Field(gt=0, le=4096)] = Field(
         default=64.0,
         description="Memory for waiting messages. When it is full, the busiest tags lose their oldest ones.",
-    )
-
-
-class HistorySettings(_Section):
-    """Which poses the history in `data_dir` keeps, and for how long."""
-
-    enabled: bool = Field(default=True, description="Whether to keep a history. It needs a `data_dir`.")
-    period_s: Annotated[float, Field(gt=0, le=3600)] = Field(
-        default=1.0, description="Keep at most one pose of a tag per period."
-    )
-    distance_m: Annotated[float, Field(ge=0, le=1000)] = Field(
-        default=0.1, description="Leave out a pose that is nearer than this to the one before and in the same state."
-    )
-    still_s: Annotated[float, Field(ge=0, le=3600)] = Field(
-        default=5.0,
-        description="But keep one after this time, even of a tag that stands. Beyond 10 s, no pose can be "
-        "interpolated in between.",
-    )
-    keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older poses.")
-    most_mib: Annotated[float, Field(ge=1)] = Field(
-        default=4096.0, description="Size of the history; the oldest poses make room."
-    )
-
-
-class RecordingSettings(_Section):
-    """What to record in `data_dir`/recordings, and for how long to keep it."""
-
-    enabled: bool = Field(default=False, description="Record from the start; otherwise when REST asks for it.")
-    tags: tuple[SettingsId, ...] = Field(default=(), description="Record only these tags from the start; empty: all.")
-    pose_period_s: Annotated[float, Field(gt=0, le=3600)] = Field(
-        default=0.2, description="Record at most one pose of a tag per period. All samples are recorded."
-    )
-    file_mib: Annotated[float, Field(ge=0.01)] = Field(default=256.0, description="Finish a file that is larger.")
-    file_minutes: Annotated[float, Field(gt=0)] = Field(default=60.0, description="Finish a file that is older.")
-    keep_files: Annotated[int, Field(ge=1)] = Field(default=10_000, description="Number of files to keep.")
-    keep_days: Annotated[float, Field(gt=0, le=36_500)] = Field(default=30.0, description="Delete older files.")
-    most_mib: Annotated[float, Field(ge=1)] = Field(
-        default=16_384.0, description="Size of all files; the oldest make room."
     )
 
 

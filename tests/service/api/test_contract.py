@@ -13,7 +13,7 @@ from schemathesis.specs.openapi.checks import negative_data_rejection, positive_
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.wire import ENCODING_PACKED
 from dropanchor_service.basemap.basemap import ServedBasemap
-from dropanchor_service.history.tracks import Retention
+from dropanchor_service.history.storage import Retention
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
 from support.api import make_api_bench

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import pytest
 
 from dropanchor_service.cluster.database import make_tables
-from support.postgresql import PostgreSql, running_postgresql
+from support.postgresql import Postgresql, running_postgresql
 
 
 @pytest.fixture(scope="session")
-def database() -> Iterator[PostgreSql]:
+def database() -> Iterator[Postgresql]:
     with running_postgresql() as server:
         with server.connect() as connection:
             make_tables(connection)

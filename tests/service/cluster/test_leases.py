@@ -16,7 +16,7 @@ from dropanchor_service.cluster.owner import Renewal
 from dropanchor_service.cluster.shared_state import CheckpointRow, save_document
 from dropanchor_service.cluster.tenure import Standing, Tenure
 from dropanchor_service.commands import cluster as command
-from support.postgresql import PostgreSql, needs_postgresql
+from support.postgresql import Postgresql, needs_postgresql
 from support.zenoh_router import wait_until
 
 pytestmark = needs_postgresql
@@ -32,8 +32,8 @@ CREATE TRIGGER full_disk BEFORE UPDATE ON dropanchor_checkpoint
 """
 
 
-def claimed(database: PostgreSql, bucket: str, who: Claimant = A) -> Claim:
-    with connect(database.url, who.name) as connection:
+def claimed(database: Postgresql, bucket: str, who: Claimant = A) -> Claim:
+    with connect(database.url(), who.name) as connection:
         claim = leases.claim(connection, leases.seen_or_new(connection, bucket), who)
     assert claim is not None
     return claim
@@ -43,19 +43,19 @@ def snapshot(*numbers: float) -> Snapshot:
     return Snapshot({"numbers": np.array(numbers)}, {"site": "yard"})
 
 
-def row(database: PostgreSql, bucket: str, claim: Claim, layout: str = "layout") -> CheckpointRow:
-    kept = CheckpointRow(partial(connect, database.url, "a"), bucket, layout, snapshot())
+def row(database: Postgresql, bucket: str, claim: Claim, layout: str = "layout") -> CheckpointRow:
+    kept = CheckpointRow(partial(connect, database.url(), "a"), bucket, layout, snapshot())
     kept.own(claim)
     return kept
 
 
-def test_of_all_that_saw_the_same_lease_one_claims_it(database: PostgreSql) -> None:
-    with connect(database.url, "all") as connection:
+def test_of_all_that_saw_the_same_lease_one_claims_it(database: Postgresql) -> None:
+    with connect(database.url(), "all") as connection:
         seen = leases.seen_or_new(connection, "race")
     claims: list[Claim | None] = []
 
     def claim() -> None:
-        with connect(database.url, "one") as connection:
+        with connect(database.url(), "one") as connection:
             claims.append(leases.claim(connection, seen, A))
 
     threads = [threading.Thread(target=claim) for _ in range(8)]
@@ -67,9 +67,9 @@ def test_of_all_that_saw_the_same_lease_one_claims_it(database: PostgreSql) -> N
     assert [each for each in claims if each is not None] == [Claim(1, b"", {})]
 
 
-def test_a_lease_that_was_renewed_since_it_was_seen_is_not_claimed(database: PostgreSql) -> None:
+def test_a_lease_that_was_renewed_since_it_was_seen_is_not_claimed(database: Postgresql) -> None:
     claim = claimed(database, "renewed")
-    with connect(database.url, "b") as connection:
+    with connect(database.url(), "b") as connection:
         seen = leases.read(connection, "renewed")
         assert seen is not None
         assert leases.renew(connection, "renewed", claim.epoch)
@@ -79,8 +79,8 @@ def test_a_lease_that_was_renewed_since_it_was_seen_is_not_claimed(database: Pos
         assert not leases.renew(connection, "renewed", claim.epoch - 1)
 
 
-def test_a_former_owner_can_write_neither_checkpoint_nor_sites_and_its_successor_has_both(database: PostgreSql) -> None:
-    reach = partial(connect, database.url, "a")
+def test_a_former_owner_can_write_neither_checkpoint_nor_sites_and_its_successor_has_both(database: Postgresql) -> None:
+    reach = partial(connect, database.url(), "a")
     first = claimed(database, "fenced")
     kept = row(database, "fenced", first)
     assert kept.newest() == (None, [])
@@ -110,10 +110,10 @@ def test_a_former_owner_can_write_neither_checkpoint_nor_sites_and_its_successor
         "DELETE FROM dropanchor_lease WHERE bucket = 'edited'",
     ],
 )
-def test_an_owner_leaves_a_lease_that_was_edited_and_the_epoch_still_grows(database: PostgreSql, edit: str) -> None:
+def test_an_owner_leaves_a_lease_that_was_edited_and_the_epoch_still_grows(database: Postgresql, edit: str) -> None:
     claim = claimed(database, "edited")
     tenure = Tenure(claim.epoch, 2.0, lambda: 0.0, lambda: True, asked_s=0.0)
-    with Renewal(partial(connect, database.url, "a"), "edited", 0.2, tenure):
+    with Renewal(partial(connect, database.url(), "a"), "edited", 0.2, tenure):
         with database.connect() as connection:
             connection.execute(edit)
         wait_until(lambda: tenure.standing is Standing.LOST)
@@ -121,20 +121,20 @@ def test_an_owner_leaves_a_lease_that_was_edited_and_the_epoch_still_grows(datab
     assert claimed(database, "edited", B).epoch == claim.epoch + 1
 
 
-def test_an_owner_renews_and_gives_its_bucket_back_when_it_stops(database: PostgreSql) -> None:
+def test_an_owner_renews_and_gives_its_bucket_back_when_it_stops(database: Postgresql) -> None:
     claim = claimed(database, "stopped")
     tenure = Tenure(claim.epoch, 2.0, lambda: 0.0, lambda: True, asked_s=0.0)
-    with connect(database.url, "b") as connection:
-        with Renewal(partial(connect, database.url, "a"), "stopped", 0.2, tenure):
+    with connect(database.url(), "b") as connection:
+        with Renewal(partial(connect, database.url(), "a"), "stopped", 0.2, tenure):
             wait_until(lambda: leases.seen_or_new(connection, "stopped").renewals >= 2)
         assert leases.seen_or_new(connection, "stopped").owner == ""
 
 
-def test_a_lease_that_was_moved_is_left_only_when_the_successor_is_there(database: PostgreSql) -> None:
+def test_a_lease_that_was_moved_is_left_only_when_the_successor_is_there(database: Postgresql) -> None:
     claim = claimed(database, "moved")
     tenure = Tenure(claim.epoch, 2.0, lambda: 0.0, lambda: True, asked_s=0.0)
-    with Renewal(partial(connect, database.url, "a"), "moved", 0.2, tenure):
-        with connect(database.url, "b") as connection:
+    with Renewal(partial(connect, database.url(), "a"), "moved", 0.2, tenure):
+        with connect(database.url(), "b") as connection:
             leases.set_moving(connection, "moved", True)
         successor = claimed(database, "moved", B)
         wait_until(lambda: tenure.standing is Standing.LEAVING)
@@ -142,11 +142,14 @@ def test_a_lease_that_was_moved_is_left_only_when_the_successor_is_there(databas
         wait_until(lambda: tenure.standing is Standing.LOST)
 
 
-def test_an_owner_whose_database_is_full_goes_on_and_says_so(database: PostgreSql) -> None:
+def test_an_owner_whose_database_is_full_goes_on_and_says_so(database: Postgresql) -> None:
     claim = claimed(database, "full")
     kept = row(database, "full", claim)
     tenure = Tenure(claim.epoch, 0.5, boot_s, lambda: True, asked_s=boot_s())
-    with database.connect() as connection, Renewal(partial(connect, database.url, "a"), "full", 0.5, tenure) as renewal:
+    with (
+        database.connect() as connection,
+        Renewal(partial(connect, database.url(), "a"), "full", 0.5, tenure) as renewal,
+    ):
         connection.execute(FULL_DISK)
         wait_until(lambda: tenure.standing is Standing.ALONE)
         assert renewal.database_error == "the disk is full"
@@ -160,18 +163,18 @@ def test_an_owner_whose_database_is_full_goes_on_and_says_so(database: PostgreSq
     kept.close()
 
 
-def test_tables_of_another_version_are_named(database: PostgreSql) -> None:
-    with connect(database.url, "a") as connection, pytest.raises(DatabaseError) as caught:
+def test_tables_of_another_version_are_named(database: Postgresql) -> None:
+    with connect(database.url(), "a") as connection, pytest.raises(DatabaseError) as caught:
         connection.execute("SELECT colour FROM dropanchor_lease")
     assert sentence_of(caught.value).startswith("its tables are not those of this version (column")
 
 
-def run(database: PostgreSql, action: str, bucket: str = "") -> int:
-    return command.run(argparse.Namespace(action=action, bucket=bucket, config=None, url=database.url))
+def run(database: Postgresql, action: str, bucket: str = "") -> int:
+    return command.run(argparse.Namespace(action=action, bucket=bucket, config=None, url=database.url()))
 
 
 def test_the_command_shows_buckets_and_refuses_what_cannot_be(
-    database: PostgreSql, capsys: pytest.CaptureFixture[str]
+    database: Postgresql, capsys: pytest.CaptureFixture[str]
 ) -> None:
     kept = row(database, "shown", claimed(database, "shown"))
     kept.write(snapshot(*[0.0] * 1000))
@@ -186,10 +189,10 @@ def test_the_command_shows_buckets_and_refuses_what_cannot_be(
     assert "there is no bucket 'lost' (known: " in capsys.readouterr().err
     assert run(database, "move", "shown") == 2
     assert "no standby of shown can take over: there is none" in capsys.readouterr().err
-    with connect(database.url, "b") as connection:
+    with connect(database.url(), "b") as connection:
         leases.note_standby(connection, "shown", "b", "its settings of sites and tags are not those of the owner")
     assert run(database, "move", "shown") == 2
     assert "b (cannot take over: its settings" in capsys.readouterr().err
     assert run(database, "accept", "shown") == 0
-    with connect(database.url, "b") as connection:
+    with connect(database.url(), "b") as connection:
         assert leases.seen_or_new(connection, "shown").takes_any

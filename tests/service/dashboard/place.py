@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dropanchor_schemas.site import Site
-from dropanchor_service.history.tracks import Retention
+from dropanchor_service.history.storage import Retention
 from support.api import ApiBench, make_api_bench
 
 

@@ -17,7 +17,7 @@ from dropanchor_service.api.app import DASHBOARD
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.estimation.columns import Frame, State
 from dropanchor_service.events.drafts import Stay
-from dropanchor_service.history.tracks import Retention
+from dropanchor_service.history.storage import Retention
 from service.dashboard.place import Place, live_api_bench
 from support.axe import violations
 from support.browser import WatchedPage, every_look, watched_page

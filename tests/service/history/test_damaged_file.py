@@ -10,9 +10,10 @@ import pytest
 
 from dropanchor_schemas.site import Site
 from dropanchor_service.estimation.columns import POSE
-from dropanchor_service.history.tracks import FILE_NAME, MAX_DAMAGED_FILES, Tracks
+from dropanchor_service.history.sqlite.store import FILE_NAME, MAX_DAMAGED_FILES, SqliteStorage
+from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.persistence import retention_of
-from dropanchor_service.settings.model import HistorySettings
+from dropanchor_service.settings.history import HistorySettings
 from dropanchor_service.store import SiteStore, TagTable
 
 SECOND = 1_000_000_000
@@ -22,7 +23,8 @@ T_NS = 1_800_000_000 * SECOND
 def tracks_in(folder: Path) -> Tracks:
     tags = TagTable()
     tags.register("a")
-    return Tracks(folder, retention_of(HistorySettings()), tags, SiteStore(Site(), {}, None), lambda: T_NS)
+    retention = retention_of(HistorySettings())
+    return Tracks(SqliteStorage(folder, retention, lambda: T_NS), retention, tags, SiteStore(Site(), {}, None))
 
 
 def write(tracks: Tracks, *times_s: int) -> bool:

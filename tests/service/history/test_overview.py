@@ -1,17 +1,16 @@
 """The overview of many tracks: figures, a few points of each tag, and what is known between them."""
 
 import sqlite3
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame, State
-from dropanchor_service.history.covering import TooMuchError, UnfinishedSummaryError
+from dropanchor_service.history.errors import TooMuchError, UnfinishedSummaryError
 from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.summaries import Between
-from dropanchor_service.history.summary_table import LENGTHS_NS
-from dropanchor_service.history.track_file import TrackReader, TrackWriter
+from dropanchor_service.history.summary_table import COARSE, FINE, LENGTHS_NS
+from support.history_places import FilePlace, Place, Writer, count_written
 
 SECOND = 1_000_000_000
 T_NS = 1_800_000_000 * SECOND // LENGTHS_NS[1] * LENGTHS_NS[1]
@@ -29,23 +28,25 @@ def drive(seconds: Array, speed: float = 2.0, state: State = State.TRACKING, **f
     return made
 
 
-def store(path: Path, **tracks: Array) -> TrackWriter:
+def store(place: Place, **tracks: Array) -> Writer:
     """Write tracks by tag, and every summary that can be written."""
-    writer = TrackWriter(path)
+    writer = place.writer()
     for tag, made in tracks.items():
         writer.insert(made, [tag] * len(made), [None] * len(made))
     summarise(writer)
     return writer
 
 
-def summarise(writer: TrackWriter) -> None:
+def summarise(writer: Writer) -> None:
     for _ in range(2):  # the stretches rest after the first round
         while writer.summarise():
             pass
 
 
-def overview(path: Path, from_s: float, to_s: float, tags: list[str] | None = None, max_points: int = 100) -> Overview:
-    return TrackReader(path).overview(tags, T_NS + round(from_s * SECOND), T_NS + round(to_s * SECOND), max_points)
+def overview(
+    place: Place, from_s: float, to_s: float, tags: list[str] | None = None, max_points: int = 100
+) -> Overview:
+    return place.reader.overview(tags, T_NS + round(from_s * SECOND), T_NS + round(to_s * SECOND), max_points)
 
 
 def figures(found: Overview, tag: str) -> dict[str, float]:
@@ -58,41 +59,34 @@ def points(found: Overview, tag: str) -> Array:
     return found.points[np.isin(found.points["tag"], numbers)]
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "h.sqlite"
-
-
-def test_figures_of_a_drive_are_its_distance_time_and_speeds(path: Path) -> None:
-    store(path, a=drive(np.arange(0.0, 601.0)), b=drive(np.arange(0.0, 601.0), speed=-1.0)).close()
-    found = overview(path, 0, 600)
+def test_figures_of_a_drive_are_its_distance_time_and_speeds(any_place: Place) -> None:
+    store(any_place, a=drive(np.arange(0.0, 601.0)), b=drive(np.arange(0.0, 601.0), speed=-1.0)).close()
+    found = overview(any_place, 0, 600)
     assert figures(found, "a") == {"poses": 601, "distance_m": 1200, "tracked_s": 600, "max_speed": 2}
     assert figures(found, "b") == {"poses": 601, "distance_m": 600, "tracked_s": 600, "max_speed": 1}
 
 
-def test_the_noise_of_a_standing_tag_is_no_distance(path: Path) -> None:
+def test_the_noise_of_a_standing_tag_is_no_distance(place: Place) -> None:
     noisy = drive(np.arange(0.0, 300.0), speed=0.0, x=np.random.default_rng(1).normal(0, 0.2, 300))
-    store(path, a=noisy).close()
-    assert figures(overview(path, 0, 300), "a")["distance_m"] == 0
+    store(place, a=noisy).close()
+    assert figures(overview(place, 0, 300), "a")["distance_m"] == 0
 
 
 @pytest.mark.parametrize("hours", [(0.0, 0.5), (0.001, 7.9), (0.4999, 7.51), (0.0, 24.0)])
 def test_every_level_gives_the_figures_of_the_poses(
-    path: Path, hours: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+    any_place: Place, hours: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = drive(np.arange(0.0, 8 * HOUR, 5.0))
     made["state"][300:310], made["state"][1000:1005] = State.AMBIGUOUS, State.COASTING
     made["frame"][2000:2010] = Frame.RELATIVE
-    store(path, a=made[made["t_ns"] // SECOND % 4000 > 60], b=drive(np.arange(0.0, 8 * HOUR, 7.0))).close()
-    with sqlite3.connect(path) as file:
-        written = file.execute("SELECT level, count(*) FROM summaries GROUP BY level ORDER BY level").fetchall()
-    file.close()
-    assert written == [(0, 239), (1, 15)]
+    store(any_place, a=made[made["t_ns"] // SECOND % 4000 > 60], b=drive(np.arange(0.0, 8 * HOUR, 7.0))).close()
+    whole = T_NS, T_NS + 9 * HOUR * SECOND
+    assert [count_written(any_place, "summaries", level, *whole) for level in (FINE, COARSE)] == [239, 15]
     seen = []
     for poses, fine in ((10**9, 0), (0, 10**9), (0, 0)):
         monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", poses)
         monkeypatch.setattr("dropanchor_service.history.overview.MAX_FINE", fine)
-        found = overview(path, hours[0] * HOUR, hours[1] * HOUR)
+        found = overview(any_place, hours[0] * HOUR, hours[1] * HOUR)
         seen.append([figures(found, tag) for tag in ("a", "b")])
     assert seen[0][0]["tracked_s"] > 1000
     for other in seen[1:]:
@@ -100,16 +94,16 @@ def test_every_level_gives_the_figures_of_the_poses(
             assert actual == pytest.approx(expected, rel=1e-5)
 
 
-def test_late_poses_of_a_summarised_time_are_in_the_summary(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_late_poses_of_a_summarised_time_are_in_the_summary(any_place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", 0)
     monkeypatch.setattr("dropanchor_service.history.overview.MAX_FINE", 0)
     whole = drive(np.arange(0.0, 2 * HOUR, 5.0))
-    writer = store(path, a=np.delete(whole, slice(100, 200)))
-    before = figures(overview(path, 0, 2 * HOUR), "a")
+    writer = store(any_place, a=np.delete(whole, slice(100, 200)))
+    before = figures(overview(any_place, 0, 2 * HOUR), "a")
     writer.insert(whole[100:200], ["a"] * 100, [None] * 100)
-    unwritten = figures(overview(path, 0, 2 * HOUR), "a")
+    unwritten = figures(overview(any_place, 0, 2 * HOUR), "a")
     summarise(writer)
-    written = figures(overview(path, 0, 2 * HOUR), "a")
+    written = figures(overview(any_place, 0, 2 * HOUR), "a")
     assert (before["poses"], unwritten["poses"], written["poses"]) == (len(whole) - 100, len(whole), len(whole))
     assert (
         before["tracked_s"]
@@ -120,20 +114,21 @@ def test_late_poses_of_a_summarised_time_are_in_the_summary(path: Path, monkeypa
     writer.close()
 
 
-def test_summaries_that_a_kill_left_unwritten_are_written_after_the_next_start(path: Path) -> None:
-    writer = TrackWriter(path)
+def test_summaries_that_a_kill_left_unwritten_are_written_after_the_next_start(any_place: Place) -> None:
+    writer = any_place.writer()
     writer.insert(drive(np.arange(0.0, HOUR, 5.0)), ["a"] * 720, [None] * 720)
     writer.close()
-    again = TrackWriter(path)
-    assert again.summarise()
+    again = any_place.writer()
+    summarise(again)
+    assert count_written(any_place, "summaries", FINE, T_NS, T_NS + HOUR * SECOND) == 30
     again.close()
 
 
-def test_thinned_points_keep_the_first_the_last_and_changes_of_state(path: Path) -> None:
+def test_thinned_points_keep_the_first_the_last_and_changes_of_state(place: Place) -> None:
     made = drive(np.arange(0.0, 1000.0))
     made["state"][501] = State.COASTING
-    store(path, a=made).close()
-    found = points(overview(path, 0, 2000, max_points=20), "a")
+    store(place, a=made).close()
+    found = points(overview(place, 0, 2000, max_points=20), "a")
     seconds = ((found["point"]["t_ns"] - T_NS) // SECOND).tolist()
     assert len(found) <= 20
     assert (seconds[0], seconds[-1]) == (0, 999)
@@ -143,11 +138,11 @@ def test_thinned_points_keep_the_first_the_last_and_changes_of_state(path: Path)
 
 
 @pytest.mark.parametrize("max_points", [2, 3, 7, 50])
-def test_a_tag_that_flaps_between_states_has_no_more_points_than_allowed(path: Path, max_points: int) -> None:
+def test_a_tag_that_flaps_between_states_has_no_more_points_than_allowed(place: Place, max_points: int) -> None:
     made = drive(np.arange(0.0, 1000.0))
     made["state"][::2] = State.AMBIGUOUS
-    store(path, a=made, b=drive(np.arange(0.0, 1000.0))).close()
-    found = overview(path, 0, 1000, max_points=max_points)
+    store(place, a=made, b=drive(np.arange(0.0, 1000.0))).close()
+    found = overview(place, 0, 1000, max_points=max_points)
     assert 2 <= len(points(found, "a")) <= max_points
     assert 2 <= len(points(found, "b")) <= max_points
     assert set(points(found, "a")["since_previous"].tolist()) == {Between.UNKNOWN}
@@ -166,63 +161,68 @@ def test_a_tag_that_flaps_between_states_has_no_more_points_than_allowed(path: P
     ],
 )
 def test_one_pose_that_is_no_place_breaks_the_line_at_every_level(
-    path: Path, change: dict[str, object], expected: Between, monkeypatch: pytest.MonkeyPatch
+    place: Place, change: dict[str, object], expected: Between, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = drive(np.arange(0.0, 4 * HOUR, 5.0))
     for name, value in change.items():
         made[name][1005] = value
     if "t_ns" in change:  # a gap
         made = np.delete(made, slice(1005, 1008))
-    store(path, a=made).close()
+    store(place, a=made).close()
     for poses, fine in ((10**9, 0), (0, 10**9), (0, 0)):
         monkeypatch.setattr("dropanchor_service.history.overview.MAX_POSES", poses)
         monkeypatch.setattr("dropanchor_service.history.overview.MAX_FINE", fine)
-        found = points(overview(path, 0, 4 * HOUR, max_points=2), "a")
+        found = points(overview(place, 0, 4 * HOUR, max_points=2), "a")
         assert found["since_previous"].tolist() == [Between.UNKNOWN, expected]
 
 
-def test_only_the_named_tags_are_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    store(path, **{f"t{i}": drive(np.arange(0.0, HOUR, 10.0)) for i in range(5)}).close()
+def test_only_the_named_tags_are_read(any_place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    store(any_place, **{f"t{i}": drive(np.arange(0.0, HOUR, 10.0)) for i in range(5)}).close()
     for most in (0, 100):
-        monkeypatch.setattr("dropanchor_service.history.bulk_reading.MAX_NAMED", most)
-        found = overview(path, 0, HOUR, ["t1", "t3", "nobody"])
+        monkeypatch.setattr("dropanchor_service.history.sqlite.rows.MAX_NAMED", most)
+        found = overview(any_place, 0, HOUR, ["t1", "t3", "nobody"])
         assert {found.names[row["tag"]] for row in found.figures} == {"t1", "t3"}
-    assert len(overview(path, 0, HOUR, ["nobody"]).points) == 0
+    assert len(overview(any_place, 0, HOUR, ["nobody"]).points) == 0
 
 
-def test_a_long_period_without_summaries_is_refused_with_a_reason(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    writer = TrackWriter(path)
+def test_a_long_period_without_summaries_is_refused_with_a_reason(
+    any_place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer = any_place.writer()
     writer.insert(drive(np.arange(0.0, HOUR, 10.0)), ["a"] * 360, [None] * 360)
     monkeypatch.setattr("dropanchor_service.history.covering.MAX_TAG_SLOTS", 100)
     with pytest.raises(UnfinishedSummaryError, match="still being made"):
-        overview(path, 0, HOUR)
+        overview(any_place, 0, HOUR)
     writer.close()
-    again = TrackWriter(path)
+    again = any_place.writer()
     summarise(again)
-    assert figures(overview(path, 0, 720 * HOUR), "a")["poses"] == 360
+    assert figures(overview(any_place, 0, 720 * HOUR), "a")["poses"] == 360
     again.close()
 
 
-def test_a_period_with_too_many_summaries_is_refused_with_a_reason(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    store(path, a=drive(np.arange(0.0, 200 * HOUR, 60.0))).close()
+def test_a_period_with_too_many_summaries_is_refused_with_a_reason(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store(place, a=drive(np.arange(0.0, 60 * HOUR, 60.0))).close()
     monkeypatch.setattr("dropanchor_service.history.covering.MAX_BYTES", 10_000)
     with pytest.raises(TooMuchError, match="name the tags"):
-        overview(path, 0, 200 * HOUR)
-    assert figures(overview(path, 0, 20 * HOUR), "a")["poses"] == 1201
+        overview(place, 0, 60 * HOUR)
+    assert figures(overview(place, 0, 20 * HOUR), "a")["poses"] == 1201
 
 
-def test_a_file_without_summaries_gets_them(path: Path) -> None:
-    TrackWriter(path).close()
-    old = sqlite3.connect(path)
+def test_a_file_without_summaries_gets_them(place: FilePlace) -> None:
+    place.writer().close()
+    old = sqlite3.connect(place.path)
     old.executescript("DROP TABLE summaries; DROP TABLE heat; PRAGMA user_version = 1;")
     old.close()
-    store(path, a=drive(np.arange(0.0, HOUR, 10.0))).close()
-    assert figures(overview(path, 0, HOUR), "a")["poses"] == 360
+    store(place, a=drive(np.arange(0.0, HOUR, 10.0))).close()
+    assert figures(overview(place, 0, HOUR), "a")["poses"] == 360
 
 
-def test_summaries_end_with_the_poses_that_they_summarise(path: Path) -> None:
-    writer = store(path, a=drive(np.arange(0.0, 4 * HOUR, 10.0)))
+def test_summaries_end_with_the_poses_that_they_summarise(place: FilePlace) -> None:
+    store(place, a=drive(np.arange(0.0, 4 * HOUR, 10.0))).close()
+    writer = place.writer()
     while writer.prune(T_NS + 3 * HOUR * SECOND, 2**40):
         pass
-    assert figures(overview(path, 0, 720 * HOUR), "a")["poses"] == 360
+    assert figures(overview(place, 0, 720 * HOUR), "a")["poses"] == 360
     writer.close()

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame, State
-from dropanchor_service.history.track_file import TrackFileError, TrackReader, TrackWriter
+from dropanchor_service.history.reader import TrackReader
+from dropanchor_service.history.sqlite.track_file import FileReader, TrackFileError, TrackWriter
+from support.history_places import Place
 
 SECOND = 1_000_000_000
 T_NS = 1_800_000_000 * SECOND
@@ -29,8 +31,8 @@ def times(reader: TrackReader, tag: str, from_s: float = -LONG, to_s: float = LO
     return [(t_ns - T_NS) / SECOND for t_ns in found.poses["t_ns"].tolist()]
 
 
-def test_poses_are_read_in_order_of_time_with_their_anchors(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+def test_poses_are_read_in_order_of_time_with_their_anchors(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     writer.insert(poses(25, 0, 3, 1), ["a", "a", "b", "a"], ["7", None, "7", "Süd"])
     assert times(reader, "a") == [0, 1, 25]
     assert times(reader, "b") == [3]
@@ -43,8 +45,8 @@ def test_poses_are_read_in_order_of_time_with_their_anchors(tmp_path: Path) -> N
     writer.close()
 
 
-def test_a_pose_keeps_its_state_and_its_frame(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+def test_a_pose_keeps_its_state_and_its_frame(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     made = poses(0, 1)
     made["state"], made["frame"] = [State.TRACKING, State.DEGRADED], [Frame.RELATIVE, Frame.SITE]
     writer.insert(made, ["a", "a"], [None, None])
@@ -54,8 +56,8 @@ def test_a_pose_keeps_its_state_and_its_frame(tmp_path: Path) -> None:
     writer.close()
 
 
-def test_a_window_includes_its_ends_and_can_be_read_from_either(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+def test_a_window_includes_its_ends_and_can_be_read_from_either(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     writer.insert(poses(*range(100)), ["a"] * 100, [None] * 100)
     assert times(reader, "a", 9, 12) == [9, 10, 11, 12]
     assert times(reader, "a", 9, 40, limit=3) == [9, 10, 11]
@@ -75,7 +77,7 @@ def test_inserts_of_any_size_use_few_different_statements(tmp_path: Path, monkey
     monkeypatch.setattr(
         sqlite3, "connect", lambda *args, **kwargs: connect(*args, **kwargs, factory=RecordingConnection)
     )
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
     counts = [*range(1, 150), 1023, 1024, 1025]
     for number, count in enumerate(counts):
         writer.insert(poses(*range(count)), [str(number)] * count, [None] * count)
@@ -84,8 +86,8 @@ def test_inserts_of_any_size_use_few_different_statements(tmp_path: Path, monkey
     assert [len(times(reader, str(number), limit=2000)) for number in range(len(counts))] == counts
 
 
-def test_a_pose_of_the_same_time_is_replaced(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+def test_a_pose_of_the_same_time_is_replaced(any_place: Place) -> None:
+    writer, reader = any_place.writer(), any_place.reader
     for x in (1.0, 2.0):
         writer.insert(poses(0, x=x), ["a"], [None])
     assert reader.poses("a", T_NS, T_NS, 10).poses["x"].tolist() == [2.0]
@@ -93,7 +95,7 @@ def test_a_pose_of_the_same_time_is_replaced(tmp_path: Path) -> None:
 
 
 def test_the_oldest_poses_are_pruned_first_by_age_and_by_size(tmp_path: Path) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
     writer.insert(poses(*range(5000)), ["a"] * 5000, [None] * 5000)
     while writer.prune(T_NS + 1005 * SECOND, 2**40):
         pass
@@ -107,7 +109,7 @@ def test_the_oldest_poses_are_pruned_first_by_age_and_by_size(tmp_path: Path) ->
 
 
 def test_a_failed_insert_leaves_nothing_behind(tmp_path: Path, connections: list[sqlite3.Connection]) -> None:
-    writer, reader = TrackWriter(tmp_path / "h.sqlite"), TrackReader(tmp_path / "h.sqlite")
+    writer, reader = TrackWriter(tmp_path / "h.sqlite"), FileReader(tmp_path / "h.sqlite")
     (writing,) = connections
     writer.insert(poses(0), ["a"], [None])
     writing.execute(f"PRAGMA max_page_count = {writer.used_bytes() // 4096 + 3}")
@@ -149,7 +151,7 @@ def test_a_writer_that_is_killed_in_a_transaction_loses_only_that_transaction(
     torn.mkdir()
     for file in tmp_path.glob("h.sqlite*"):  # as a kill leaves them
         (torn / file.name).write_bytes(file.read_bytes())
-    assert len(times(TrackReader(torn / "h.sqlite"), "a")) == 100
+    assert len(times(FileReader(torn / "h.sqlite"), "a")) == 100
     writing.execute("ROLLBACK")
     writer.close()
 
@@ -165,5 +167,5 @@ def test_a_slow_reader_does_not_block_the_writer(tmp_path: Path) -> None:
     assert writer.prune(T_NS + 50 * SECOND, LONG) == 1
     assert len(rows.fetchall()) == 99  # the rows at the time it began
     slow.close()
-    assert len(times(TrackReader(path), "a")) == 190
+    assert len(times(FileReader(path), "a")) == 190
     writer.close()

@@ -84,7 +84,7 @@ def test_a_standby_with_other_sites_or_another_layout_says_so_and_waits_until_it
 ) -> None:
     monkeypatch.setattr(standby_module, "NOTE_S", 0.0)
     with running_postgresql() as database, database.connect() as connection:
-        reach = partial(connect, database.url, "b")
+        reach = partial(connect, database.url(), "b")
         first = Standby(reach, "yard", Claimant("a", "https://a.example", "sites", 0.5), "layout")
         assert first.wait(lambda: None)[0].epoch == 1
         connection.execute("UPDATE dropanchor_checkpoint SET layout = 'layout'")

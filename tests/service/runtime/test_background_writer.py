@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import pytest
+
 from dropanchor_service.runtime.background_writer import BackgroundWriter
 from support.zenoh_router import wait_until
 
@@ -63,3 +65,12 @@ def test_a_bug_in_write_drops_its_items_but_does_not_end_the_thread() -> None:
     wait_until(lambda: disk.items == [1])
     assert writer.is_alive
     writer.stop()
+
+
+def test_a_write_that_does_not_return_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str | None] = []
+    monkeypatch.setattr("dropanchor_service.runtime.background_writer.STUCK_S", 0.0)
+    writer: BackgroundWriter[int] = BackgroundWriter("test", lambda _: seen.append(writer.problem), 3600.0, 1000)
+    assert writer.flush()
+    assert seen == ["test cannot be written: a write has taken more than 0 s"]
+    assert writer.problem is None

@@ -1,6 +1,5 @@
 """The route for the figures of tags over a period: distance, speed and time in zones, as JSON or CSV."""
 
-import sqlite3
 from collections import defaultdict
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -20,7 +19,7 @@ from dropanchor_service.api.routes.parameters import Ids, example_response, json
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.events.stays import TimeInZone, times_in_zones
-from dropanchor_service.history.covering import TooMuchError
+from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.summaries import GAP_NS
 
@@ -91,7 +90,7 @@ def _figures(answers: Answers, events: EventParts, query: FiguresQuery) -> dict[
         overview = tracks.overview(selected_tags(answers, tracks, query), from_ns, to_ns, 2)
     except TooMuchError as error:
         raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-    except sqlite3.Error as error:
+    except HistoryError as error:
         raise unreadable(error) from error
     with reading():
         times = times_in_zones(events.store.database, from_ns, to_ns, _last_known_ns(overview))

@@ -1,6 +1,5 @@
 """The route that tells for how long tags were where over a period."""
 
-import sqlite3
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
-from dropanchor_service.history.covering import TooMuchError
+from dropanchor_service.history.errors import HistoryError, TooMuchError
 from dropanchor_service.history.heat_cells import LARGEST_M, SMALLEST_M
 from dropanchor_service.history.heat_map import MAX_SQUARES
 from dropanchor_service.history.tracks import Tracks
@@ -65,7 +64,7 @@ def heat_map_router(site_of: SiteOfRequest) -> APIRouter:
             return json_response(_heat_map(tracks, tags, from_ns, to_ns, query.cell_m))
         except TooMuchError as error:
             raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-        except sqlite3.Error as error:
+        except HistoryError as error:
             raise unreadable(error) from error
 
     return router

@@ -1,7 +1,5 @@
 """The route that says whether there is a history, and which time it covers."""
 
-import sqlite3
-
 from fastapi import APIRouter, Request
 from starlette.responses import Response
 
@@ -10,6 +8,7 @@ from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.period import unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.history.errors import HistoryError
 
 _EXAMPLE = {"enabled": True, "from_ns": 1_797_408_000_000_000_000, "to_ns": 1_800_000_000_000_000_000}
 
@@ -30,7 +29,7 @@ def history_router(site_of: SiteOfRequest) -> APIRouter:
             return json_response({"enabled": False, "from_ns": None, "to_ns": None})
         try:
             span = answers.tracks.span()
-        except sqlite3.Error as error:
+        except HistoryError as error:
             raise unreadable(error) from error
         from_ns, to_ns = (None, None) if span is None else span
         return json_response({"enabled": True, "from_ns": from_ns, "to_ns": to_ns})

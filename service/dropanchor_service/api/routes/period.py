@@ -1,7 +1,5 @@
 """What the routes of the history share: a period, and the problems of a history that is missing or unreadable."""
 
-import sqlite3
-
 from pydantic import BaseModel, ConfigDict, Field
 
 from dropanchor_schemas.site import Label
@@ -9,6 +7,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.routes.known_tag import unknown_tag
 from dropanchor_service.api.routes.parameters import TagFilter, TimeNs
+from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.tracks import Tracks
 
 HOUR_NS = 3_600_000_000_000
@@ -60,7 +59,7 @@ class TagsInPeriod(TagFilter, Period):
 
 
 def selected_tags(answers: Answers, tracks: Tracks, query: TagsInPeriod) -> list[str] | None:
-    """Return the tags that the query names, None for all. Raises sqlite3.Error."""
+    """Return the tags that the query names, None for all. Raises HistoryError."""
     if not query.group:
         return query.tags or None
     return query.of_names(answers, query.tags or tracks.tags())
@@ -82,7 +81,8 @@ def history_of(answers: Answers) -> Tracks:
     if answers.tracks is None:
         raise ProblemError(
             Kind.NO_HISTORY,
-            "Start the service with `--data-dir FOLDER`, or set `data_dir`, and leave `history.enabled` at true.",
+            "Start the service with `--data-dir FOLDER`, or set `data_dir` or `history.url`, and leave "
+            "`history.enabled` at true.",
         )
     return answers.tracks
 
@@ -93,5 +93,5 @@ def require_known(answers: Answers, tracks: Tracks, tag: str) -> None:
         raise unknown_tag(tag)
 
 
-def unreadable(error: sqlite3.Error) -> ProblemError:
-    return ProblemError(Kind.HISTORY_UNREADABLE, f"The history file cannot be read: {error}.")
+def unreadable(error: HistoryError) -> ProblemError:
+    return ProblemError(Kind.HISTORY_UNREADABLE, f"The history cannot be read: {error}.")

@@ -1,6 +1,5 @@
 """The route for the track of a tag: its stored poses, page by page."""
 
-import sqlite3
 from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
@@ -18,6 +17,7 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.history.errors import HistoryError
 
 MAX_POSES = 10_000
 
@@ -75,7 +75,7 @@ def _page(answers: Answers, tag: str, from_ns: int, to_ns: int, limit: int) -> T
     try:
         require_known(answers, tracks, tag)
         return track_page(tracks, answers.site, tag, from_ns, to_ns, limit)
-    except sqlite3.Error as error:
+    except HistoryError as error:
         raise unreadable(error) from error
 
 

@@ -1,6 +1,5 @@
 """The route that exports the whole track of a tag over a period as a file."""
 
-import sqlite3
 from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
@@ -18,6 +17,7 @@ from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.history.errors import HistoryError
 
 PAGE = 5000
 PARQUET = "parquet"
@@ -89,7 +89,7 @@ def _pages(answers: Answers, tag: str, from_ns: int, to_ns: int) -> Iterator[Tra
     try:
         require_known(answers, tracks, tag)
         first = track_page(tracks, answers.site, tag, from_ns, to_ns, PAGE)
-    except sqlite3.Error as error:
+    except HistoryError as error:
         raise unreadable(error) from error
 
     def every() -> Iterator[TrackPage]:

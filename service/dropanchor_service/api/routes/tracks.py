@@ -1,6 +1,5 @@
 """The route for the tracks of many tags over a period: figures, and a few points of each."""
 
-import sqlite3
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
@@ -14,7 +13,7 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import TagFilter, example_response, json_response
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
-from dropanchor_service.history.covering import TooMuchError
+from dropanchor_service.history.errors import HistoryError, TooMuchError
 
 _DESCRIPTION = """\
 The distance, the tracked time and the speeds of each tag over a period, and a few of its stored poses: the first, the
@@ -48,7 +47,7 @@ def tracks_router(site_of: SiteOfRequest) -> APIRouter:
             return json_response(many_tracks(tracks, query.tags or None, from_ns, to_ns, query.max_points))
         except TooMuchError as error:
             raise ProblemError(Kind.INVALID_REQUEST, f"query: {error}") from error
-        except sqlite3.Error as error:
+        except HistoryError as error:
             raise unreadable(error) from error
 
     return router

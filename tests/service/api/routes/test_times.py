@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dropanchor_service.answers.times import iso_utc, ns_of_iso
-from dropanchor_service.history.tracks import Retention
+from dropanchor_service.history.storage import Retention
 from support.api import T_NS, ask, kind_of, make_api_bench
 
 T_UTC = "2027-01-15T08:00:00.000000000Z"

@@ -12,7 +12,7 @@ from dropanchor_schemas.pose import Pose
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.track import Track
 from dropanchor_service.estimation.columns import State
-from dropanchor_service.history.tracks import Retention
+from dropanchor_service.history.storage import Retention
 from dropanchor_service.store import LatestPoses
 from support.api import T_NS, ApiBench, ask, kind_of, make_api_bench
 

@@ -12,17 +12,27 @@ from pathlib import Path
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.heat_cells import NO_HEAT
-from dropanchor_service.history.heat_map import HeatMap, heat_map_of, read_heat_map
-from dropanchor_service.history.overview import EMPTY, Overview, read_overview
-from dropanchor_service.history.records import NO_POSES, SLOT_NS, StoredPoses, records_of, stored_poses
-from dropanchor_service.history.summary_table import HEAT_SCHEMA, SummaryTable
-from dropanchor_service.history.summary_table import SCHEMA as SUMMARY_SCHEMA
+from dropanchor_service.history.errors import HistoryError
+from dropanchor_service.history.reader import TrackReader
+from dropanchor_service.history.records import SLOT_NS, records_of
+from dropanchor_service.history.sqlite.rows import SqliteRows
+from dropanchor_service.history.summary_table import SLOTS, SummaryTable
 
 VERSION = 3  # 1: without summaries, 2: without heat
 MAX_ROWS = 512  # per statement: sqlite3 releases the interpreter's lock in each one and must win it back
 BUSY_S = 5.0
 
+_SUMMARY_SCHEMA = """
+CREATE TABLE summaries (
+    level INTEGER NOT NULL, stretch INTEGER NOT NULL, tags BLOB NOT NULL, PRIMARY KEY (level, stretch)
+);
+"""
+_HEAT_SCHEMA = """
+CREATE TABLE heat (
+    level INTEGER NOT NULL, stretch INTEGER NOT NULL, heads BLOB NOT NULL, cells BLOB NOT NULL,
+    PRIMARY KEY (level, stretch)
+);
+"""
 _SCHEMA = f"""
 CREATE TABLE tags (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
 CREATE TABLE anchors (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
@@ -31,16 +41,11 @@ CREATE TABLE poses (
     slot INTEGER NOT NULL, tag INTEGER NOT NULL, t_ns INTEGER NOT NULL, pose BLOB NOT NULL,
     PRIMARY KEY (slot, tag, t_ns)
 ) WITHOUT ROWID;
-{SUMMARY_SCHEMA}
-{HEAT_SCHEMA}
+{_SUMMARY_SCHEMA}
+{_HEAT_SCHEMA}
 PRAGMA user_version = {VERSION};
 """
-_UPGRADES = {1: f"{SUMMARY_SCHEMA} {HEAT_SCHEMA}", 2: HEAT_SCHEMA}  # from each version
-_FORWARD = """
-SELECT t_ns, pose FROM slots CROSS JOIN poses USING (slot)
-WHERE slots.slot BETWEEN ? AND ? AND tag = ? AND t_ns BETWEEN ? AND ? ORDER BY slots.slot, t_ns LIMIT ?
-"""
-_BACKWARD = _FORWARD.replace("slots.slot, t_ns", "slots.slot DESC, t_ns DESC")
+_UPGRADES = {1: f"{_SUMMARY_SCHEMA} {_HEAT_SCHEMA}", 2: _HEAT_SCHEMA}  # from each version
 
 
 class TrackFileError(sqlite3.Error):
@@ -55,7 +60,8 @@ class TrackWriter:
         self._connection = sqlite3.connect(path, BUSY_S, isolation_level=None, check_same_thread=False)
         try:
             self._prepare()
-            self._summaries = SummaryTable(self._connection)
+            self._rows = SqliteRows(self._connection)
+            self._summaries = SummaryTable(self._rows)
         except sqlite3.Error:
             self._connection.close()
             raise
@@ -78,7 +84,7 @@ class TrackWriter:
                 "INSERT OR IGNORE INTO slots VALUES (?)", [(slot,) for slot in np.unique(slots).tolist()]
             )
             blobs = records_of(poses[order], anchor_ids[order])
-            self._summaries.delete(slots)
+            self._summaries.delete(self._rows, slots)
             self._insert(slots.tolist(), tag_ids[order].tolist(), poses["t_ns"][order].tolist(), blobs)
 
     def prune(self, keep_from_ns: int, max_bytes: int) -> int:
@@ -92,13 +98,15 @@ class TrackWriter:
         with self._transaction():
             self._connection.execute("DELETE FROM poses WHERE slot <= ?", (oldest,))
             self._connection.execute("DELETE FROM slots WHERE slot <= ?", (oldest,))
-            self._summaries.prune(oldest)
+            for level, length in enumerate(SLOTS):  # the stretches that ended with this slot or before
+                self._rows.delete_stretches_before(level, (oldest + 1) // length)
+                self._summaries.forget(level, (oldest + 1) // length)
         return 1
 
     def summarise(self) -> bool:
         """Write one missing summary, the newest first. Return whether there was one to write."""
         with self._transaction():
-            return self._summaries.write_next()
+            return self._summaries.write_next(self._rows)
 
     def used_bytes(self) -> int:
         """Return the size of the file without its free pages."""
@@ -159,73 +167,25 @@ class TrackWriter:
         return known
 
 
-class TrackReader:
-    """Reads the file. It opens the file for every call, so that it holds no lock between calls."""
+class FileReader(TrackReader):
+    """Reads the file. It opens the file for every snapshot, so that it holds no lock between them."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
-    def poses(self, tag: str, from_ns: int, to_ns: int, limit: int, newest_first: bool = False) -> StoredPoses:
-        """Return up to `limit` poses between the two times, both included.
-
-        Returns none when the file does not exist. Raises sqlite3.Error.
-        """
+    @contextmanager
+    def snapshot(self) -> Iterator[SqliteRows | None]:
+        """Return the tracks at this moment; None while there is no file. Raises HistoryError."""
         if not self._path.exists():
-            return NO_POSES
-        with self._connected() as connection:
-            tag_id = _tag_id(connection, tag)
-            sql = _BACKWARD if newest_first else _FORWARD
-            window = (from_ns // SLOT_NS, to_ns // SLOT_NS, tag_id, from_ns, to_ns, limit)
-            rows = connection.execute(sql, window).fetchall()
-            names = dict(connection.execute("SELECT id, name FROM anchors"))
-        return stored_poses(rows, names)
-
-    def overview(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, max_points: int) -> Overview:
-        """Return the figures of these tags, or of all, and at most `max_points` points of each.
-
-        Raises sqlite3.Error and TooMuchError.
-        """
-        if not self._path.exists():
-            return EMPTY
-        with self._connected() as connection:
-            connection.execute("BEGIN")  # one state of the file for all statements
-            return read_overview(connection, tags, from_ns, to_ns, max_points)
-
-    def heat_map(self, tags: Sequence[str] | None, from_ns: int, to_ns: int, cell_m: float) -> HeatMap:
-        """Return where these tags, or all, were, in squares of at least `cell_m`.
-
-        Raises sqlite3.Error and TooMuchError.
-        """
-        if not self._path.exists():
-            return heat_map_of(NO_HEAT, cell_m)
-        with self._connected() as connection:
-            connection.execute("BEGIN")
-            return read_heat_map(connection, tags, from_ns, to_ns, cell_m)
-
-    def tags(self) -> list[str]:
-        """Return all tags of which the file ever held a pose. Raises sqlite3.Error."""
-        if not self._path.exists():
-            return []
-        with self._connected() as connection:
-            return [name for (name,) in connection.execute("SELECT name FROM tags")]
-
-    def span(self) -> tuple[int, int] | None:
-        """Return the time that the stored poses cover, ns; None without poses. Raises sqlite3.Error."""
-        if not self._path.exists():
-            return None
-        with self._connected() as connection:
-            oldest, newest = connection.execute("SELECT min(slot), max(slot) FROM slots").fetchone()
-        return None if oldest is None else (oldest * SLOT_NS, (newest + 1) * SLOT_NS)
-
-    def has_tag(self, tag: str) -> bool:
-        """Return whether the file ever held a pose of this tag. Raises sqlite3.Error."""
-        if not self._path.exists():
-            return False
-        with self._connected() as connection:
-            return _tag_id(connection, tag) is not None
-
-    def _connected(self) -> closing[sqlite3.Connection]:
-        return closing(sqlite3.connect(f"{self._path.absolute().as_uri()}?mode=ro", BUSY_S, uri=True))
+            yield None
+            return
+        try:
+            uri = f"{self._path.absolute().as_uri()}?mode=ro"
+            with closing(sqlite3.connect(uri, BUSY_S, uri=True)) as connection:
+                connection.execute("BEGIN")  # one state of the file for all statements
+                yield SqliteRows(connection)
+        except sqlite3.Error as error:
+            raise HistoryError(str(error)) from error
 
 
 def _powers(count: int) -> Iterator[int]:
@@ -237,8 +197,3 @@ def _powers(count: int) -> Iterator[int]:
         rows = min(MAX_ROWS, 1 << (count.bit_length() - 1))
         yield rows
         count -= rows
-
-
-def _tag_id(connection: sqlite3.Connection, tag: str) -> int | None:
-    found = connection.execute("SELECT id FROM tags WHERE name = ?", (tag,)).fetchone()
-    return None if found is None else int(found[0])

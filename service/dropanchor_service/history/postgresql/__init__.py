@@ -1,0 +1,1 @@
+"""Tracks in a PostgreSQL database, which several sites and services may share."""

@@ -1,0 +1,1 @@
+"""Tracks in a SQLite file, which belongs to one site and one process."""
