@@ -126,7 +126,7 @@ def _open_storage(
     if database is not None:
         from dropanchor_service.history.postgresql.store import PostgresqlStorage
 
-        return PostgresqlStorage(database, site.site.id, retention, now_ns)
+        return PostgresqlStorage(database, site.site.id, retention, now_ns, lambda: site.epoch)
     return None if settings.data_dir is None else SqliteStorage(settings.data_dir, retention, now_ns)
 
 

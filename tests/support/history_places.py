@@ -74,7 +74,7 @@ class DatabasePlace:
         return DatabaseReader(self.database, self.site)
 
     def writer(self, epoch: int = 0) -> DatabaseWriter:
-        return _PatientWriter(self.database, self.site, self.retention, epoch)
+        return _PatientWriter(self.database, self.site, self.retention, lambda: epoch)
 
 
 @contextmanager

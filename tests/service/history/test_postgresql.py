@@ -141,7 +141,7 @@ def test_a_database_that_is_away_costs_no_pose_and_is_named(
     try:
         assert not write(tracks, NOW_NS + SECOND)
         (problem,) = tracks.problems
-        assert problem.startswith("history cannot be written: the database cannot be reached: connection to server on ")
+        assert problem.startswith("history cannot be written: the database cannot be reached: connection to server ")
         assert "\n" not in problem
         with monkeypatch.context() as patched:
             patched.setattr("psycopg.connect", None)  # readers do not wait for what the writer could not reach
@@ -177,9 +177,9 @@ def test_poses_that_find_no_place_while_the_database_is_away_are_counted(
 
 
 def test_a_refused_login_is_named_without_the_password(postgresql: Postgresql, url: str, tmp_path: Path) -> None:
-    name = url.partition("@/")[2].partition("?")[0]
+    name = url.rpartition("/")[2]
     access = postgresql.folder / "data" / "pg_hba.conf"
-    access.write_text(f"local {name} guest scram-sha-256\n{access.read_text()}")
+    access.write_text(f"host {name} guest 127.0.0.1/32 scram-sha-256\n{access.read_text()}")
     postgresql.run(url, "CREATE ROLE guest LOGIN PASSWORD 'tr0ub4dor'", "SELECT pg_reload_conf()")
     file = tmp_path / "password"
     database = Database(postgresql.url(name, "guest"), file, lambda: NOW_NS)

@@ -88,8 +88,10 @@ def settings_of(url: str) -> Settings:
 
 @needs_postgresql
 def test_the_sites_of_a_service_share_a_database_without_a_data_folder(postgresql: Postgresql, tmp_path: Path) -> None:
-    settings, metrics = settings_of(postgresql.new_database()), Metrics()
+    url, metrics = postgresql.new_database(), Metrics()
+    settings = settings_of(url)
     sites = open_sites(settings)
+    sites[1].store.epoch = 7  # this service has taken it over from another one
     poses = np.zeros(2, POSE)
     poses["row"], poses["x"] = [site.tags.register("cart").row for site in sites], [1.0, 2.0]
     poses["t_ns"], poses["state"], poses["anchor"] = T_NS, State.TRACKING, -1
@@ -100,6 +102,9 @@ def test_the_sites_of_a_service_share_a_database_without_a_data_folder(postgresq
         assert [one.poses("cart", 0, 2 * T_NS, 9).poses["x"].tolist() for one in tracks] == [[1.0], [2.0]]
         assert len({id(one.usage) for one in tracks}) == 1
         assert f"dropanchor_history_bytes {float(tracks[0].usage.bytes)}" in generate_latest(metrics.registry).decode()
+    of_sites = "dropanchor_history.poses JOIN dropanchor_history.sites ON id = site"
+    epochs = postgresql.run(url, f"SELECT name, epoch FROM {of_sites} ORDER BY x")
+    assert epochs == [("north", 0), ("Lager Süd", 7)]
     away = settings_of(f"postgresql://nobody@/history?host={tmp_path}")
     with SiteFolders(away, open_sites(away), lambda: T_NS, Metrics()) as folders:
         assert [one.tracks is not None and one.tracks.writer.flush() for one in folders.all] == [False, False]

@@ -34,15 +34,25 @@ class DatabaseReader(TrackReader):
 
 
 class PostgresqlStorage:
-    """The `Storage` of a site in a database. `write` raises HistoryError, and may then have stored a part."""
+    """The `Storage` of a site in a database. `write` raises HistoryError, and may then have stored a part.
+
+    epoch_of: as for `DatabaseWriter`.
+    """
 
     damaged: Sequence[str] = ()
 
-    def __init__(self, database: Database, site: str, retention: Retention, now_ns: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        database: Database,
+        site: str,
+        retention: Retention,
+        now_ns: Callable[[], int],
+        epoch_of: Callable[[], int] = lambda: 0,
+    ) -> None:
         self._database = database
         self._keep_ns = retention.keep_ns
         self._now_ns = now_ns
-        self._writer = DatabaseWriter(database, site, retention)
+        self._writer = DatabaseWriter(database, site, retention, epoch_of)
         self.reader = DatabaseReader(database, site)
 
     @property

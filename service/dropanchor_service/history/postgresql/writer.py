@@ -1,7 +1,7 @@
 """Write poses and summaries of a site into the database."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -26,15 +26,17 @@ ON CONFLICT (name) DO UPDATE SET keep_ns = excluded.keep_ns, max_bytes = exclude
 class DatabaseWriter:
     """Writes one site. Other services may write it too. Every method raises HistoryError and then has changed nothing.
 
-    epoch: of the ownership of this service. Where two services have written a tag, readers take the later owner's poses
-    from its first pose on.
+    epoch_of: returns the epoch in which this service owns the site. Where two services have written a tag, readers take
+    the later owner's poses from its first pose on.
     """
 
-    def __init__(self, database: Database, site: str, retention: Retention, epoch: int = 0) -> None:
+    def __init__(
+        self, database: Database, site: str, retention: Retention, epoch_of: Callable[[], int] = lambda: 0
+    ) -> None:
         self._database = database
         self._site = site
         self._limits = (retention.keep_ns, retention.max_bytes)
-        self._epoch = epoch
+        self._epoch_of = epoch_of
         self._insertion: Insertion | None = None
         self._summaries: SummaryTable | None = None
 
@@ -71,7 +73,7 @@ class DatabaseWriter:
         try:
             with self._database.writing() as connection:
                 if self._insertion is None:
-                    self._insertion = Insertion(self._site_number(connection), self._epoch)
+                    self._insertion = Insertion(self._site_number(connection), self._epoch_of())
                 yield connection, self._insertion
         except BaseException:
             self._insertion = self._summaries = None
@@ -86,7 +88,7 @@ class DatabaseWriter:
     @contextmanager
     def _site_locked(self, connection: Connection, site: int) -> Iterator[tuple[PostgresqlRows, SummaryTable]]:
         """Open a transaction in which no other service writes the site, so that no summary can lack a pose."""
-        rows = PostgresqlRows(connection, site, self._epoch)
+        rows = PostgresqlRows(connection, site, self._epoch_of())
         with connection.transaction():
             lock(connection, site)
             if self._summaries is None:
