@@ -73,7 +73,9 @@ def test_the_simplest_message_decodes() -> None:
 def test_the_keys_are_those_of_the_code() -> None:
     of_tag = [keys.samples_key, keys.tag_alive_key, keys.health_key, keys.settings_key, keys.pose_key, keys.event_key]
     spelled = [*of_tag, None, keys.anchor_key, keys.service_alive_key]
-    for (key, *_), make in zip(rows("Keys"), spelled, strict=True):
+    *of_sites, (of_owner, *_) = rows("Keys")
+    assert keys.owner_key("B", 7) == of_owner.strip("`").replace("<bucket>", "B").replace("<epoch>", "7")
+    for (key, *_), make in zip(of_sites, spelled, strict=True):
         made = keys.poses_key("S") if make is None else make("S", "I")
         assert re.sub("<site>", "S", re.sub("<(tag|anchor|id)>", "I", key.strip("`"))) == made
     assert keys.samples_key("default", "tag 1").split("/")[4] == "tag%201"
