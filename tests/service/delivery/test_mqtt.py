@@ -1,5 +1,6 @@
 """Events reach a real MQTT broker over TLS: acknowledged, in order per tag, and through its restart."""
 
+import gc
 import subprocess
 import threading
 import time
@@ -28,6 +29,13 @@ pytestmark = needs_mosquitto
 @pytest.fixture(autouse=True)
 def _fast(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(queue, "FIRST_RETRY_S", 0.05)
+
+
+@pytest.fixture
+def sockets_of_paho() -> Iterator[None]:
+    """Close the sockets that paho leaves to the garbage collector, before another test gets their warnings."""
+    yield
+    gc.collect()
 
 
 @contextmanager
@@ -130,9 +138,8 @@ def test_a_wrong_password_is_said_and_mended_without_a_restart(tmp_path: Path) -
             wait_until(lambda: bench.counts() == (0, 0))
 
 
-@pytest.mark.filterwarnings(
-    "ignore::pytest.PytestUnraisableExceptionWarning"
-)  # paho leaves the socket to the collector
+@pytest.mark.usefixtures("sockets_of_paho")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_broker_whose_certificate_is_not_trusted_gets_nothing(tmp_path: Path) -> None:
     with secured_broker(tmp_path) as broker:
         settings = MqttSettings(server="127.0.0.1", port=broker.port)
@@ -144,9 +151,8 @@ def test_a_broker_whose_certificate_is_not_trusted_gets_nothing(tmp_path: Path) 
             assert bench.counts() == (1, 0)
 
 
-@pytest.mark.filterwarnings(
-    "ignore::pytest.PytestUnraisableExceptionWarning"
-)  # paho leaves the socket to the collector
+@pytest.mark.usefixtures("sockets_of_paho")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_the_destinations_of_all_sites_share_one_connection_and_one_thread(tmp_path: Path) -> None:
     with secured_broker(tmp_path) as broker, listening(broker) as got:
         benches = [bench_of(broker) for _ in range(5)]
