@@ -17,20 +17,25 @@ Scheme = Literal["light", "dark"]
 
 LOOKS: list[tuple[tuple[int, int], Scheme]] = [
     ((1280, 800), "light"),
-    ((1280, 800), "dark"),
-    ((820, 1180), "light"),
+    ((820, 1180), "dark"),
     ((390, 844), "dark"),
 ]
 """Every size, and both colour schemes."""
 
 
 def every_look(page: Page) -> Iterator[str]:
-    """Show a loaded page in every look, then in the first one again. Yield the name of each, such as `390x844-dark`."""
-    for (width, height), scheme in [*LOOKS, LOOKS[0]]:
-        page.set_viewport_size({"width": width, "height": height})
-        page.emulate_media(color_scheme=scheme)
-        page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        yield f"{width}x{height}-{scheme}"
+    """Show a loaded page in every look and yield its name, such as `390x844-dark`. Then show the first one again."""
+    for look in LOOKS:
+        yield _show(page, look)
+    _show(page, LOOKS[0])
+
+
+def _show(page: Page, look: tuple[tuple[int, int], Scheme]) -> str:
+    (width, height), scheme = look
+    page.set_viewport_size({"width": width, "height": height})
+    page.emulate_media(color_scheme=scheme)
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return f"{width}x{height}-{scheme}"
 
 
 @contextmanager
