@@ -15,6 +15,9 @@ RESULTS := service/docs/results
 .PHONY: help demo test check bench results install kernels chromium mosquitto postgresql clean
 .DEFAULT_GOAL := help
 
+# Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
+unexport PYTHONDONTWRITEBYTECODE
+
 help:
 	@echo 'make demo     start the service and simulated tags around one anchor, print the page address'
 	@echo 'make test     install what the tests need and run them all'
@@ -40,6 +43,7 @@ demo: install
 
 kernels: install
 	@PYTHONPATH=tests $(BIN)/python -m support.kernel_cache
+	@$(BIN)/python -m pytest --collect-only -q >/dev/null # compiles the tests once, and not once in each worker
 
 chromium:
 	@command -v chromium-headless-shell >/dev/null || { \
