@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
 DISTRIBUTIONS := -e schemas -e tag_client -e 'service[evaluation,foxglove,mqtt,parquet,postgresql,ros2]'
 PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service
-PARALLEL := -n 3 --dist loadfile --no-loadscope-reorder
+PARALLEL := -n 4 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
 
 RESULTS := service/docs/results
