@@ -59,7 +59,7 @@ from dropanchor_service.estimation.fleet.belief.predict import (
     predict_state,
 )
 from dropanchor_service.estimation.fleet.belief.publish import publish
-from dropanchor_service.estimation.fleet.belief.rigidity import follow_mount, slip_std_of
+from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of
 from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_turnabout
 from dropanchor_service.estimation.fleet.belief.start import (
     collect_start,
@@ -68,6 +68,7 @@ from dropanchor_service.estimation.fleet.belief.start import (
     uses_heading,
 )
 from dropanchor_service.estimation.fleet.belief.states import FAULT, INITIALISING
+from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, predict_tilt
 from dropanchor_service.estimation.fleet.belief.update import update_standstill
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
@@ -93,6 +94,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     lateral, slip_std = follow_mount(work, count, row, node, scratch), slip_std_of(row)
+    tilts = slip_std <= RIGID_SLIP and bends_tilt(node)
     fill_noise(decay, growth, node, row, t)
     for heading_class in range(CLASSES):
         filled = False
@@ -104,6 +106,8 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 predict_state(work[h].mean, node, decay, F)
                 predict_covariance(work[h].cov, F, decay, FP)
                 add_process_noise(work[h].mean, work[h].cov, F, growth, node, t, work[h].nlos)
+                if tilts:
+                    predict_tilt(work[h].mean, work[h].cov, node)
                 if lateral:
                     update_lateral(work[h], scratch, node, row, slip_std)
 

@@ -111,14 +111,14 @@ def predict_attitude(a: Attitude, dt: float, gyro: Array, rest: bool) -> None:
 @njit(cache=True, nogil=True)
 def correct_tilt(
     a: Attitude, dt: float, ax: float, ay: float, az: float, rest: bool, roughness: float, tau: float = TAU
-) -> None:
+) -> float:
     """Correct with one accelerometer sample, m/s^2. roughness: its variance within tenths of a second, (m/s^2)^2.
 
-    tau: s, under motion.
+    tau: s, under motion. Return the share of a deviation that was taken for tilt.
     """
     n = math.sqrt(ax * ax + ay * ay + az * az)
     if n < 1.0 or dt == 0.0:
-        return
+        return 0.0
     if a.age == 0.0:
         a.gravity = n
     a.age += dt
@@ -131,6 +131,7 @@ def correct_tilt(
     k = weight * dt / (min(a.age, TAU_REST if rest else tau) + dt)
     s = 1.0 / n
     ex, ey, ez = s * (ay * uz - az * uy), s * (az * ux - ax * uz), s * (ax * uy - ay * ux)
+    scale = 1.0
     if a.age >= SETTLED and not rest:
         bound = BOUND + SHAKING * math.sqrt(roughness) / a.gravity
         scale = bound / max(math.sqrt(ex * ex + ey * ey + ez * ez), bound)
@@ -141,6 +142,7 @@ def correct_tilt(
         a.bias[0] -= ki * ex
         a.bias[1] -= ki * ey
         a.bias[2] -= ki * ez
+    return k * scale  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)

@@ -142,6 +142,7 @@ def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
     p.gap_s = 0.0
     p.extrapolated_s = 0.0
     p.no_acc_s = 0.0
+    p.tilt_gain = 0.0
     f.magnetometer.elapsed = 0.0
     f.magnetometer.count = 0.0
     f.magnetometer.sum_m[:] = 0.0
@@ -208,7 +209,7 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
     rest = s.quiet > CONFIRM and c.carried == 0
     predict_attitude(a, dt, gyro, rest)
     if heard:
-        correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
+        p.tilt_gain += correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
         add_acceleration(p, dt, a.q, acc, a.gravity, s.acc_var)
         if c.motion != VEHICLE:
             add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)
@@ -248,7 +249,7 @@ def fill_unknown(dt: float, node: Node) -> None:
     node.dt_s = dt
     node.dyaw, node.dyaw_var = 0.0, unobserved_turn_var(dt)
     node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
-    node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
+    node.dv_forward, node.dv_left, node.dv_var, node.tilt_gain = 0.0, 0.0, math.inf, 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.rest = MOVING
     node.unobserved_s = dt

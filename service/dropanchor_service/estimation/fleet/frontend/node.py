@@ -38,6 +38,7 @@ NODE: Final = np.dtype(
         ("dv_left", np.float64),  # m/s
         ("swing_forward", np.float64),  # m, of the tag about the point that follows the course, in the same frame
         ("swing_left", np.float64),  # m
+        ("tilt_gain", np.float64),  # share of the acceleration that the tilt took for gravity in the interval
         ("dv_var", np.float64),  # (m/s)^2, inf without an accelerometer
         ("heading", np.float64),  # rad, body yaw at the end of the interval
         ("heading_var", np.float64),  # rad^2

@@ -27,6 +27,7 @@ PREINTEGRATION = np.dtype(
         ("V_end", "f8", 2),
         ("gap_s", "f8"),  # s without usable IMU since the last node
         ("extrapolated_s", "f8"),  # s since the last IMU sample that earlier nodes have already counted as silent
+        ("tilt_gain", "f8"),  # share of the acceleration that the tilt took for gravity since the last node
         ("no_acc_s", "f8"),  # s without usable accelerometer since the last node
     ]
 )
@@ -90,6 +91,7 @@ def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node)
     gap_s = p.gap_s + max(0.0, beyond - p.extrapolated_s)
     p.extrapolated_s = max(p.extrapolated_s, beyond)
     node.unobserved_s = gap_s
+    node.tilt_gain = p.tilt_gain
     node.dyaw_var = GYRO_NOISE * dt + (GYRO_SCALE * node.dyaw) ** 2 + unobserved_turn_var(gap_s)
     node.dv_var = (
         math.inf if p.no_acc_s > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.acc_var) * dt + unobserved_speed_var(gap_s)
@@ -98,4 +100,5 @@ def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node)
     p.V_end[0], p.V_end[1] = vx, vy
     p.gap_s = 0.0
     p.no_acc_s = 0.0
+    p.tilt_gain = 0.0
     return end  # type: ignore[no-any-return]

@@ -1,0 +1,98 @@
+"""The predicted error of the tilt: its Jacobian, and what the front-end really makes of an arc."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, N, V
+from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, predict_tilt
+from dropanchor_service.estimation.fleet.tuning import Tuning
+from support.belief import STATE, jacobian_fd, node_of
+from support.frontend import new_frontend, run
+from support.imu import Motion, synthesise
+
+SPEED, RATE, STARTS, TURNS, SHARPLY = 2.0, 0.3, 4.0, 20.0, 20.5  # m/s, rad/s, s: an arc, then a right angle
+
+
+def yaw_rate_at(t: Any) -> Any:
+    return np.select([t < STARTS, t < TURNS, t < SHARPLY], [0.0, RATE, math.pi], 0.0)
+
+
+def ride(seconds: float = 24.0) -> Motion:
+    """A level tag at a constant speed: straight on, an arc, a sharp turn, straight on."""
+    t = np.arange(0.0, seconds, 0.01)
+    edges = [(STARTS, TURNS, RATE), (TURNS, SHARPLY, math.pi)]
+
+    def angles(at: Any) -> Any:
+        yaw = sum(rate * np.clip(at - low, 0.0, high - low) for low, high, rate in edges)
+        return np.column_stack([yaw, np.zeros_like(at), np.zeros_like(at)])
+
+    def acceleration(at: Any) -> Any:
+        yaw, across = angles(at)[:, 0], SPEED * yaw_rate_at(at)
+        return np.column_stack([-np.sin(yaw) * across, np.cos(yaw) * across, np.zeros_like(at)])
+
+    motion, rng = synthesise(t, angles, acceleration), np.random.default_rng(5)
+    motion.acc += rng.normal(0.0, 0.2, motion.acc.shape)  # so that straight on is not taken for standstill
+    motion.gyro += rng.normal(0.0, 0.01, motion.gyro.shape)
+    return motion
+
+
+def test_the_biases_follow_what_an_arc_and_a_sharp_turn_do_to_the_tilt() -> None:
+    """The mean error of a second of increments is predicted to more than a half; the rest is decay and noise."""
+    ends = np.arange(0.1, 23.9, 0.1)
+    nodes = run(new_frontend(), ride(), ends).view(np.recarray)
+    s, P = np.zeros(N), np.zeros((N, N))
+    s[V] = SPEED
+    wrong: list[Any] = []
+    predicted: list[Any] = []
+    for node in nodes[40:]:
+        assert bends_tilt(node)
+        s[[ACC_BIAS, LEFT_BIAS]] *= math.exp(-node.dt_s / Tuning().acc_bias_tau)  # as `predict_state` does
+        predict_tilt(s, P, node)
+        half = node.dyaw / 2
+        along = node.dv_forward * math.cos(half) + node.dv_left * math.sin(half)
+        across = node.dv_left * math.cos(half) - node.dv_forward * math.sin(half)
+        wrong.append((along / node.dt_s, (across - 2.0 * SPEED * math.sin(half)) / node.dt_s))
+        predicted.append((s[ACC_BIAS], s[LEFT_BIAS]))
+    for second in (14.0, 18.0, 21.5):  # in the arc twice, and after the sharp turn
+        around = slice(round(10 * (second - STARTS - 1.0)), round(10 * (second - STARTS)))
+        true, told = np.mean(wrong[around], axis=0), np.mean(predicted[around], axis=0)
+        assert np.hypot(*true) > 0.2
+        assert np.hypot(*(true - told)) < 0.5 * np.hypot(*true)
+
+
+@pytest.mark.parametrize("dyaw", [-0.4, 0.0, 0.06])
+def test_the_covariance_follows_the_jacobian_by_finite_differences(dyaw: float) -> None:
+    node = node_of(dyaw=dyaw)
+    node["tilt_gain"] = 0.02
+
+    def predicted(s: Any) -> Any:
+        after = s.copy()
+        predict_tilt(after, np.zeros((N, N)), node)
+        return after
+
+    J = jacobian_fd(predicted, STATE)
+    # The rotation of the biases themselves by an error of the gyroscope's bias is of second order and left out.
+    J[[ACC_BIAS, LEFT_BIAS]] += rotation_by_gyro_bias(predicted(STATE), node)
+    root = np.random.default_rng(3).normal(size=(N, N)) * 0.1
+    before = root @ root.T
+    P = before.copy()
+    predict_tilt(STATE.copy(), P, node)
+    np.testing.assert_allclose(P, J @ before @ J.T, atol=1e-7)
+
+
+def rotation_by_gyro_bias(after: Any, node: Any) -> Any:
+    """What the finite differences hold of that rotation, with the opposite sign."""
+    rows = np.zeros((2, N))
+    rows[:, GYRO_BIAS] = np.array([after[LEFT_BIAS], -after[ACC_BIAS]]) * node["dt_s"]
+    return rows
+
+
+@pytest.mark.parametrize(("field", "value"), [("carried", 1), ("rest", 1), ("dt_s", 0.0), ("dv_var", math.inf)])
+def test_only_a_vehicle_that_moves_bends_the_tilt(field: str, value: float) -> None:
+    node = node_of()
+    assert bends_tilt(node)
+    node[field] = value
+    assert not bends_tilt(node)
