@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from dropanchor_service.commands import evaluate_bounds as bounds
 from dropanchor_service.commands import evaluate_product as product
 from dropanchor_service.evaluation import recordings
 from dropanchor_service.evaluation.paper.whole import FULL, QUICK, TITLE, Experiment, experiments, preface
@@ -24,6 +25,7 @@ paper       all experiments of the paper that need none of its hardware, in a re
 recordings  the paper's filter and the engine fleet on real recordings with ground truth
 product     the whole engine on the samples of tags: scalar, 9-axis or 6-axis sensors; everything, the mounting angle
             or nothing configured; known and unknown start; vehicles, trolley, forklift, walks, recordings
+bounds      what no engine can exceed in the rows of `product` with vehicles: posterior Cramér-Rao bounds
 """
 EPILOG = """\
 examples:
@@ -33,6 +35,7 @@ examples:
   dropanchor evaluate recordings --data FOLDER      your own recordings, one folder each, with truth.csv
   dropanchor evaluate product --quick               a few rows and three development seeds
   dropanchor evaluate product --rows 'S5/*' 'walk-*/9-axis/*' --seeds 5000-5019
+  dropanchor evaluate bounds --rows 'S5/*' --seeds 5000-5019
 """
 DATA = Path("../shared/data")
 SOURCES = ("service/dropanchor_service/estimation", "service/dropanchor_service/evaluation/paper")
@@ -54,6 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_common(real)
     product.add_arguments(what.add_parser("product", help="the whole engine on the samples of tags"))
     _add_common(what.choices["product"])
+    bounds.add_arguments(what.add_parser("bounds", help="what no engine can exceed on these samples"))
+    _add_processes(what.choices["bounds"])
 
 
 def _add_into(parser: argparse.ArgumentParser) -> None:
@@ -68,6 +73,10 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help=f"folder of recordings (default: $DROPANCHOR_DATA or {DATA})",
     )
+    _add_processes(parser)
+
+
+def _add_processes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--processes",
         "--jobs",
@@ -81,7 +90,8 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run an evaluation. Return 0 on success, 2 if recordings are unusable or nothing can be written, 130 on Ctrl-C."""
     try:
-        return {"paper": _paper, "recordings": _recordings, "product": product.run}[arguments.what](arguments)
+        run_it = {"paper": _paper, "recordings": _recordings, "product": product.run, "bounds": bounds.run}
+        return run_it[arguments.what](arguments)
     except (RecordingError, NoRowError, NoPlaceError, OSError) as error:
         print(f"dropanchor evaluate: {error}", file=sys.stderr)
         return 2

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.report import PAGE as PERFORMANCE
-from benchmarks.report import SOURCES
+from benchmarks.report import SOURCES, page_of
 from dropanchor_service.evaluation import results
 from dropanchor_service.evaluation.results import Measured, NoPlaceError, main, problems, require_place, write
 
@@ -111,4 +110,4 @@ def test_a_page_without_a_place_is_an_error(root: Path) -> None:
 
 @pytest.mark.parametrize("table", SOURCES)
 def test_every_table_of_the_benchmarks_has_a_place(table: str) -> None:
-    assert require_place(PERFORMANCE, table)
+    assert require_place(page_of(table), table)

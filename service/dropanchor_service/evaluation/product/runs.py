@@ -71,19 +71,19 @@ def mounting_angle(seed: int) -> float:
 
 
 def _simulated(row: Row, seed: int) -> Simulation:
-    models = _sensors(row)
+    models = sensor_models(row)
     if row.scenario in CARRIED:
         return simulate_walk(row.scenario.removeprefix("walk-"), seed, walking_sensors(models))  # type: ignore[arg-type]
-    if row.scenario == "rolling":
-        models = smooth(models)
     return simulate(row.scenario, seed, replace(models, mount_rad=mounting_angle(seed)))
 
 
-def _sensors(row: Row) -> SensorModels:
+def sensor_models(row: Row) -> SensorModels:
+    """Return the sensors of the tags of a row, without their mounting angles."""
     if row.motion.endswith(FAST):
         return calibrated(preset("paper", range_hz=IMU_HZ, imu_hz=IMU_HZ))
     models = preset("real", range_hz=RANGE_HZ, imu_hz=IMU_HZ)
-    return models if row.sensors == BARE else calibrated(models)
+    models = models if row.sensors == BARE else calibrated(models)
+    return smooth(models) if row.scenario == "rolling" else models
 
 
 def _of_simulation(row: Row, run: Simulation) -> TagRun:
