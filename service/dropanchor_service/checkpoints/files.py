@@ -3,24 +3,25 @@
 from contextlib import suppress
 from pathlib import Path
 
-from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, decoded, encoded
+from dropanchor_service.checkpoints.format import CheckpointError, Decode, Snapshot, UnreadableLayoutError, encoded
 from dropanchor_service.runtime.atomic_file import write_atomically
 
 KEPT = 2
 _PREFIX = "checkpoint-"
+_ASIDE = f"unread-{_PREFIX}"
 
 
 class CheckpointFolder:
-    """Checkpoints of one layout in a folder. Not thread-safe.
+    """Checkpoints in a folder, written in one layout. Not thread-safe.
 
-    template: any snapshot of this layout, for its dtypes.
+    A checkpoint whose layout `decode` cannot read is kept under another name.
     """
 
-    def __init__(self, folder: Path, layout: str, template: Snapshot) -> None:
+    def __init__(self, folder: Path, layout: str, decode: Decode) -> None:
         self._folder = folder
         self._layout = layout
-        self._template = template
-        self._next = max((_number(path) for path in self._files()), default=0) + 1
+        self._decode = decode
+        self._next = max((_number(path) for path in [*self._files(), *self._files(_ASIDE)]), default=0) + 1
 
     def write(self, snapshot: Snapshot) -> int:
         """Write the newest checkpoint; see `Checkpoints`."""
@@ -38,16 +39,28 @@ class CheckpointFolder:
         complaints: list[str] = []
         for path in reversed(self._files()):
             try:
-                return decoded(path.read_bytes(), self._layout, self._template), complaints
+                return self._decode(path.read_bytes()), complaints
+            except UnreadableLayoutError as error:
+                complaints.append(f"{path.name} is not used: {error}; {_put_aside(path)}")
             except (OSError, CheckpointError) as error:
                 complaints.append(f"{path.name} is not used: {error}")
         return None, complaints
 
-    def _files(self) -> list[Path]:
+    def _files(self, prefix: str = _PREFIX) -> list[Path]:
         """Return the checkpoints, the oldest first."""
-        found = [path for path in self._folder.glob(f"{_PREFIX}*") if path.name[len(_PREFIX) :].isdecimal()]
+        found = [path for path in self._folder.glob(f"{prefix}*") if path.name[len(prefix) :].isdecimal()]
         return sorted(found, key=_number)
 
 
+def _put_aside(path: Path) -> str:
+    """Rename a checkpoint, so that no later one takes its place. Return what became of it, for people."""
+    kept = path.with_name(f"unread-{path.name}")
+    try:
+        path.replace(kept)
+    except OSError as error:
+        return f"it cannot be kept: {error.strerror}"
+    return f"it is kept as {kept.name}"
+
+
 def _number(path: Path) -> int:
-    return int(path.name[len(_PREFIX) :])
+    return int(path.name.rpartition("-")[2])

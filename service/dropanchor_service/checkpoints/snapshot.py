@@ -6,16 +6,14 @@ from typing import Any
 import numpy as np
 
 from dropanchor_schemas.site import Anchor
-from dropanchor_service.checkpoints.format import Snapshot, layout_of
+from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.checkpoints.layouts import name_of, version_of, why_unreadable
+from dropanchor_service.checkpoints.migrations import as_they_are, migrated
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.publishers import Publishers
-from dropanchor_service.runtime.kernel_cache import STATE_SOURCES, sources_digest
 from dropanchor_service.store import LatestPoses, ServedSite, Sites
 from dropanchor_service.store.records import put
-
-_NAMES: dict[str, Any] = {"site": "", "anchors": [], "tags": []}
-"""The document of one site. The layout does not tell how many sites a checkpoint holds."""
 
 _log = logging.getLogger(__name__)
 
@@ -30,8 +28,8 @@ class ServiceState:
         self._engine = engine
         self._publishers = publishers
         self._buffers: dict[str, Array] = {}
-        self.template = self.snapshot()
-        self.layout = layout_of(Snapshot(self.template.arrays, _NAMES), meaning=sources_digest(STATE_SOURCES))
+        self._dtypes = self.snapshot().dtypes
+        self.layout = name_of(self._dtypes)
 
     @property
     def messages(self) -> int:
@@ -49,6 +47,24 @@ class ServiceState:
         arrays |= {f"latest.{name}": array for name, array in self._latest.state().items()}
         arrays |= {f"engine.{name}": array for name, array in self._engine.state().items()}
         return Snapshot({name: self._copied(name, array) for name, array in arrays.items()}, self._document())
+
+    def decoded(self, whole: bytes) -> Snapshot:
+        """Return the snapshot in the bytes of a checkpoint, in this layout. Raises CheckpointError."""
+        layout, found = decoded(whole)
+        why_not = why_unreadable(layout, self.layout)
+        if why_not is not None:
+            raise UnreadableLayoutError(f"its layout is {why_not}")
+        if layout == self.layout:
+            return as_they_are(found, self._dtypes)
+        try:
+            present = migrated(found, version_of(layout) or 0, self._dtypes, self._fresh)
+        except CheckpointError as error:
+            raise UnreadableLayoutError(f"its layout is {layout}, but {error}") from error
+        _log.info("the checkpoint has the earlier layout %s: its %d tags go on", layout, len(found.document["tags"]))
+        return present
+
+    def _fresh(self, settings: Array) -> dict[str, Array]:
+        return {f"engine.{name}": array for name, array in self._engine.fresh(settings).items()}
 
     def _document(self) -> dict[str, Any]:
         """Return the names in the order of rows and indices. With several sites, each has the place of its site."""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dropanchor_service.checkpoints.files import CheckpointFolder
-from dropanchor_service.checkpoints.format import Snapshot, layout_of
+from dropanchor_service.checkpoints.format import Snapshot, UnreadableLayoutError, decoded
 from dropanchor_service.estimation.columns import HYPOTHESIS
 from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE
 
@@ -30,9 +30,14 @@ def snapshot(value: int) -> Snapshot:
     return Snapshot(arrays, {"tags": ["a", "Süd"], "value": value})
 
 
-def folder_of(path: Path, meaning: str = "") -> CheckpointFolder:
-    template = snapshot(0)
-    return CheckpointFolder(path, layout_of(template, meaning), template)
+def folder_of(path: Path, layout: str = "layout") -> CheckpointFolder:
+    def decode(whole: bytes) -> Snapshot:
+        found, content = decoded(whole)
+        if found != layout:
+            raise UnreadableLayoutError(f"its layout is {found}")
+        return content
+
+    return CheckpointFolder(path, layout, decode)
 
 
 def value_in(folder: CheckpointFolder) -> int | None:
@@ -61,15 +66,17 @@ def test_the_last_two_checkpoints_are_kept_and_the_numbers_continue_after_a_rest
     assert value_in(folder_of(tmp_path)) == 3
 
 
-def test_a_checkpoint_of_another_layout_is_rejected_and_both_layouts_are_named(tmp_path: Path) -> None:
-    old, new = folder_of(tmp_path, "old"), folder_of(tmp_path, "new")
-    old.write(snapshot(1))
-    found, complaints = new.newest()
+def test_a_checkpoint_of_another_layout_is_kept_under_another_name(tmp_path: Path) -> None:
+    folder_of(tmp_path, "theirs").write(snapshot(1))
+    whole = (tmp_path / "checkpoint-000000000001").read_bytes()
+    found, complaints = folder_of(tmp_path, "ours").newest()
     assert found is None
-    assert len(complaints) == 1
-    assert complaints[0].startswith("checkpoint-000000000001 is not used: its layout is ")
-    assert layout_of(snapshot(0), "old") in complaints[0]
-    assert layout_of(snapshot(0), "new") in complaints[0]
+    kept = "unread-checkpoint-000000000001"
+    assert complaints == [f"checkpoint-000000000001 is not used: its layout is theirs; it is kept as {kept}"]
+    for value in range(2, 6):
+        folder_of(tmp_path, "ours").write(snapshot(value))
+    assert (tmp_path / kept).read_bytes() == whole
+    assert value_in(folder_of(tmp_path, "ours")) == 5
 
 
 def test_the_previous_checkpoint_is_used_when_the_newest_is_cut_at_any_byte(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ class CheckpointBench:
         self.bench = IngestBench(engine=self.engine, folder=folder)
         self.bench.guarded_engine.follow_sites()
         state = self.bench.service_state()
-        checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.template)
+        checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.decoded)
         self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, period_s=0.01)
         self.thread = IngestThread(
             self.bench.ingest, self.bench.buffer, self.bench.metrics, 0.001, self.checkpoints.between_turns

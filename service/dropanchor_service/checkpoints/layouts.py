@@ -1,0 +1,80 @@
+"""Which layouts of checkpoints there are, which of them this version reads, and the columns of each.
+
+The name of a layout is its number and a digest of its columns. A higher number is a later layout.
+"""
+
+import hashlib
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import orjson
+
+VERSION = 2
+"""Number of the layout that this version writes. Raise it when a column of the state changes, in its name, its type or
+its meaning: `migrations.py` says what else to do."""
+READ_BEFORE = 2
+"""How many layouts before its own a version reads."""
+
+_FIRST = "fa8bf211067538b1"
+"""Name of the first layout, which had no number. Its files do not list their columns: `version_1.json` does."""
+_NUMBERED = re.compile(r"([1-9]\d*)-[0-9a-f]{16}")
+
+DTypes = Mapping[str, np.dtype[Any]]
+
+
+def name_of(dtypes: DTypes) -> str:
+    """Return the name of the present layout, whose arrays have these dtypes."""
+    text = repr(sorted((name, str(np.lib.format.dtype_to_descr(dtype))) for name, dtype in dtypes.items()))
+    return f"{VERSION}-{hashlib.blake2b(text.encode(), digest_size=8).hexdigest()}"
+
+
+def version_of(layout: str) -> int | None:
+    """Return the number of a layout, None if this version does not know its name."""
+    if layout == _FIRST:
+        return 1
+    numbered = _NUMBERED.fullmatch(layout)
+    return None if numbered is None else int(numbered[1])
+
+
+def why_unreadable(layout: str, own: str) -> str | None:
+    """Return why a version whose layout is `own` does not read another one, as the end of a sentence; None if it does.
+
+    The sentence begins with what has the layout: "its layout is".
+    """
+    if layout == own:
+        return None
+    version, oldest = version_of(layout), VERSION - READ_BEFORE
+    if version is not None and oldest <= version < VERSION:
+        return None
+    if version is not None and version > VERSION:
+        return f"{layout}, but this version uses {own}, which is older"
+    if version is not None and version < oldest:
+        return f"{layout}, but this version uses {own} and reads none before {oldest}"
+    return f"{layout}, but this version uses {own}"
+
+
+def described(dtypes: DTypes) -> dict[str, Any]:
+    """Return the columns of arrays as values that JSON can hold."""
+    return {name: np.lib.format.dtype_to_descr(dtype) for name, dtype in dtypes.items()}
+
+
+def dtypes_of(description: Mapping[str, Any]) -> DTypes:
+    """Return what `described` was given."""
+    return {name: np.lib.format.descr_to_dtype(_as_written(columns)) for name, columns in description.items()}
+
+
+@cache
+def first_dtypes() -> DTypes:
+    """Return the dtypes of the first layout."""
+    return dtypes_of(orjson.loads(files(__package__).joinpath("version_1.json").read_bytes()))
+
+
+def _as_written(columns: Any) -> Any:
+    """Return a description with the tuples that NumPy wants and JSON does not have."""
+    if isinstance(columns, str):
+        return columns
+    return [(name, _as_written(kind), *(tuple(shape) for shape in shapes)) for name, kind, *shapes in columns]
