@@ -6,12 +6,13 @@ from dropanchor_schemas import keys
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.tracks import Tracks
+from dropanchor_service.settings.buckets import common_bucket
 from dropanchor_service.store import LatestPoses, Sites
 from dropanchor_service.store.clock_offsets import ClockOffsets
 
 
 class AnswersOfSites:
-    """The answers of each site. only: those of the only site, None when there are several.
+    """The answers of each site. only: those of the only site, or None. bucket: of all sites, or None.
 
     answers: in the order of the sites' indices. Their poses are in one `LatestPoses`.
     """
@@ -21,6 +22,7 @@ class AnswersOfSites:
         self._by_id = {one.site.site.id: one for one in answers}
         self._by_chunk = {keys.chunk_from_id(site): one for site, one in self._by_id.items()}
         self.only = answers[0] if len(answers) == 1 else None
+        self.bucket = common_bucket(self._by_id)
         self.latest = answers[0].latest
 
     def __len__(self) -> int:

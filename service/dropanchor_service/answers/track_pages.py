@@ -11,7 +11,7 @@ from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pos
 from dropanchor_service.answers.times import isos_utc
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.errors import HistoryError
-from dropanchor_service.history.records import StoredPoses
+from dropanchor_service.history.records import ESTIMATED, StoredPoses
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.site import SiteStore
 
@@ -91,20 +91,6 @@ def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
         lat, lon = lat_lon(origin, *(np.where(in_site, poses[axis], np.nan) for axis in ("x", "y")))
         columns["lat"], columns["lon"] = np.round(lat, 9).tolist(), np.round(lon, 9).tolist()
     return columns
-
-
-ESTIMATED = {
-    "x": "x",
-    "y": "y",
-    "heading_rad": "heading",
-    "speed_mps": "speed",
-    "yaw_rate_radps": "yaw_rate",
-    "p_mode": "p_mode",
-    "sigma_pos_m": "sigma_pos",
-    "sigma_obs_m": "sigma_obs",
-    "range_m": "range",
-}
-"""Numbers of an estimate, and the fields of POSE that hold them."""
 
 
 def _short(values: Array) -> Array:

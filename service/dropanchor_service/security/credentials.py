@@ -4,7 +4,7 @@ import logging
 from contextlib import suppress
 from datetime import datetime, timedelta
 
-from dropanchor_service.security import api_keys, oidc, share_links
+from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
 from dropanchor_service.security.authority import expiry
@@ -84,6 +84,15 @@ def authenticator_of(settings: Settings, only_site: str | None = None) -> Authen
         raise SettingsError(f"share links: {error}") from error
 
 
+def keys_and_tokens_of(settings: Settings) -> Authenticator | None:
+    """Return what authenticates API keys and tokens, but no share links; None when anonymous access is allowed.
+
+    Raises SettingsError.
+    """
+    providers = _providers_of(settings)
+    return Authenticator(providers) if providers else None
+
+
 def _providers_of(settings: Settings) -> dict[str, IdentityProvider]:
     providers: dict[str, IdentityProvider] = {}
     security = settings.security
@@ -93,6 +102,8 @@ def _providers_of(settings: Settings) -> dict[str, IdentityProvider]:
     except ApiKeyError as error:
         raise SettingsError(f"security.folder: {error}") from error
     if security.oidc is not None:
+        from dropanchor_service.security import oidc  # with its libraries, 3 MB of memory
+
         of_sites = {name: site.oidc_scopes for name, site in settings.sites.items()}
         providers[oidc.SOURCE] = oidc.OidcTokens(security.oidc, of_sites)
     return providers

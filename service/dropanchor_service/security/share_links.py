@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 
-import jwt
 from pydantic import TypeAdapter, ValidationError
 
 from dropanchor_schemas.shares import Share, ShareRequest
@@ -78,6 +77,8 @@ class ShareLinks:
                 raise TooManyLinksError
             self._write(listed | {link.id: link})
         claims = {"jti": link.id, "aud": _AUDIENCE, "exp": link.expires_ns // NS, "tag": link.tag, "group": link.group}
+        import jwt  # with its cryptography, 3 MB of memory, only where there are links
+
         return link, PREFIX + jwt.encode(claims, self._key, _ALGORITHM)
 
     def revoke(self, site: str, identifier: str) -> bool:
@@ -93,6 +94,8 @@ class ShareLinks:
 
     def identify(self, secret: str) -> Identity:
         """Return the identity of a token. Raises UnauthenticatedError when it is invalid, revoked or expired."""
+        import jwt
+
         try:
             claims = jwt.decode(
                 secret.removeprefix(PREFIX),

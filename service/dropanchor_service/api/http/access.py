@@ -28,7 +28,9 @@ INGEST = "/api/v1/ingest/"
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
-_SITES, _SITE = "/api/v1/sites", "/api/v1/site"
+OF_ALL_SITES = ("/api/v1/sites", "/api/v1/sites/poses")
+"""Paths whose answers hold what the client may read of each site."""
+_SITE = "/api/v1/site"
 _SHARES = "/api/v1/shares"
 _DESTINATIONS = "/api/v1/destinations/"
 _HOW_TO_AUTHENTICATE = (
@@ -187,7 +189,7 @@ def _forbidden(request: Request, identity: Identity | None, site: str | None, se
     if path.startswith(INGEST):
         allowed = speaks_in(identity, site, several_sites)
         needs = f"a key that was created with {key_command(several_sites)}"
-    elif request.scope["path"] == _SITES and identity.of_sites:
+    elif request.scope["path"] in OF_ALL_SITES and identity.of_sites:
         return None  # it learns of its sites alone
     else:
         required = required_scope(request.method, path)

@@ -100,7 +100,7 @@ class _Stream:
         rate_limiter: RateLimiter | None,
     ) -> None:
         self._site_of = site_of
-        self._make_a_key = f"Make a key with {key_command(site_of.only is None)}."
+        self._key_command = key_command(site_of.only is None)
         self._stopping = stopping
         self._authenticator = authenticator
         self._rate_limiter = rate_limiter
@@ -131,10 +131,9 @@ class _Stream:
                     FORBIDDEN, "A page of another origin may not send samples to a service without keys."
                 )
             return None
-        offered = (name.removeprefix(KEY_PROTOCOL) for name in _protocols(socket) if name.startswith(KEY_PROTOCOL))
-        secret = bearer_of(socket) or next(offered, "")
+        secret = bearer_of(socket) or key_among_protocols(socket)
         if not secret:
-            raise _ClosedError(UNAUTHENTICATED, f"This service needs a key. {self._make_a_key}")
+            raise _ClosedError(UNAUTHENTICATED, f"This service needs a key. Make a key with {self._key_command}.")
         try:
             return await identify(self._authenticator, secret)
         except UnauthenticatedError as error:
@@ -145,7 +144,7 @@ class _Stream:
         named = socket.query_params.get("tag")
         own = None if identity is None else identity.tag
         if identity is not None and own is None:
-            raise _ClosedError(FORBIDDEN, f"This key may not send samples. {self._make_a_key}")
+            raise _ClosedError(FORBIDDEN, f"This key may not send samples. Make a key with {self._key_command}.")
         if own is not None and named not in (None, own):
             raise _ClosedError(FORBIDDEN, f"This key speaks for the tag {own!r} only.")
         tag = own or named
@@ -167,7 +166,10 @@ class _Stream:
             unnamed = "Say which site this is: add ?site=SITE to the address of the page."
             raise _ClosedError(UNREADABLE, unnamed if error.kind is Kind.SEVERAL_SITES else error.detail) from error
         if identity is not None and not speaks_in(identity, site.id, self._site_of.only is None):
-            raise _ClosedError(FORBIDDEN, f"This key may not send samples to the site {site.id!r}. {self._make_a_key}")
+            raise _ClosedError(
+                FORBIDDEN,
+                f"This key may not send samples to the site {site.id!r}. Make a key with {self._key_command}.",
+            )
         return site
 
     async def _wait_for_turn(self, client: str) -> None:
@@ -186,7 +188,9 @@ class _Stream:
             and self._authenticator is not None
             and not self._authenticator.is_still_valid(identity)
         ):
-            raise _ClosedError(UNAUTHENTICATED, f"The key was revoked or has expired. {self._make_a_key}")
+            raise _ClosedError(
+                UNAUTHENTICATED, f"The key was revoked or has expired. Make a key with {self._key_command}."
+            )
 
 
 def ingest_stream_router(
@@ -218,6 +222,12 @@ async def _messages(socket: WebSocket) -> AsyncIterator[tuple[bytes, str]]:
     while (message := await socket.receive())["type"] == "websocket.receive":
         text = message.get("text")
         yield (message["bytes"], ENCODING_PACKED) if text is None else (text.encode(), ENCODING_JSON)
+
+
+def key_among_protocols(socket: WebSocket) -> str:
+    """Return the key that a browser offers; empty without one."""
+    offered = (name.removeprefix(KEY_PROTOCOL) for name in _protocols(socket) if name.startswith(KEY_PROTOCOL))
+    return next(offered, "")
 
 
 def _protocols(socket: WebSocket) -> list[str]:

@@ -22,7 +22,7 @@ PROGRAMS = frozenset(
 )
 """What a page, a worker or a computed `import()` asks for."""
 
-_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_COMMENT = re.compile(r"/\*\*.*?\*/", re.DOTALL)  # its types look like imports
 _IMPORT = re.compile(r'^import (?:\{ (?P<names>[^}]+) \}|(?P<default>\w+)) from "(?P<path>[^"]+)";$', re.MULTILINE)
 _LATER_IMPORT = re.compile(r'\bimport\("(?P<path>[^"]+)"\)')
 _EXPORT = re.compile(r"^export (?=(?:(?:async )?function\*? |class |const )(?P<name>[\w$]+))", re.MULTILINE)

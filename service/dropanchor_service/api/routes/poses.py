@@ -104,7 +104,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
             return _response(geojson.collection_of(answers.pose_list(tags, query.wanted)), geojson.MEDIA_TYPE)
         headers = {"cache-control": "no-store", "vary": "accept"}
         return StreamingResponse(
-            _in_pieces(answers.pose_list_json(tags, query.wanted)), media_type=geojson.JSON, headers=headers
+            in_pieces(answers.pose_list_json(tags, query.wanted)), media_type=geojson.JSON, headers=headers
         )
 
 
@@ -127,7 +127,7 @@ class PlainPose(APIRoute):
         return handle
 
 
-async def _in_pieces(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
+async def in_pieces(chunks: Iterator[bytes | memoryview]) -> AsyncIterator[bytes | memoryview]:
     """Yield the chunks in pieces, and let other requests run between two chunks."""
     for chunk in chunks:
         for begin in range(0, len(chunk), PIECE_BYTES):

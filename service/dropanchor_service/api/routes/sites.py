@@ -1,18 +1,22 @@
 """The sites that the service serves, and the routes that each of them has."""
 
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.routing import APIRoute
-from starlette.responses import Response
+from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.answers import SiteList
+from dropanchor_schemas.pose import SitePosesList
+from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.site_summaries import summaries
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
-from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
+from dropanchor_service.api.routes.parameters import NO_QUERY, PoseQuery, example_response, json_response
+from dropanchor_service.api.routes.poses import in_pieces
 from dropanchor_service.api.routes.site_of_request import SITE_IN_PATH, SITE_PREFIX, SiteOfRequest
+from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.security.identity import Scope
 
 
@@ -20,6 +24,7 @@ def sites_router(site_of: SiteOfRequest, routers: Iterable[APIRouter]) -> APIRou
     """Return the list of the sites, and below the id of each site the routes of these routers."""
     router = APIRouter()
     _add_list_route(router, site_of)
+    _add_poses_route(router, site_of)
     for routes in routers:
         for route in _api_routes(routes):
             route.operation_id = route.unique_id = f"{route.operation_id}_of_site"
@@ -49,6 +54,41 @@ def _add_list_route(router: APIRouter, sites: SiteOfRequest) -> None:
         dependencies=[NO_QUERY],
     )
     def list_sites(request: Request) -> Response:
-        scope_in = getattr(request.state, "scope_in", lambda _: Scope.ADMIN)  # without authentication
-        wanted = {one.id for one in sites if scope_in(one.id) is not None}
+        wanted = {one.id for one in _readable(sites, request)}
         return json_response({"sites": list(summaries([one.answers for one in sites], wanted))})
+
+
+def _add_poses_route(router: APIRouter, sites: SiteOfRequest) -> None:
+    @router.get(
+        "/sites/poses",
+        operation_id="list_poses_of_sites",
+        summary="List the latest poses of the tags of all sites",
+        tags=["poses"],
+        response_model=SitePosesList,
+        responses=example_response({"sites": [{"site": "default", **examples.POSE_LIST}]})
+        | problems(Kind.INVALID_REQUEST),
+    )
+    async def list_poses_of_sites(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
+        chunks = _poses_json(_readable(sites, request), query)
+        return StreamingResponse(
+            in_pieces(chunks), media_type="application/json", headers={"cache-control": "no-store"}
+        )
+
+
+def _readable(sites: SiteOfRequest, request: Request) -> list[SiteParts]:
+    """Return the sites that the client of a request may read."""
+    scope_in = getattr(request.state, "scope_in", lambda _: Scope.ADMIN)  # without authentication
+    return [one for one in sites if scope_in(one.id) is not None]
+
+
+def _poses_json(sites: Sequence[SiteParts], query: PoseQuery) -> Iterator[bytes | memoryview]:
+    """Yield the JSON of a `SitePosesList`, in chunks."""
+    before = b'{"sites":['
+    for one in sites:
+        answers = one.answers
+        found = [tag for tag in map(answers.tags.find, query.tags) if tag is not None]
+        poses = answers.pose_list_json(found if query.tags else None, query.wanted)
+        yield b'%b{"site":%b,%b' % (before, to_json(one.id), bytes(next(poses))[1:])
+        yield from poses
+        before = b","
+    yield b"]}" if sites else b'{"sites":[]}'

@@ -1,11 +1,10 @@
 """Check with schemathesis that the omlox interface follows its own OpenAPI document."""
 
-from collections.abc import Iterator
-
 import pytest
+from fastapi import FastAPI
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
-from support.contract import Operation, assert_follows_the_document, operations_of
+from support.contract import assert_follows_the_document, operations_of
 from support.events import circle
 from support.omlox import OmloxBench
 
@@ -21,14 +20,14 @@ REFUSES_VALID = (
 GeoJSON is never `local`. Beside these, whatever names an object may name one that does not exist."""
 
 
-def operations() -> Iterator[Operation]:
+def app() -> FastAPI:
     bench = OmloxBench()
     bench.poses.move("tag-1", "a")
     bench.zones.put(circle("dock"))
-    yield from operations_of(bench.app, "/omlox/v2/openapi.json")
+    return bench.app
 
 
-OPERATIONS = {operation.definition.raw["operationId"]: operation for operation in operations()}
+OPERATIONS = operations_of(app(), "/omlox/v2/openapi.json")
 
 
 @pytest.mark.parametrize("name", OPERATIONS)

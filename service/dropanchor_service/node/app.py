@@ -1,0 +1,118 @@
+"""The application of an API node: what it answers itself, and all else passed on to the owners of the sites."""
+
+import re
+import secrets
+from collections.abc import Callable, Sequence
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+
+from fastapi import FastAPI
+from prometheus_client import CollectorRegistry
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.responses import RedirectResponse
+from starlette.routing import Match, Mount, Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from dropanchor_service.api.app import DASHBOARD, MAX_BODY_BYTES, PREFIX
+from dropanchor_service.api.http.access import Access
+from dropanchor_service.api.http.errors import ProblemError, add_error_handlers
+from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
+from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
+from dropanchor_service.api.http.rates import RateLimiter
+from dropanchor_service.api.routes.dashboard import page_mounts
+from dropanchor_service.api.routes.health import Impaired, Ready, health_router, metrics_router
+from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
+from dropanchor_service.node.owners import Owners
+from dropanchor_service.security.identity import Authenticator
+
+REQUEST_ID = "x-request-id"
+_ID = re.compile(r"[A-Za-z0-9._:-]{1,64}")
+
+Lifespan = Callable[[FastAPI], AbstractAsyncContextManager[None]]
+
+
+def create_node_app(
+    gateway: ASGIApp,
+    owners: Owners,
+    *,
+    ready: Ready,
+    impaired: Impaired,
+    registry: CollectorRegistry,
+    lifespan: Lifespan,
+    authenticator: Authenticator | None = None,
+    rate_limiter: RateLimiter | None = None,
+    cors_origins: Sequence[str] = (),
+    dashboard: Path = DASHBOARD,
+) -> FastAPI:
+    """Return the application. The page, health and metrics are of the node itself; `gateway` has the rest.
+
+    authenticator, rate_limiter: for the metrics; the owners check all else. lifespan: what runs as long as it does.
+    """
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, redirect_slashes=False, lifespan=lifespan)
+    app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES, of_paths={f"{PREFIX}/plan-images": MAX_UPLOAD_BYTES})
+    app.add_middleware(EscapedPath)
+    app.add_middleware(RequestId)
+    app.add_middleware(SecurityHeaders)
+    allow_origins(app, cors_origins)
+    add_error_handlers(app)
+    metrics = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
+    metrics.add_middleware(
+        Access, authenticator=authenticator, rate_limiter=rate_limiter, members=lambda *_: [], only_site=None
+    )
+    metrics.include_router(metrics_router(registry))
+    page = page_mounts(dashboard)
+    app.router.routes.extend([FrontPage(gateway, page[-1], owners), *page, Route("/metrics", metrics, methods=["GET"])])
+    app.include_router(health_router(ready, impaired), prefix=PREFIX)
+    app.router.default = gateway
+    return app
+
+
+class FrontPage(Route):
+    """The page without a site: of several buckets the overview, of an only one what its owner has there.
+
+    While that owner is away, the page of this node says so.
+    """
+
+    def __init__(self, gateway: ASGIApp, page: Mount, owners: Owners) -> None:
+        super().__init__("/", self._serve, methods=["GET"])
+        self.app = self._serve
+        self._gateway = gateway
+        self._page = page
+        self._owners = owners
+
+    def matches(self, scope: Scope) -> tuple[Match, Scope]:
+        match, child_scope = super().matches(scope)
+        names_site = match is not Match.NONE and "site" in Request(scope).query_params
+        return (Match.NONE, {}) if names_site else (match, child_scope)
+
+    async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if len(self._owners.buckets) > 1:
+            await RedirectResponse("sites/")(scope, receive, send)
+            return
+        try:
+            await self._gateway(scope, receive, send)
+        except ProblemError:
+            await self._page.app(scope, receive, send)
+
+
+class RequestId:
+    """ASGI middleware that gives a request an id, the client's or a new one, and its answer the same."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get(REQUEST_ID, "")
+        request_id = given if _ID.fullmatch(given) else secrets.token_hex(16)
+        scope.setdefault("state", {})["request_id"] = request_id
+
+        async def sending(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message)[REQUEST_ID] = request_id
+            await send(message)
+
+        await self._app(scope, receive, sending)
