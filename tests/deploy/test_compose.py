@@ -5,21 +5,22 @@ from typing import Any
 
 import yaml
 
+from dropanchor_service.cli import _parser
 from support.commands import python
 from support.service import ROOT
 
 DEPLOY = ROOT / "deploy"
-COMPOSE = DEPLOY / "compose.yaml"
+COMPOSE, CLUSTER = DEPLOY / "compose.yaml", DEPLOY / "compose.cluster.yaml"
 MADE_BY_THE_OPERATOR = "./security"
 
 
-def services() -> dict[str, Any]:
-    found: dict[str, Any] = yaml.safe_load(COMPOSE.read_text())["services"]
+def services(file: Path = COMPOSE) -> dict[str, Any]:
+    found: dict[str, Any] = yaml.safe_load(file.read_text())["services"]
     return found
 
 
-def test_the_file_follows_the_compose_specification(tmp_path: Path) -> None:
-    checked = python("-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec", str(COMPOSE))
+def test_the_files_follow_the_compose_specification(tmp_path: Path) -> None:
+    checked = python("-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec", str(COMPOSE), str(CLUSTER))
     assert checked.returncode == 0, checked.stdout
     wrong = tmp_path / "compose.yaml"
     wrong.write_text(COMPOSE.read_text().replace("depends_on: [router]", "depends_upon: [router]"))
@@ -27,7 +28,7 @@ def test_the_file_follows_the_compose_specification(tmp_path: Path) -> None:
 
 
 def test_every_mounted_file_exists_or_is_made_by_the_operator() -> None:
-    for service in services().values():
+    for service in (*services().values(), *services(CLUSTER).values()):
         for source in (volume.split(":")[0] for volume in service.get("volumes", [])):
             if source.startswith("./") and not source.startswith(MADE_BY_THE_OPERATOR):
                 assert (DEPLOY / source).exists(), source
@@ -46,3 +47,20 @@ def test_our_containers_are_read_only_and_cannot_gain_privileges() -> None:
         assert service["cap_drop"] == ["ALL"]
         assert service["security_opt"] == ["no-new-privileges:true"]
         assert "./security:/security:ro" in service["volumes"]
+
+
+def test_the_cluster_has_three_nodes_two_api_nodes_and_no_open_port_of_ray() -> None:
+    found = services(CLUSTER)
+    nodes = [name for name, service in found.items() if "--join" in service.get("command", [])]
+    assert (nodes, found["api"]["deploy"]["replicas"]) == (["node-1", "node-2", "node-3"], 2)
+    assert {name for name, service in found.items() if "ports" in service} == {"router", "api"}
+    for name in (*nodes, "head", "api", "router"):
+        assert found[name]["cap_drop"] == ["ALL"]
+        words = found[name]["command"]
+        _parser(words[:1]).parse_args(words)
+    for name in nodes:
+        environment = found[name]["environment"]
+        assert (environment["DROPANCHOR_CLUSTER__NAME"], environment["DROPANCHOR_CLUSTER__ADDRESS"]) == (
+            name,
+            f"http://{name}",
+        )

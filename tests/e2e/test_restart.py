@@ -55,7 +55,8 @@ def test_a_checkpoint_of_another_layout_is_refused_by_name_and_all_tags_start_af
         send(service, "a", 20)
         assert service.stop() == 0
     newest = max((tmp_path / "checkpoints").iterdir())
-    newest.write_bytes(with_another_layout(newest.read_bytes()))
+    newest_bytes = with_another_layout(newest.read_bytes())
+    newest.write_bytes(newest_bytes)
     for other in (tmp_path / "checkpoints").iterdir():
         if other != newest:
             other.unlink()
@@ -63,6 +64,7 @@ def test_a_checkpoint_of_another_layout_is_refused_by_name_and_all_tags_start_af
         log = "".join(service.log)
         assert f"{newest.name} is not used: its layout is " in log
         assert "all tags start afresh" in log
+        assert (newest.parent / f"unread-{newest.name}").read_bytes() == newest_bytes
         assert service.get("/api/v1/poses")["poses"] == []
 
 

@@ -33,6 +33,7 @@ CREATE TABLE IF NOT EXISTS dropanchor_lease (
     lease_s double precision NOT NULL DEFAULT 0,
     renewed timestamptz NOT NULL DEFAULT clock_timestamp()
 );
+ALTER TABLE dropanchor_lease ADD COLUMN IF NOT EXISTS moving_to text NOT NULL DEFAULT '';
 CREATE TABLE IF NOT EXISTS dropanchor_checkpoint (
     bucket text PRIMARY KEY,
     epoch bigint NOT NULL,
@@ -54,6 +55,12 @@ CREATE TABLE IF NOT EXISTS dropanchor_standby (
     obstacle text NOT NULL DEFAULT '',
     seen timestamptz NOT NULL DEFAULT clock_timestamp(),
     PRIMARY KEY (bucket, name)
+);
+CREATE TABLE IF NOT EXISTS dropanchor_node (
+    name text PRIMARY KEY,
+    shards integer NOT NULL DEFAULT 0,
+    is_drained boolean NOT NULL DEFAULT false,
+    seen timestamptz NOT NULL DEFAULT clock_timestamp()
 );
 """
 """The content of a checkpoint is numbers, which the database would try to compress in vain."""
@@ -77,7 +84,7 @@ def make_tables(connection: Connection) -> None:
     """Make the tables that do not exist yet. Raises DatabaseError."""
     with connection.transaction():
         connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
-        found = connection.execute("SELECT to_regclass('dropanchor_standby')").fetchone()
+        found = connection.execute("SELECT to_regclass('dropanchor_node')").fetchone()
         if found is None or found[0] is None:
             connection.execute(_TABLES)
 

@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 from dropanchor_service.cluster.database import Connection
-from dropanchor_service.cluster.watch import Lease
+from dropanchor_service.cluster.watch import Lease, node_of
 
 _COLUMNS = """
     lease.bucket, greatest(lease.epoch, coalesce(checkpoint.epoch, 0)), lease.owner, lease.address, lease.sites,
-    coalesce(checkpoint.layout, ''), lease.renewals, lease.is_moving, lease.was_moved, lease.takes_any, lease.lease_s,
+    coalesce(checkpoint.layout, ''), lease.renewals, lease.is_moving, lease.moving_to,
+    lease.was_moved, lease.takes_any, lease.lease_s,
     extract(epoch FROM clock_timestamp() - lease.renewed)::double precision
 """
 _SELECT = f"""
@@ -16,8 +18,8 @@ _SELECT = f"""
 """
 _CLAIM = """
     UPDATE dropanchor_lease SET epoch = %(next)s, owner = %(owner)s, address = %(address)s, sites = %(sites)s,
-        renewals = 0, lease_s = %(lease_s)s, was_moved = is_moving, is_moving = false, takes_any = false,
-        renewed = clock_timestamp()
+        renewals = 0, lease_s = %(lease_s)s, was_moved = is_moving, is_moving = false, moving_to = '',
+        takes_any = false, renewed = clock_timestamp()
     WHERE bucket = %(bucket)s AND epoch <= %(epoch)s AND renewals = %(renewals)s AND owner = %(seen_owner)s
 """
 _FENCE = """
@@ -33,6 +35,8 @@ _RENEW = """
 _RELEASE = """
     UPDATE dropanchor_lease SET owner = '', address = '', renewals = renewals + 1 WHERE bucket = %s AND epoch = %s
 """
+_ADDRESS = "UPDATE dropanchor_lease SET address = %s WHERE bucket = %s AND epoch = %s"
+_MOVE = "UPDATE dropanchor_lease SET is_moving = %s, moving_to = %s WHERE bucket = %s"
 _STANDBY = """
     INSERT INTO dropanchor_standby (bucket, name, obstacle) VALUES (%s, %s, %s)
     ON CONFLICT (bucket, name) DO UPDATE SET obstacle = excluded.obstacle, seen = clock_timestamp()
@@ -45,6 +49,11 @@ _STATUS = """
               AND seen > clock_timestamp() - interval '5 s' ORDER BY name)
     FROM dropanchor_lease AS lease LEFT JOIN dropanchor_checkpoint USING (bucket) ORDER BY bucket
 """
+ANY = "*"
+"""The bucket of a standby that takes over any."""
+HEAD = "@head"
+"""The bucket that has no sites: its owner looks after the nodes and shards of the cluster."""
+HEAD_SEEN_S = 10.0  # since the last renewal, after which the head is taken for gone
 
 
 @dataclass(frozen=True)
@@ -66,6 +75,13 @@ class Claim:
     documents: dict[str, bytes]
 
 
+class Claimed(NamedTuple):
+    """A claim, and when it was asked for, by the clock of leases."""
+
+    claim: Claim
+    asked_s: float
+
+
 @dataclass(frozen=True)
 class BucketStatus:
     """A bucket, for people. standbys: those that were seen in the last seconds, each with its obstacle."""
@@ -80,6 +96,12 @@ def read(connection: Connection, bucket: str) -> Lease | None:
     """Return the lease of a bucket, None if it has none. Its epoch is the highest that anybody had of it."""
     row = connection.execute(f"{_SELECT} WHERE bucket = %s", [bucket]).fetchone()
     return None if row is None else _lease(row)
+
+
+def read_all(connection: Connection) -> dict[str, Lease]:
+    """Return the leases of all buckets of sites, by bucket."""
+    found = map(_lease, connection.execute(f"{_SELECT} WHERE bucket <> %s", [HEAD]))
+    return {lease.bucket: lease for lease in found}
 
 
 def seen_or_new(connection: Connection, bucket: str) -> Lease:
@@ -127,14 +149,31 @@ def release(connection: Connection, bucket: str, epoch: int) -> None:
     connection.execute(_RELEASE, [bucket, epoch])
 
 
+def set_address(connection: Connection, bucket: str, epoch: int, address: str) -> None:
+    """Write where clients reach the owner, which was not known when it claimed the bucket."""
+    connection.execute(_ADDRESS, [address, bucket, epoch])
+
+
 def note_standby(connection: Connection, bucket: str, name: str, obstacle: str | None) -> None:
     """Write that a standby is there, for people."""
     connection.execute(_STANDBY, [bucket, name, obstacle or ""])
 
 
-def set_moving(connection: Connection, bucket: str, is_moving: bool) -> None:
-    """Let the next standby take the bucket over at once, or no longer."""
-    connection.execute("UPDATE dropanchor_lease SET is_moving = %s WHERE bucket = %s", [is_moving, bucket])
+def set_moving(connection: Connection, bucket: str, is_moving: bool, to: str = "") -> None:
+    """Let the next standby take the bucket over at once, or no longer. to: its node, if not any."""
+    connection.execute(_MOVE, [is_moving, to, bucket])
+
+
+def owned_by_node(connection: Connection, node: str) -> list[str]:
+    """Return the buckets that the shards of a node own, by name."""
+    owners = ((lease.bucket, lease.owner) for lease in read_all(connection).values())
+    return sorted(bucket for bucket, owner in owners if owner and node_of(owner) == node)
+
+
+def has_head(connection: Connection) -> bool:
+    """Return whether a head looks after the nodes."""
+    lease = read(connection, HEAD)
+    return lease is not None and bool(lease.owner) and lease.age_s < HEAD_SEEN_S
 
 
 def accept_any(connection: Connection, bucket: str) -> None:
@@ -143,8 +182,8 @@ def accept_any(connection: Connection, bucket: str) -> None:
 
 
 def status(connection: Connection) -> list[BucketStatus]:
-    """Return all buckets, in the order of their names."""
-    leases = {lease.bucket: lease for lease in map(_lease, connection.execute(_SELECT))}
+    """Return all buckets of sites, in the order of their names."""
+    leases = read_all(connection)
     rows = connection.execute(_STATUS).fetchall()
     return [BucketStatus(leases[row[0]], *row[1:]) for row in rows if row[0] in leases]
 

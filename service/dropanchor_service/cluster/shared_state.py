@@ -6,7 +6,7 @@ Each write holds only while nobody has a higher epoch.
 from collections.abc import Callable
 from threading import Lock
 
-from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, decoded, encoded
+from dropanchor_service.checkpoints.format import CheckpointError, Decode, Snapshot, encoded
 from dropanchor_service.cluster.database import Connection, DatabaseError, sentence_of
 from dropanchor_service.cluster.leases import Claim
 
@@ -24,14 +24,14 @@ _DOCUMENT = """
 class CheckpointRow:
     """The checkpoint of a bucket, in the database.
 
-    connect: raises DatabaseError. template: any snapshot of the layout, for its dtypes.
+    connect: raises DatabaseError. layout: in which it is written.
     """
 
-    def __init__(self, connect: Callable[[], Connection], bucket: str, layout: str, template: Snapshot) -> None:
+    def __init__(self, connect: Callable[[], Connection], bucket: str, layout: str, decode: Decode) -> None:
         self.layout = layout
         self._connect = connect
         self._bucket = bucket
-        self._template = template
+        self._decode = decode
         self._connection: Connection | None = None
         self._claim = Claim(0, b"", {})
         self._lock = Lock()
@@ -67,7 +67,7 @@ class CheckpointRow:
         if not self._claim.checkpoint:
             return None, []
         try:
-            return decoded(self._claim.checkpoint, self.layout, self._template), []
+            return self._decode(self._claim.checkpoint), []
         except CheckpointError as error:
             return None, [f"the checkpoint of the bucket {self._bucket} is not used: {error}"]
 

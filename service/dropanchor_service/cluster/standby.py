@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import Connection, DatabaseError, make_tables, sentence_of
-from dropanchor_service.cluster.leases import Claim, Claimant
+from dropanchor_service.cluster.leases import Claimant, Claimed
 from dropanchor_service.cluster.sentences import database_away, standby_of, unable
 from dropanchor_service.cluster.watch import Watch, obstacle
 
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 class Standby:
     """Looks at the lease of a bucket until it can claim it. sentence: what it waits for, for people.
 
-    connect: raises DatabaseError. layout: of the checkpoints that this version reads.
+    connect: raises DatabaseError. layout: of the checkpoints that this version writes.
     """
 
     def __init__(self, connect: Callable[[], Connection], bucket: str, who: Claimant, layout: str) -> None:
@@ -29,15 +29,12 @@ class Standby:
         self._bucket = bucket
         self._who = who
         self._layout = layout
-        self._watch = Watch(who.lease_s)
+        self._watch = Watch(who.lease_s, who.name)
         self._noted_s = 0.0
         self.sentence = "The service is starting."
 
-    def wait(self, on_look: Callable[[], None]) -> tuple[Claim, float]:
-        """Return what was claimed, and when that was asked for, by the clock of leases.
-
-        on_look: called about once a second.
-        """
+    def wait(self, on_look: Callable[[], None]) -> Claimed:
+        """Return what was claimed. on_look: called about once a second."""
         while True:
             on_look()
             try:
@@ -49,7 +46,7 @@ class Standby:
                 self._say(database_away(self._bucket, sentence_of(error)))
                 time.sleep(RETRY_S)
 
-    def _watched(self, connection: Connection, on_look: Callable[[], None]) -> tuple[Claim, float]:
+    def _watched(self, connection: Connection, on_look: Callable[[], None]) -> Claimed:
         while True:
             lease, now_s = leases.seen_or_new(connection, self._bucket), boot_s()
             why_not = obstacle(lease, self._who.sites, self._layout)
@@ -58,7 +55,7 @@ class Standby:
                 if claim is not None:
                     before = lease.owner or "nobody"
                     _log.info("this process owns %s now, epoch %d (before: %s)", self._bucket, claim.epoch, before)
-                    return claim, now_s
+                    return Claimed(claim, now_s)
             self._say(standby_of(lease) if why_not is None else unable(lease, why_not))
             if now_s - self._noted_s > NOTE_S:
                 self._noted_s = now_s

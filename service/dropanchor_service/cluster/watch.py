@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from dropanchor_service.checkpoints import layouts
+
 
 @dataclass(frozen=True)
 class Lease:
@@ -9,8 +11,9 @@ class Lease:
 
     owner: empty when nobody owns the bucket. sites: digest of the owner's settings of its sites. layout: of the newest
     checkpoint; empty when there is none. renewals: count of the current owner. is_moving: the next standby may take
-    over at once. was_moved: the owner became it that way. takes_any: the next owner may have other sites or another
-    layout. lease_s: of the owner. age_s: since the last renewal, by the clock of the database; for people.
+    over at once; moving_to: only one on this node, if it is not empty. was_moved: the owner became it that way.
+    takes_any: the next owner may have other sites or another layout. lease_s: of the owner. age_s: since the last
+    renewal, by the clock of the database; for people.
     """
 
     bucket: str
@@ -21,10 +24,16 @@ class Lease:
     layout: str = ""
     renewals: int = 0
     is_moving: bool = False
+    moving_to: str = ""
     was_moved: bool = False
     takes_any: bool = False
     lease_s: float = 0.0
     age_s: float = 0.0
+
+
+def node_of(owner: str) -> str:
+    """Return the node of an owner: shards are named after theirs, such as `machine-1/3`."""
+    return owner.partition("/")[0]
 
 
 class Watch:
@@ -33,8 +42,10 @@ class Watch:
     A lease has ended when it has not changed for as long as it lasts, while this process looked all the time.
     """
 
-    def __init__(self, lease_s: float) -> None:
+    def __init__(self, lease_s: float, name: str = "") -> None:
+        """name: of the standby that watches."""
         self._lease_s = lease_s
+        self._node = node_of(name)
         self._seen: tuple[int, int] | None = None  # epoch and renewals
         self._since_s = 0.0
         self._looked_s = 0.0
@@ -47,7 +58,8 @@ class Watch:
             self._seen, self._since_s = seen, now_s
         self._looked_s = now_s
         ended = now_s - self._since_s > max(self._lease_s, lease.lease_s)
-        return lease.owner == "" or lease.is_moving or ended
+        moves_here = lease.is_moving and lease.moving_to in ("", self._node)
+        return lease.owner == "" or moves_here or ended
 
     def look_away(self) -> None:
         """Begin anew: while the database was away, the owner could not renew its lease either."""
@@ -55,11 +67,13 @@ class Watch:
 
 
 def obstacle(lease: Lease, sites: str, layout: str) -> str | None:
-    """Return why a standby with these sites and this layout of checkpoints cannot take over, None if it can."""
+    """Return why a standby with these sites cannot take over, None if it can.
+
+    layout: of the checkpoints that it writes; it reads those before it, too.
+    """
     if lease.takes_any:
         return None
     if lease.sites not in ("", sites):
         return "its settings of sites and tags are not those of the owner"
-    if lease.layout not in ("", layout):
-        return f"the checkpoint has the layout {lease.layout}, but this version uses {layout}"
-    return None
+    why_unreadable = layouts.why_unreadable(lease.layout, layout) if lease.layout else None
+    return None if why_unreadable is None else f"the checkpoint has the layout {why_unreadable}"

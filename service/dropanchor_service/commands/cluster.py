@@ -1,114 +1,139 @@
-"""`dropanchor cluster`: show who serves which bucket of sites, and let another process take one over."""
+"""`dropanchor cluster`: run sites on several machines, show who serves what, and move it."""
 
 import argparse
-import sys
 import time
-from pathlib import Path
 
-from dropanchor_service.cluster import leases
+from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import Connection, DatabaseError, connect, make_tables, sentence_of
 from dropanchor_service.cluster.leases import BucketStatus
-from dropanchor_service.settings.sources import SettingsError, load_settings
+from dropanchor_service.cluster.watch import node_of
+from dropanchor_service.commands import cluster_start
+from dropanchor_service.commands.cluster_options import add_database_options, refuse, url_of
+from dropanchor_service.commands.cluster_status import status_text
+from dropanchor_service.settings.sources import SettingsError
 
 DESCRIPTION = """\
-Shows which process owns which bucket of sites, and its standbys; lets a standby take a bucket over while all runs
-(`move`), or lets the next owner have other settings of sites or another version (`accept`).
+Runs sites on several machines: `start` makes this machine a node, `stop` ends that, `drain` moves all buckets off a
+node. `status` shows which process owns which bucket, and who stands by; `move` lets another take a bucket over while
+all runs; `accept` lets the next owner have other settings of sites or another version.
 """
 EPILOG = """\
 examples:
-  dropanchor cluster status --config yard.toml
-  dropanchor cluster move yard --url postgresql://dropanchor@db.example/dropanchor
-  dropanchor cluster accept yard --config yard.toml     after an update, or after the settings of the sites changed
+  dropanchor cluster start --head --config yards.toml                 on the machine that looks after the others
+  dropanchor cluster start --join --config yards.toml                 on each of the others
+  dropanchor cluster status --config yards.toml
+  dropanchor cluster move 017 --to machine-2 --config yards.toml
+  dropanchor cluster drain machine-1 --config yards.toml              before you service it
+  dropanchor cluster accept 017 018 --config yards.toml               after the settings of the sites changed
 """
-EXIT_ERROR = 2
 MOVE_S = 15.0
+DRAIN_S = 120.0
 POLL_S = 0.05
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    status = actions.add_parser("status", help="list the buckets")
+    cluster_start.add_actions(actions)
+    status = actions.add_parser("status", help="list nodes and buckets")
+    drain = actions.add_parser("drain", help="move all buckets off a node, until it starts again")
+    drain.add_argument("node", metavar="NODE")
+    drain.add_argument("--undo", action="store_true", help="give it buckets again")
     move = actions.add_parser("move", help="let a standby take a bucket over")
+    move.add_argument("bucket", metavar="BUCKET")
+    move.add_argument("--to", default="", metavar="NODE", help="the node that takes it over (default: any)")
     accept = actions.add_parser("accept", help="let the next owner have other settings of sites, or another version")
-    for action in (move, accept):
-        action.add_argument("bucket", metavar="BUCKET")
-    for action in (status, move, accept):
-        action.add_argument("--config", type=Path, metavar="FILE", help="settings file (TOML) with cluster.url")
-        action.add_argument("--url", metavar="URL", help="PostgreSQL database of the cluster, instead of cluster.url")
+    accept.add_argument("buckets", nargs="+", metavar="BUCKET")
+    for action in (status, drain, move, accept):
+        add_database_options(action)
+        action.set_defaults(act=_with_database)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the action. Return 0, or 2 on an error."""
+    """Run the action. Return 0, 1 if a node died, 2 on an error, or 75 if another head has taken over."""
     try:
-        with connect(_url_of(arguments), "cluster") as connection:
-            make_tables(connection)
-            return _run(arguments, connection)
+        return int(arguments.act(arguments))
+    except KeyboardInterrupt:
+        return 0
     except (SettingsError, ValueError) as error:
-        return _refuse(str(error))
+        return refuse(str(error))
     except DatabaseError as error:
-        return _refuse(f"the database does not answer as expected: {sentence_of(error)}")
+        return refuse(f"the database does not answer as expected: {sentence_of(error)}")
 
 
-def _url_of(arguments: argparse.Namespace) -> str:
-    options = {} if arguments.url is None else {"cluster": {"url": arguments.url, "bucket": "any"}}
-    url = load_settings(arguments.config, options).cluster.url
-    if url is None:
-        raise ValueError("say which database: --url URL, or --config FILE with cluster.url")
-    return url
+def _with_database(arguments: argparse.Namespace) -> int:
+    actions = {"status": _status, "drain": _drain, "move": _move, "accept": _accept}
+    with connect(url_of(arguments), "cluster") as connection:
+        make_tables(connection)
+        return actions[arguments.action](arguments, connection)
 
 
-def _run(arguments: argparse.Namespace, connection: Connection) -> int:
+def _status(_: argparse.Namespace, connection: Connection) -> int:
+    print(status_text(connection))
+    return 0
+
+
+def _found(connection: Connection, bucket: str) -> BucketStatus:
+    """Return the status of a bucket. Raises ValueError if there is none of this name."""
     buckets = leases.status(connection)
-    if arguments.action == "status":
-        print("\n".join(map(_lines_of, buckets)) or "there are no buckets yet: no process has been started")
-        return 0
-    found = next((each for each in buckets if each.lease.bucket == arguments.bucket), None)
-    if found is None:
-        known = ", ".join(each.lease.bucket for each in buckets) or "none"
-        return _refuse(f"there is no bucket {arguments.bucket!r} (known: {known})")
-    if arguments.action == "accept":
-        leases.accept_any(connection, arguments.bucket)
-        print(f"The next owner of {arguments.bucket} may have other settings of sites or another version.")
-        return 0
-    return _move(connection, found)
+    for each in buckets:
+        if each.lease.bucket == bucket:
+            return each
+    known = ", ".join(each.lease.bucket for each in buckets) or "none"
+    raise ValueError(f"there is no bucket {bucket!r} (known: {known})")
 
 
-def _move(connection: Connection, found: BucketStatus) -> int:
-    able = [name for name in found.standbys if "cannot take over" not in name]
-    if not able and not found.lease.takes_any:
-        return _refuse(
-            f"no standby of {found.lease.bucket} can take over: {'; '.join(found.standbys) or 'there is none'}"
-        )
-    leases.set_moving(connection, found.lease.bucket, True)
+def _accept(arguments: argparse.Namespace, connection: Connection) -> int:
+    for bucket in [_found(connection, each).lease.bucket for each in arguments.buckets]:
+        leases.accept_any(connection, bucket)
+        print(f"The next owner of {bucket} may have other settings of sites or another version.")
+    return 0
+
+
+def _move(arguments: argparse.Namespace, connection: Connection) -> int:
+    found = _found(connection, arguments.bucket)
+    bucket, to = found.lease.bucket, arguments.to
+    standbys = _standbys_on(to, connection, found)
+    able = [name for name, why_not in standbys.items() if not why_not]
+    if not able and not (standbys and found.lease.takes_any):
+        said = "; ".join(f"{name} (cannot take over: {why_not})" for name, why_not in standbys.items())
+        return refuse(f"no standby{f' on {to}' if to else ''} of {bucket} can take over: {said or 'there is none'}")
+    leases.set_moving(connection, bucket, True, to)
     end_s = time.monotonic() + MOVE_S
     while time.monotonic() < end_s:
-        lease = leases.read(connection, found.lease.bucket)
+        lease = leases.read(connection, bucket)
         if lease is not None and lease.epoch > found.lease.epoch:
-            print(f"{lease.bucket} is owned by {lease.owner} now, epoch {lease.epoch}")
+            print(f"{bucket} is owned by {lease.owner} now, epoch {lease.epoch}")
             return 0
         time.sleep(POLL_S)
-    leases.set_moving(connection, found.lease.bucket, False)
-    return _refuse(
-        f"no standby took {found.lease.bucket} over within {MOVE_S:.0f} s; `dropanchor cluster status` says why"
+    leases.set_moving(connection, bucket, False)
+    return refuse(f"no standby took {bucket} over within {MOVE_S:.0f} s; `dropanchor cluster status` says why")
+
+
+def _standbys_on(node: str, connection: Connection, found: BucketStatus) -> dict[str, str]:
+    """Return who stands by for a bucket on a node, or on any, each with its obstacle."""
+    own = (name.partition(" (cannot take over: ") for name in found.standbys)
+    every = {name: why_not.removesuffix(")") for name, _, why_not in own} | nodes.standbys(connection)
+    return {name: why_not for name, why_not in every.items() if node in ("", node_of(name))}
+
+
+def _drain(arguments: argparse.Namespace, connection: Connection) -> int:
+    name = arguments.node
+    known = [node.name for node in nodes.read(connection)]
+    if name not in known:
+        return refuse(f"there is no node {name!r} (known: {', '.join(known) or 'none'})")
+    nodes.set_drained(connection, name, not arguments.undo)
+    if arguments.undo:
+        print(f"{name} gets buckets again.")
+        return 0
+    left: list[str] = []
+    end_s = time.monotonic() + DRAIN_S
+    while time.monotonic() < end_s:
+        left = leases.owned_by_node(connection, name)
+        if not left:
+            print(f"{name} has no buckets, and gets none until it starts again.")
+            return 0
+        time.sleep(POLL_S)
+    return refuse(
+        f"{name} still has {', '.join(left)}: the head moves them one after another, if one runs and if other "
+        "nodes have shards that stand by; `dropanchor cluster status` shows that"
     )
-
-
-def _lines_of(status: BucketStatus) -> str:
-    lease = status.lease
-    address = f" at {lease.address}" if lease.address else ""
-    owner = f"{lease.owner}{address}, lease renewed {lease.age_s:.1f} s ago" if lease.owner else "nobody"
-    size = f"{status.checkpoint_bytes / 1e6:.2f} MB, {status.checkpoint_age_s:.1f} s old"
-    lines = [
-        f"{lease.bucket}: epoch {lease.epoch}",
-        f"  owner: {owner}",
-        f"  checkpoint: {size if status.checkpoint_bytes else 'none'}",
-        f"  standbys: {', '.join(status.standbys) or 'none'}",
-    ]
-    if lease.takes_any:
-        lines.append("  the next owner may have other settings of sites or another version")
-    return "\n".join(lines)
-
-
-def _refuse(text: str) -> int:
-    sys.stderr.write(f"dropanchor cluster: {text}\n")
-    return EXIT_ERROR

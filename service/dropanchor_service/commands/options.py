@@ -49,10 +49,10 @@ def positive(text: str) -> int:
 def settings_of(arguments: argparse.Namespace, **more: Any) -> Settings:
     """Return the settings from the options, the environment and the settings file. Raises SettingsError."""
     options: dict[str, Any] = {
-        "http": _given(host=arguments.host, port=arguments.port),
-        "zenoh": _given(listen=arguments.zenoh_listen, connect=arguments.zenoh_connect),
-        "security": _given(folder=arguments.security),
-        **_given(engine=arguments.engine, data_dir=arguments.data_dir, insecure=arguments.insecure),
+        "http": given(host=arguments.host, port=arguments.port),
+        "zenoh": given(listen=arguments.zenoh_listen, connect=arguments.zenoh_connect),
+        "security": given(folder=arguments.security),
+        **given(engine=arguments.engine, data_dir=arguments.data_dir, insecure=arguments.insecure),
         **more,
     }
     return load_settings(arguments.config, {key: value for key, value in options.items() if value != {}})
@@ -62,12 +62,12 @@ def router_settings(arguments: argparse.Namespace) -> Settings:
     """Return the settings of a separate router; all others keep their defaults. Raises SettingsError."""
     options = {
         "http": {"host": "127.0.0.1"},
-        "zenoh": {"connect": []} | _given(listen=arguments.zenoh_listen),
-        "security": _given(folder=arguments.security),
-        **_given(insecure=arguments.insecure),
+        "zenoh": {"connect": []} | given(listen=arguments.zenoh_listen),
+        "security": given(folder=arguments.security),
+        **given(insecure=arguments.insecure),
     }
     return load_settings(options=options)
 
 
-def _given(**options: Any) -> dict[str, Any]:
+def given(**options: Any) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value is not None}

@@ -1,18 +1,19 @@
 """`dropanchor serve`: run the service until it is stopped."""
 
 import argparse
-import gc
 import sys
 from typing import Protocol
 
 from dropanchor_service.api.http.server import ListenError
 from dropanchor_service.commands.lan import show_addresses
 from dropanchor_service.commands.options import add_service_options, settings_of
-from dropanchor_service.runtime import logs, open_files
-from dropanchor_service.runtime.memory import HeapTrimmer
+from dropanchor_service.runtime import logs
+from dropanchor_service.runtime.interpreter import prepare_to_serve
+from dropanchor_service.runtime.memory import HeapTrimmer, give_back_files
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.runtime.systemd import Systemd
 from dropanchor_service.service import Service
+from dropanchor_service.settings.served import served_settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.session import ZenohError
 
@@ -36,9 +37,6 @@ a settings file:
   height_m = 1.2
   start = { x = 10.0, y = 0.0, heading_rad = 1.57 }
 """
-# The garbage collector runs less often: messages are thousands of tuples without reference cycles.
-GC_THRESHOLD = 10_000, 20, 20
-SWITCH_INTERVAL_S = 0.0005  # threads yield the interpreter soon, so that queries do not wait for the engine
 EXIT_ERROR = 2
 EXIT_DIED = 1
 EXIT_GONE = 75  # EX_TEMPFAIL of sysexits.h: another process serves the sites, and a restart begins as a standby
@@ -51,9 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the service. Return 0 if it was stopped, 1 if it died, 2 if it could not start, 75 if another took over."""
     logs.configure(arguments.log_level)
-    open_files.raise_limit()
-    gc.set_threshold(*GC_THRESHOLD)
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    prepare_to_serve()
     systemd = Systemd()
 
     def standing_by() -> None:
@@ -63,10 +59,11 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with (
             interrupts() as interrupt,
-            Service(settings_of(arguments), interrupt.raising(), standing_by) as service,
+            Service(served_settings(settings_of(arguments)), interrupt.raising(), standing_by) as service,
         ):
             systemd.ready()
             show_addresses(service.url, sys.stdout)
+            give_back_files()
             heap = HeapTrimmer()
             stopped = interrupt.wait(lambda: supervise(service, systemd, heap))
             systemd.stopping()

@@ -6,6 +6,7 @@ from typing import Self
 
 import zenoh
 from prometheus_client.registry import Collector
+from starlette.types import ASGIApp
 
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.format import Checkpoints
@@ -50,7 +51,7 @@ class Ownership:
         """Return the place for checkpoints, None if there is none."""
         if self._folder is None:
             return None
-        return CheckpointFolder(self._folder / "checkpoints", state.layout, state.template)
+        return CheckpointFolder(self._folder / "checkpoints", state.layout, state.decoded)
 
     def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
         """Return when this process serves the sites.
@@ -69,6 +70,10 @@ class Ownership:
     def impairments(self) -> Sequence[str]:
         """Return what does not work although this process serves the sites."""
         return []
+
+    def around(self, app: ASGIApp) -> ASGIApp:
+        """Return the application with what the API nodes of a cluster need."""
+        return app
 
     def zenoh_parts(self, session: zenoh.Session) -> ZenohParts:  # noqa: ARG002 - a process that is alone needs none
         """Return what this takes in a session."""

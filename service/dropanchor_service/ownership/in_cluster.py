@@ -4,24 +4,29 @@ import hashlib
 import logging
 import socket
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Self
 
 import zenoh
 from pydantic import ValidationError
+from starlette.types import ASGIApp
 
+from dropanchor_service.api.http.of_cluster import FromNodes, NamesOwner
 from dropanchor_service.checkpoints.snapshot import ServiceState
-from dropanchor_service.cluster import sentences
+from dropanchor_service.cluster import leases, sentences
 from dropanchor_service.cluster.boot_clock import boot_s
-from dropanchor_service.cluster.database import Connection, connect
-from dropanchor_service.cluster.leases import Claimant
+from dropanchor_service.cluster.database import Connection, DatabaseError, connect
+from dropanchor_service.cluster.leases import Claimant, Claimed
 from dropanchor_service.cluster.owner import Renewal
 from dropanchor_service.cluster.shared_state import CheckpointRow, save_document
 from dropanchor_service.cluster.standby import Standby
 from dropanchor_service.cluster.tenure import Standing, Tenure
 from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.ownership.address import address_of
 from dropanchor_service.ownership.alone import Ownership, ZenohParts
+from dropanchor_service.security.node_secret import node_secret_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import Sites
@@ -39,9 +44,16 @@ _log = logging.getLogger(__name__)
 class ClusterOwnership(Ownership):
     """See `Ownership`. Creating it raises SettingsError."""
 
-    def __init__(self, settings: Settings, sites: Sites, metrics: Metrics, on_look: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        sites: Sites,
+        metrics: Metrics,
+        on_look: Callable[[], None],
+        claimed: Claimed | None = None,
+    ) -> None:
         super().__init__(settings)
-        _refuse_unfit(settings)
+        refuse_unfit(settings)
         cluster = settings.cluster
         assert cluster.url is not None
         assert cluster.bucket is not None
@@ -49,8 +61,11 @@ class ClusterOwnership(Ownership):
         self._bucket = cluster.bucket
         self._sites = sites
         self._on_look = on_look
+        self._node_secret = node_secret_of(cluster.node_secret)
         self._connect: Callable[[], Connection] = partial(connect, cluster.url, name)
         self._who = Claimant(name, cluster.address or "", digest_of_sites(settings), cluster.lease_s)
+        self._claimed = claimed
+        self._settings = settings
         self._standby: Standby | None = None
         self._tenure: Tenure | None = None
         self._token: ZenohOwner | None = None
@@ -62,14 +77,14 @@ class ClusterOwnership(Ownership):
         return ClusterGauges(self._bucket, self._state)
 
     def checkpoints(self, state: ServiceState) -> CheckpointRow:
-        self._row = CheckpointRow(self._connect, self._bucket, state.layout, state.template)
+        self._row = CheckpointRow(self._connect, self._bucket, state.layout, state.decoded)
         return self._row
 
     def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
         assert self._row is not None
-        _log.info("standing by at %s, for %s", page, self._bucket)
-        self._standby = Standby(self._connect, self._bucket, self._who, self._row.layout)
-        claim, asked_s = self._standby.wait(self._on_look)
+        claim, asked_s = self._claimed or self._waited(page, self._row.layout)
+        if self._claimed is not None:
+            self._show_address(claim.epoch, page)
         self._tenure = Tenure(claim.epoch, self._who.lease_s, boot_s, hears_others, asked_s)
         self._renewal = Renewal(self._connect, self._bucket, self._who.lease_s, self._tenure)
         self._row.own(claim)
@@ -81,6 +96,16 @@ class ClusterOwnership(Ownership):
                 kept.share(claim.documents.get(document), save)
             except (OSError, ValidationError) as error:
                 raise SettingsError(f"cluster: {document} of {self._bucket} cannot be shared: {error}") from error
+
+    def _waited(self, page: str, layout: str) -> Claimed:
+        _log.info("standing by at %s, for %s", page, self._bucket)
+        self._standby = Standby(self._connect, self._bucket, self._who, layout)
+        return self._standby.wait(self._on_look)
+
+    def _show_address(self, epoch: int, page: str) -> None:
+        """Tell API nodes where this shard is. Without the database, they do not learn it."""
+        with suppress(DatabaseError), self._connect() as connection:
+            leases.set_address(connection, self._bucket, epoch, address_of(self._settings, page))
 
     def __enter__(self) -> Self:
         self._renewal.__enter__()
@@ -121,6 +146,10 @@ class ClusterOwnership(Ownership):
             f"{self._bucket}, epoch {self._tenure.epoch}, until another one takes over"
         ]
 
+    def around(self, app: ASGIApp) -> ASGIApp:
+        assert self._tenure is not None
+        return NamesOwner(FromNodes(app, self._node_secret), self._bucket, self._tenure.epoch)
+
     def zenoh_parts(self, session: zenoh.Session) -> ZenohParts:
         assert self._tenure is not None
         self._token = ZenohOwner(session, self._bucket, self._tenure.epoch, self._tenure.saw_epoch)
@@ -135,7 +164,8 @@ def digest_of_sites(settings: Settings) -> str:
     return hashlib.blake2b(settings.model_dump_json(include=OF_THE_SITES).encode(), digest_size=8).hexdigest()
 
 
-def _refuse_unfit(settings: Settings) -> None:
+def refuse_unfit(settings: Settings) -> None:
+    """Raise SettingsError for what no other process could go on with."""
     if not settings.zenoh.connect and settings.zenoh.config_file is None:
         raise SettingsError(
             "cluster.url: the processes need one router that outlives them: start `dropanchor router`, and set "

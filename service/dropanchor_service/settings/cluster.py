@@ -1,6 +1,7 @@
 """The settings of a process that shares its sites with others, of which one serves them."""
 
 import re
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -27,18 +28,25 @@ class ClusterSettings(BaseModel):
         "`postgresql`. Not set: this process serves its sites alone.",
     )
     bucket: SettingsId | None = Field(
-        default=None, description="Name of the sites of this process, equal in all processes that can serve them."
+        default=None,
+        description="Name of the sites of this process, equal in all processes that can serve them. If the ids of "
+        "sites begin with a bucket, such as `017.yard`: the bucket that this process serves.",
     )
     name: str | None = Field(default=None, description="Name of this process; not set: that of its machine.")
     address: Annotated[str, Field(pattern=r"^https?://[^\s#]+$")] | None = Field(
         default=None, description="Where clients reach this process. A standby tells them the address of the owner."
+    )
+    node_secret: Path | None = Field(
+        default=None,
+        description="File with a secret that the nodes of `dropanchor api` show to the services. Only whoever shows it "
+        "is believed about the address of a client.",
     )
     lease_s: Annotated[float, Field(ge=0.5, le=60)] = Field(
         default=2.0, description="Silence of the owner after which a standby takes over."
     )
 
     @model_validator(mode="after")
-    def _url_and_bucket_belong_together(self) -> "ClusterSettings":
-        if (self.url is None) != (self.bucket is None):
-            raise ValueError("`url` and `bucket` belong together: set both or none")
+    def _a_bucket_needs_a_url(self) -> "ClusterSettings":
+        if self.url is None and self.bucket is not None:
+            raise ValueError("`bucket` is of a cluster: set `url`, too")
         return self

@@ -13,6 +13,7 @@ from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
 from dropanchor_service.estimation.paper.parameters import TUNED, PaperParameters
 from dropanchor_service.settings.basemap import BasemapSettings
+from dropanchor_service.settings.buckets import refuse_unfit_buckets
 from dropanchor_service.settings.cluster import ClusterSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 from dropanchor_service.settings.history import HistorySettings, RecordingSettings
@@ -251,6 +252,17 @@ class Settings(_Section):
     def _listed_tags_fit(self) -> "Settings":
         if len(self.tags) > self.max_tags:
             raise ValueError(f"max_tags is {self.max_tags}, but {len(self.tags)} tags are listed")
+        return self
+
+    @property
+    def site_ids(self) -> list[str]:
+        """The ids of all sites."""
+        return list(self.sites) or [self.site.id]
+
+    @model_validator(mode="after")
+    def _buckets_fit(self) -> "Settings":
+        if self.cluster.url is not None:
+            refuse_unfit_buckets(self.site_ids, self.cluster.bucket)
         return self
 
     @model_validator(mode="after")

@@ -1,13 +1,13 @@
 """The tables of a cluster in a real database: one owner, and nothing that a former one writes holds."""
 
-import argparse
 import threading
 from functools import partial
 
 import numpy as np
 import pytest
 
-from dropanchor_service.checkpoints.format import CheckpointError, Snapshot
+from dropanchor_service.checkpoints.format import CheckpointError, Snapshot, UnreadableLayoutError, decoded
+from dropanchor_service.cli import main
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import DatabaseError, connect, sentence_of
@@ -15,7 +15,6 @@ from dropanchor_service.cluster.leases import Claim, Claimant
 from dropanchor_service.cluster.owner import Renewal
 from dropanchor_service.cluster.shared_state import CheckpointRow, save_document
 from dropanchor_service.cluster.tenure import Standing, Tenure
-from dropanchor_service.commands import cluster as command
 from support.postgresql import Postgresql, needs_postgresql
 from support.zenoh_router import wait_until
 
@@ -44,7 +43,13 @@ def snapshot(*numbers: float) -> Snapshot:
 
 
 def row(database: Postgresql, bucket: str, claim: Claim, layout: str = "layout") -> CheckpointRow:
-    kept = CheckpointRow(partial(connect, database.url(), "a"), bucket, layout, snapshot())
+    def decode(whole: bytes) -> Snapshot:
+        found, content = decoded(whole)
+        if found != layout:
+            raise UnreadableLayoutError(f"its layout is {found}, but this version uses {layout}")
+        return content
+
+    kept = CheckpointRow(partial(connect, database.url(), "a"), bucket, layout, decode)
     kept.own(claim)
     return kept
 
@@ -169,8 +174,8 @@ def test_tables_of_another_version_are_named(database: Postgresql) -> None:
     assert sentence_of(caught.value).startswith("its tables are not those of this version (column")
 
 
-def run(database: Postgresql, action: str, bucket: str = "") -> int:
-    return command.run(argparse.Namespace(action=action, bucket=bucket, config=None, url=database.url()))
+def run(database: Postgresql, *words: str) -> int:
+    return main(["cluster", *words, "--url", database.url()])
 
 
 def test_the_command_shows_buckets_and_refuses_what_cannot_be(

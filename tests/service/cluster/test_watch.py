@@ -2,6 +2,9 @@
 
 from dataclasses import replace
 
+import pytest
+
+from dropanchor_service.checkpoints import layouts
 from dropanchor_service.cluster.watch import Lease, Watch, obstacle
 
 HELD = Lease("yard", epoch=4, owner="a", sites="s", layout="l", renewals=7, lease_s=2.0, age_s=1e9)
@@ -44,3 +47,14 @@ def test_other_sites_and_another_layout_are_obstacles_unless_somebody_accepts_th
     assert obstacle(HELD, "other", "l") == "its settings of sites and tags are not those of the owner"
     assert obstacle(HELD, "s", "m") == "the checkpoint has the layout l, but this version uses m"
     assert obstacle(replace(HELD, takes_any=True), "other", "m") is None
+
+
+def test_a_standby_reads_the_layouts_before_its_own_but_no_later_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(layouts, "VERSION", 5)
+    own, of = "5-00000000000000aa", "{}-00000000000000bb".format
+    obstacles = {version: obstacle(replace(HELD, layout=of(version)), "s", own) for version in range(1, 8)}
+    assert obstacles[3] is obstacles[4] is None
+    assert obstacles[2] == f"the checkpoint has the layout {of(2)}, but this version uses {own} and reads none before 3"
+    assert obstacles[5] == f"the checkpoint has the layout {of(5)}, but this version uses {own}"
+    assert obstacles[6] == f"the checkpoint has the layout {of(6)}, but this version uses {own}, which is older"
+    assert obstacle(replace(HELD, layout=""), "s", own) is None

@@ -8,10 +8,12 @@ import pytest
 
 from dropanchor_schemas.zones import Zone
 from dropanchor_service.api.routes import event_examples
+from dropanchor_service.checkpoints import layouts
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster import standby as standby_module
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.cluster.leases import Claimant
+from dropanchor_service.cluster.shared_state import CheckpointRow
 from dropanchor_service.cluster.standby import Standby
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.ownership.choose import ownership_of
@@ -20,6 +22,7 @@ from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_service.store import Sites, SiteStore
 from dropanchor_service.zones.items import ZoneItems
+from support.golden_checkpoint import Drive, golden
 from support.postgresql import needs_postgresql, running_postgresql
 from support.sites import make_sites
 
@@ -45,7 +48,7 @@ def test_what_could_not_go_on_is_refused(settings: Settings, sentence: str) -> N
 @pytest.mark.parametrize(
     ("cluster", "sentence"),
     [
-        ({"url": URL}, "`url` and `bucket` belong together: set both or none"),
+        ({"bucket": "yard"}, "`bucket` is of a cluster: set `url`, too"),
         ({"url": "mysql://db/x", "bucket": "yard"}, "cluster.url: an address such as postgresql://"),
         ({"url": "postgresql://a:secret@db/x", "bucket": "yard"}, "the password does not belong here"),
         ({"url": URL, "bucket": "a*"}, "cluster.bucket: "),
@@ -108,6 +111,34 @@ def test_a_standby_with_other_sites_or_another_layout_says_so_and_waits_until_it
         with reach() as also:
             leases.accept_any(also, "yard")
         assert standby.wait(lambda: None)[0].epoch == 2
+
+
+@needs_postgresql
+def test_a_standby_takes_over_from_the_version_before_it_with_all_tracks(tmp_path: Path) -> None:
+    with running_postgresql() as database, database.connect() as connection:
+        reach, state = partial(connect, database.url(), "new"), Drive(tmp_path).state
+        first = Standby(reach, "yard", Claimant("old", "", "sites", 0.5), "fa8bf211067538b1")
+        assert first.wait(lambda: None)[0].epoch == 1
+        save = "UPDATE dropanchor_checkpoint SET layout = %s, content = %b"
+        connection.execute(save, ["fa8bf211067538b1", golden(1)], binary=True)
+        standby = Standby(reach, "yard", Claimant("new", "", "sites", 0.5), state.layout)
+        row = CheckpointRow(reach, "yard", state.layout, state.decoded)
+        row.own(standby.wait(lambda: None)[0])
+        found, complaints = row.newest()
+        assert complaints == []
+        assert found is not None
+        state.restore(found)
+        row.write(state.snapshot())
+        row.close()
+        assert connection.execute("SELECT epoch, layout FROM dropanchor_checkpoint").fetchone() == (2, state.layout)
+        later = layouts.name_of({}).replace("2-", "3-")
+        connection.execute("UPDATE dropanchor_checkpoint SET layout = %s", [later])
+        former = Standby(reach, "yard", Claimant("old", "", "sites", 0.5), state.layout)
+        with pytest.raises(KeyboardInterrupt):
+            former.wait(looks(8))
+        assert f"the checkpoint has the layout {later}, but this version uses {state.layout}, which is older" in (
+            former.sentence
+        )
 
 
 def test_a_site_goes_on_from_what_another_process_saved_and_saves_there(tmp_path: Path) -> None:

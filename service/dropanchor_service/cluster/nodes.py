@@ -1,0 +1,59 @@
+"""The table of the nodes of a cluster, and the shards on them that stand by."""
+
+from dataclasses import dataclass
+
+from dropanchor_service.cluster.database import Connection
+from dropanchor_service.cluster.leases import ANY
+
+_NOTE = """
+    INSERT INTO dropanchor_node (name, shards) VALUES (%s, %s)
+    ON CONFLICT (name) DO UPDATE SET shards = excluded.shards, seen = clock_timestamp()
+"""
+_DRAIN = """
+    INSERT INTO dropanchor_node (name, is_drained) VALUES (%s, %s)
+    ON CONFLICT (name) DO UPDATE SET is_drained = excluded.is_drained
+"""
+_READ = """
+    SELECT name, shards, is_drained, extract(epoch FROM clock_timestamp() - seen)::double precision
+    FROM dropanchor_node ORDER BY name
+"""
+_STANDBYS = """
+    SELECT name, obstacle FROM dropanchor_standby WHERE bucket = %s AND seen > clock_timestamp() - interval '5 s'
+    AND name NOT IN (SELECT owner FROM dropanchor_lease) ORDER BY name
+"""
+
+
+@dataclass(frozen=True)
+class NodeRow:
+    """A node. shards: how many it carries. age_s: since the head saw it alive, by the clock of the database."""
+
+    name: str
+    shards: int
+    is_drained: bool
+    age_s: float
+
+
+def note(connection: Connection, name: str, shards: int) -> None:
+    """Write that a node is alive."""
+    connection.execute(_NOTE, [name, shards])
+
+
+def set_drained(connection: Connection, name: str, is_drained: bool) -> None:
+    """Let the shards of a node take over no bucket, or again."""
+    connection.execute(_DRAIN, [name, is_drained])
+
+
+def read(connection: Connection) -> list[NodeRow]:
+    """Return all nodes that there ever were, by name."""
+    return [NodeRow(*row) for row in connection.execute(_READ)]
+
+
+def is_drained(connection: Connection, name: str) -> bool:
+    """Return whether the shards of this node must not take over."""
+    row = connection.execute("SELECT is_drained FROM dropanchor_node WHERE name = %s", [name]).fetchone()
+    return row is not None and bool(row[0])
+
+
+def standbys(connection: Connection) -> dict[str, str]:
+    """Return the shards that stand by for any bucket, each with its obstacle, which is empty if it can take over."""
+    return dict(connection.execute(_STANDBYS, [ANY]).fetchall())

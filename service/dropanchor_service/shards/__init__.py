@@ -1,0 +1,1 @@
+"""Shards: processes of which each serves one bucket or stands by for any. Ray places, starts and restarts them."""

@@ -1,0 +1,109 @@
+"""Where shards run and which node serves which bucket. Pure: it knows neither Ray nor the database.
+
+Every node carries a number of shards. Those without a bucket stand by for any, so a bucket whose shard or node dies
+goes on in a process that waits already.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+UNEVEN = 2  # buckets by which the loads of two nodes differ before one moves
+
+
+@dataclass(frozen=True)
+class Node:
+    """A machine that is alive. shards: how many it carries."""
+
+    name: str
+    shards: int
+    is_drained: bool = False
+
+
+class Move(NamedTuple):
+    """A bucket, and the node whose standby is to take it over."""
+
+    bucket: str
+    to: str
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Who owns what now. owners: the shard that owns a bucket, by bucket. standbys: shards that can take one over."""
+
+    nodes: Collection[Node]
+    owners: Mapping[str, str]
+    standbys: Collection[str]
+
+    def load(self) -> Counter[str]:
+        """Return the number of buckets of each node that is alive."""
+        alive = {node.name for node in self.nodes}
+        return Counter(node for owner in self.owners.values() if (node := node_of_shard(owner)) in alive)
+
+    def next_move(self) -> Move | None:
+        """Return what to move: first off a node that is drained, then from a full node to an emptier one."""
+        waiting = Counter(map(node_of_shard, self.standbys))
+        able = [node for node in self.nodes if not node.is_drained and waiting[node.name]]
+        load = self.load()
+        for bucket, owner in sorted(self.owners.items()):
+            source = self._node(node_of_shard(owner))
+            targets = [node for node in able if node is not source]
+            if source is None or not targets:
+                continue
+            emptiest = min(targets, key=lambda node: (load[node.name] / node.shards, node.name))
+            if source.is_drained or _is_uneven(load, source, emptiest):
+                return Move(bucket, emptiest.name)
+        return None
+
+    def without_standby(self) -> tuple[str, int] | None:
+        """Return the node whose loss leaves most buckets without a standby, and how many; None if none does."""
+        buckets = len(self.owners)
+        shards = {node.name: 0 if node.is_drained else node.shards for node in self.nodes}
+        worst = max(shards, key=lambda name: (shards[name], name), default=None)
+        if worst is None:
+            return None
+        missing = buckets - (sum(shards.values()) - shards[worst])
+        return (worst, missing) if missing > 0 else None
+
+    def _node(self, name: str) -> Node | None:
+        return next((node for node in self.nodes if node.name == name), None)
+
+
+def _is_uneven(load: Mapping[str, int], source: Node, target: Node) -> bool:
+    """Return whether a move from `source` to `target` makes their loads more even, by far enough."""
+    difference = load.get(source.name, 0) - load.get(target.name, 0)
+    fuller_after = (load.get(target.name, 0) + 1) / target.shards
+    return difference >= UNEVEN and fuller_after < load.get(source.name, 0) / source.shards
+
+
+def node_of_shard(shard: str) -> str:
+    """Return the node of a shard, such as `machine-1` of `machine-1/3`."""
+    return shard.partition("/")[0]
+
+
+def missing_shards(node: Node, running: Collection[str]) -> list[str]:
+    """Return the names of the shards that a node has to carry and does not."""
+    return [name for number in range(1, node.shards + 1) if (name := f"{node.name}/{number}") not in running]
+
+
+class Hung:
+    """Finds shards that run and do nothing: their lease has run out, and they do not stand by either."""
+
+    def __init__(self, limit_s: float) -> None:
+        self._limit_s = limit_s
+        self._heard_s: dict[str, float] = {}
+
+    def look_away(self) -> None:
+        """Begin anew: while the database was away, nothing could be heard."""
+        self._heard_s = {}
+
+    def find(self, running: Iterable[str], heard: Collection[str], now_s: float) -> list[str]:
+        """Return the shards that were heard once, and not for too long. A shard that starts was not heard yet."""
+        known = set(running)
+        self._heard_s = {name: at_s for name, at_s in self._heard_s.items() if name in known}
+        self._heard_s |= dict.fromkeys(known.intersection(heard), now_s)
+        found = [name for name, at_s in sorted(self._heard_s.items()) if now_s - at_s > self._limit_s]
+        for name in found:
+            del self._heard_s[name]  # it is killed, and starts again
+        return found

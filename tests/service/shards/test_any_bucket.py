@@ -1,0 +1,59 @@
+"""A standby of any bucket takes the first whose lease is free, and none while its node is drained."""
+
+from functools import partial
+from threading import Thread
+
+from dropanchor_service.cluster import leases, nodes
+from dropanchor_service.cluster.database import connect
+from dropanchor_service.cluster.leases import Claimant
+from dropanchor_service.shards.any_bucket import AnyStandby, Owned
+from support.postgresql import needs_postgresql
+from support.zenoh_router import wait_until
+
+LEASE_S = 0.5
+
+
+def standby(url: str, name: str, buckets: tuple[str, ...] = ("001", "002", "003"), sites: str = "") -> AnyStandby:
+    who = {bucket: Claimant(name, "", sites or bucket, LEASE_S) for bucket in buckets}
+    return AnyStandby(partial(connect, url, name), who, "layout")
+
+
+@needs_postgresql
+def test_each_standby_gets_a_bucket_of_its_own_and_then_those_of_the_dead(url: str) -> None:
+    found: dict[str, Owned] = {}
+
+    def wait(name: str) -> None:
+        found[name] = standby(url, name).wait()
+
+    threads = [Thread(target=wait, args=(f"a/{number}",), daemon=True) for number in range(1, 5)]
+    for thread in threads:
+        thread.start()
+    wait_until(lambda: len(found) == 3)
+    assert {owned.bucket for owned in found.values()} == {"001", "002", "003"}
+    assert {owned.claimed.claim.epoch for owned in found.values()} == {1}
+    wait_until(lambda: len(found) == 4)  # nobody renews a lease, so the fourth takes one over
+    assert max(owned.claimed.claim.epoch for owned in found.values()) == 2
+
+
+@needs_postgresql
+def test_a_drained_node_and_other_settings_get_nothing_and_say_why(url: str) -> None:
+    with connect(url, "test") as connection:
+        nodes.set_drained(connection, "a", True)
+        for bucket in ("001", "002"):
+            seen = leases.seen_or_new(connection, bucket)
+            assert leases.claim(connection, seen, Claimant("gone/1", "", bucket, LEASE_S))
+        found: dict[str, Owned] = {}
+
+        def wait(name: str, sites: str) -> None:
+            found[name] = standby(url, name, ("001", "002"), sites).wait()
+
+        for name, sites in (("a/1", ""), ("b/1", "others")):
+            Thread(target=wait, args=(name, sites), daemon=True).start()
+        why = "001: its settings of sites and tags are not those of the owner"
+        wait_until(lambda: nodes.standbys(connection) == {"a/1": "its node is drained", "b/1": why})
+        assert found == {}
+        leases.accept_any(connection, "002")
+        wait_until(lambda: "b/1" in found)
+        assert found["b/1"].bucket == "002"
+        nodes.set_drained(connection, "a", False)
+        wait_until(lambda: "a/1" in found)
