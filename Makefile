@@ -5,14 +5,14 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/installed
-DISTRIBUTIONS := -e schemas -e tag_client -e 'service[evaluation,foxglove,mqtt,parquet,postgresql,ros2]'
+DISTRIBUTIONS := -e schemas -e tag_client -e 'service[cluster,evaluation,foxglove,mqtt,parquet,postgresql,ros2]'
 PACKAGES := schemas/dropanchor_schemas tag_client/dropanchor_tag_client service/dropanchor_service
 PARALLEL := -n 4 --dist loadfile --no-loadscope-reorder
 PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/pyproject.toml service/pyproject.toml
 
 RESULTS := service/docs/results
 
-.PHONY: help demo test check bench results install kernels chromium mosquitto postgresql clean
+.PHONY: help demo test test-cluster check bench results install kernels chromium mosquitto postgresql clean
 .DEFAULT_GOAL := help
 
 # Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
@@ -23,6 +23,7 @@ help:
 	@echo 'make test     install what the tests need and run them all'
 	@echo 'make check    format, lint, types, import rules, generated files, age of the results'
 	@echo 'make bench    measure what the service costs, print it and write it into $(RESULTS)/performance.md'
+	@echo 'make test-cluster  let each part of a cluster die, and write the silences into $(RESULTS)/cluster.md'
 	@echo 'make results  measure everything in $(RESULTS) again: hours, on a machine that does nothing else'
 	@echo 'make install  the set-up alone: a virtual environment in $(VENV)'
 
@@ -84,10 +85,14 @@ check: install
 bench: install chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
+test-cluster: install postgresql
+	@$(BIN)/python -m pytest tests/benchmarks/test_cluster_failures.py -s -m '' $(PYTEST)
+
 results: bench
 	@$(BIN)/dropanchor evaluate recordings --into $(RESULTS)/recordings.md $(EVALUATE)
 	@$(BIN)/dropanchor evaluate paper --into $(RESULTS)/paper.md $(EVALUATE)
 	@$(BIN)/dropanchor evaluate product --into $(RESULTS)/scenarios.md $(EVALUATE)
+	@$(BIN)/dropanchor evaluate bounds --into $(RESULTS)/scenarios.md $(EVALUATE)
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -167,6 +167,9 @@ class SiteList(_Answer):
     """All sites that the service serves."""
 
     sites: list[SiteSummary]
+    unavailable: list[str] = Field(
+        default=[], description="Of an API node: the buckets whose sites are missing, because nobody serves them now."
+    )
 
 
 class AnchorList(_Answer):

@@ -104,17 +104,17 @@ def all_tags(site: str, leaf: str) -> str:
     return f"{_site_prefix(site)}/tag/*/{leaf}"
 
 
-def all_sites(leaf: str) -> str:
-    """Return the key expression of `leaf` of every tag of every site."""
-    return f"{PREFIX}/*/tag/*/{leaf}"
+def all_sites(leaf: str, bucket: str | None = None) -> str:
+    """Return the key expression of `leaf` of every tag of every site, or of those whose ids begin with a bucket."""
+    return f"{PREFIX}/{_sites_in(bucket)}/tag/*/{leaf}"
 
 
-def anchors_of_all_sites() -> str:
-    return f"{PREFIX}/*/anchor/*"
+def anchors_of_all_sites(bucket: str | None = None) -> str:
+    return f"{PREFIX}/{_sites_in(bucket)}/anchor/*"
 
 
-def poses_of_all_sites() -> str:
-    return f"{PREFIX}/*/poses"
+def poses_of_all_sites(bucket: str | None = None) -> str:
+    return f"{PREFIX}/{_sites_in(bucket)}/poses"
 
 
 def services_of_all_sites() -> str:
@@ -160,6 +160,11 @@ def _chunks(key: str) -> list[str]:
 
 def _owner_prefix(bucket: str) -> str:
     return f"{PREFIX}/@owner/{chunk_from_id(bucket)}"
+
+
+def _sites_in(bucket: str | None) -> str:
+    """Return the chunk that matches the sites of a bucket, such as `017.yard` of `017`; without one, all sites."""
+    return "*" if bucket is None else f"{chunk_from_id(bucket)}.$*"
 
 
 def _site_prefix(site: str) -> str:

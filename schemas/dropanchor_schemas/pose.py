@@ -119,6 +119,21 @@ class PoseList(_Answer):
     poses: list[Pose]
 
 
+class SitePoses(PoseList):
+    """Poses of many tags of a site."""
+
+    site: str = Field(description="Id of the site.")
+
+
+class SitePosesList(_Answer):
+    """Poses of the tags of all sites."""
+
+    sites: list[SitePoses]
+    unavailable: list[str] = Field(
+        default=[], description="Of an API node: the buckets whose sites are missing, because nobody serves them now."
+    )
+
+
 class PoseFrame(_Answer):
     """Poses of many tags in columns: entry i of every column belongs to tag i. Names and units are those of a pose.
     Metres and radians are rounded to 4 decimals, degrees to 9. `lat` and `lon` exist only if the site is

@@ -16,7 +16,8 @@ _COMMANDS = {
     "demo": "run the service with simulated tags and watch them in a browser",
     "serve": "run the service",
     "router": "run a separate Zenoh router",
-    "cluster": "show which machine serves what, and move it",
+    "api": "run an API node of a cluster: the page and REST of all its sites",
+    "cluster": "run sites on several machines: start, show, move, drain",
     "security": "create the credentials of a site",
     "tag": "issue and revoke the certificates of tags",
     "compile": "compile the estimator ahead of the first start",
@@ -37,6 +38,7 @@ _EXTRAS = {
     "sympy": "evaluation",
     "foxglove": "foxglove",
     "psycopg": "postgresql",
+    "ray": "cluster",
     "rosbags": "ros2",
     "xxhash": "ros2",
 }

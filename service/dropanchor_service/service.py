@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from functools import partial
 from threading import Event
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import zenoh
 from fastapi import FastAPI
@@ -53,6 +53,9 @@ from dropanchor_service.zenoh_io.publishers import ZenohPoses
 from dropanchor_service.zenoh_io.queryables import ZenohAnswers
 from dropanchor_service.zenoh_io.remote_settings import ZenohRemoteSettings
 
+if TYPE_CHECKING:
+    from dropanchor_service.cluster.leases import Claimed
+
 HTTP_STOP_S = 1.5
 
 _log = logging.getLogger(__name__)
@@ -69,9 +72,10 @@ class Service:
         settings: Settings,
         compiling: AbstractContextManager[None] | None = None,
         standing_by: Callable[[], None] = lambda: None,
+        claimed: "Claimed | None" = None,
     ) -> None:
         """compiling: entered while the kernels are compiled, and while this process is a standby, so that a signal can
-        interrupt that. standing_by: called now and then by a standby.
+        interrupt that. standing_by: called now and then by a standby. claimed: the bucket, if it was claimed before.
         """
         refuse_too_many_sites(settings)
         self._settings = settings
@@ -88,7 +92,7 @@ class Service:
         self.latest = LatestPoses()
         put_site_files_in_place(settings)
         self.sites = open_sites(settings)
-        self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by)
+        self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by, claimed)
         now_ns = self.clock.now_ns
         self._serving = Serving(settings, self._credentials, self.sites, self.latest, now_ns, self.metrics)
         self._publishers = Publishers()
@@ -127,7 +131,8 @@ class Service:
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._serving.zone_events)
             self._opened.enter_context(self._link)
-            self._app.app = Gate(self._ownership.may_serve, self._full_app(), self._app.app)
+            app = self._ownership.around(self._full_app())
+            self._app.app = Gate(self._ownership.may_serve, app, self._app.app)
             # The HTTP server is told to stop first and joined last, so that a stuck client does not delay the rest.
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()

@@ -4,7 +4,7 @@ It prints "ready" once the service has subscribed to each session. Then it reads
 sends, and prints a report after the next line on stdin.
 
 Arguments: endpoint, first tag, number of tags, number of sessions, seconds, congestion control ("block" or "drop"),
-and the number of tags to register before, slowly and with two messages each.
+the number of tags to register before, slowly and with two messages each, and the sites that share the tags.
 """
 
 import json
@@ -28,15 +28,24 @@ REGISTERING = 2  # messages that register a tag
 Put = Callable[[int, bytes], None]
 
 
-def main(endpoint: str, first: int, tags: int, sessions: int, duration_s: float, control: str, register: int) -> None:
+def main(
+    endpoint: str,
+    first: int,
+    tags: int,
+    sessions: int,
+    duration_s: float,
+    control: str,
+    register: int,
+    sites: list[str],
+) -> None:
     motions = [track.bodies for track in tracks(duration_s + (1 + REGISTERING) * MESSAGE_S)]
-    names = [samples_key("default", f"sim-{first + index}") for index in range(max(tags, register))]
+    names = [samples_key(sites[index % len(sites)], f"sim-{first + index}") for index in range(max(tags, register))]
     encoding = zenoh.Encoding(ENCODING_PACKED)
     when_full = zenoh.CongestionControl.BLOCK if control == "block" else zenoh.CongestionControl.DROP
     with ExitStack() as stack:
         opened = [stack.enter_context(connected_session(endpoint)) for _ in range(sessions)]
         for session in opened:
-            wait_for_listener(session)
+            wait_for_listener(session, sites[0])
 
         def put(tag: int, payload: bytes) -> None:
             opened[tag % sessions].put(names[tag], payload, encoding=encoding, congestion_control=when_full)
@@ -48,9 +57,9 @@ def main(endpoint: str, first: int, tags: int, sessions: int, duration_s: float,
         print(json.dumps(report | {"registered": register}), flush=True)
 
 
-def wait_for_listener(session: zenoh.Session) -> None:
+def wait_for_listener(session: zenoh.Session, site: str = "default") -> None:
     """Wait for a subscriber to the samples. Messages that are put earlier are lost."""
-    publisher = session.declare_publisher(all_tags("default", "samples"))
+    publisher = session.declare_publisher(all_tags(site, "samples"))
 
     def is_matching() -> bool:
         status = publisher.matching_status
@@ -99,4 +108,4 @@ def send(
 
 if __name__ == "__main__":
     given = sys.argv[1:]
-    main(given[0], int(given[1]), int(given[2]), int(given[3]), float(given[4]), given[5], int(given[6]))
+    main(given[0], int(given[1]), int(given[2]), int(given[3]), float(given[4]), given[5], int(given[6]), given[7:])

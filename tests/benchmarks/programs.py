@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -63,10 +63,16 @@ def running(name: str, *arguments: object) -> Iterator[Program]:
 
 
 def generator(
-    endpoint: str, tags: int, duration_s: float, first: int = 0, control: str = "block", register: int = 0
+    endpoint: str,
+    tags: int,
+    duration_s: float,
+    first: int = 0,
+    control: str = "block",
+    register: int = 0,
+    sites: Sequence[str] = ("default",),
 ) -> Program:
     """Start a load generator. The caller ends it. register: number of tags to register before."""
-    return Program("generator", endpoint, first, tags, SESSIONS, duration_s, control, register)
+    return Program("generator", endpoint, first, tags, SESSIONS, duration_s, control, register, *sites)
 
 
 @contextmanager

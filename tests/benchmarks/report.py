@@ -1,21 +1,28 @@
 """The measurements as tables, and their place in the documents."""
 
+from pathlib import Path
+
 from benchmarks.step import Figures
 from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
 
-PAGE = PAGES / "performance.md"
+_PAGE = PAGES / "performance.md"
+_PAGE_OF = {"cluster": PAGES / "cluster.md"}
+"""Tables that have a page of their own."""
 _WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
 SOURCES = {
     "capacity": _WHOLE,
+    "cluster": ("cluster", "shards", "ownership"),
     "delivery": ("delivery",),
     "engines": ("estimation",),
     "history": ("history",),
     "idle": _WHOLE,
+    "nodes": ("answers", "api", "node"),
     "overload": _WHOLE,
     "page": ("dashboard",),
     "pose-json": ("answers",),
     "rest": ("answers", "api"),
     "sessions": _WHOLE,
+    "small": (*_WHOLE, "runtime", "events", "delivery"),
     "sites": ("estimation/fleet", "ingest", "store"),
     "zones": ("zones",),
 }
@@ -50,7 +57,18 @@ def ratios(end_to_end: float, costs: dict[str, float]) -> str:
     return "\n".join([*head, f"| the service, end to end | {end_to_end:.2f} | 1.00 |", *lines])
 
 
+def page_of(name: str) -> Path:
+    """Return the page of a table."""
+    return _PAGE_OF.get(name, _PAGE)
+
+
 def record(name: str, text: str) -> None:
     """Print the table, and write it between the markers of this name in the page of results."""
     print(f"\n== {name}\n{text}", flush=True)
-    write(ROOT, PAGE, name, text, Measured([f"service/dropanchor_service/{source}" for source in SOURCES[name]]))
+    write(
+        ROOT,
+        page_of(name),
+        name,
+        text,
+        Measured([f"service/dropanchor_service/{source}" for source in SOURCES[name]]),
+    )

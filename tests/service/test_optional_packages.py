@@ -59,6 +59,7 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
         ("rosbags", "ros2", ["ros2", "--tag=cart"]),
         ("xxhash", "ros2", ["ros2", "--tag=cart"]),
         ("psycopg", "postgresql", ["cluster", "status"]),
+        ("ray", "cluster", ["cluster", "start", "--join", "--config=yards.toml"]),
     ],
 )
 def test_a_command_that_needs_an_extra_says_how_to_install_it(missing: str, extra: str, command: list[str]) -> None:

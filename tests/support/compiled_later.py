@@ -30,7 +30,7 @@ def main() -> None:
         warmed_up = _signatures()
         _send(before, messages[:half])
         state, after = before.service_state(), _bench(Path(folder) / "after")
-        checkpoints = CheckpointFolder(Path(folder) / "checkpoints", state.layout, state.template)
+        checkpoints = CheckpointFolder(Path(folder) / "checkpoints", state.layout, state.decoded)
         checkpoints.write(state.snapshot())
         found, _ = checkpoints.newest()
         assert found is not None

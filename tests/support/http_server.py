@@ -9,16 +9,21 @@ from starlette.types import ASGIApp
 
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.server import build_server, listen
+from dropanchor_service.security.certificate import Certificate
 from support.zenoh_router import wait_until
 
 
 @contextmanager
 def running_server(
-    app: ASGIApp, stopping: Event, port: int = 0, protocol: type[GuardedProtocol] = GuardedProtocol
+    app: ASGIApp,
+    stopping: Event,
+    port: int = 0,
+    protocol: type[GuardedProtocol] = GuardedProtocol,
+    certificate: Certificate | None = None,
 ) -> Iterator[int]:
     """Serve the app on loopback until the block ends. Yield the port."""
     socket = listen("127.0.0.1", port)
-    server = build_server(app, stopping, protocol)
+    server = build_server(app, stopping, protocol, certificate)
     thread = Thread(target=lambda: asyncio.run(server.serve(sockets=[socket])))
     thread.start()
     wait_until(lambda: server.started)

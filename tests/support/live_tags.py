@@ -38,8 +38,10 @@ class LiveTags:
         cache_messages: int = 600,
         step_s: float = 0.1,
         boot_clock: bool = False,
+        site: str = "default",
     ) -> None:
         self._endpoint = endpoint
+        self._site = site
         self._step_s = step_s
         self._boot_clock = boot_clock
         self._stop = Event()
@@ -71,6 +73,7 @@ class LiveTags:
             self._clients.enter_context(
                 TagClient(
                     tag_name(index),
+                    site=self._site,
                     connect=self._endpoint,
                     cache_messages=self._cache_messages,
                     clock="boot" if self._boot_clock else "utc",

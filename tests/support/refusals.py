@@ -35,7 +35,7 @@ NOT_SHOWN = {
         *("basemap", "events", "figures", "heat_map", "period", "poses", "track_file", "tracks", "site_of_request"),
     ),
     "only programs use these": (
-        *("ingest", "ingest_health", "ingest_phyphox", "ingest_stream", "recordings", "remote_settings", "oidc"),
+        *("ingest", "ingest_health", "ingest_phyphox", "recordings", "remote_settings", "oidc"),
     ),
     "these speak while the service starts, and not to the page": ("health", "folder", "authority", "certificate"),
 }
@@ -50,6 +50,7 @@ SAYING = {
         "ValueError",
         "InvalidKeyError",
         "_unauthenticated",
+        "_ClosedError",
     ),
 }
 """What is called with a sentence, as its last text."""

@@ -86,7 +86,8 @@ def running_service(
     """Run `dropanchor serve` on free ports until the block ends. ready: wait until it reports that it is ready."""
     compile_once()
     zenoh = endpoint or free_endpoint()
-    listening = () if any("--zenoh" in argument for argument in arguments) else ("--zenoh-listen", zenoh)
+    has_zenoh = subcommand != "api" and not any("--zenoh" in argument for argument in arguments)
+    listening = ("--zenoh-listen", zenoh) if has_zenoh else ()
     began_s = time.monotonic()
     process = subprocess.Popen(
         command(subcommand, "--port", "0", *listening, *arguments), stderr=subprocess.PIPE, text=True, env=environment()

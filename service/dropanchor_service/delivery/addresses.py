@@ -7,8 +7,10 @@ nothing.
 import ipaddress
 import socket
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
-import httpx
+if TYPE_CHECKING:
+    import httpx
 
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 Address = ipaddress.IPv4Address | ipaddress.IPv6Address
@@ -24,8 +26,10 @@ class RefusedAddressError(UrlError):
     """The receiver has an address that the settings do not allow."""
 
 
-def checked_url(url: str) -> httpx.URL:
+def checked_url(url: str) -> "httpx.URL":
     """Return the parsed URL. Raises UrlError."""
+    import httpx  # see `tls_context`
+
     try:
         parsed = httpx.URL(url)
         host = parsed.host
@@ -38,7 +42,7 @@ def checked_url(url: str) -> httpx.URL:
     return parsed
 
 
-def resolved(url: httpx.URL) -> list[str]:
+def resolved(url: "httpx.URL") -> list[str]:
     """Return the addresses of the host of the URL. Blocks. Raises OSError."""
     port = url.port or (443 if url.scheme == "https" else 80)
     found = socket.getaddrinfo(url.host, port, type=socket.SOCK_STREAM)

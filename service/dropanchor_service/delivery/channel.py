@@ -6,8 +6,6 @@ from enum import Enum
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-import httpx
-
 
 class ChannelError(ValueError):
     """Nothing can be delivered to this destination. The message says what to do."""
@@ -53,6 +51,8 @@ class Channel(Protocol):
 
 def tls_context(authorities: Path | None) -> ssl.SSLContext:
     """Return a context that trusts the public authorities and those in the PEM file. Raises OSError."""
+    import httpx  # 4 MB of memory, only where something is delivered
+
     context = httpx.create_ssl_context(trust_env=False)
     if authorities is not None:
         context.load_verify_locations(authorities)

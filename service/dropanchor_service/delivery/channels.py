@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING
 from dropanchor_schemas.destinations import Destination, EmailDestination, MqttDestination, WebhookDestination
 from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
 from dropanchor_service.delivery.channel import Channel, ChannelError, tls_context
-from dropanchor_service.delivery.mail import open_mail
 from dropanchor_service.delivery.sentences import NameOf
 from dropanchor_service.delivery.signature import SecretError, key_of
-from dropanchor_service.delivery.webhook import open_webhook
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 
 if TYPE_CHECKING:
@@ -75,8 +73,12 @@ class Channels:
         timeout_s = self._delivery.timeout_s
         match destination:
             case WebhookDestination():
+                from dropanchor_service.delivery.webhook import open_webhook  # these libraries take memory
+
                 return open_webhook(destination, self._shared.webhook, timeout_s, self._delivery.allow_networks)
             case EmailDestination():
+                from dropanchor_service.delivery.mail import open_mail
+
                 page = self._delivery.page
                 return open_mail(destination, self._email, self._shared.email, timeout_s, page, self._name_of)
             case MqttDestination():

@@ -6,6 +6,7 @@ import sqlite3
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 
@@ -19,7 +20,6 @@ from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.runtime.worker import Worker
 from dropanchor_service.store.items import NamedItems
 
-LOOK_S = 0.1
 STOP_S = 2.0
 
 Name = tuple[int, str]
@@ -52,14 +52,31 @@ class DeliveryThread(Worker):
         self._edited = deque(range(len(sites)))
         self._with_news: deque[int] = deque()
         for index, site in enumerate(sites):
-            site.destinations.on_change(partial(self._edited.append, index))
-            site.store.on_commit(partial(self._with_news.append, index))
-            site.deliveries.on_retry(partial(self._with_news.append, index))
+            site.destinations.on_change(partial(self._note, self._edited, index))
+            site.store.on_commit(partial(self._note, self._with_news, index))
+            site.deliveries.on_retry(partial(self._note, self._with_news, index))
         self._served: dict[Name, Destination] = {}
         self._queues: dict[Name, Queue] = {}
         self._tasks: dict[Name, asyncio.Task[None]] = {}
         self._ended: deque[asyncio.Task[None]] = deque()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._awake = asyncio.Event()
         self.counts = Counts()
+
+    def _note(self, indices: deque[int], index: int) -> None:
+        indices.append(index)
+        self.wake()
+
+    def wake(self) -> None:
+        """See `Worker`. Here it is the loop that sleeps."""
+        if self._loop is not None:
+            with suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._awake.set)
+
+    def stop(self) -> None:
+        self._stop.set()
+        self.wake()
+        super().stop()
 
     def problem_of(self, site: int, destination: str) -> str | None:
         """Return what went wrong at the last attempt, None if nothing did."""
@@ -70,7 +87,9 @@ class DeliveryThread(Worker):
         asyncio.run(self._deliver_all())
 
     async def _deliver_all(self) -> None:
+        self._loop = asyncio.get_running_loop()
         while not self._stop.is_set():
+            self._awake.clear()
             for index in _taken(self._edited):
                 await self._follow(index)
             for index in _taken(self._with_news):
@@ -81,7 +100,7 @@ class DeliveryThread(Worker):
                 task = self._ended.popleft()
                 if not task.cancelled():
                     task.result()  # raises what ended it: the supervision ends the process
-            await asyncio.sleep(LOOK_S)
+            await self._awake.wait()
         for name in list(self._tasks):
             await self._end(name)
 
@@ -100,7 +119,11 @@ class DeliveryThread(Worker):
         self._served[name] = destination
         queue = self._queues[name] = Queue(destination.id, site.deliveries, self._patience, self.counts, self._now_ns)
         task = self._tasks[name] = asyncio.create_task(self._deliver(destination, queue, site.channels))
-        task.add_done_callback(self._ended.append)
+        task.add_done_callback(self._on_end)
+
+    def _on_end(self, task: asyncio.Task[None]) -> None:
+        self._ended.append(task)
+        self._awake.set()
 
     async def _end(self, name: Name) -> None:
         task = self._tasks.pop(name)

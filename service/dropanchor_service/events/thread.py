@@ -32,6 +32,8 @@ class Retention:
 class EventThread(Worker):
     """Watches all sites while this context is open. An event is shown to nobody before it is stored.
 
+    It sleeps while nothing changes and no rule waits for a time to pass.
+
     problems: by the index of a site, why its events cannot be stored. stored: events, since the start. busy_s: time
     that the thread has worked.
     """
@@ -52,6 +54,7 @@ class EventThread(Worker):
         self._retention = retention
         self._now_ns = now_ns
         self._period_s = period_s
+        watcher.on_news(self.wake)
         self._prune_due = deque((0.0, index) for index in range(len(stores)))
         self._turns = 0
         self.problems: dict[int, str] = {}
@@ -60,9 +63,12 @@ class EventThread(Worker):
 
     def _run(self) -> None:
         while not self._stop.wait(self._period_s if len(self.problems) < len(self._stores) else RETRY_S):
+            self._news.clear()
             began_s = time.thread_time()
             self.turn()
             self.busy_s += time.thread_time() - began_s
+            if not self._watcher.needs_time:
+                self._news.wait(max(0.0, self._prune_due[0][0] - time.monotonic()))
 
     def turn(self) -> None:
         """Watch and store once. The thread calls this; without the thread, its owner may."""

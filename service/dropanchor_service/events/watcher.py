@@ -27,6 +27,7 @@ class Watcher:
 
     def __init__(self, sites: Sequence[WatchedSite], latest: LatestPoses, now_ns: Callable[[], int]) -> None:
         """sites: in the order of their indices."""
+        self._watched = sites
         self._rows = sites[0].tags.rows
         self._latest = latest
         self._now_ns = now_ns
@@ -47,6 +48,18 @@ class Watcher:
         self._deleted: frozenset[int] = frozenset()
         self.is_full = False
         """Whether there are more pairs of tags too close to each other than a rule can follow."""
+
+    def on_news(self, told: Callable[[], None]) -> None:
+        """Call this after each change that a turn would judge, on the thread that makes it."""
+        self._latest.on_change(told)
+        for site in self._watched:
+            for one in (site.items.zones, site.items.rules, site.store):
+                one.on_change(told)
+
+    @property
+    def needs_time(self) -> bool:
+        """Whether time alone can make an event, or something waits to be stored: then turns must go on."""
+        return bool(self._with_pairs or self._with_tag_rules or self.changed)
 
     def turn(self) -> None:
         """Judge what is new."""

@@ -19,19 +19,19 @@ RECORD = np.dtype(
         *((name, "<f4") for name in ("p_mode", "sigma_pos", "sigma_obs")),
     ]
 )
-_SAME_IN_POSE = (
-    "state",
-    "reason",
-    "range",
-    "x",
-    "y",
-    "heading",
-    "speed",
-    "yaw_rate",
-    "p_mode",
-    "sigma_pos",
-    "sigma_obs",
-)
+ESTIMATED = {
+    "x": "x",
+    "y": "y",
+    "heading_rad": "heading",
+    "speed_mps": "speed",
+    "yaw_rate_radps": "yaw_rate",
+    "p_mode": "p_mode",
+    "sigma_pos_m": "sigma_pos",
+    "sigma_obs_m": "sigma_obs",
+    "range_m": "range",
+}
+"""Numbers of an estimate, and the fields of POSE that hold them."""
+_SAME_IN_POSE = ("state", "reason", *ESTIMATED.values())
 _UPPER_TRIANGLE = np.triu_indices(3)
 
 

@@ -66,6 +66,7 @@ class MessageBuffer:
         self._max_wait_ns = max_wait_ns
         self._lock = Lock()
         self._filled = Event()
+        self._woken = False
         self._rows: dict[str, int] = {}
         self._messages: list[Message] = []
         self._bytes = 0
@@ -117,8 +118,15 @@ class MessageBuffer:
         return self._rows.get(key)
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait for a message. Return False if none arrives within `timeout_s`."""
-        return self._filled.wait(timeout_s)
+        """Wait for a message or `wake`. Return False if neither comes within `timeout_s`."""
+        came = self._filled.wait(timeout_s)
+        self._woken = False
+        return came
+
+    def wake(self) -> None:
+        """End a wait, the present or the next one. Any thread may call this."""
+        self._woken = True
+        self._filled.set()
 
     def drain(self, limit: int, now_ns: int = 0) -> tuple[list[Message], list[UnregisteredMessage]]:
         """Take out up to `limit` messages of registered tags, and up to UNREGISTERED_PER_TURN others.
@@ -133,7 +141,7 @@ class MessageBuffer:
                 self._unregistered.popleft() for _ in range(min(UNREGISTERED_PER_TURN, len(self._unregistered)))
             ]
             self._unregistered_bytes -= sum(map(_size, unregistered))
-            if not self._messages and not self._unregistered:
+            if not self._messages and not self._unregistered and not self._woken:
                 self._filled.clear()
             return taken, unregistered
 

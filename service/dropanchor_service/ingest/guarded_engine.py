@@ -88,6 +88,15 @@ class GuardedEngine:
         self._has_configured = np.zeros(len(settings), bool)
         self._has_configured[list(self._configured)] = True
 
+    def fresh(self, settings: Array) -> dict[str, Array]:
+        """Return the engine's state of rows with these TAG_SETTINGS before the first sample; empty without one."""
+        if not isinstance(self._engine, Restorable):
+            return {}
+        engine = type(self._engine)()
+        for row, of_tag in enumerate(settings):
+            engine.configure(row, of_tag)
+        return engine.state()
+
     def follow_sites(self) -> list[ServedSite]:
         """Apply the changes of the sites since the last call. Return the sites that have changed.
 

@@ -1,6 +1,7 @@
 """Take in what tags report about themselves."""
 
 from collections import Counter, deque
+from collections.abc import Callable
 from threading import Lock
 
 import numpy as np
@@ -27,7 +28,11 @@ class HealthIntake:
     A tag that reports too often loses its own reports, not those of others.
     """
 
-    def __init__(self, admission: Admission, sites: Sites, rejections: Rejections) -> None:
+    def __init__(
+        self, admission: Admission, sites: Sites, rejections: Rejections, wake: Callable[[], None] = lambda: None
+    ) -> None:
+        """wake: called after a report has come, for a turn."""
+        self._wake = wake
         self._admission = admission
         self._sites = sites
         self._rejections = rejections
@@ -48,6 +53,7 @@ class HealthIntake:
                 self._surplus[key] += 1
             else:
                 self._waiting.append((key, payload, encoding, arrival_ns))
+        self._wake()
 
     def turn(self) -> None:
         """Use what has arrived."""

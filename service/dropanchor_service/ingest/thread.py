@@ -11,7 +11,9 @@ from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.runtime.worker import Worker
 
-IDLE_S = 0.25
+IDLE_S = 0.25  # between two turns without messages
+CALM_S = 2.0  # without messages, after which turns are CALM_IDLE_S apart
+CALM_IDLE_S = 1.0
 PENDING_S = 0.02  # longest wait while messages are pending, which may become due
 BACKLOG = 1000  # messages from which on a turn starts at once
 SILENT_S = 5.0  # without a turn: then the thread counts as stuck
@@ -43,7 +45,7 @@ class IngestThread(Worker):
         self._period_s = period_s
         self._between_turns = between_turns
         self._may_turn = may_turn
-        self._turned_s = time.monotonic()
+        self._turned_s = self._heard_s = time.monotonic()
         self._limit = MIN_MESSAGES
 
     @property
@@ -57,11 +59,17 @@ class IngestThread(Worker):
     def _run(self) -> None:
         self._turn()  # admits the listed tags before the first message
         while not self._stop.is_set():
-            if self._buffer.wait(PENDING_S if self._ingest.has_pending else IDLE_S) and self._buffer.depth < BACKLOG:
+            if self._buffer.wait(self._longest_wait_s()) and self._buffer.depth < BACKLOG:
+                self._heard_s = time.monotonic()
                 # Gather messages, so that one call fuses many of them.
                 self._stop.wait(self._turned_s + self._period_s - time.monotonic())
             self._turn()
         self._turn()  # fuses what arrived before the stop
+
+    def _longest_wait_s(self) -> float:
+        if self._ingest.has_pending:
+            return PENDING_S
+        return IDLE_S if time.monotonic() - self._heard_s < CALM_S else CALM_IDLE_S
 
     def _turn(self) -> None:
         self._turned_s = time.monotonic()

@@ -47,7 +47,7 @@ class Ingest:
         reorder_ns: int = 250_000_000,
     ) -> None:
         self._rejections = Rejections(sites.rows, metrics)
-        self.health = HealthIntake(admission, sites, self._rejections)
+        self.health = HealthIntake(admission, sites, self._rejections, buffer.wake)
         self._reader = SampleReader(sites, engine, self._rejections, publishers, reorder_ns)
         self._buffer = buffer
         self._admission = admission
@@ -62,10 +62,13 @@ class Ingest:
         self._clock = clock
         self._observers = observers
         self._announced: deque[str] = deque(maxlen=1024)
+        for site in sites:
+            site.store.on_change(buffer.wake)
 
     def announce(self, key: str) -> None:
         """Admit the tag with this key, which is online, in the next turn. Thread-safe."""
         self._announced.append(key)
+        self._buffer.wake()
 
     @property
     def has_pending(self) -> bool:

@@ -9,8 +9,8 @@ from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.columns import FRAMES, REASONS, STATES
 from dropanchor_service.answers.geodesy import lat_lon
-from dropanchor_service.answers.track_pages import ESTIMATED
 from dropanchor_service.estimation.columns import Array, Frame
+from dropanchor_service.history.records import ESTIMATED
 from dropanchor_service.recording import schemas
 from dropanchor_service.store.site import SiteDocument
 

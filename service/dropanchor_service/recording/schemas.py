@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from dropanchor_schemas.kinds import SCALARS
-from dropanchor_service.answers.track_pages import ESTIMATED
+from dropanchor_service.history.records import ESTIMATED
 
 POSE = "foxglove.PoseInFrame"
 LOCATION = "foxglove.LocationFix"

@@ -12,6 +12,7 @@ import dropanchor_service
 from dropanchor_service.api import export as openapi
 from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.health import HealthGauges
+from dropanchor_service.metrics.node import LeaseGauges, NodeMetrics
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.reference import (
@@ -41,7 +42,7 @@ def pages() -> dict[str, str]:
             "rest.md": rest_page.page(json.loads(openapi.text())),
             "omlox.md": omlox_page.page(openapi.omlox_document()),
             "pose-states.md": states_page.page(),
-            "metrics.md": metrics_page.page(registry),
+            "metrics.md": metrics_page.page(registry, _registry_of_node()),
             "rejections.md": rejections_page.page(),
         }
     return {name: NOTE + text for name, text in texts.items()}
@@ -62,6 +63,13 @@ def main(arguments: list[str]) -> int:
 
 def _is_current(path: Path, text: str) -> bool:
     return path.exists() and path.read_text(encoding="utf-8") == text
+
+
+def _registry_of_node() -> CollectorRegistry:
+    metrics = NodeMetrics()
+    metrics.requests.labels("200")
+    metrics.registry.register(LeaseGauges(list, list, lambda: 0.0))
+    return metrics.registry
 
 
 def _registry(folder: Path) -> CollectorRegistry:

@@ -15,10 +15,21 @@ in `_total`. No metric has a label per tag; `GET /api/v1/tags/{tag}` counts per 
 """
 
 
-def page(registry: CollectorRegistry) -> str:
-    """Return the page as Markdown. registry: with everything that the service registers."""
+_OF_A_NODE = """\
+## Of an API node
+
+`dropanchor api` has these, and none of the above.
+"""
+
+
+def page(registry: CollectorRegistry, of_node: CollectorRegistry) -> str:
+    """Return the page as Markdown. registry: with everything that a service registers. of_node: the same of a node."""
+    return "\n".join([_INTRODUCTION, _table(registry), _OF_A_NODE, _table(of_node)])
+
+
+def _table(registry: CollectorRegistry) -> str:
     families = sorted(registry.collect(), key=lambda family: family.name)
-    return f"{_INTRODUCTION}\n{table(('metric', 'type', 'labels', 'meaning'), _rows(families))}"
+    return table(("metric", "type", "labels", "meaning"), _rows(families))
 
 
 def _rows(families: Iterable[Metric]) -> Iterable[tuple[str, str, str, str]]:

@@ -8,30 +8,27 @@ import hashlib
 import logging
 import os
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
-STATE_SOURCES = ("estimation", "ingest/kernels")
-"""Packages that define the meaning of the rows in a checkpoint."""
-KERNEL_SOURCES = (*STATE_SOURCES, "answers/kernels", "zones")
+KERNEL_SOURCES = ("estimation", "ingest/kernels", "answers/kernels", "zones")
 
 _log = logging.getLogger(__name__)
 
 
-def sources_digest(packages: Sequence[str] = KERNEL_SOURCES) -> str:
-    """Return a digest of all sources in these packages, by default of all that define kernels."""
-    return hashlib.sha256(b"".join(source.read_bytes() for source in _sources(packages))).hexdigest()[:16]
+def sources_digest() -> str:
+    """Return a digest of all sources that define kernels."""
+    return hashlib.sha256(b"".join(source.read_bytes() for source in _sources())).hexdigest()[:16]
 
 
 def sources_stamp() -> str:
     """Return a digest of where the sources of the kernels are and when each was written."""
-    stamps = [(str(source), source.stat().st_mtime_ns) for source in _sources(KERNEL_SOURCES)]
+    stamps = [(str(source), source.stat().st_mtime_ns) for source in _sources()]
     return hashlib.sha256(repr(stamps).encode()).hexdigest()[:8]
 
 
-def _sources(packages: Sequence[str]) -> list[Path]:
-    return sorted(source for name in packages for source in (Path(__file__).parents[1] / name).rglob("*.py"))
+def _sources() -> list[Path]:
+    return sorted(source for name in KERNEL_SOURCES for source in (Path(__file__).parents[1] / name).rglob("*.py"))
 
 
 def use_kernel_cache() -> None:

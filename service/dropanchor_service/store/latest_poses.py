@@ -3,6 +3,7 @@
 One thread writes and any thread reads. Arrays have one row per tag.
 """
 
+from collections.abc import Callable
 from threading import Lock
 
 import numpy as np
@@ -29,11 +30,20 @@ class LatestPoses:
         self._history = PoseHistory()
         self._innovations = RowRings(INNOVATION, MAX_INNOVATIONS, MAX_INNOVATION_BYTES)
         self._version = 0
+        self._told: list[Callable[[], None]] = []
+
+    def on_change(self, told: Callable[[], None]) -> None:
+        """Call this after every change, on the thread that makes it."""
+        self._told.append(told)
 
     @property
     def version(self) -> int:
         """A number that grows with every write."""
         return self._version
+
+    def _tell(self) -> None:
+        for told in self._told:
+            told()
 
     def write(self, poses: Array, hypotheses: Array, innovations: Array | None = None) -> None:
         """Store the last pose of each row, its hypotheses, and the innovations that led to it.
@@ -53,6 +63,7 @@ class LatestPoses:
             self._history.write(poses)
             if innovations is not None:
                 self._innovations.write(innovations)
+        self._tell()
 
     def forget(self, row: int) -> None:
         """Remove the pose of a row until the next one is written."""
@@ -60,6 +71,7 @@ class LatestPoses:
             if row < len(self._changed):
                 self._changed[row] = 0
                 self._hypothesis_counts[row] = 0
+        self._tell()
 
     def state(self) -> dict[str, Array]:
         """Return copies of the latest poses and their hypotheses, for a checkpoint."""

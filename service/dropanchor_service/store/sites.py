@@ -8,6 +8,7 @@ from functools import partial
 from dropanchor_schemas import keys
 from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_schemas.site import Site
+from dropanchor_service.settings.buckets import common_bucket
 from dropanchor_service.settings.quota import Quota
 from dropanchor_service.store.health import HealthTable
 from dropanchor_service.store.pending_tags import MAX_BYTES, PendingTags
@@ -48,6 +49,7 @@ class Sites:
             self._add(store, quota, path)
         self._by_id = {site.id: site for site in self._sites}
         self._chunks = {_chunk(site.store) for site in self._sites}
+        self._bucket = common_bucket(self._by_id)
 
     def _add(self, store: SiteStore, quota: Quota, path: str) -> ServedSite:
         index = len(self._sites)
@@ -114,8 +116,11 @@ class Sites:
         return site.tags.find(tag)
 
     def all_tags(self, leaf: str) -> str:
-        """Return the key expression of `leaf` of every tag of these sites. Several sites also get keys of others."""
-        return keys.all_sites(leaf) if self.only is None else keys.all_tags(self.only.id, leaf)
+        """Return the key expression of `leaf` of every tag of these sites.
+
+        Several sites also get keys of others, but not of other buckets if all have one.
+        """
+        return keys.all_sites(leaf, self._bucket) if self.only is None else keys.all_tags(self.only.id, leaf)
 
     def serves(self, key: str) -> bool:
         """Return whether a key that `all_tags` matches is of one of these sites."""

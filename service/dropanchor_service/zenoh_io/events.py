@@ -11,7 +11,7 @@ from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.may_serve import MayServe, always
 from dropanchor_service.zenoh_io.periodic import PeriodicPublisher
 
-PERIOD_S = 0.1
+PERIOD_S = 0.1  # between two looks at the stores
 AT_ONCE = 1000
 
 
@@ -24,6 +24,8 @@ class ZenohEvents(PeriodicPublisher):
         super().__init__("zenoh events", PERIOD_S, metrics, may_publish)
         self._session = session
         self._stores = stores
+        for store in stores:
+            store.on_commit(self.wake)
         self._published = [store.newest for store in stores]
 
     def publish(self) -> None:

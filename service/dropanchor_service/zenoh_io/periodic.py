@@ -1,6 +1,7 @@
-"""Publish from a thread of its own."""
+"""Publish from a thread of its own, which sleeps until there is something new."""
 
 import logging
+import time
 from abc import abstractmethod
 
 from dropanchor_service.metrics.registry import Metrics
@@ -10,10 +11,10 @@ from dropanchor_service.runtime.worker import Worker
 
 
 class PeriodicPublisher(Worker):
-    """Calls `publish` every `period_s` while it is open. An error is counted and logged, and the calls go on.
+    """Calls `publish` after each `wake` while it is open, but not twice within `period_s`.
 
-    The ingest thread must not publish, because a put may take longer than it can wait. may_publish: asked before each
-    call.
+    An error is counted and logged, and the call is repeated. The ingest thread must not publish, because a put may take
+    longer than it can wait. may_publish: asked before each call.
     """
 
     def __init__(self, name: str, period_s: float, metrics: Metrics, may_publish: MayServe = always) -> None:
@@ -29,11 +30,17 @@ class PeriodicPublisher(Worker):
         """Put what has changed since the last call."""
 
     def _run(self) -> None:
-        while not self._stop.wait(self._period_s):
-            if not self._may_publish():
-                continue
-            try:
-                self.publish()
-            except Exception as error:
-                self._metrics.faults.labels("publication").inc()
-                self._log.exception(f"publication of {self._name}", error)
+        while self._news.wait() and not self._stop.is_set():
+            due_s = time.monotonic() + self._period_s
+            if self._may_publish():
+                self._news.clear()
+                self._attempt()
+            self._stop.wait(max(0.0, due_s - time.monotonic()))
+
+    def _attempt(self) -> None:
+        try:
+            self.publish()
+        except Exception as error:
+            self.wake()
+            self._metrics.faults.labels("publication").inc()
+            self._log.exception(f"publication of {self._name}", error)

@@ -37,24 +37,34 @@ class ZenohPoses(PeriodicPublisher):
         self._tag_version = 0
         self._frame_version = 0
         self._frame_due_s = 0.0
+        sites.latest.on_change(self.wake)
 
     def __enter__(self) -> Self:
         tags, frames = self._keys()
         self._tag_publisher = self._session.declare_publisher(tags)
         self._frame_publisher = self._session.declare_publisher(frames)
+        # The first subscriber gets a frame of what there is.
+        self._listener = self._frame_publisher.declare_matching_listener(
+            zenoh.handlers.Callback(self._on_matching, indirect=False)
+        )
+        self.wake()
         return super().__enter__()
+
+    def _on_matching(self, _: zenoh.MatchingStatus) -> None:
+        self.wake()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         super().__exit__(kind, error, traceback)
+        self._listener.undeclare()
         for publisher in (self._tag_publisher, self._frame_publisher, *self._of_site.values()):
             publisher.undeclare()
 
     def _keys(self) -> tuple[str, str]:
         """Return the key expressions of the poses of tags and of frames."""
         if self._sites.only is None:
-            return keys.all_sites("pose"), keys.poses_of_all_sites()
+            return keys.all_sites("pose", self._sites.bucket), keys.poses_of_all_sites(self._sites.bucket)
         site = self._sites.only.site.site.id
         return keys.all_tags(site, "pose"), keys.poses_key(site)
 
@@ -77,11 +87,12 @@ class ZenohPoses(PeriodicPublisher):
                     self._put(keys.pose_key(site, tag), pose)
 
     def _put_frame(self) -> None:
-        if self._sites.latest.version == self._frame_version or time.monotonic() < self._frame_due_s:
+        if self._sites.latest.version == self._frame_version or not _has_subscribers(self._frame_publisher):
+            return
+        if time.monotonic() < self._frame_due_s:
+            self.wake()
             return
         self._frame_due_s = time.monotonic() + FRAME_PERIOD_S
-        if not _has_subscribers(self._frame_publisher):
-            return
         self._frame_version, changed = self._sites.latest.since(self._frame_version)
         for answers, _ in self._sites.divided(changed):
             key = keys.poses_key(answers.site.site.id)

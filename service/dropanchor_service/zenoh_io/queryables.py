@@ -60,7 +60,8 @@ class ZenohAnswers:
     def _keys(self) -> tuple[str, str, str]:
         """Return the key expressions of poses, anchors and settings."""
         if self._sites.only is None:
-            return keys.all_sites("pose"), keys.anchors_of_all_sites(), keys.all_sites("settings")
+            bucket = self._sites.bucket
+            return keys.all_sites("pose", bucket), keys.anchors_of_all_sites(bucket), keys.all_sites("settings", bucket)
         site = self._sites.only.site.site.id
         return keys.all_tags(site, "pose"), keys.all_anchors(site), keys.all_tags(site, "settings")
 

@@ -22,6 +22,8 @@ class ZenohRemoteSettings(PeriodicPublisher):
         super().__init__("remote settings", PERIOD_S, metrics, may_publish)
         self._session = session
         self._stores = [site.store for site in sites]
+        for store in self._stores:
+            store.on_change(self.wake)
         self._published = [store.document.remote for store in self._stores]
 
     def publish(self) -> None:

@@ -15,6 +15,7 @@ from dropanchor_service.answers import hints
 from dropanchor_service.answers.care import care_of
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.checkpoints.layouts import VERSION
 from dropanchor_service.cluster import sentences as of_cluster
 from dropanchor_service.cluster.watch import Lease, obstacle
 from dropanchor_service.engines.warm_up import CompilationProgress
@@ -74,7 +75,8 @@ def refused_shapes() -> Iterator[str]:
 def sentences_of_a_cluster() -> Iterator[str]:
     lease = Lease("yard", epoch=4, owner="a", sites="s", layout="l")
     yield from map(of_cluster.standby_of, (lease, replace(lease, owner=""), replace(lease, address="https://a:8080")))
-    for other in (obstacle(lease, "other", "l"), obstacle(lease, "s", "m")):
+    later, own = replace(lease, layout=f"{VERSION + 1}-{'a' * 16}"), f"{VERSION}-{'b' * 16}"
+    for other in (obstacle(lease, "other", "l"), obstacle(lease, "s", "m"), obstacle(later, "s", own)):
         assert other is not None
         yield of_cluster.unable(lease, other)
     yield of_cluster.database_away("yard", "connection refused")

@@ -83,6 +83,17 @@ def test_a_zone_and_a_rule_are_of_their_site_even_where_names_and_places_are_equ
     assert company.stay(3.0, near) == ["b zone.exit cart"]
 
 
+def test_zones_that_another_process_has_saved_are_watched() -> None:
+    saved: list[bytes] = []
+    owner, successor = ZoneItems.opened(None), Company(make_sites("a", "b"))
+    owner.zones.share(None, saved.append)
+    owner.zones.put("dock", circle())
+    both = {(0, "cart"): 0.0, (1, "cart"): 0.0}
+    assert successor.stay(1.0, both) == []
+    successor.items[1].zones.share(saved[-1], saved.append)
+    assert successor.stay(3.0, both) == ["b zone.enter cart"]
+
+
 def test_tags_of_a_site_that_has_left_make_no_events_and_a_restart_repeats_none(tmp_path: Path) -> None:
     company = Company(make_sites("a", "b"), tmp_path)
     for items in company.items:

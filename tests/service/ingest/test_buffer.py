@@ -225,3 +225,13 @@ def test_no_message_is_lost_or_duplicated_between_threads() -> None:
     while any(thread.is_alive() for thread in threads) or buffer.depth:
         found.update(message[0] for message in buffer.drain(100)[0])
     assert found == dict.fromkeys(range(4), 2000)
+
+
+def test_a_wake_ends_one_wait_also_when_it_comes_before_the_drain() -> None:
+    buffer = MessageBuffer(10_000)
+    assert not buffer.wait(0.0)
+    buffer.wake()
+    buffer.drain(10)
+    assert buffer.wait(0.0)
+    buffer.drain(10)
+    assert not buffer.wait(0.0)

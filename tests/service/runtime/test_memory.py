@@ -1,12 +1,13 @@
 """Heap memory that is no longer used is returned to the system."""
 
 import ctypes
+import mmap
 import os
 from pathlib import Path
 
 import pytest
 
-from dropanchor_service.runtime.memory import PERIOD_S, HeapTrimmer
+from dropanchor_service.runtime.memory import PERIOD_S, HeapTrimmer, give_back_files
 
 
 def resident_bytes() -> int:
@@ -27,3 +28,28 @@ def test_free_memory_between_used_blocks_is_returned_once_per_period() -> None:
     assert not heap.trim()
     assert before - resident_bytes() > 50 * 2**20
     assert len(kept) == 100
+
+
+def protect(mapped: mmap.mmap, protection: int) -> None:
+    address = ctypes.addressof(ctypes.c_char.from_buffer(mapped))
+    assert ctypes.CDLL(None).mprotect(ctypes.c_void_p(address), ctypes.c_size_t(len(mapped)), protection) == 0
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps").exists(), reason="this system does not list its mappings")
+def test_pages_of_files_are_given_back_and_those_that_were_changed_keep_their_content(tmp_path: Path) -> None:
+    file, size = tmp_path / "library", 40 * 2**20
+    file.write_bytes(b"a" * size)
+    with file.open("rb") as opened:
+        constants, tables = (
+            mmap.mmap(opened.fileno(), size, mmap.MAP_PRIVATE, mmap.PROT_READ | mmap.PROT_WRITE) for _ in range(2)
+        )
+    tables[5] = ord("b")
+    for mapped in (constants, tables):
+        protect(mapped, mmap.PROT_READ)
+        assert mapped.find(b"c") == -1  # reads all pages
+    before = resident_bytes()
+    give_back_files()
+    assert before - resident_bytes() > 35 * 2**20
+    assert resident_bytes() > size
+    assert constants[:] == b"a" * size
+    assert tables[:7] == b"aaaaaba"

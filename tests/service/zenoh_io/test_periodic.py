@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import time
 
 import pytest
 
@@ -27,7 +28,10 @@ class FailsFirst(PeriodicPublisher):
 def test_an_error_is_counted_and_logged_and_does_not_end_the_calls(caplog: pytest.LogCaptureFixture) -> None:
     metrics = Metrics()
     with caplog.at_level(logging.ERROR), FailsFirst(metrics) as publisher:
-        wait_until(lambda: len(publisher.calls) > 3)
+        publisher.wake()
+        wait_until(lambda: len(publisher.calls) == 2)
+        publisher.wake()
+        wait_until(lambda: len(publisher.calls) == 3)
     assert metrics.registry.get_sample_value("dropanchor_faults_total", {"where": "publication"}) == 1
     assert [record.getMessage() for record in caplog.records] == [
         "publication of numbers: OSError: the network is down"
@@ -42,9 +46,20 @@ def test_nothing_is_published_while_the_process_may_not_serve() -> None:
         return asked[-1]
 
     with FailsFirst(Metrics(), may_publish) as publisher:
-        wait_until(lambda: len(asked) > 5)
-    assert asked[:4] == [False, False, False, True]
-    assert len(publisher.calls) == asked.count(True)
+        publisher.wake()
+        wait_until(lambda: len(publisher.calls) == 2)
+    assert asked == [False, False, False, True, True]
+
+
+def test_it_sleeps_until_there_is_something_and_then_calls_once() -> None:
+    with FailsFirst(Metrics()) as publisher:
+        publisher.wake()
+        wait_until(lambda: len(publisher.calls) == 2)  # the first failed
+        time.sleep(0.05)
+        assert len(publisher.calls) == 2
+        for _ in range(3):
+            publisher.wake()
+        wait_until(lambda: len(publisher.calls) > 2)
 
 
 def test_its_thread_ends_with_the_context() -> None:

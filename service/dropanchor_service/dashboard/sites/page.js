@@ -34,7 +34,9 @@ function linkTo(one) {
 async function refresh() {
   clearTimeout(timer);
   try {
-    ({ sites } = await getJson(new URL("../api/v1/sites", document.baseURI)));
+    const answer = await getJson(new URL("../api/v1/sites", document.baseURI));
+    sites = answer.sites;
+    showUnavailable(answer.unavailable ?? []);
     become("live");
     show();
   } catch (error) {
@@ -42,6 +44,12 @@ async function refresh() {
     if (error instanceof KeyRequiredError) return;
   }
   timer = setTimeout(refresh, REQUEST_MS + REQUEST_MS_PER_SITE * sites.length);
+}
+
+/** Name the buckets whose sites nobody serves now. @param {string[]} buckets */
+function showUnavailable(buckets) {
+  byId("unavailable").hidden = buckets.length === 0;
+  byId("unavailable").textContent = t("sites.unavailable", { buckets: buckets.join(", ") });
 }
 
 /** @param {"live" | "lost" | "locked"} status */

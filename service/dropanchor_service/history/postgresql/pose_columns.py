@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_service.estimation.columns import POSE, Array, Frame
-from dropanchor_service.history.records import StoredPoses
+from dropanchor_service.history.records import ESTIMATED, StoredPoses
 from dropanchor_service.history.summaries import POINT, RELATIVE, summary_of_each
 
 
@@ -32,20 +32,7 @@ _KEYS = [
 ]
 _CONTENT = [
     Column("anchor", "integer", ">i4"),  # -1: none
-    *(
-        Column(name, "real", ">f4", field)
-        for name, field in {
-            "range_m": "range",
-            "x": "x",
-            "y": "y",
-            "heading_rad": "heading",
-            "speed_mps": "speed",
-            "yaw_rate_radps": "yaw_rate",
-            "p_mode": "p_mode",
-            "sigma_pos_m": "sigma_pos",
-            "sigma_obs_m": "sigma_obs",
-        }.items()
-    ),
+    *(Column(name, "real", ">f4", field) for name, field in ESTIMATED.items()),
     *(
         Column(f"cov_{'xyh'[row]}{'xyh'[column]}", "real", ">f4", "cov", (row, column))
         for row in range(3)

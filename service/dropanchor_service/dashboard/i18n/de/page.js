@@ -111,5 +111,6 @@ export default {
   "sites.map_of": "{site}: {tags}",
   "sites.none": "Kein Standort heißt so.",
   "sites.lost": "Der Dienst antwortet nicht. Diese Zahlen sind veraltet; neuer Versuch läuft.",
+  "sites.unavailable": "Die Standorte von {buckets} bedient gerade niemand, deshalb fehlen sie hier.",
   "sites.key": "Dieser Schlüssel öffnet keinen Standort.",
 };

@@ -111,5 +111,6 @@ export default {
   "sites.map_of": "{site}: {tags}",
   "sites.none": "No site has this name.",
   "sites.lost": "The service does not answer. These numbers are out of date; trying again.",
+  "sites.unavailable": "Nobody serves the sites of {buckets} now, so they are missing here.",
   "sites.key": "This key opens no site.",
 };

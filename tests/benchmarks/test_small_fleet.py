@@ -1,0 +1,97 @@
+"""Measure what a service costs whose tags are few: without any, and with five in each of ten sites."""
+
+import json
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from benchmarks import proc, report
+from benchmarks.motion import ANCHOR, tracks
+from benchmarks.programs import generator
+from benchmarks.service import counters, lost
+from benchmarks.step import when_quiet
+from support.commands import environment
+from support.service import running_service
+
+SITES, TAGS = [f"site-{number}" for number in range(10)], 50
+SETTLE_S, IDLE_S, MOVING_S = 5.0, 20.0, 30.0
+FLOOR = """
+import resource
+from pathlib import Path
+def shown(what):
+    pages = Path("/proc/self/statm").read_text().split()
+    resident, of_files = (int(count) * resource.getpagesize() / 1e6 for count in pages[1:3])
+    print(what, round(resident), round(resident - of_files), sep=";")
+shown("Python")
+import numpy, zenoh
+shown("NumPy and Zenoh")
+import fastapi, uvicorn
+shown("FastAPI and uvicorn")
+import numba
+shown("numba with LLVM")
+import dropanchor_service.service
+shown("the modules of the service")
+from dropanchor_service.engines.compiled import compiled_engine
+from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.settings.model import Settings
+compiled_engine(Settings(), CompilationProgress())
+shown("the kernels")
+from dropanchor_service.runtime.memory import give_back_files
+give_back_files()
+shown("file pages given back")
+"""
+
+pytestmark = pytest.mark.benchmark
+
+
+def settings_file(folder: Path) -> Path:
+    """Write settings of the sites, with the start of every tag."""
+    starts = [track.start for track in tracks(1.0)]
+    text = ""
+    for index, site in enumerate(SITES):
+        text += f'[[sites.{site}.site.anchors]]\nid = "{ANCHOR}"\n'
+        for tag in range(index, TAGS, len(SITES)):
+            x, y, heading = starts[tag % len(starts)]
+            text += f"[sites.{site}.tags.sim-{tag}.start]\nx = {x!r}\ny = {y!r}\nheading_rad = {heading!r}\n"
+    file = folder / "sites.toml"
+    file.write_text(text)
+    return file
+
+
+def test_the_cost_of_ten_sites_with_five_tags_each(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        service = stack.enter_context(
+            running_service("--config", str(settings_file(tmp_path)), "--data-dir", str(tmp_path))
+        )
+        pid = service.process.pid
+        time.sleep(SETTLE_S)
+        idle_mb, began_s = proc.resident_bytes(pid) / 1e6, proc.thread_s(pid)
+        time.sleep(IDLE_S)
+        idle = (proc.thread_s(pid) - began_s) / IDLE_S
+        fleet = generator(service.zenoh, TAGS, SETTLE_S + MOVING_S, sites=SITES)
+        stack.callback(fleet.end)
+        before = counters(service)
+        fleet.send_line(time.time_ns() + 300_000_000)
+        time.sleep(SETTLE_S)
+        began_s = proc.cpu_s(pid)
+        time.sleep(MOVING_S - 2.0)
+        cpu, moving_mb = (proc.cpu_s(pid) - began_s) / (MOVING_S - 2.0), proc.resident_bytes(pid) / 1e6
+        sent = json.loads(fleet.request("end"))
+        missing = lost(sent["messages"], before, when_quiet(lambda: counters(service)))
+    report.record(
+        "small",
+        f"Without tags: {idle * 100:.2f} % of a core, {idle_mb:.0f} MB resident. {TAGS} tags in {len(SITES)} sites: "
+        f"{cpu:.3f} of a core, {moving_mb:.0f} MB, {missing} samples lost.\n\n" + floor(),
+    )
+    assert missing == 0
+
+
+def floor() -> str:
+    """Return what each part of a process adds to its memory, as a table."""
+    run = subprocess.run([sys.executable, "-c", FLOOR], env=environment(), capture_output=True, text=True, check=True)
+    rows = [f"| {' | '.join(line.split(';'))} |" for line in run.stdout.splitlines()]
+    return "\n".join(["| a process with, added up | MB resident | of them not in files |", "|---|---|---|", *rows])

@@ -1,0 +1,31 @@
+"""A subscriber that comes while no tag moves still gets the poses that there are."""
+
+import time
+
+import orjson
+import zenoh
+
+from dropanchor_schemas.keys import poses_key
+from dropanchor_schemas.wire import Frame, RangeSample
+from dropanchor_service.answers.of_sites import answers_of_sites
+from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.zenoh_io.publishers import ZenohPoses
+from support.ingest import IngestBench
+from support.zenoh_router import connected_session, wait_until
+
+
+def test_the_first_subscriber_to_frames_gets_one_although_nothing_changes(router_endpoint: str) -> None:
+    bench = IngestBench()
+    answers = answers_of_sites(bench.sites, bench.latest, time.time_ns, [None], bench.publishers)
+    frames: list[zenoh.Sample] = []
+    with (
+        connected_session(router_endpoint) as ours,
+        connected_session(router_endpoint) as theirs,
+        ZenohPoses(ours, answers, Metrics()),
+    ):
+        bench.send("cart", Frame(ranges=[RangeSample(time.time_ns(), 7, 4.0)]))
+        time.sleep(0.3)  # the thread has found no subscriber, and sleeps
+        subscriber = theirs.declare_subscriber(poses_key("default"), frames.append)
+        wait_until(lambda: frames)
+        subscriber.undeclare()
+    assert orjson.loads(frames[0].payload.to_bytes())["x"] == [4.0]
