@@ -65,13 +65,16 @@ class OnRay:
         return [name for full in list_named_actors() if (name := full.partition(" ")[0]) and full == self._full(name)]
 
     def start(self, name: str) -> None:
-        """Start a shard on its node."""
+        """Start a shard on its node.
+
+        It takes nothing of the resource that counts the shards of a node. If the head dies while Ray makes the process
+        of a shard, nobody gives back what the process would have taken, and a shard in its place would wait for ever.
+        """
         alive = self._nodes[node_of_shard(name)]
         actor: Any = ray.remote(ShardActor)
         actor.options(
             name=self._full(name),
             num_cpus=0,
-            resources={RESOURCE: 1},
             max_restarts=-1,
             lifetime="detached",
             get_if_exists=True,
@@ -79,9 +82,12 @@ class OnRay:
         ).remote(name)
 
     def kill(self, name: str) -> None:
-        """End a shard. Ray starts it again."""
+        """End a shard for good, so that its name is free for another one.
+
+        Ray could not restart one whose process it has never made.
+        """
         with suppress(ValueError):  # it is gone already
-            ray.kill(ray.get_actor(self._full(name)), no_restart=False)
+            ray.kill(ray.get_actor(self._full(name)), no_restart=True)
 
     def _full(self, name: str) -> str:
         """Return the name of an actor. After a restart of its node, the shard is another actor."""

@@ -88,22 +88,27 @@ def missing_shards(node: Node, running: Collection[str]) -> list[str]:
 
 
 class Hung:
-    """Finds shards that run and do nothing: their lease has run out, and they do not stand by either."""
+    """Finds shards that do nothing: their lease has run out, they do not stand by, and they do not start either.
 
-    def __init__(self, limit_s: float) -> None:
-        self._limit_s = limit_s
-        self._heard_s: dict[str, float] = {}
+    silence_s: after which a shard hangs that was heard once. start_s: that others have until they are heard; Ray may
+    list a shard whose process it never starts, if the head dies meanwhile.
+    """
+
+    def __init__(self, silence_s: float, start_s: float) -> None:
+        self._silence_s = silence_s
+        self._start_s = start_s
+        self._due_s: dict[str, float] = {}  # when a shard has to be heard again
 
     def look_away(self) -> None:
         """Begin anew: while the database was away, nothing could be heard."""
-        self._heard_s = {}
+        self._due_s = {}
 
     def find(self, running: Iterable[str], heard: Collection[str], now_s: float) -> list[str]:
-        """Return the shards that were heard once, and not for too long. A shard that starts was not heard yet."""
+        """Return the shards that hang. They count as new from then on."""
         known = set(running)
-        self._heard_s = {name: at_s for name, at_s in self._heard_s.items() if name in known}
-        self._heard_s |= dict.fromkeys(known.intersection(heard), now_s)
-        found = [name for name, at_s in sorted(self._heard_s.items()) if now_s - at_s > self._limit_s]
+        self._due_s = {name: self._due_s.get(name, now_s + self._start_s) for name in known}
+        self._due_s |= dict.fromkeys(known.intersection(heard), now_s + self._silence_s)
+        found = sorted(name for name, due_s in self._due_s.items() if now_s > due_s)
         for name in found:
-            del self._heard_s[name]  # it is killed, and starts again
+            del self._due_s[name]
         return found

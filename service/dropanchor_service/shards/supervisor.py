@@ -11,7 +11,8 @@ from dropanchor_service.cluster.leases import HEAD
 from dropanchor_service.cluster.watch import Lease
 from dropanchor_service.shards.placement import Hung, Move, Node, Placement, missing_shards
 
-HUNG_S = 20.0  # more than a process needs until it says that it starts
+HUNG_S = 20.0  # since it was heard
+START_S = 60.0  # much more than a process needs until it says that it starts
 MOVE_S = 10.0  # for a standby to take a bucket over
 REST_S = 1.0  # between two moves
 FRESH = 2.0  # times its length: an older lease has run out
@@ -39,7 +40,7 @@ class Supervisor:
         self._connect = connect
         self._epoch = epoch
         self._connection: Connection | None = None
-        self._hung = Hung(HUNG_S)
+        self._hung = Hung(HUNG_S, START_S)
         self._move: tuple[Move, int, float] | None = None  # epoch before it, and when it is given up
         self._rests_until_s = 0.0
         self._drained: set[str] = set()
@@ -99,7 +100,7 @@ class Supervisor:
 
     def _kill_hung(self, running: Collection[str], heard: Collection[str], now_s: float) -> None:
         for name in self._hung.find(running, heard, now_s):
-            _log.warning("the shard %s hangs: it has neither renewed a lease nor stood by for %.0f s", name, HUNG_S)
+            _log.warning("the shard %s hangs: it renews no lease, does not stand by, and does not start", name)
             self._shards.kill(name)
 
     def _move_one(self, connection: Connection, placement: Placement, owned: dict[str, Lease], now_s: float) -> None:

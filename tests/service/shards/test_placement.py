@@ -74,11 +74,20 @@ def test_it_says_how_many_buckets_the_loss_of_a_node_would_leave_without_a_stand
     assert placed([A, Node("b", 4, is_drained=True)], a=1).without_standby() == ("a", 1)
 
 
-def test_a_shard_that_was_heard_and_is_silent_hangs_and_one_that_starts_does_not() -> None:
-    hung = Hung(10.0)
+def test_a_shard_that_was_heard_and_is_silent_hangs_sooner_than_one_that_starts() -> None:
+    hung = Hung(10.0, start_s=60.0)
     assert hung.find(["a/1", "a/2"], ["a/1"], 0.0) == []
     assert hung.find(["a/1", "a/2"], [], 11.0) == ["a/1"]  # a/2 was never heard: it compiles
     assert hung.find(["a/1", "a/2"], [], 30.0) == []  # it was killed, and starts
     assert hung.find(["a/1"], ["a/1"], 31.0) == []
     hung.look_away()
     assert hung.find(["a/1"], [], 60.0) == []  # the database was away
+
+
+def test_a_shard_that_is_never_heard_hangs_and_the_one_in_its_place_has_time_to_start() -> None:
+    hung = Hung(10.0, start_s=60.0)
+    assert hung.find(["a/1", "a/2"], ["a/2"], 0.0) == []
+    assert hung.find(["a/1", "a/2"], ["a/2"], 61.0) == ["a/1"]
+    assert hung.find(["a/2"], ["a/2"], 62.0) == []
+    assert hung.find(["a/1", "a/2"], ["a/2"], 122.0) == []
+    assert hung.find(["a/1", "a/2"], ["a/2"], 183.0) == ["a/1"]
