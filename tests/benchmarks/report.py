@@ -6,15 +6,17 @@ from benchmarks.step import Figures
 from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
 
 _PAGE = PAGES / "performance.md"
-_PAGE_OF = {"cluster": PAGES / "cluster.md"}
+_PAGE_OF = dict.fromkeys(("cluster", "hosts"), PAGES / "cluster.md")
 """Tables that have a page of their own."""
 _WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
+_CLUSTER = ("cluster", "shards", "ownership")
 SOURCES = {
     "capacity": _WHOLE,
-    "cluster": ("cluster", "shards", "ownership"),
+    "cluster": _CLUSTER,
     "delivery": ("delivery",),
     "engines": ("estimation",),
     "history": ("history",),
+    "hosts": _CLUSTER,
     "idle": _WHOLE,
     "nodes": ("answers", "api", "node"),
     "overload": _WHOLE,

@@ -37,10 +37,14 @@ class Trial:
         self.cluster.start(name, NODES[name], "--join", "--shards", str(SHARDS))
 
     def wait_until_whole(self) -> None:
-        """Wait until each node serves a bucket, and all other shards stand by."""
-        spare = len(NODES) * SHARDS - BUCKETS
-        wait_until(lambda: nodes_of(self.cluster) == set(NODES) and len(self.cluster.standbys()) == spare, 120.0)
+        """Wait until there is a head, each node serves a bucket, and all other shards stand by."""
+        wait_until(self._is_whole, 240.0)
         time.sleep(3.0)
+
+    def _is_whole(self) -> bool:
+        spare = len(NODES) * SHARDS - BUCKETS
+        all_serve = nodes_of(self.cluster) == set(NODES)
+        return all_serve and len(self.cluster.standbys()) == spare and self.cluster.has_head()
 
     def measure(self, what: str, fail: Callable[[str, str], None], mend: Callable[[str], None]) -> None:
         """Note the longest time without a pose until all is as before. fail: gets the node of 001, and its shard."""
@@ -117,6 +121,15 @@ def _all_failures(trial: Trial, database: Postgresql) -> None:
         time.sleep(5.0)
         cluster.start("head", 2, "--head")
 
+    def head_dies_while_shards_start(node: str, _: str) -> None:
+        words = f"starting the shard {node}/"
+        before = cluster.count_said("head", words)
+        cluster.kill(node)
+        trial.start(node)
+        wait_until(lambda: cluster.count_said("head", words) > before, 60.0)
+        cluster.kill("head")
+        cluster.start("head", 2, "--head")
+
     def database_away(_: str, __: str) -> None:
         database.stop()
         time.sleep(8.0)
@@ -128,5 +141,6 @@ def _all_failures(trial: Trial, database: Postgresql) -> None:
     trial.measure("kill -9 of all processes of a node", lambda node, _: cluster.kill(node), trial.start)
     trial.measure("kill -9 of a raylet", lambda node, _: cluster.kill_raylet(node), restart)
     trial.measure("head gone for 5 s", head_dies, nothing)
+    trial.measure("kill -9 of the head while shards of a node start again", head_dies_while_shards_start, nothing)
     trial.measure("PostgreSQL away for 8 s", database_away, nothing)
     trial.measure("node frozen for 20 s", freeze, restart)

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import pytest
 from psycopg.errors import UndefinedTable
@@ -16,38 +16,68 @@ from psycopg.errors import UndefinedTable
 from support.kernel_cache import compile_once
 from support.postgresql import Postgresql
 from support.service import command, environment
-from support.zenoh_router import free_port
+from support.zenoh_router import free_port, wait_until
 
 needs_ray = pytest.mark.skipif(
     importlib.util.find_spec("ray") is None, reason="Ray is not installed: pip install 'dropanchor-service[cluster]'"
 )
 
 
-class Cluster:
-    """Nodes with these settings of sites. folder: short, because of the sockets of Ray. head: its address and port."""
+class Machines(Protocol):
+    """Where nodes run, by their numbers."""
 
-    def __init__(self, folder: Path, database: Postgresql, router: str, sites: Sequence[str]) -> None:
+    def address(self, number: int) -> str: ...
+
+    def command(self, number: int, words: Sequence[str]) -> list[str]:
+        """Return the command that runs these words on a machine."""
+        ...
+
+    def settings(self, number: int) -> list[str]:
+        """Return settings of a machine, for the top of the file."""
+        ...
+
+
+class Loopback:
+    """Addresses of the loopback in place of machines."""
+
+    def address(self, number: int) -> str:
+        return f"127.0.0.{number}"
+
+    def command(self, _: int, words: Sequence[str]) -> list[str]:
+        return list(words)
+
+    def settings(self, _: int) -> list[str]:
+        return []
+
+
+class Cluster:
+    """Nodes with these settings of sites. folder: short, because of the sockets of Ray."""
+
+    def __init__(
+        self, folder: Path, database: Postgresql, router: str, sites: Sequence[str], machines: Machines
+    ) -> None:
         self.folder = folder
+        self._machines = machines
         self._database = database
         self._lines = ["[zenoh]", f'connect = ["{router}"]', *sites]
         self._port = free_port()
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, number: int, *options: str) -> "subprocess.Popen[bytes]":
-        """Start a node at 127.0.0.`number`. Without options, it joins the head."""
+        """Start a node on the machine `number`. Without options, it joins the head."""
         folder = self.folder / name
         folder.mkdir(exist_ok=True)
         config = folder / "sites.toml"
         cluster = ["[cluster]", f'url = "{self._database.url()}"', f'name = "{name}"']
-        config.write_text("\n".join(["history.enabled = false", *cluster, *self._lines]) + "\n")
+        lines = ["history.enabled = false", *self._machines.settings(number), *cluster, *self._lines]
+        config.write_text("\n".join(lines) + "\n")
         words = ["--config", str(config), "--folder", str(folder), "--token", str(self.folder / "token")]
         role = options or ("--join",)
         port = ["--port", str(self._port)] if "--head" in role else []
-        where = ["--address", f"127.0.0.{number}", *role, *port]
+        where = ["--address", self._machines.address(number), *role, *port]
+        start = self._machines.command(number, command("cluster", "start", *words, *where))
         with (folder / "log").open("ab") as log:
-            process = subprocess.Popen(
-                command("cluster", "start", *words, *where), env=environment(), stderr=log, stdout=log
-            )
+            process = subprocess.Popen(start, env=environment(), stderr=log, stdout=log)
         self._processes[name] = process
         return process
 
@@ -64,10 +94,12 @@ class Cluster:
                 os.kill(number, how)
 
     def kill_raylet(self, name: str) -> None:
-        """Kill the process of Ray that starts all others of a node."""
-        for number, line in _descendants(self._processes[name].pid).items():
-            if "raylet/raylet" in line:
-                os.kill(number, signal.SIGKILL)
+        """Kill the process of Ray that starts the shards of a node, and wait until they have ended."""
+        every = _descendants(self._processes[name].pid).items()
+        raylet = next(number for number, line in every if "raylet/raylet" in line)
+        shards = _descendants(raylet)
+        os.kill(raylet, signal.SIGKILL)
+        wait_until(lambda: not any(map(_runs, shards)), 60.0)
 
     def signal_shard(self, shard: str, bucket: str, how: signal.Signals) -> None:
         """Send a signal to the process of a shard that serves a bucket: the name of its log ends with its number."""
@@ -85,7 +117,10 @@ class Cluster:
         return dict(self._rows("SELECT bucket, owner FROM dropanchor_lease WHERE owner <> '' AND bucket <> '@head'"))
 
     def has_head(self) -> bool:
-        return bool(self._rows("SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND owner <> ''"))
+        """Return whether a head has renewed its lease a moment ago."""
+        statement = """SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND owner <> '' AND renewals > 0
+            AND renewed > clock_timestamp() - interval '2 s'"""
+        return bool(self._rows(statement))
 
     def address(self, bucket: str) -> str:
         """Return the address of the page of the owner."""
@@ -107,6 +142,10 @@ class Cluster:
         words = command("cluster", *arguments, "--url", self._database.url())
         return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=90)
 
+    def count_said(self, name: str, words: str) -> int:
+        """Return how often the process of a node has logged these words."""
+        return (self.folder / name / "log").read_text(errors="replace").count(words)
+
     def log(self) -> str:
         """Return what the nodes and their shards have said."""
         files = sorted(
@@ -123,6 +162,14 @@ class Cluster:
             self.kill(name)
 
 
+def _runs(process: int) -> bool:
+    """Return whether a process has not ended, even if nobody has noticed its end yet."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2][0] != "Z"
+    except OSError:
+        return False
+
+
 def _descendants(process: int) -> dict[int, str]:
     """Return the children of a process, theirs and so on, each with its command line."""
     found: dict[int, str] = {}
@@ -134,11 +181,13 @@ def _descendants(process: int) -> dict[int, str]:
 
 
 @contextmanager
-def running_cluster(database: Postgresql, router: str, sites: Sequence[str]) -> Iterator[Cluster]:
+def running_cluster(
+    database: Postgresql, router: str, sites: Sequence[str], machines: Machines | None = None
+) -> Iterator[Cluster]:
     """Give a cluster without nodes, and end all of its nodes after the block."""
     compile_once()
     with tempfile.TemporaryDirectory(prefix="dr-", dir="/tmp", ignore_cleanup_errors=True) as folder:
-        cluster = Cluster(Path(folder), database, router, sites)
+        cluster = Cluster(Path(folder), database, router, sites, machines or Loopback())
         try:
             yield cluster
         finally:

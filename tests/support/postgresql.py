@@ -26,7 +26,6 @@ _USER = "postgres"  # whom Debian's package makes: PostgreSQL refuses to run as 
 _QUICK = (
     "fsync=off",
     "shared_buffers=32MB",
-    "listen_addresses=127.0.0.1",
     "unix_socket_directories=",
     "autovacuum=off",
 )
@@ -35,15 +34,18 @@ _numbers = count()
 
 @dataclass
 class Postgresql:
-    """A server. The role `dropanchor` may do everything."""
+    """A server. The role `dropanchor` may do everything. host: address where it listens."""
 
     folder: Path
     options: tuple[str, ...] = ()
+    host: str = "127.0.0.1"
     port: int = field(default_factory=free_port)
     process: "subprocess.Popen[bytes] | None" = None
 
     def start(self) -> None:
-        options = [word for option in (*_QUICK, *self.options) for word in ("-c", option)]
+        options = [
+            word for option in (*_QUICK, f"listen_addresses={self.host}", *self.options) for word in ("-c", option)
+        ]
         command = [_program("postgres"), "-D", f"{self.folder}/data", "-p", str(self.port), *options]
         log = self.folder / "log"
         with log.open("ab") as file:
@@ -58,7 +60,7 @@ class Postgresql:
             self.process = None
 
     def url(self, database: str = "postgres", user: str = "dropanchor") -> str:
-        return f"postgresql://{user}@127.0.0.1:{self.port}/{database}"
+        return f"postgresql://{user}@{self.host}:{self.port}/{database}"
 
     def new_database(self) -> str:
         """Return the URL of an empty database."""
@@ -84,10 +86,10 @@ class Postgresql:
 
 
 @contextmanager
-def running_postgresql(*options: str) -> Iterator[Postgresql]:
-    """Run a server until the block ends."""
+def running_postgresql(*options: str, host: str = "127.0.0.1") -> Iterator[Postgresql]:
+    """Run a server until the block ends. Whoever is in the network of `host` may connect."""
     folder = Path(tempfile.mkdtemp(prefix="dropanchor-pg-"))
-    server = Postgresql(folder, options)
+    server = Postgresql(folder, options, host)
     try:
         if _user() is not None:
             shutil.chown(folder, _USER)
@@ -100,6 +102,8 @@ def running_postgresql(*options: str) -> Iterator[Postgresql]:
             group=_group(),
             cwd=folder,
         )
+        with (folder / "data" / "pg_hba.conf").open("a") as rules:
+            rules.write("host all all samenet trust\n")
         server.start()
         yield server
     finally:
