@@ -86,7 +86,7 @@ bench: install chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
 test-cluster: install postgresql
-	@$(BIN)/python -m pytest tests/benchmarks/test_cluster_failures.py -s -m '' $(PYTEST)
+	@$(BIN)/python -m pytest tests/benchmarks/test_cluster_failures.py tests/benchmarks/test_cluster_of_hosts.py -s -m '' $(PYTEST)
 
 results: bench
 	@$(BIN)/dropanchor evaluate recordings --into $(RESULTS)/recordings.md $(EVALUATE)
