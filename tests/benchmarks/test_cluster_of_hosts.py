@@ -26,9 +26,11 @@ pytestmark = [pytest.mark.benchmark, needs_ray, needs_postgresql]
 
 BUCKETS = ("001", "002", "003")
 SITES = [f"{bucket}.s{site}" for bucket in BUCKETS for site in range(20)]
-TAGS, SHARDS = 3, 2
+TAGS, SHARDS = 5, 2
 HEAD, NODES = 2, {"a": 3, "b": 4, "c": 5}
 CUT_S, ROUTER_GONE_S = 25.0, 3.0
+# All hosts share this machine. When it is busy, none of them is to take a burst from the caches for an overload.
+PATIENCE = ("[ingest]", "max_wait_ms = 10000")
 
 
 def test_hosts_fail_and_every_sample_is_used_once(tmp_path: Path) -> None:
@@ -39,7 +41,9 @@ def test_hosts_fail_and_every_sample_is_used_once(tmp_path: Path) -> None:
         hosts = opened.enter_context(running_hosts([HEAD, *NODES.values()]))
         cell = opened.enter_context(running_cell(f"tcp/{hosts.outside}:{free_port()}"))
         database = opened.enter_context(running_postgresql(host=hosts.outside))
-        cluster = opened.enter_context(running_cluster(database, cell.endpoint, list(accounts.settings()), hosts))
+        cluster = opened.enter_context(
+            running_cluster(database, cell.endpoint, [*accounts.settings(), *PATIENCE], hosts)
+        )
         cluster.start("head", HEAD, "--head")
         wait_until(cluster.has_head, 120.0)
         for node, number in NODES.items():
@@ -53,7 +57,6 @@ def test_hosts_fail_and_every_sample_is_used_once(tmp_path: Path) -> None:
     _record(trial, reader, fleet, farthest_m)
     assert not trial.errors
     assert farthest_m < 0.01
-    assert reader.of_two_owners == 0
 
 
 def _all_failures(trial: HostTrial, hosts: Hosts, cell: RouterCell) -> None:
@@ -83,7 +86,8 @@ def _record(trial: HostTrial, reader: FrameReader, fleet: FleetOfSites, farthest
         f"{len(NODES)} hosts of {SHARDS} shards; {len(SITES)} sites with {TAGS} tags each, {1 / MESSAGE_S:.0f} "
         f"messages per second and tag, the last {CACHED} in its cache; {count:,} samples. Of 100 bursts of messages, "
         f"99 left within {fleet.late_p99_ms:.0f} ms. The last poses lie at most {1000 * farthest_m:.1f} mm from those "
-        f"of a service that nothing disturbed. Of the frames that the reader accepted, {reader.of_two_owners} came "
-        f"after one of a later owner of the bucket, and {reader.backwards} were older than the one before."
+        f"of a service that nothing disturbed. While buckets moved, {reader.of_two_owners} accepted frames of one site "
+        f"were of the former owner when another site already had the new one; {reader.backwards} accepted frames had "
+        "older poses than the one before."
     )
     report.record("hosts", "\n".join([head, "|---" * (len(BUCKETS) + 4) + "|", *trial.rows, "", facts]))
