@@ -48,6 +48,7 @@ class HostTrial:
         time.sleep(SETTLED_S)
 
     def _is_whole(self) -> bool:
+        self.cluster.restart_ended()
         owners = self.cluster.owners()
         all_serve = nodes_of(self.cluster) == set(self._nodes)
         spare = len(self._nodes) * self._shards - len(owners)

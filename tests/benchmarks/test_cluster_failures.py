@@ -41,6 +41,7 @@ class Trial:
         time.sleep(3.0)
 
     def _is_whole(self) -> bool:
+        self.cluster.restart_ended()
         spare = len(NODES) * SHARDS - BUCKETS
         all_serve = nodes_of(self.cluster) == set(NODES)
         return all_serve and len(self.cluster.standbys()) == spare and self.cluster.has_head()

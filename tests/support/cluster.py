@@ -62,6 +62,7 @@ class Cluster:
         self._lines = ["[zenoh]", f'connect = ["{router}"]', *sites]
         self._port = free_port()
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._started: dict[str, tuple[int, tuple[str, ...]]] = {}
 
     def start(self, name: str, number: int, *options: str) -> "subprocess.Popen[bytes]":
         """Start a node on the machine `number`. Without options, it joins the head."""
@@ -79,7 +80,15 @@ class Cluster:
         with (folder / "log").open("ab") as log:
             process = subprocess.Popen(start, env=environment(), stderr=log, stdout=log)
         self._processes[name] = process
+        self._started[name] = number, options
         return process
+
+    def restart_ended(self) -> None:
+        """Start the nodes again whose process has ended, as a service manager does."""
+        for name, process in list(self._processes.items()):
+            if process.poll() is not None:
+                number, options = self._started[name]
+                self.start(name, number, *options)
 
     def kill(self, name: str) -> None:
         """Kill all processes of a node at once."""
