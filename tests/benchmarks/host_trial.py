@@ -11,8 +11,9 @@ from support.cluster import Cluster
 from support.cluster_sites import nodes_of
 from support.zenoh_router import wait_until
 
-STABLE_S = 20.0  # without a change, after which samples that are missing count as lost: a service asks the caches of 20
-# silent tags per second
+# Samples that are missing count as lost after this time without a change. A service asks the caches of 20 silent tags
+# per second.
+STABLE_S = 20.0
 SETTLED_S = 3.0  # for a former owner to leave
 
 
