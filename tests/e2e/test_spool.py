@@ -1,12 +1,12 @@
 """A tag that is killed in an outage longer than its memory: after both, the service has used each sample once."""
 
-import time
 from pathlib import Path
 
 from support.commands import start_python
 from support.service import running_service
 from support.zenoh_router import free_endpoint, start_router_process, wait_until
 
+RECORD_BYTES = 12 + 32 + 2 * 16  # of a message with two ranges in the spool
 PUBLISH = """
 import sys, time
 from dropanchor_tag_client import TagClient
@@ -56,7 +56,7 @@ def test_a_long_outage_with_a_killed_tag_loses_no_sample_and_uses_none_twice(tmp
             router.kill()
             router.communicate()
             tag.publish(6)  # 300 messages, while the cache holds 60
-            time.sleep(0.2)  # what is younger may not be on disk
+            wait_until(lambda: sum(path.stat().st_size for path in tmp_path.rglob("*.spool")) >= 300 * RECORD_BYTES)
             tag.kill()
             tag = PublishingTag(endpoint, tmp_path)
             tag.publish(2)
