@@ -61,3 +61,16 @@ def test_a_drained_node_and_other_settings_get_nothing_and_say_why(url: str) -> 
         assert found["b/1"].bucket == "002"
         nodes.set_drained(connection, "a", False)
         wait_until(lambda: "a/1" in found)
+
+
+@needs_postgresql
+def test_a_process_that_starts_on_a_drained_node_does_not_take_a_free_bucket(url: str) -> None:
+    found: list[Owned] = []
+    with connect(url, "test") as connection:
+        nodes.set_drained(connection, "a", True)
+        leases.seen_or_new(connection, "001")
+        Thread(target=lambda: found.append(standby(url, "a/1").wait()), daemon=True).start()
+        wait_until(lambda: found or nodes.standbys(connection) == {"a/1": "its node is drained"})
+        assert found == []
+        nodes.set_drained(connection, "a", False)
+        wait_until(lambda: found)
