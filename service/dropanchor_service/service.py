@@ -39,6 +39,7 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.serving import Serving
+from dropanchor_service.settings.http_url import http_url
 from dropanchor_service.settings.many_sites import refuse_too_many_sites
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.site_files import put_site_files_in_place
@@ -65,6 +66,7 @@ class Service:
     """The running service: `with Service(settings) as service`.
 
     Creating or entering it raises SettingsError, ListenError or ZenohError, each with a message for the user.
+    url: the address of the page and the REST interface, known once the server listens.
     """
 
     def __init__(
@@ -75,8 +77,7 @@ class Service:
         claimed: "Claimed | None" = None,
     ) -> None:
         """compiling: entered while the kernels are compiled, and while this process is a standby, so that a signal can
-        interrupt that. standing_by: called now and then by a standby. claimed: the bucket, if it was claimed before.
-        """
+        interrupt that. standing_by: called now and then by a standby. claimed: the bucket, if it was claimed before."""
         refuse_too_many_sites(settings)
         self._settings = settings
         self._credentials = credentials_of(settings)
@@ -93,11 +94,10 @@ class Service:
         put_site_files_in_place(settings)
         self.sites = open_sites(settings)
         self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by, claimed)
-        now_ns = self.clock.now_ns
-        self._serving = Serving(settings, self._credentials, self.sites, self.latest, now_ns, self.metrics)
+        self._serving = Serving(settings, self._credentials, self.sites, self.latest, self.clock.now_ns, self.metrics)
         self._publishers = Publishers()
         tracks = [one.tracks for one in self._serving.folders.all]
-        self.answers = answers_of_sites(self.sites, self.latest, now_ns, tracks, self._publishers)
+        self.answers = answers_of_sites(self.sites, self.latest, self.clock.now_ns, tracks, self._publishers)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self._register_gauges()
@@ -123,10 +123,7 @@ class Service:
                 self._ownership.stand_by(self.url, self._shared(), lambda: self._link.problem is None)
             self._opened.enter_context(self._ownership)
             self._opened.enter_context(self._serving.folders)
-            if self._checkpoints is not None:
-                self._checkpoints.load()
-                self._checkpoints.start()
-                self._opened.callback(self._write_last_checkpoint, self._checkpoints)
+            self._start_checkpoints()
             self._thread.start()
             self._opened.callback(self._thread.stop)
             self._opened.enter_context(self._serving.zone_events)
@@ -137,11 +134,17 @@ class Service:
             self._opened.callback(self._http.ask_to_stop)
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, %s, engine %s", self.url, self._name(), self._settings.engine)
-        if self._checkpoints is None:
-            engine = f"not possible with the engine {self._settings.engine}"
-            reason = "data_dir is not set" if self._settings.data_dir is None else engine
-            _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
         return self
+
+    def _start_checkpoints(self) -> None:
+        if self._checkpoints is not None:
+            self._checkpoints.load()
+            self._checkpoints.start()
+            self._opened.callback(self._write_last_checkpoint, self._checkpoints)
+            return
+        engine = f"not possible with the engine {self._settings.engine}"
+        reason = "data_dir is not set" if self._settings.data_dir is None else engine
+        _log.info("no checkpoints: %s; after a restart all tags start afresh", reason)
 
     def _shared(self) -> dict[str, Shared]:
         """Return what people change over REST and the owner of the sites shares with its successor, by name."""
@@ -181,13 +184,6 @@ class Service:
         self._stopping.set()
         self._opened.close()
         _log.info("stopped")
-
-    @property
-    def url(self) -> str:
-        """The address of the dashboard."""
-        host, port = self._address[:2]
-        scheme = "http" if self._certificate is None else "https"
-        return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
     def problems(self) -> Sequence[str]:
         """Return why the service cannot do its work now; empty when it can."""
@@ -269,7 +265,8 @@ class Service:
             return self._ownership.sentence or self._progress.sentence
 
         self._app = CurrentApp(create_starting_app(reason, gauges=self._ownership.gauges))
-        self._address = bound.getsockname()
+        host, port = bound.getsockname()[:2]
+        self.url = http_url(host, port, is_encrypted=self._certificate is not None)
         return HttpThread(build_server(self._app, self._stopping, certificate=self._certificate), bound)
 
     def _full_app(self) -> FastAPI:

@@ -26,7 +26,7 @@ def test_no_sample_is_lost_or_duplicated_while_the_router_is_down() -> None:
             client.flush()
             wait_until(lambda: service.get("/api/v1/tags/a")["samples"] == {"range": published})
             assert service.metric("dropanchor_missed_messages_total") == 0
-            assert service.get("/api/v1/tags/a")["online"]
+            wait_until(lambda: service.get("/api/v1/tags/a")["online"])
     finally:
         router.kill()
         router.communicate()

@@ -44,6 +44,7 @@ def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(tmp_pa
                 answer = service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
                 assert (answer.status_code, answer.json()) == (202, {"samples": 10})
         wait_until(lambda: samples(service, {}) == {"imu": 100 * seconds - 1, "range": 10 * seconds})
+        wait_until(lambda: service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000)
         pose = service.get("/api/v1/tags/anna/pose")
         status = service.get("/api/v1/tags/anna")
         service.ask("POST", f"{SAMPLES}?tag=anna", content=b"{", headers={"content-type": ENCODING_JSON})
@@ -52,7 +53,6 @@ def test_a_phone_and_ranges_from_elsewhere_for_the_same_tag_become_a_pose(tmp_pa
     assert set(status["rejected"]) == {"late"}  # the message that the next one overtook
     assert status["rejected"]["late"] < 300
     assert pose["anchor"] == "7"
-    assert pose["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000
 
 
 def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_an_experiment_of_phyphox_and_ranges_from_elsewhere_become_a_pose(tmp_pa
                 json = {"content-type": ENCODING_JSON}
                 service.ask("POST", f"{SAMPLES}?tag=anna", content=distances, headers=json)
         wait_until(lambda: samples(service, {}) == {"imu": 100 * seconds - 1, "range": 10 * seconds})
-        assert service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000
+        wait_until(lambda: service.get("/api/v1/tags/anna/pose")["t_ns"] > start_ns + (seconds - 1) * 1_000_000_000)
         assert service.ask("POST", f"{PHYPHOX}?tag=anna", content=b"{").status_code == 422
         wait_until(lambda: service.get("/api/v1/tags/anna")["rejected"].get("json_syntax") == 1)
 

@@ -72,6 +72,11 @@ def samples_of(service: Running, tag: str) -> dict[str, int]:
     return dict(tags[tag]["samples"]) if tag in tags else {}
 
 
+def rejected_of(service: Running, tag: str) -> dict[str, int]:
+    tags = {status["tag"]: status for status in service.get("/api/v1/tags")["tags"]}
+    return dict(tags[tag]["rejected"]) if tag in tags else {}
+
+
 def offline(config: Path, tag: str, frame: Frame) -> list[float]:
     """Return x and y after these samples, from a service without threads and network."""
     settings = load_settings(config, environment={})
@@ -91,7 +96,9 @@ def test_the_samples_of_a_client_give_the_same_pose_over_zenoh_and_rest(
     with TagClient(tag, connect=service.zenoh, encoding=encoding) as client:  # type: ignore[arg-type]
         send(client, frame)
         wait_until(lambda: samples_of(service, tag) == {"imu": 100, "heading": 100, "range": 100})
-        over_rest = Pose.model_validate(service.get(f"/api/v1/tags/{tag}/pose"))
+        pose = f"/api/v1/tags/{tag}/pose"
+        wait_until(lambda: service.ask("GET", pose).json().get("t_ns") == frame.ranges[-1].t_ns)
+        over_rest = Pose.model_validate(service.get(pose))
         over_zenoh = Pose.model_validate(ask(session, keys.pose_key("default", tag))[keys.pose_key("default", tag)])
     assert over_rest.t_ns == over_zenoh.t_ns == frame.ranges[-1].t_ns
     assert (over_rest.x, over_rest.y, over_rest.state) == (over_zenoh.x, over_zenoh.y, over_zenoh.state)
@@ -221,13 +228,14 @@ def test_garbage_is_counted_for_its_tag_and_the_service_goes_on(service: Running
     ):
         session.put(key, payload, encoding=encoding)
     session.put(f"{keys.PREFIX}/default/tag/%zz/samples", b"x", encoding=ENCODING_PACKED)
-    before = samples_of(service, "a").get("range", 0)
-    put(session, "a", straight_north(2))
-    wait_until(lambda: samples_of(service, "a")["range"] == before + 2)
-    rejected = service.get("/api/v1/tags/rogue")["rejected"]
+    before = samples_of(service, "b")["range"]
+    put(session, "b", straight_north(2))
+    wait_until(lambda: samples_of(service, "b")["range"] == before + 2)
+    wait_until(lambda: sum(rejected_of(service, "rogue").values()) >= 6)
+    rejected = rejected_of(service, "rogue")
     assert sum(rejected.values()) == 6
     assert rejected["payload_empty"] == rejected["length_mismatch"] == rejected["encoding_unknown"] == 1
-    assert service.metric('dropanchor_rejected_total{reason="key_invalid"}') == 1
+    wait_until(lambda: service.metric('dropanchor_rejected_total{reason="key_invalid"}') == 1)
     assert service.process.poll() is None
 
 

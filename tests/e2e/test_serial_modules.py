@@ -73,5 +73,8 @@ def test_each_module_is_a_dot_that_moves_along_its_ranges(tmp_path: Path) -> Non
 
         wait_until(lambda: set(poses()) == set(EXAMPLES))
         first = poses()
-        wait_until(lambda: all(is_on_its_range(*place, began_s) for place in poses().values()))
-        assert all(hypot(x - first[tag][0], y - first[tag][1]) > 1.0 for tag, (x, y) in poses().items())
+
+        def follows_its_ranges(tag: str, x: float, y: float) -> bool:
+            return is_on_its_range(x, y, began_s) and hypot(x - first[tag][0], y - first[tag][1]) > 1.0
+
+        wait_until(lambda: all(follows_its_ranges(tag, *place) for tag, place in poses().items()))

@@ -44,11 +44,17 @@ def publish(client: TagClient, frame: Frame, part: slice) -> None:
     client.flush()
 
 
-def wait_for_ranges(service: Running, count: int) -> None:
-    def ranges(site: str) -> int:
-        return int(service.get(f"/api/v1/sites/{site}/tags/cart")["samples"].get("range", 0))
+def wait_for_ranges(service: Running, frame: Frame, count: int) -> None:
+    """Wait until both sites have used the first ranges of the frame."""
 
-    wait_until(lambda: [ranges(site) for site in ("north", "south")] == [count, count])
+    def have_arrived(site: str) -> bool:
+        cart = f"/api/v1/sites/{site}/tags/cart"
+        pose = service.ask("GET", f"{cart}/pose").json()
+        if pose.get("t_ns") != frame.ranges[count - 1].t_ns:
+            return False
+        return bool(service.get(cart)["samples"]["range"] == count)
+
+    wait_until(lambda: all(map(have_arrived, ("north", "south"))))
 
 
 def kill(service: Running) -> None:
@@ -86,7 +92,7 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
                 opened.enter_context(session.declare_subscriber(wanted, lambda put: received.append(str(put.key_expr))))
             for client in clients:
                 publish(client, frame, slice(BEFORE))
-            wait_for_ranges(service, BEFORE)
+            wait_for_ranges(service, frame, BEFORE)
             _check_answers(service, session)
             publish(clients[0], frame, slice(BEFORE, BEFORE + 10))
             publish(clients[1], frame, slice(BEFORE, BEFORE + 10))
@@ -97,7 +103,7 @@ def test_two_sites_with_equal_names_are_served_apart_and_go_on_after_a_kill(
             publish(client, frame, slice(BEFORE + 10, None))
         with running_service(*options) as service:
             assert any("going on from a checkpoint with 2 tags" in line for line in service.log)
-            wait_for_ranges(service, RANGES)
+            wait_for_ranges(service, frame, RANGES)
             _check_answers(service, session)
             _check_events(service, session, router_endpoint)
             assert service.stop() == 0
@@ -119,7 +125,7 @@ def test_a_site_that_leaves_and_one_that_comes_keep_the_tracks_of_the_others_thr
                 with ExitStack() as opened:
                     for site in served:
                         publish(opened.enter_context(TagClient("cart", site=site, connect=router_endpoint)), frame, ALL)
-                    wait_for_ranges(service, RANGES)
+                    wait_for_ranges(service, frame, RANGES)
                 poses = {site: service.get(f"/api/v1/sites/{site}/tags/cart/pose") for site in served}
             else:
                 assert any("going on from a checkpoint" in line for line in service.log)

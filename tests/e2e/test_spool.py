@@ -1,8 +1,8 @@
 """A tag that is killed in an outage longer than its memory: after both, the service has used each sample once."""
 
-import time
 from pathlib import Path
 
+from dropanchor_schemas.wire import Frame, decode_packed
 from support.commands import start_python
 from support.service import running_service
 from support.zenoh_router import free_endpoint, start_router_process, wait_until
@@ -11,7 +11,7 @@ PUBLISH = """
 import sys, time
 from dropanchor_tag_client import TagClient
 count = 0
-with TagClient("a", connect=sys.argv[1], spool=sys.argv[2], cache_messages=60, batch_samples=2) as tag:
+with TagClient("a", connect=sys.argv[1], spool=sys.argv[2], cache_messages=60, batch_samples=2, batch_s=None) as tag:
     for _ in sys.stdin:
         for _ in range(100):
             tag.publish_range(7, 10.0)
@@ -41,6 +41,13 @@ class PublishingTag:
         self._process.communicate()
 
 
+def last_number_on_disk(folder: Path) -> int | None:
+    """Return the number of the newest message in the spool. Each has two ranges, and is the end of its record."""
+    newest = max(folder.rglob("*.spool"), default=None)
+    frame = None if newest is None else decode_packed(newest.read_bytes()[-64:])
+    return frame.sequence if isinstance(frame, Frame) else None
+
+
 def test_a_long_outage_with_a_killed_tag_loses_no_sample_and_uses_none_twice(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     router = start_router_process(endpoint)
@@ -56,7 +63,7 @@ def test_a_long_outage_with_a_killed_tag_loses_no_sample_and_uses_none_twice(tmp
             router.kill()
             router.communicate()
             tag.publish(6)  # 300 messages, while the cache holds 60
-            time.sleep(0.2)  # what is younger may not be on disk
+            wait_until(lambda: last_number_on_disk(tmp_path) == 399)
             tag.kill()
             tag = PublishingTag(endpoint, tmp_path)
             tag.publish(2)

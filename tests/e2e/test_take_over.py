@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from threading import Lock
@@ -19,7 +20,7 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.epochs import EpochFence
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.commands.serve import EXIT_GONE
-from support.live_tags import LiveTags, distance, is_current, samples_of
+from support.live_tags import LiveTags, distance, fused, is_current, poses_of, samples_of
 from support.postgresql import Postgresql, needs_postgresql, running_postgresql
 from support.relay import running_relay
 from support.service import Running, command, environment, running_service
@@ -102,8 +103,8 @@ def wait_for(service: Running, *words: str) -> None:
 
 
 def wait_until_gone(service: Running) -> None:
-    assert service.process.wait(20.0) == EXIT_GONE, "".join(service.log)
-    assert any("Started again, this process is a standby" in line for line in service.log)
+    assert service.process.wait(60.0) == EXIT_GONE, "".join(service.log)
+    wait_until(lambda: any("Started again, this process is a standby" in line for line in service.log))
 
 
 @needs_postgresql
@@ -161,8 +162,8 @@ def test_each_failure_of_an_owner_leaves_one_owner_and_loses_no_sample(
 
         tags.finish()
         wait_until(lambda: samples_of(a) == tags.samples)
-        answers = {pose["tag"]: pose for pose in a.get("/api/v1/poses")["poses"]}
         expected = tags.expected(cluster.config)
+        answers = fused(expected, partial(poses_of, a))
         status = cluster.run("status").stdout
         anchors = sorted(anchor["id"] for anchor in a.get("/api/v1/site")["anchors"])
         zones = [zone["id"] for zone in a.get("/api/v1/zones")["zones"]]

@@ -2,9 +2,10 @@
 
 import logging
 import time
+from functools import partial
 from pathlib import Path
 
-from support.live_tags import LiveTags, distance, is_current, samples_of
+from support.live_tags import LiveTags, distance, fused, is_current, poses_of, samples_of
 from support.service import running_service
 from support.zenoh_router import free_endpoint, router_process, wait_until
 
@@ -29,10 +30,11 @@ def test_a_killed_router_costs_no_sample_and_the_poses_become_current_again(tmp_
                 if life == KILLS:
                     tags.finish()
                     wait_until(lambda: samples_of(service) == tags.samples, 120.0)
-                    answers = {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"]}
+                    expected = tags.expected(config)
+                    answers = fused(expected, partial(poses_of, service))
                     assert service.metric("dropanchor_missed_messages_total") == 0
                     tags.close()
             time.sleep(DOWN_S)
-    apart = {tag: distance(pose, answers[tag]) for tag, pose in tags.expected(config).items()}
+    apart = {tag: distance(pose, answers[tag]) for tag, pose in expected.items()}
     assert apart.keys() == answers.keys()
     assert max(apart.values()) < 1e-3

@@ -12,11 +12,12 @@ import statistics
 import time
 from collections import Counter
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from support.live_tags import LiveTags, distance, is_current, samples_of
+from support.live_tags import LiveTags, distance, fused, is_current, poses_of, samples_of
 from support.service import Running, running_service
 from support.zenoh_router import free_endpoint, router_process, wait_until
 
@@ -60,8 +61,8 @@ def test_a_killed_service_loses_no_sample_and_reaches_the_poses_of_an_uninterrup
                 wait_until(lambda: samples_of(service) == tags.samples)
             assert lost(service) == {}
             assert samples_of(service) == tags.samples
-            answers = {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"]}
-    expected = tags.expected(config)
+            expected = tags.expected(config)
+            answers = fused(expected, partial(poses_of, service))
     assert expected.keys() == answers.keys()
     apart = {tag: distance(pose, answers[tag]) for tag, pose in expected.items()}
     _log.info(

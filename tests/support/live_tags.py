@@ -3,7 +3,7 @@
 import json
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from itertools import islice
 from pathlib import Path
@@ -21,6 +21,7 @@ from dropanchor_tag_client.simulator.live import Delivery, deliveries, start_pos
 from dropanchor_tag_client.simulator.sensors import preset
 from support.ingest import IngestBench
 from support.service import Running
+from support.zenoh_router import wait_until
 
 
 class LiveTags:
@@ -152,6 +153,20 @@ def distance(pose: Any, answer: dict[str, Any]) -> float:
 def samples_of(service: Running) -> dict[str, dict[str, int]]:
     """Return the number of samples that reached the estimators, by tag and kind."""
     return {status["tag"]: status["samples"] for status in service.get("/api/v1/tags")["tags"]}
+
+
+def poses_of(service: Running) -> dict[str, Any]:
+    """Return the poses of the REST API, by tag."""
+    return {pose["tag"]: pose for pose in service.get("/api/v1/poses")["poses"]}
+
+
+def fused(expected: Mapping[str, Any], read: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Return the poses that `read` returns by tag, once they are as new as those expected.
+
+    Samples are counted before they are fused, so that their number says nothing about the poses.
+    """
+    wait_until(lambda: all(pose["t_ns"] <= read()[tag]["t_ns"] for tag, pose in expected.items()))
+    return read()
 
 
 def is_current(service: Running, tags: int) -> bool:

@@ -56,15 +56,22 @@ def create_node_app(
     app.add_middleware(SecurityHeaders)
     allow_origins(app, cors_origins)
     add_error_handlers(app)
-    metrics = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
-    metrics.add_middleware(
-        Access, authenticator=authenticator, rate_limiter=rate_limiter, members=lambda *_: [], only_site=None
-    )
-    metrics.include_router(metrics_router(registry))
     page = page_mounts(dashboard)
-    app.router.routes.extend([FrontPage(gateway, page[-1], owners), *page, Route("/metrics", metrics, methods=["GET"])])
+    metrics = Route("/metrics", _metrics_app(registry, authenticator, rate_limiter), methods=["GET"])
+    app.router.routes.extend([FrontPage(gateway, page[-1], owners), *page, metrics])
     app.include_router(health_router(ready, impaired), prefix=PREFIX)
     app.router.default = gateway
+    return app
+
+
+def _metrics_app(
+    registry: CollectorRegistry, authenticator: Authenticator | None, rate_limiter: RateLimiter | None
+) -> FastAPI:
+    app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None)
+    app.add_middleware(
+        Access, authenticator=authenticator, rate_limiter=rate_limiter, members=lambda *_: [], only_site=None
+    )
+    app.include_router(metrics_router(registry))
     return app
 
 

@@ -11,6 +11,7 @@ import httpx
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.of_cluster import epoch_in
 from dropanchor_service.metrics.node import NodeMetrics
+from dropanchor_service.node import sentences
 from dropanchor_service.node.links import Links
 from dropanchor_service.node.owners import Owner, Owners
 from dropanchor_service.node.request import Asked, ClientGoneError
@@ -87,25 +88,20 @@ class Forwarding:
     def _known(self, bucket: str) -> Owner:
         owner = self._owners.of(bucket)
         if owner is None or not owner.name:
-            raise MissedError(f"The sites of {bucket} have no owner now: a standby has to take over.", True)
+            raise MissedError(sentences.without_owner(bucket), True)
         if not owner.address:
-            raise MissedError(f"{owner.name} serves {bucket}, but does not say where: set its cluster.address.", True)
+            raise MissedError(sentences.without_address(owner), True)
         return owner
 
     async def _ask_once(self, owner: Owner, asked: Asked) -> Answer:
         try:
             response = await while_newest(self._links.ask(owner, asked), self._owners.followed(owner))
         except FollowedError as error:
-            raise MissedError(f"{owner.name} no longer serves {owner.bucket}.") from error
+            raise MissedError(sentences.former(owner)) from error
         except (httpx.ConnectError, httpx.ConnectTimeout) as error:
-            raise MissedError(
-                f"{owner.name}, the owner of {owner.bucket}, cannot be reached. If it is gone, a standby takes over.",
-                did_not_arrive=True,
-            ) from error
+            raise MissedError(sentences.unreachable(owner), did_not_arrive=True) from error
         except httpx.TransportError as error:
-            raise MissedError(
-                f"{owner.name}, the owner of {owner.bucket}, ended the connection before it answered."
-            ) from error
+            raise MissedError(sentences.cut_short(owner)) from error
         try:
             return Answer(self._answering(owner, response), response)
         except MissedError:
@@ -117,12 +113,12 @@ class Forwarding:
         epoch = epoch_in(response.headers, owner.bucket)
         if epoch is None:
             is_standby = response.status_code == Kind.NOT_READY.status
-            raise MissedError(f"{owner.name} does not serve {owner.bucket} now.", did_not_arrive=is_standby)
+            raise MissedError(sentences.silent(owner), did_not_arrive=is_standby)
         answering = self._owners.accepted(owner, epoch)
         if answering is None:
             self._metrics.dropped.inc()
             _log.warning("dropped an answer of %s with the former epoch %d of %s", owner.name, epoch, owner.bucket)
-            raise MissedError(f"{owner.name} no longer serves {owner.bucket}.")
+            raise MissedError(sentences.former(owner))
         return answering
 
 

@@ -18,6 +18,7 @@ from dropanchor_service.api.http.site_in_path import divided
 from dropanchor_service.api.routes.ingest_stream import key_among_protocols
 from dropanchor_service.api.routes.poses import PIECE_BYTES
 from dropanchor_service.metrics.node import NodeMetrics
+from dropanchor_service.node import sentences
 from dropanchor_service.node.all_sites import Part, joined, parts_of, refusal_of
 from dropanchor_service.node.forwarding import Answer, FollowedError, Forwarding, while_connected, while_newest
 from dropanchor_service.node.owners import Owners
@@ -155,7 +156,7 @@ class Gateway:
         if not isinstance(found, Unknown):
             return found
         raise {
-            Unknown.NO_BUCKETS: ProblemError(Kind.NOT_READY, "This node has not found the owners of the sites yet."),
+            Unknown.NO_BUCKETS: ProblemError(Kind.NOT_READY, sentences.NO_BUCKETS),
             Unknown.SITE: ProblemError(Kind.UNKNOWN_SITE, f"There is no site {site!r}. /api/v1/sites lists the sites."),
             Unknown.NO_SITE: ProblemError(
                 Kind.SEVERAL_SITES,

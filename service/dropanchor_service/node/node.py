@@ -23,6 +23,7 @@ from dropanchor_service.node.owners import Owners
 from dropanchor_service.node.sockets import Sockets
 from dropanchor_service.security.credentials import certificate_of, credentials_of, keys_and_tokens_of
 from dropanchor_service.security.node_secret import node_secret_of
+from dropanchor_service.settings.http_url import http_url
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
@@ -33,7 +34,10 @@ _log = logging.getLogger(__name__)
 
 
 class Node:
-    """A running node: `with Node(settings) as node`. Creating or entering it raises SettingsError or ListenError."""
+    """A running node: `with Node(settings) as node`. Creating or entering it raises SettingsError or ListenError.
+
+    url: the address of the page and the REST interface, known once the node runs.
+    """
 
     def __init__(self, settings: Settings) -> None:
         url, secret = settings.cluster.url, node_secret_of(settings.cluster.node_secret)
@@ -66,7 +70,8 @@ class Node:
             self._opened.callback(self._http.join, HTTP_STOP_S)
             self._http.start()
             self._opened.callback(self._http.ask_to_stop)
-            self._address = bound.getsockname()
+            host, port = bound.getsockname()[:2]
+            self.url = http_url(host, port, is_encrypted=self._certificate is not None)
             self._opened = self._opened.pop_all()
         _log.info("ready at %s, for the owners in the table of leases", self.url)
         return self
@@ -77,12 +82,6 @@ class Node:
         self._stopping.set()
         self._opened.close()
         _log.info("stopped")
-
-    @property
-    def url(self) -> str:
-        host, port = self._address[:2]
-        scheme = "http" if self._certificate is None else "https"
-        return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
     @property
     def is_alive(self) -> bool:

@@ -13,6 +13,7 @@ from websockets.typing import Subprotocol
 
 from dropanchor_service.api.http.of_cluster import epoch_in
 from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES
+from dropanchor_service.node import sentences
 from dropanchor_service.node.forwarding import FollowedError, while_newest
 from dropanchor_service.node.links import Links
 from dropanchor_service.node.owners import Owner, Owners
@@ -41,9 +42,9 @@ class Sockets:
                 await socket.accept(upstream.subprotocol)
                 await while_newest(_pass_on(socket, upstream), self._owners.followed(answering))
         except FollowedError:
-            await close(socket, f"{owner.bucket} has another owner now. Connect again.")
+            await close(socket, sentences.socket_followed(owner.bucket))
         except (OSError, TimeoutError, InvalidHandshake, InvalidMessage):
-            await close(socket, f"{owner.name}, the owner of {owner.bucket}, cannot be reached. Connect again.")
+            await close(socket, sentences.socket_unreachable(owner))
 
     def _connection(self, socket: WebSocket, owner: Owner, target: bytes, headers: RawHeaders) -> connect:
         base = httpx.URL(owner.address)

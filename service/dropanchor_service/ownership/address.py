@@ -3,6 +3,7 @@
 import socket
 from urllib.parse import urlsplit
 
+from dropanchor_service.settings.http_url import http_url
 from dropanchor_service.settings.model import Settings
 
 _EVERYWHERE = ("0.0.0.0", "::")
@@ -17,4 +18,5 @@ def address_of(settings: Settings, url: str) -> str:
     listens = urlsplit(url)
     named = urlsplit(settings.cluster.address or "").hostname
     host = named or (socket.gethostname() if settings.http.host in _EVERYWHERE else settings.http.host)
-    return f"{listens.scheme}://[{host}]:{listens.port}" if ":" in host else f"{listens.scheme}://{host}:{listens.port}"
+    assert listens.port is not None
+    return http_url(host, listens.port, is_encrypted=listens.scheme == "https")

@@ -45,11 +45,8 @@ def all_schemas() -> dict[str, Schema]:
         ),
         ESTIMATE: _object(
             t_ns=_INTEGER,
-            state=_TEXT,
-            reason=_TEXT,
-            frame=_TEXT,
-            anchor=_TEXT,
             covariance=_NINE,
+            **dict.fromkeys(("state", "reason", "frame", "anchor"), _TEXT),
             **dict.fromkeys(ESTIMATED, _NUMBER),
         ),
         SAMPLES: _object(

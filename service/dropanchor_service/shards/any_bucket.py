@@ -67,15 +67,15 @@ class AnyStandby:
         while True:
             found, now_s = leases.read_all(connection), boot_s()
             whys = {bucket: self._obstacle(found[bucket]) for bucket in self._order if bucket in found}
+            if now_s - self._noted_s > NOTE_S:  # also before the first claim: the node may be drained
+                self._noted_s = now_s
+                self._note(connection, whys)
             for bucket, why_not in whys.items():
                 may = self._watches[bucket].may_claim(found[bucket], now_s)
                 if may and why_not is None and not self._drained:
                     claim = leases.claim(connection, found[bucket], self._claimants[bucket])
                     if claim is not None:
                         return Owned(bucket, Claimed(claim, now_s))
-            if now_s - self._noted_s > NOTE_S:
-                self._noted_s = now_s
-                self._note(connection, whys)
             time.sleep(self._look_s)
 
     def _note(self, connection: Connection, whys: Mapping[str, str | None]) -> None:

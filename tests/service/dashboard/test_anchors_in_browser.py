@@ -62,7 +62,7 @@ def test_a_dragged_anchor_moves_in_every_open_page_and_undo_moves_it_back(chromi
         moved = anchors_of(place)["17"]
         assert moved.y > 0.1
         assert moved.x == pytest.approx(2 * moved.y, abs=0.05)
-        other.wait_for(f"dropanchor.anchors()[0]?.x === {moved.x}", timeout_s=2)
+        other.wait_for(f"dropanchor.anchors()[0]?.x === {moved.x}")
         outcome.get_by_role("button", name="Undo").click()
         expect(outcome).to_contain_text("Undone: Anchor 17 moved.")
         assert anchors_of(place)["17"] == Anchor(id="17")

@@ -108,6 +108,6 @@ def test_a_link_brings_its_floor_and_the_wall_shows_one_floor_after_another(
         expect(choice).to_have_value("Upper")
     with watched_page(chromium, f"{place.url}?kiosk=floors&every=2") as page:
         for floor in ("Upper", "Ground", "Upper"):
-            expect(page.page.locator("#floor")).to_have_value(floor, timeout=8000)
+            expect(page.page.locator("#floor")).to_have_value(floor)
         expect(page.page.locator("#floor")).to_be_visible()
         assert page.errors == []

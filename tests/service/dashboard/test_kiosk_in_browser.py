@@ -56,7 +56,7 @@ def test_the_wall_shows_one_tag_after_another_and_escape_leaves_it(chromium: Bro
     with watched_page(chromium, f"{place.url}?kiosk=tags&every=2#text=") as page:
         name = page.page.locator("#detail h2")
         for tag in ("a", "b", "c", "a"):
-            expect(name).to_have_text(tag, timeout=8000)
+            expect(name).to_have_text(tag)
         page.page.keyboard.press("Escape")
         page.page.wait_for_url(lambda url: "kiosk" not in url)
         expect(page.page.locator("#options")).to_be_visible()

@@ -53,7 +53,7 @@ def test_without_a_tag_the_page_shows_how_to_start_one(chromium: Browser, place:
 
 def test_a_pose_is_a_dot_and_a_table_row_and_both_follow_the_tag(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
-        place.move("cart", x=1.0, y=2.0, speed=0.5)
+        place.move("cart", x=1.0, y=2.0, speed=0.5, t_ns=time.time_ns() + 60_000_000_000)  # it stays fresh
         line = page.page.locator("tr[data-tag='cart']")
         assert line.inner_text().split()[:4] == ["cart", "Tracking", "1.00", "2.00"]
         page.wait_for_map(1)

@@ -19,6 +19,8 @@ from dropanchor_service.checkpoints.layouts import VERSION
 from dropanchor_service.cluster import sentences as of_cluster
 from dropanchor_service.cluster.watch import Lease, obstacle
 from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.node import sentences as of_node
+from dropanchor_service.node.owners import Owner
 from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 from dropanchor_service.store.tags import KINDS
@@ -85,6 +87,18 @@ def sentences_of_a_cluster() -> Iterator[str]:
     yield of_cluster.gone("yard", "an owner with the higher epoch 5 is alive")
 
 
+def sentences_of_a_node() -> Iterator[str]:
+    owner = Owner("017", 3, "machine-1", "https://machine-1.example:8080")
+    yield of_node.NO_BUCKETS
+    yield of_node.without_owner(owner.bucket)
+    yield of_node.socket_followed(owner.bucket)
+    for say in (
+        *(of_node.without_address, of_node.unreachable, of_node.cut_short, of_node.silent, of_node.former),
+        of_node.socket_unreachable,
+    ):
+        yield say(owner)
+
+
 def progress() -> Iterator[str]:
     compilation = CompilationProgress()
     yield compilation.sentence
@@ -110,7 +124,8 @@ def in_german(**texts: list[str]) -> list[str]:
 
 
 def test_every_sentence_and_every_code_has_a_german_translation() -> None:
-    sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *sentences_of_a_cluster(), *progress()})
+    of_processes = {*sentences_of_a_cluster(), *sentences_of_a_node(), *progress()}
+    sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *of_processes})
     codes = [*REASONS, *Reason, *KINDS]
     same = {"imu"}
     untranslated = [

@@ -44,7 +44,7 @@ def test_a_name_a_colour_and_a_group_show_on_the_list_and_the_map_of_every_page(
         expect(page.page.locator("#outcome")).to_contain_text("Settings of cart changed.")
         given = place.bench.answers.site.tag_settings("cart")
         assert given == TagSettings(name="Forklift 1", colour="#d97a0a", group="forklifts")
-        expect(other.page.locator("tr[data-tag='cart'] .name")).to_have_text("Forklift 1", timeout=2000)
+        expect(other.page.locator("tr[data-tag='cart'] .name")).to_have_text("Forklift 1")
         other.wait_for_map(2)
         x, y = next(tag["pixel"] for tag in other.tags().values() if tag["tag"] == "cart")
         other.wait_for("dropanchor.drawing().still")

@@ -15,6 +15,12 @@ from support.browser import WatchedPage, watched_page
 
 pytestmark = pytest.mark.browser
 
+IS_WRITTEN = """(() => {
+    const [x, y] = (new URLSearchParams(location.hash.slice(1)).get("centre") ?? "").split(",").map(Number);
+    const [left, top] = dropanchor.screen(x, y);
+    const { clientWidth, clientHeight } = document.getElementById("map");
+    return dropanchor.drawing().still && Math.hypot(left - clientWidth / 2, top - clientHeight / 2) < 2;
+})()"""  # the centre in the address is that of the map
 VIEW = "(({ anchors }) => anchors()[0].pixel.map(Math.round))(dropanchor)"
 
 
@@ -43,8 +49,7 @@ def test_a_copied_link_shows_the_same_tag_map_filter_language_and_units(
             page.page.locator("#zoom-in").click()
         page.page.locator("#map").focus()
         page.page.keyboard.press("ArrowLeft")
-        page.wait_for("location.hash.includes('centre=') && location.hash.includes('group=')")
-        page.page.wait_for_timeout(1000)
+        page.wait_for(f"location.hash.includes('group=') && {IS_WRITTEN}")
         link, view = page.page.url, page.page.evaluate(VIEW)
         page.page.get_by_role("button", name="Anzeige").click()
         expect(page.page.locator("#link")).to_have_text(link)

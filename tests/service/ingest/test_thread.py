@@ -57,7 +57,7 @@ def test_a_thread_that_is_not_running_or_stuck_is_a_problem(monkeypatch: pytest.
     thread = thread_of(bench)
     assert thread.problem == "the ingest thread is not running"
     release = threading.Event()
-    monkeypatch.setattr(bench.ingest, "turn", lambda _: release.wait(5.0))
+    monkeypatch.setattr(bench.ingest, "turn", lambda _: release.wait(60.0))
     monkeypatch.setattr(ingest_thread, "SILENT_S", 0.05)
     thread.start()
     wait_until(lambda: "stuck" in (thread.problem or ""))

@@ -13,26 +13,30 @@ from support.zenoh_router import wait_until
 LEASE_S = 0.5
 
 
-def standby(url: str, name: str, buckets: tuple[str, ...] = ("001", "002", "003"), sites: str = "") -> AnyStandby:
-    who = {bucket: Claimant(name, "", sites or bucket, LEASE_S) for bucket in buckets}
+def standby(
+    url: str, name: str, buckets: tuple[str, ...] = ("001", "002", "003"), sites: str = "", lease_s: float = LEASE_S
+) -> AnyStandby:
+    who = {bucket: Claimant(name, "", sites or bucket, lease_s) for bucket in buckets}
     return AnyStandby(partial(connect, url, name), who, "layout")
 
 
 @needs_postgresql
 def test_each_standby_gets_a_bucket_of_its_own_and_then_those_of_the_dead(url: str) -> None:
-    found: dict[str, Owned] = {}
+    found: list[Owned] = []
 
-    def wait(name: str) -> None:
-        found[name] = standby(url, name).wait()
+    def wait(number: int, lease_s: float) -> None:
+        found.append(standby(url, f"a/{number}", lease_s=lease_s).wait())
 
-    threads = [Thread(target=wait, args=(f"a/{number}",), daemon=True) for number in range(1, 5)]
-    for thread in threads:
-        thread.start()
+    for number in range(3):
+        Thread(target=wait, args=(number, 3600.0), daemon=True).start()
     wait_until(lambda: len(found) == 3)
-    assert {owned.bucket for owned in found.values()} == {"001", "002", "003"}
-    assert {owned.claimed.claim.epoch for owned in found.values()} == {1}
-    wait_until(lambda: len(found) == 4)  # nobody renews a lease, so the fourth takes one over
-    assert max(owned.claimed.claim.epoch for owned in found.values()) == 2
+    assert {owned.bucket for owned in found} == {"001", "002", "003"}
+    assert {owned.claimed.claim.epoch for owned in found} == {1}
+    with connect(url, "test") as connection:
+        connection.execute("UPDATE dropanchor_lease SET lease_s = %s WHERE bucket = '002'", [LEASE_S])
+    Thread(target=wait, args=(3, LEASE_S), daemon=True).start()
+    wait_until(lambda: len(found) == 4)  # nobody renews a lease
+    assert (found[3].bucket, found[3].claimed.claim.epoch) == ("002", 2)
 
 
 @needs_postgresql
@@ -57,3 +61,16 @@ def test_a_drained_node_and_other_settings_get_nothing_and_say_why(url: str) -> 
         assert found["b/1"].bucket == "002"
         nodes.set_drained(connection, "a", False)
         wait_until(lambda: "a/1" in found)
+
+
+@needs_postgresql
+def test_a_process_that_starts_on_a_drained_node_does_not_take_a_free_bucket(url: str) -> None:
+    found: list[Owned] = []
+    with connect(url, "test") as connection:
+        nodes.set_drained(connection, "a", True)
+        leases.seen_or_new(connection, "001")
+        Thread(target=lambda: found.append(standby(url, "a/1").wait()), daemon=True).start()
+        wait_until(lambda: found or nodes.standbys(connection) == {"a/1": "its node is drained"})
+        assert found == []
+        nodes.set_drained(connection, "a", False)
+        wait_until(lambda: found)

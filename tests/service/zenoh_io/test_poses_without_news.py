@@ -14,6 +14,16 @@ from support.ingest import IngestBench
 from support.zenoh_router import connected_session, wait_until
 
 
+class CountingPoses(ZenohPoses):
+    """Counts how often it has looked for news and subscribers."""
+
+    looks = 0
+
+    def publish(self) -> None:
+        super().publish()
+        self.looks += 1
+
+
 def test_the_first_subscriber_to_frames_gets_one_although_nothing_changes(router_endpoint: str) -> None:
     bench = IngestBench()
     answers = answers_of_sites(bench.sites, bench.latest, time.time_ns, [None], bench.publishers)
@@ -21,10 +31,11 @@ def test_the_first_subscriber_to_frames_gets_one_although_nothing_changes(router
     with (
         connected_session(router_endpoint) as ours,
         connected_session(router_endpoint) as theirs,
-        ZenohPoses(ours, answers, Metrics()),
+        CountingPoses(ours, answers, Metrics()) as poses,
     ):
+        wait_until(lambda: poses.looks == 1)
         bench.send("cart", Frame(ranges=[RangeSample(time.time_ns(), 7, 4.0)]))
-        time.sleep(0.3)  # the thread has found no subscriber, and sleeps
+        wait_until(lambda: poses.looks == 2)  # it has found no subscriber, and sleeps
         subscriber = theirs.declare_subscriber(poses_key("default"), frames.append)
         wait_until(lambda: frames)
         subscriber.undeclare()

@@ -4,7 +4,6 @@ import asyncio
 import socket
 import ssl
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -27,6 +26,10 @@ REQUEST = b"GET / HTTP/1.1\r\nhost: x\r\nconnection: close\r\n\r\n"
 
 class ShortDeadlines(GuardedProtocol):
     stalled_s = 0.3
+
+
+class PatientUntilShutdown(GuardedProtocol):
+    stalled_s = 3600.0
 
 
 @dataclass
@@ -83,11 +86,9 @@ def stuck_client(served: TlsServer) -> Iterator[None]:
 
 
 def test_a_server_stops_in_time_with_a_client_that_does_not_read_its_last_response(tmp_path: Path) -> None:
-    with serving(tmp_path) as served, stuck_client(served):
+    with serving(tmp_path, PatientUntilShutdown) as served, stuck_client(served):
         served.server.ask_to_stop()
-        began_s = time.monotonic()
-        wait_until(lambda: not served.protocols, timeout_s=5.0)
-        assert time.monotonic() - began_s < 5.0
+        wait_until(lambda: not served.protocols)
     assert served.errors == []
 
 

@@ -71,13 +71,13 @@ def place(tmp_path: Path) -> Place:
 def end_of(socket: ClientConnection) -> tuple[int, str]:
     """Return the code and the sentence with which the service ends a connection. It must not answer before."""
     with pytest.raises(ConnectionClosed) as closed:
-        socket.recv(5)
+        socket.recv(20)
     assert closed.value.rcvd is not None
     return closed.value.rcvd.code, closed.value.rcvd.reason
 
 
 def answer(socket: ClientConnection) -> SamplesAcknowledged:
-    return SamplesAcknowledged.model_validate_json(socket.recv(5))
+    return SamplesAcknowledged.model_validate_json(socket.recv(20))
 
 
 def test_every_message_is_passed_on_as_it_is_and_acknowledged_in_order(place: Place) -> None:
@@ -245,4 +245,4 @@ def test_the_answer_is_in_the_interface_document(place: Place) -> None:
 
 def _greeting(place: Place) -> str:
     with place.running(), place.connect(place.anna) as socket:
-        return str(socket.recv(5))
+        return str(socket.recv(20))

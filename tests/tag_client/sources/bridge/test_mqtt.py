@@ -4,6 +4,7 @@ import base64
 import json
 import struct
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -76,8 +77,8 @@ def test_ranges_of_a_decawave_gateway_and_of_a_template_are_published(router_end
         wait_for_line(process, "connected")
         publish(client, "dwm/node/9a28/uplink/data", {"data": DISTANCES})
         publish(client, "plant/hall/uwb", {"id": 3, "m": 2.5})
-        wait_until(lambda: ("t-hall", 3, 2.5) in ranges(heard))
-    assert ("t-9A28", anchor_number("yard"), 7.94) in ranges(heard)
+        expected = {("t-hall", 3, 2.5), ("t-9A28", anchor_number("yard"), 7.94)}
+        wait_until(lambda: expected <= set(ranges(heard)))
 
 
 def test_a_phone_publishes_over_websocket_and_its_tag_is_in_the_topic(router_endpoint: str, tmp_path: Path) -> None:
@@ -125,13 +126,14 @@ def test_a_flood_of_bad_payloads_is_told_once_per_second(router_endpoint: str, t
         broker.publisher() as client,
     ):
         wait_for_line(process, "connected")
+        began_s = time.monotonic()
         for _ in range(2000):
             client.publish("dwm/node/bad/uplink/data", b"{")
         publish(client, "dwm/node/bad/uplink/data", b"{")
         wait_for_line(process, "left out: not_json")
         process.terminate()
         _, rest = process.communicate(timeout=30)
-    assert rest.count("left out: not_json") <= 3
+    assert rest.count("left out: not_json") <= time.monotonic() - began_s + 2
 
 
 def test_the_bridge_comes_back_with_the_broker(router_endpoint: str, tmp_path: Path) -> None:
