@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -46,10 +47,27 @@ class Cluster:
         where = ["--address", f"127.0.0.{number}", *role, *port]
         with (folder / "log").open("ab") as log:
             process = subprocess.Popen(
-                command("cluster", "start", *words, *where), env=environment(), stderr=log, stdout=log
+                command("cluster", "start", *words, *where), env=self._environment(name), stderr=log, stdout=log
             )
         self._processes[name] = process
         return process
+
+    def install(self, name: str, version: str) -> None:
+        """Do on a node what pip does at the end of an update: name the new version beside the packages."""
+        packages = self._packages(name)
+        named = packages / f"dropanchor_service-{version}.dist-info"
+        named.mkdir(parents=True)
+        (named / "METADATA").write_text(f"Metadata-Version: 2.1\nName: dropanchor-service\nVersion: {version}\n")
+        for other in set(packages.iterdir()) - {named}:
+            shutil.rmtree(other)
+
+    def _packages(self, name: str) -> Path:
+        return self.folder / name / "packages"
+
+    def _environment(self, name: str) -> dict[str, str]:
+        """Return the environment of the programs of a node. What is installed there comes before our own packages."""
+        ours = environment()
+        return ours | {"PYTHONPATH": os.pathsep.join([str(self._packages(name)), ours["PYTHONPATH"]])}
 
     def kill(self, name: str) -> None:
         """Kill all processes of a node at once."""
@@ -62,6 +80,11 @@ class Cluster:
         for number in [process.pid, *_descendants(process.pid)]:
             with suppress(ProcessLookupError):
                 os.kill(number, how)
+
+    def stop(self, name: str) -> None:
+        """Stop a node as an operator does."""
+        self._processes[name].terminate()
+        self._processes.pop(name).wait(60)
 
     def kill_raylet(self, name: str) -> None:
         """Kill the process of Ray that starts all others of a node."""
@@ -102,10 +125,10 @@ class Cluster:
             return self._database.run(self._database.url(), statement)
         return []
 
-    def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        """Run `dropanchor cluster` and return what it said."""
-        words = command("cluster", *arguments, "--url", self._database.url())
-        return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=90)
+    def run(self, *arguments: str, node: str = "head", limit_s: float = 90) -> "subprocess.CompletedProcess[str]":
+        """Run `dropanchor cluster` on a node and return what it said."""
+        words, there = command("cluster", *arguments, "--url", self._database.url()), self._environment(node)
+        return subprocess.run(words, capture_output=True, text=True, env=there, check=False, timeout=limit_s)
 
     def log(self) -> str:
         """Return what the nodes and their shards have said."""

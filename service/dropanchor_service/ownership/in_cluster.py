@@ -22,6 +22,7 @@ from dropanchor_service.cluster.owner import Renewal
 from dropanchor_service.cluster.shared_state import CheckpointRow, save_document
 from dropanchor_service.cluster.standby import Standby
 from dropanchor_service.cluster.tenure import Standing, Tenure
+from dropanchor_service.cluster.versions import installed
 from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.ownership.address import address_of
@@ -63,7 +64,7 @@ class ClusterOwnership(Ownership):
         self._on_look = on_look
         self._node_secret = node_secret_of(cluster.node_secret)
         self._connect: Callable[[], Connection] = partial(connect, cluster.url, name)
-        self._who = Claimant(name, cluster.address or "", digest_of_sites(settings), cluster.lease_s)
+        self._who = Claimant(name, cluster.address or "", digest_of_sites(settings), cluster.lease_s, installed())
         self._claimed = claimed
         self._settings = settings
         self._standby: Standby | None = None

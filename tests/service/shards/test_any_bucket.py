@@ -6,7 +6,7 @@ from threading import Thread
 from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.cluster.leases import Claimant
-from dropanchor_service.shards.any_bucket import AnyStandby, Owned
+from dropanchor_service.shards.any_bucket import AnyStandby, AskedToEndError, Owned
 from support.postgresql import needs_postgresql
 from support.zenoh_router import wait_until
 
@@ -57,3 +57,26 @@ def test_a_drained_node_and_other_settings_get_nothing_and_say_why(url: str) -> 
         assert found["b/1"].bucket == "002"
         nodes.set_drained(connection, "a", False)
         wait_until(lambda: "a/1" in found)
+
+
+@needs_postgresql
+def test_a_shard_that_was_asked_to_end_does_so_once_and_no_longer_stands_by(url: str) -> None:
+    ended: list[str] = []
+
+    def wait() -> None:
+        try:
+            standby(url, "a/1", ("001",), "others").wait()
+        except AskedToEndError:
+            ended.append("a/1")
+
+    with connect(url, "test") as connection:
+        seen = leases.seen_or_new(connection, "001")
+        assert leases.claim(connection, seen, Claimant("gone/1", "", "sites", LEASE_S))
+        for _ in range(2):  # it starts again
+            Thread(target=wait, daemon=True).start()
+            wait_until(lambda: [shard.name for shard in nodes.waiting(connection)] == ["a/1"])
+            assert ended == []
+            nodes.ask_to_end(connection, "a/1")
+            wait_until(lambda: ended == ["a/1"])
+            assert nodes.waiting(connection) == []
+            ended.clear()
