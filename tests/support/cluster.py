@@ -110,6 +110,10 @@ class Cluster:
     def has_head(self) -> bool:
         return bool(self._rows("SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND owner <> ''"))
 
+    def head_sees_nodes(self) -> bool:
+        """Return whether the head looks after its nodes: it is the head some seconds before Ray has started."""
+        return bool(self._rows("SELECT 1 FROM dropanchor_node WHERE seen > clock_timestamp() - interval '2 s'"))
+
     def address(self, bucket: str) -> str:
         """Return the address of the page of the owner."""
         return str(dict(self._rows("SELECT bucket, address FROM dropanchor_lease"))[bucket])

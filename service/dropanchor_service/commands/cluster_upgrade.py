@@ -27,6 +27,7 @@ after it, restart each `dropanchor api`, and `stop` and `start` each node when i
 """
 WAIT_S = 300.0  # for a shard to start: a new version may have to compile
 MOVE_S = 15.0
+HEAD_S = 60.0  # for a head to see its nodes
 POLL_S = 0.1
 
 
@@ -39,9 +40,9 @@ def add_arguments(upgrade: argparse.ArgumentParser) -> None:
 def upgrade(arguments: argparse.Namespace, connection: Connection) -> int:
     """Run the command. Return 0, or 2 if something hinders it."""
     target = installed()
-    seen = seen_in(connection)
+    seen = _seen_by_head(connection)
     if not seen.nodes:
-        return refuse("there are no nodes; `upgrade` is for shards that `dropanchor cluster start` runs")
+        return refuse("no head sees a node; `upgrade` is for shards that `dropanchor cluster start` runs")
     found = obstacles(seen, target)
     if found:
         return refuse("\n  ".join(["the upgrade cannot begin:", *found]))
@@ -62,6 +63,14 @@ def seen_in(connection: Connection) -> Seen:
         waiting=nodes.waiting(connection),
         leases={name: lease for name, lease in leases.read_all(connection).items() if is_held(lease)},
     )
+
+
+def _seen_by_head(connection: Connection) -> Seen:
+    """Return the cluster, once a head that has just started sees its nodes, or sees none for long."""
+    end_s = time.monotonic() + HEAD_S
+    while not (seen := seen_in(connection)).nodes and seen.head and time.monotonic() < end_s:
+        time.sleep(POLL_S)
+    return seen
 
 
 class UpgradeError(ValueError):

@@ -75,7 +75,7 @@ def test_upgrade_says_what_hinders_it_and_changes_nothing(
         shown = capsys.readouterr()
         return code, shown.out + shown.err
 
-    assert "there are no nodes" in said()[1]
+    assert "no head sees a node" in said()[1]
     with connect(url, "test") as connection:
         become_head(connection, "head", "10.0.0.1:6379", "sites")
         nodes.note(connection, "a", 2)
