@@ -43,6 +43,8 @@ CREATE TABLE IF NOT EXISTS dropanchor_checkpoint (
     content bytea NOT NULL DEFAULT ''
 );
 ALTER TABLE dropanchor_checkpoint ALTER content SET STORAGE EXTERNAL;
+ALTER TABLE dropanchor_checkpoint ADD COLUMN IF NOT EXISTS object text NOT NULL DEFAULT '';
+ALTER TABLE dropanchor_checkpoint ADD COLUMN IF NOT EXISTS bytes bigint NOT NULL DEFAULT 0;
 CREATE TABLE IF NOT EXISTS dropanchor_document (
     bucket text,
     name text,
@@ -69,7 +71,7 @@ CREATE TABLE IF NOT EXISTS dropanchor_node (
 """
 """The content of a checkpoint is numbers, which the database would try to compress in vain."""
 _NEWEST = """
-    SELECT 1 FROM pg_attribute WHERE attrelid = to_regclass('dropanchor_standby') AND attname = 'has_to_end'
+    SELECT 1 FROM pg_attribute WHERE attrelid = to_regclass('dropanchor_checkpoint') AND attname = 'bytes'
 """
 
 

@@ -25,7 +25,7 @@ _CLAIM = """
 """
 _FENCE = """
     INSERT INTO dropanchor_checkpoint (bucket, epoch) VALUES (%(bucket)s, %(next)s)
-    ON CONFLICT (bucket) DO UPDATE SET epoch = excluded.epoch RETURNING content
+    ON CONFLICT (bucket) DO UPDATE SET epoch = excluded.epoch RETURNING content, object
 """
 _FENCE_DOCUMENTS = """
     UPDATE dropanchor_document SET epoch = %(next)s WHERE bucket = %(bucket)s RETURNING name, content
@@ -44,7 +44,7 @@ _STANDBY = """
         installed = excluded.installed, seen = clock_timestamp()
 """
 _STATUS = """
-    SELECT bucket, coalesce(octet_length(content), 0),
+    SELECT bucket, coalesce(nullif(octet_length(content), 0), bytes, 0),
         coalesce(extract(epoch FROM clock_timestamp() - written)::double precision, 0),
         ARRAY(SELECT name || CASE obstacle WHEN '' THEN '' ELSE ' (cannot take over: ' || obstacle || ')' END
               FROM dropanchor_standby WHERE bucket = lease.bucket AND name <> lease.owner
@@ -74,11 +74,16 @@ class Claimant:
 
 @dataclass(frozen=True)
 class Claim:
-    """What a new owner has. checkpoint: its bytes, empty without one. documents: what people have changed, by name."""
+    """What a new owner has.
+
+    checkpoint: its bytes, empty if the database has none. documents: what people have changed, by name. object: name of
+    the checkpoint where checkpoints are objects; it counts only if `checkpoint` is empty.
+    """
 
     epoch: int
     checkpoint: bytes
     documents: dict[str, bytes]
+    object: str = ""
 
 
 class Claimed(NamedTuple):
@@ -144,7 +149,7 @@ def claim(connection: Connection, seen: Lease, who: Claimant) -> Claim | None:
         assert row is not None
         connection.execute("DELETE FROM dropanchor_standby WHERE name = %s", [who.name])
         documents = {name: bytes(text) for name, text in connection.execute(_FENCE_DOCUMENTS, values, binary=True)}
-    return Claim(seen.epoch + 1, bytes(row[0]), documents)
+    return Claim(seen.epoch + 1, bytes(row[0]), documents, row[1])
 
 
 def renew(connection: Connection, bucket: str, epoch: int) -> bool:
