@@ -30,10 +30,12 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         database = opened.enter_context(running_postgresql())
         cluster = opened.enter_context(running_cluster(database, router_endpoint, settings_of_sites(SITES, TAGS)))
         opened.callback(lambda: sys.stdout.write(cluster.log()))  # shown when the test fails
+        share = tmp_path / "share"
+        cluster.more = [f'checkpoints = "file://{share}"']
         for node in ("head", "a", "b"):
             cluster.install(node, OLD)
         cluster.start("head", 2, "--head")
-        wait_until(cluster.has_head, START_S)
+        wait_until(cluster.head_works, START_S)
         cluster.start("a", 3, "--join", "--shards", "2")
         wait_until(lambda: len(cluster.owners()) == 2, START_S)
         cluster.start("b", 4, "--join", "--shards", "1")
@@ -71,6 +73,7 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         wait_until(lambda: reader.are_current(ended_s), START_S)
         require_each_sample_once(cluster, tags, tmp_path)
         status = cluster.run("status").stdout
+        written = {path.parent.name for path in share.glob("*/*")}
     silences = ", ".join(f"{site} {s:.2f} s" for site, s in reader.silences_s(upgraded_s).items())
     with capsys.disabled():
         sys.stdout.write(
@@ -78,3 +81,4 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         )
     assert status.count(f"version {NEW}") == 5  # the head, two nodes and two owners
     assert OLD not in status
+    assert written == {"001", "002"}

@@ -25,13 +25,14 @@ needs_ray = pytest.mark.skipif(
 
 
 class Cluster:
-    """Nodes with these settings of sites. folder: short, because of the sockets of Ray. head: its address and port."""
+    """Nodes with these settings of sites. folder: short, because of Ray's sockets. more: settings of the cluster."""
 
     def __init__(self, folder: Path, database: Postgresql, router: str, sites: Sequence[str]) -> None:
         self.folder = folder
         self._database = database
         self._lines = ["[zenoh]", f'connect = ["{router}"]', *sites]
         self._port = free_port()
+        self.more: Sequence[str] = ()
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, number: int, *options: str) -> "subprocess.Popen[bytes]":
@@ -39,7 +40,7 @@ class Cluster:
         folder = self.folder / name
         folder.mkdir(exist_ok=True)
         config = folder / "sites.toml"
-        cluster = ["[cluster]", f'url = "{self._database.url()}"', f'name = "{name}"']
+        cluster = ["[cluster]", f'url = "{self._database.url()}"', f'name = "{name}"', *self.more]
         config.write_text("\n".join(["history.enabled = false", *cluster, *self._lines]) + "\n")
         words = ["--config", str(config), "--folder", str(folder), "--token", str(self.folder / "token")]
         role = options or ("--join",)
@@ -110,8 +111,12 @@ class Cluster:
     def has_head(self) -> bool:
         return bool(self._rows("SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND owner <> ''"))
 
+    def head_works(self) -> bool:
+        """Return whether the head has Ray: it claims its lease before that."""
+        return bool(self._rows("SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND renewals > 0"))
+
     def head_sees_nodes(self) -> bool:
-        """Return whether the head looks after its nodes: it is the head some seconds before Ray has started."""
+        """Return whether the head has seen a node lately."""
         return bool(self._rows("SELECT 1 FROM dropanchor_node WHERE seen > clock_timestamp() - interval '2 s'"))
 
     def address(self, bucket: str) -> str:
