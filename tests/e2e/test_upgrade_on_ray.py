@@ -17,7 +17,7 @@ SITES = {"001.a": 5, "002.a": 7}
 TAGS = 2
 START_S = 240.0  # Ray is slow on a busy machine
 LIMIT_S = 900.0
-OLD, NEW = "7.0.0", "7.1.0"
+OLD, NEW = "8.1.0", "8.2.0"
 
 
 @needs_ray

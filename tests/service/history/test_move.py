@@ -2,6 +2,7 @@
 
 import sqlite3
 from pathlib import Path
+from subprocess import DEVNULL, Popen
 
 import numpy as np
 import pytest
@@ -12,10 +13,13 @@ from dropanchor_service.history import move as moving
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.move import HistoryFile, Moved, move
 from dropanchor_service.history.postgresql.database import Database
+from dropanchor_service.history.postgresql.schema import SCHEMA
 from dropanchor_service.history.storage import Retention
 from service.history.test_overview import HOUR, SECOND, T_NS, drive, summarise
 from support.history_places import KEEP_ALL, DatabasePlace, FilePlace, Place, opened
 from support.postgresql import Postgresql, needs_postgresql
+from support.service import command, environment
+from support.zenoh_router import wait_until
 
 pytestmark = needs_postgresql
 END_NS = T_NS + 3 * HOUR * SECOND
@@ -107,6 +111,26 @@ def test_a_move_that_was_stopped_goes_on_and_leaves_what_the_service_has_written
         summarise(writer)
         writer.close()
         assert answers(there) == answers(place)
+
+
+def test_a_move_that_is_killed_while_it_writes_is_complete_after_the_next_one(
+    tmp_path: Path, postgresql: Postgresql
+) -> None:
+    place, url = filled(tmp_path / "history.sqlite"), postgresql.new_database()
+    words = ["history", "move", f"--from={place.path}", f"--to={url}", "--site=yard"]
+    waits = f"SELECT 1 FROM pg_locks WHERE NOT granted AND relation = '{SCHEMA}.poses'::regclass"
+    with opened(url) as database:
+        there = DatabasePlace(database, "yard")
+        there.writer().insert(drive(np.array([3.0 * HOUR])), ["cart"], ["1"])
+        with postgresql.connect(url) as connection, connection.transaction():
+            connection.execute(f"LOCK TABLE {SCHEMA}.poses IN EXCLUSIVE MODE")
+            with Popen(command(*words), env=environment(), stderr=DEVNULL) as killed:
+                wait_until(lambda: postgresql.run(url, waits), 120.0)
+                killed.kill()
+        assert there.reader.tags() == ["cart"]
+        assert main(words) == 0
+        for tag, poses in (("cart", len(SECONDS) + 1), ("truck 7", len(SECONDS))):
+            assert len(there.reader.poses(tag, 0, 2**62, 10_000).poses) == poses
 
 
 def test_the_limits_of_a_site_stay_those_of_its_service(tmp_path: Path, shared_database: str) -> None:
