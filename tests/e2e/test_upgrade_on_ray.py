@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from support.cluster import needs_ray, running_cluster
+from support.cluster import Cluster, needs_ray, running_cluster
 from support.cluster_sites import Reader, require_each_sample_once, settings_of_sites
 from support.live_tags import LiveTags
 from support.postgresql import needs_postgresql, running_postgresql
@@ -18,6 +18,11 @@ TAGS = 2
 START_S = 240.0  # Ray is slow on a busy machine
 LIMIT_S = 900.0
 OLD, NEW = "8.1.0", "8.2.0"
+
+
+def head_is_back(cluster: Cluster) -> bool:
+    cluster.start_again("head", 2, "--head")
+    return cluster.head_sees_nodes()
 
 
 @needs_ray
@@ -58,8 +63,7 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         cluster.install("b", NEW)
         cluster.stop("head")
         wait_until(lambda: not cluster.head_sees_nodes())
-        cluster.start("head", 2, "--head")
-        wait_until(cluster.head_sees_nodes, START_S)
+        wait_until(lambda: head_is_back(cluster), START_S)
 
         upgraded_s = time.monotonic()
         stopped = cluster.run("upgrade", limit_s=LIMIT_S)

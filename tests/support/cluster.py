@@ -53,6 +53,11 @@ class Cluster:
         self._processes[name] = process
         return process
 
+    def start_again(self, name: str, number: int, *options: str) -> None:
+        """Start a node if it has ended, as a service manager does: Ray gives up after half a minute."""
+        if name not in self._processes or self._processes[name].poll() is not None:
+            self.start(name, number, *options)
+
     def install(self, name: str, version: str) -> None:
         """Do on a node what pip does at the end of an update: name the new version beside the packages."""
         packages = self._packages(name)

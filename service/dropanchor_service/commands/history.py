@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from dropanchor_service.commands.history_move import HistoryFile, Moved, move, summarise
 from dropanchor_service.history.errors import HistoryError
-from dropanchor_service.history.move import HistoryFile, Moved, move, summarise
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.storage import Retention
 from dropanchor_service.persistence import open_database, retention_of

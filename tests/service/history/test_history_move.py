@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dropanchor_service.cli import main
+from dropanchor_service.commands import history_move as moving
+from dropanchor_service.commands.history_move import HistoryFile, Moved, move
 from dropanchor_service.estimation.columns import Frame, State
-from dropanchor_service.history import move as moving
 from dropanchor_service.history.errors import HistoryError
-from dropanchor_service.history.move import HistoryFile, Moved, move
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.postgresql.schema import SCHEMA
 from dropanchor_service.history.storage import Retention
