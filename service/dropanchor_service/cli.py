@@ -22,6 +22,7 @@ _COMMANDS = {
     "tag": "issue and revoke the certificates of tags",
     "compile": "compile the estimator ahead of the first start",
     "key": "manage API keys of the REST interface",
+    "history": "move the history of a site from its file into a database",
     "record": "record the samples and poses of a service, and download the files",
     "replay": "run an engine on a recording, offline",
     "foxglove": "show the poses of a running service live in Foxglove or Lichtblick",

@@ -113,3 +113,20 @@ with tempfile.TemporaryDirectory() as folder:
         0,
         "200 \n409 Parquet needs the extra `parquet`: pip install 'dropanchor-service[parquet]'\n",
     ), ended.stderr
+
+
+def test_checkpoints_outside_the_database_need_an_extra_and_the_node_says_so(tmp_path: Path) -> None:
+    config = tmp_path / "yards.toml"
+    lines = [
+        'cluster.url = "postgresql://db.example/a"',
+        'cluster.checkpoints = "s3://shared"',
+        'cluster.bucket = "yard"',
+    ]
+    config.write_text("\n".join([*lines, 'zenoh.connect = ["tcp/127.0.0.1:9"]']) + "\n")
+    for missing, sentence in (
+        ("fsspec", "cluster.checkpoints needs the extra `s3`: pip install 'dropanchor-service[s3]'"),
+        ("s3fs", "cluster.checkpoints: s3://shared cannot be used: Install s3fs to access S3"),
+    ):
+        command = ("cluster", "start", "--join", f"--config={config}", f"--folder={tmp_path}")
+        ended = python("-c", without(missing) + COMMAND, *command)
+        assert (ended.returncode, ended.stderr) == (2, f"dropanchor cluster: {sentence}\n")

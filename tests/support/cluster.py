@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import shutil
 import signal
 import subprocess
 import tempfile
@@ -51,7 +52,7 @@ class Loopback:
 
 
 class Cluster:
-    """Nodes with these settings of sites. folder: short, because of the sockets of Ray."""
+    """Nodes with these settings of sites. folder: short, because of Ray's sockets. more: settings of the cluster."""
 
     def __init__(
         self, folder: Path, database: Postgresql, router: str, sites: Sequence[str], machines: Machines
@@ -61,6 +62,7 @@ class Cluster:
         self._database = database
         self._lines = ["[zenoh]", f'connect = ["{router}"]', *sites]
         self._port = free_port()
+        self.more: Sequence[str] = ()
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         self._started: dict[str, tuple[int, tuple[str, ...]]] = {}
 
@@ -69,7 +71,7 @@ class Cluster:
         folder = self.folder / name
         folder.mkdir(exist_ok=True)
         config = folder / "sites.toml"
-        cluster = ["[cluster]", f'url = "{self._database.url()}"', f'name = "{name}"']
+        cluster = ["[cluster]", f'url = "{self._database.url()}"', f'name = "{name}"', *self.more]
         lines = ["history.enabled = false", *self._machines.settings(number), *cluster, *self._lines]
         config.write_text("\n".join(lines) + "\n")
         words = ["--config", str(config), "--folder", str(folder), "--token", str(self.folder / "token")]
@@ -78,7 +80,7 @@ class Cluster:
         where = ["--address", self._machines.address(number), *role, *port]
         start = self._machines.command(number, command("cluster", "start", *words, *where))
         with (folder / "log").open("ab") as log:
-            process = subprocess.Popen(start, env=environment(), stderr=log, stdout=log)
+            process = subprocess.Popen(start, env=self._environment(name), stderr=log, stdout=log)
         self._processes[name] = process
         self._started[name] = number, options
         return process
@@ -89,6 +91,23 @@ class Cluster:
             if process.poll() is not None:
                 number, options = self._started[name]
                 self.start(name, number, *options)
+
+    def install(self, name: str, version: str) -> None:
+        """Do on a node what pip does at the end of an update: name the new version beside the packages."""
+        packages = self._packages(name)
+        named = packages / f"dropanchor_service-{version}.dist-info"
+        named.mkdir(parents=True)
+        (named / "METADATA").write_text(f"Metadata-Version: 2.1\nName: dropanchor-service\nVersion: {version}\n")
+        for other in set(packages.iterdir()) - {named}:
+            shutil.rmtree(other)
+
+    def _packages(self, name: str) -> Path:
+        return self.folder / name / "packages"
+
+    def _environment(self, name: str) -> dict[str, str]:
+        """Return the environment of the programs of a node. What is installed there comes before our own packages."""
+        ours = environment()
+        return ours | {"PYTHONPATH": os.pathsep.join([str(self._packages(name)), ours["PYTHONPATH"]])}
 
     def kill(self, name: str) -> None:
         """Kill all processes of a node at once."""
@@ -101,6 +120,11 @@ class Cluster:
         for number in [process.pid, *_descendants(process.pid)]:
             with suppress(ProcessLookupError):
                 os.kill(number, how)
+
+    def stop(self, name: str) -> None:
+        """Stop a node as an operator does."""
+        self._processes[name].terminate()
+        self._processes.pop(name).wait(60)
 
     def kill_raylet(self, name: str) -> None:
         """Kill the process of Ray that starts the shards of a node, and wait until they have ended."""
@@ -131,6 +155,14 @@ class Cluster:
             AND renewed > clock_timestamp() - interval '2 s'"""
         return bool(self._rows(statement))
 
+    def head_works(self) -> bool:
+        """Return whether the head has Ray: it claims its lease before that."""
+        return bool(self._rows("SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND renewals > 0"))
+
+    def head_sees_nodes(self) -> bool:
+        """Return whether the head has seen a node lately."""
+        return bool(self._rows("SELECT 1 FROM dropanchor_node WHERE seen > clock_timestamp() - interval '2 s'"))
+
     def address(self, bucket: str) -> str:
         """Return the address of the page of the owner."""
         return str(dict(self._rows("SELECT bucket, address FROM dropanchor_lease"))[bucket])
@@ -146,10 +178,10 @@ class Cluster:
             return self._database.run(self._database.url(), statement)
         return []
 
-    def run(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
-        """Run `dropanchor cluster` and return what it said."""
-        words = command("cluster", *arguments, "--url", self._database.url())
-        return subprocess.run(words, capture_output=True, text=True, env=environment(), check=False, timeout=90)
+    def run(self, *arguments: str, node: str = "head", limit_s: float = 90) -> "subprocess.CompletedProcess[str]":
+        """Run `dropanchor cluster` on a node and return what it said."""
+        words, there = command("cluster", *arguments, "--url", self._database.url()), self._environment(node)
+        return subprocess.run(words, capture_output=True, text=True, env=there, check=False, timeout=limit_s)
 
     def count_said(self, name: str, words: str) -> int:
         """Return how often the process of a node has logged these words."""

@@ -57,6 +57,12 @@ def why_unreadable(layout: str, own: str) -> str | None:
     return f"{layout}, but this version uses {own}"
 
 
+def may_be_read(layout: str) -> bool:
+    """Return whether the number of a layout is one that this version reads. Its columns may still be others."""
+    version = version_of(layout)
+    return version is not None and VERSION - READ_BEFORE <= version <= VERSION
+
+
 def described(dtypes: DTypes) -> dict[str, Any]:
     """Return the columns of arrays as values that JSON can hold."""
     return {name: np.lib.format.dtype_to_descr(dtype) for name, dtype in dtypes.items()}

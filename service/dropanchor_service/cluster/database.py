@@ -34,6 +34,7 @@ CREATE TABLE IF NOT EXISTS dropanchor_lease (
     renewed timestamptz NOT NULL DEFAULT clock_timestamp()
 );
 ALTER TABLE dropanchor_lease ADD COLUMN IF NOT EXISTS moving_to text NOT NULL DEFAULT '';
+ALTER TABLE dropanchor_lease ADD COLUMN IF NOT EXISTS version text NOT NULL DEFAULT '';
 CREATE TABLE IF NOT EXISTS dropanchor_checkpoint (
     bucket text PRIMARY KEY,
     epoch bigint NOT NULL,
@@ -42,6 +43,8 @@ CREATE TABLE IF NOT EXISTS dropanchor_checkpoint (
     content bytea NOT NULL DEFAULT ''
 );
 ALTER TABLE dropanchor_checkpoint ALTER content SET STORAGE EXTERNAL;
+ALTER TABLE dropanchor_checkpoint ADD COLUMN IF NOT EXISTS object text NOT NULL DEFAULT '';
+ALTER TABLE dropanchor_checkpoint ADD COLUMN IF NOT EXISTS bytes bigint NOT NULL DEFAULT 0;
 CREATE TABLE IF NOT EXISTS dropanchor_document (
     bucket text,
     name text,
@@ -56,6 +59,9 @@ CREATE TABLE IF NOT EXISTS dropanchor_standby (
     seen timestamptz NOT NULL DEFAULT clock_timestamp(),
     PRIMARY KEY (bucket, name)
 );
+ALTER TABLE dropanchor_standby ADD COLUMN IF NOT EXISTS version text NOT NULL DEFAULT '';
+ALTER TABLE dropanchor_standby ADD COLUMN IF NOT EXISTS installed text NOT NULL DEFAULT '';
+ALTER TABLE dropanchor_standby ADD COLUMN IF NOT EXISTS has_to_end boolean NOT NULL DEFAULT false;
 CREATE TABLE IF NOT EXISTS dropanchor_node (
     name text PRIMARY KEY,
     shards integer NOT NULL DEFAULT 0,
@@ -64,6 +70,9 @@ CREATE TABLE IF NOT EXISTS dropanchor_node (
 );
 """
 """The content of a checkpoint is numbers, which the database would try to compress in vain."""
+_NEWEST = """
+    SELECT 1 FROM pg_attribute WHERE attrelid = to_regclass('dropanchor_checkpoint') AND attname = 'bytes'
+"""
 
 
 def connect(url: str, name: str) -> Connection:
@@ -81,11 +90,10 @@ def connect(url: str, name: str) -> Connection:
 
 
 def make_tables(connection: Connection) -> None:
-    """Make the tables that do not exist yet. Raises DatabaseError."""
+    """Make the tables and columns that do not exist yet. Raises DatabaseError."""
     with connection.transaction():
         connection.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
-        found = connection.execute("SELECT to_regclass('dropanchor_node')").fetchone()
-        if found is None or found[0] is None:
+        if connection.execute(_NEWEST).fetchone() is None:
             connection.execute(_TABLES)
 
 

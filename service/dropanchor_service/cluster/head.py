@@ -26,12 +26,13 @@ def become_head(connection: Connection, name: str, address: str, sites: str) -> 
     """Claim the lease of the head and return its epoch. Wait while the last head may run. Raises HeadError."""
     watch = Watch(LEASE_S)
     first = leases.seen_or_new(connection, HEAD)
+    who = Claimant(name, address, fingerprint(sites), LEASE_S, version("dropanchor-service"))
     while True:
         lease, now_s = leases.seen_or_new(connection, HEAD), boot_s()
         if (lease.epoch, lease.renewals) != (first.epoch, first.renewals) and lease.owner:
             raise HeadError(f"{lease.owner} is the head of this cluster, at {lease.address}: --join it")
         if watch.may_claim(lease, now_s):
-            claim = leases.claim(connection, lease, Claimant(name, address, fingerprint(sites), LEASE_S))
+            claim = leases.claim(connection, lease, who)
             if claim is not None:
                 return claim.epoch
         time.sleep(LOOK_S)

@@ -11,20 +11,21 @@ _COLUMNS = """
     lease.bucket, greatest(lease.epoch, coalesce(checkpoint.epoch, 0)), lease.owner, lease.address, lease.sites,
     coalesce(checkpoint.layout, ''), lease.renewals, lease.is_moving, lease.moving_to,
     lease.was_moved, lease.takes_any, lease.lease_s,
-    extract(epoch FROM clock_timestamp() - lease.renewed)::double precision
+    extract(epoch FROM clock_timestamp() - lease.renewed)::double precision, lease.version
 """
 _SELECT = f"""
     SELECT {_COLUMNS} FROM dropanchor_lease AS lease LEFT JOIN dropanchor_checkpoint AS checkpoint USING (bucket)
 """
 _CLAIM = """
     UPDATE dropanchor_lease SET epoch = %(next)s, owner = %(owner)s, address = %(address)s, sites = %(sites)s,
+        version = %(version)s,
         renewals = 0, lease_s = %(lease_s)s, was_moved = is_moving, is_moving = false, moving_to = '',
         takes_any = false, renewed = clock_timestamp()
     WHERE bucket = %(bucket)s AND epoch <= %(epoch)s AND renewals = %(renewals)s AND owner = %(seen_owner)s
 """
 _FENCE = """
     INSERT INTO dropanchor_checkpoint (bucket, epoch) VALUES (%(bucket)s, %(next)s)
-    ON CONFLICT (bucket) DO UPDATE SET epoch = excluded.epoch RETURNING content
+    ON CONFLICT (bucket) DO UPDATE SET epoch = excluded.epoch RETURNING content, object
 """
 _FENCE_DOCUMENTS = """
     UPDATE dropanchor_document SET epoch = %(next)s WHERE bucket = %(bucket)s RETURNING name, content
@@ -38,11 +39,12 @@ _RELEASE = """
 _ADDRESS = "UPDATE dropanchor_lease SET address = %s WHERE bucket = %s AND epoch = %s"
 _MOVE = "UPDATE dropanchor_lease SET is_moving = %s, moving_to = %s WHERE bucket = %s"
 _STANDBY = """
-    INSERT INTO dropanchor_standby (bucket, name, obstacle) VALUES (%s, %s, %s)
-    ON CONFLICT (bucket, name) DO UPDATE SET obstacle = excluded.obstacle, seen = clock_timestamp()
+    INSERT INTO dropanchor_standby (bucket, name, obstacle, version, installed) VALUES (%s, %s, %s, %s, %s)
+    ON CONFLICT (bucket, name) DO UPDATE SET obstacle = excluded.obstacle, version = excluded.version,
+        installed = excluded.installed, seen = clock_timestamp()
 """
 _STATUS = """
-    SELECT bucket, coalesce(octet_length(content), 0),
+    SELECT bucket, coalesce(nullif(octet_length(content), 0), bytes, 0),
         coalesce(extract(epoch FROM clock_timestamp() - written)::double precision, 0),
         ARRAY(SELECT name || CASE obstacle WHEN '' THEN '' ELSE ' (cannot take over: ' || obstacle || ')' END
               FROM dropanchor_standby WHERE bucket = lease.bucket AND name <> lease.owner
@@ -58,21 +60,30 @@ HEAD_SEEN_S = 10.0  # since the last renewal, after which the head is taken for 
 
 @dataclass(frozen=True)
 class Claimant:
-    """Who claims. sites: digest of its settings of the sites. address: for clients; empty when it is not known."""
+    """Who claims.
+
+    sites: digest of its settings of the sites. address: for clients; empty when it is not known. version: that it runs.
+    """
 
     name: str
     address: str
     sites: str
     lease_s: float
+    version: str = ""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """What a new owner has. checkpoint: its bytes, empty without one. documents: what people have changed, by name."""
+    """What a new owner has.
+
+    checkpoint: its bytes, empty if the database has none. documents: what people have changed, by name. object: name of
+    the checkpoint where checkpoints are objects; it counts only if `checkpoint` is empty.
+    """
 
     epoch: int
     checkpoint: bytes
     documents: dict[str, bytes]
+    object: str = ""
 
 
 class Claimed(NamedTuple):
@@ -128,6 +139,7 @@ def claim(connection: Connection, seen: Lease, who: Claimant) -> Claim | None:
         "address": who.address,
         "sites": who.sites,
         "lease_s": who.lease_s,
+        "version": who.version,
     }
     with connection.transaction():
         connection.execute("SET LOCAL synchronous_commit = on")
@@ -135,8 +147,9 @@ def claim(connection: Connection, seen: Lease, who: Claimant) -> Claim | None:
             return None
         row = connection.execute(_FENCE, values, binary=True).fetchone()
         assert row is not None
+        connection.execute("DELETE FROM dropanchor_standby WHERE name = %s", [who.name])
         documents = {name: bytes(text) for name, text in connection.execute(_FENCE_DOCUMENTS, values, binary=True)}
-    return Claim(seen.epoch + 1, bytes(row[0]), documents)
+    return Claim(seen.epoch + 1, bytes(row[0]), documents, row[1])
 
 
 def renew(connection: Connection, bucket: str, epoch: int) -> bool:
@@ -154,9 +167,11 @@ def set_address(connection: Connection, bucket: str, epoch: int, address: str) -
     connection.execute(_ADDRESS, [address, bucket, epoch])
 
 
-def note_standby(connection: Connection, bucket: str, name: str, obstacle: str | None) -> None:
-    """Write that a standby is there, for people."""
-    connection.execute(_STANDBY, [bucket, name, obstacle or ""])
+def note_standby(
+    connection: Connection, bucket: str, name: str, obstacle: str | None, version: str = "", installed: str = ""
+) -> None:
+    """Write that a standby is there. version: that it runs. installed: that it would run after a new start."""
+    connection.execute(_STANDBY, [bucket, name, obstacle or "", version, installed])
 
 
 def set_moving(connection: Connection, bucket: str, is_moving: bool, to: str = "") -> None:

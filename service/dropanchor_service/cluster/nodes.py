@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from dropanchor_service.cluster.database import Connection
 from dropanchor_service.cluster.leases import ANY
+from dropanchor_service.cluster.watch import node_of
 
 _NOTE = """
     INSERT INTO dropanchor_node (name, shards) VALUES (%s, %s)
@@ -21,6 +22,13 @@ _STANDBYS = """
     SELECT name, obstacle FROM dropanchor_standby WHERE bucket = %s AND seen > clock_timestamp() - interval '5 s'
     AND name NOT IN (SELECT owner FROM dropanchor_lease) ORDER BY name
 """
+_SHARDS = """
+    SELECT name, obstacle, version, installed FROM dropanchor_standby
+    WHERE bucket = %s AND seen > clock_timestamp() - interval '5 s'
+    AND name NOT IN (SELECT owner FROM dropanchor_lease) ORDER BY name
+"""
+_ASK_TO_END = "UPDATE dropanchor_standby SET has_to_end = %s WHERE bucket = %s AND name = %s"
+_END = "DELETE FROM dropanchor_standby WHERE bucket = %s AND name = %s AND has_to_end"
 
 
 @dataclass(frozen=True)
@@ -31,6 +39,25 @@ class NodeRow:
     shards: int
     is_drained: bool
     age_s: float
+
+
+@dataclass(frozen=True)
+class Waiting:
+    """A shard that stands by or starts.
+
+    obstacle: why it cannot take over; empty if it can. version: that it runs. installed: that it would run after a new
+    start.
+    """
+
+    name: str
+    obstacle: str
+    version: str
+    installed: str
+
+    @property
+    def node(self) -> str:
+        """The node that carries it."""
+        return node_of(self.name)
 
 
 def note(connection: Connection, name: str, shards: int) -> None:
@@ -57,3 +84,18 @@ def is_drained(connection: Connection, name: str) -> bool:
 def standbys(connection: Connection) -> dict[str, str]:
     """Return the shards that stand by for any bucket, each with its obstacle, which is empty if it can take over."""
     return dict(connection.execute(_STANDBYS, [ANY]).fetchall())
+
+
+def waiting(connection: Connection) -> list[Waiting]:
+    """Return the shards that stand by or start, by name."""
+    return [Waiting(*row) for row in connection.execute(_SHARDS, [ANY])]
+
+
+def ask_to_end(connection: Connection, shard: str, asks: bool = True) -> None:
+    """Ask a shard to end once it stands by, so that it starts again. asks: False takes the request back."""
+    connection.execute(_ASK_TO_END, [asks, ANY, shard])
+
+
+def has_to_end(connection: Connection, shard: str) -> bool:
+    """Return whether a shard was asked to end. Then it stands by no longer, and the request is done."""
+    return connection.execute(_END, [ANY, shard]).rowcount == 1

@@ -11,7 +11,7 @@ from dropanchor_service.cluster.database import Connection, DatabaseError, sente
 from dropanchor_service.cluster.leases import Claim
 
 _CHECKPOINT = """
-    UPDATE dropanchor_checkpoint SET layout = %s, written = clock_timestamp(), content = %b
+    UPDATE dropanchor_checkpoint SET layout = %s, written = clock_timestamp(), content = %b, object = ''
     WHERE bucket = %s AND epoch = %s
 """
 _DOCUMENT = """
@@ -65,7 +65,8 @@ class CheckpointRow:
     def newest(self) -> tuple[Snapshot | None, list[str]]:
         """Return the snapshot that the claim came with; see `Checkpoints`."""
         if not self._claim.checkpoint:
-            return None, []
+            named = self._claim.object
+            return None, [f"the checkpoint {named} is not used: cluster.checkpoints is not set"] if named else []
         try:
             return self._decode(self._claim.checkpoint), []
         except CheckpointError as error:

@@ -13,7 +13,7 @@ class Lease:
     checkpoint; empty when there is none. renewals: count of the current owner. is_moving: the next standby may take
     over at once; moving_to: only one on this node, if it is not empty. was_moved: the owner became it that way.
     takes_any: the next owner may have other sites or another layout. lease_s: of the owner. age_s: since the last
-    renewal, by the clock of the database; for people.
+    renewal, by the clock of the database; for people. version: that the owner runs.
     """
 
     bucket: str
@@ -29,6 +29,15 @@ class Lease:
     takes_any: bool = False
     lease_s: float = 0.0
     age_s: float = 0.0
+    version: str = ""
+
+
+HELD = 2.0  # times its length: an older lease has run out
+
+
+def is_held(lease: Lease) -> bool:
+    """Return whether somebody owns the bucket and renews its lease, by the clock of the database."""
+    return lease.owner != "" and lease.age_s < HELD * lease.lease_s
 
 
 def node_of(owner: str) -> str:

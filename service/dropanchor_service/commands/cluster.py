@@ -7,15 +7,18 @@ from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import Connection, DatabaseError, connect, make_tables, sentence_of
 from dropanchor_service.cluster.leases import BucketStatus
 from dropanchor_service.cluster.watch import node_of
-from dropanchor_service.commands import cluster_start
+from dropanchor_service.commands import cluster_start, cluster_upgrade
+from dropanchor_service.commands.cluster_move import moved
 from dropanchor_service.commands.cluster_options import add_database_options, refuse, url_of
 from dropanchor_service.commands.cluster_status import status_text
+from dropanchor_service.commands.cluster_upgrade import upgrade
 from dropanchor_service.settings.sources import SettingsError
 
 DESCRIPTION = """\
 Runs sites on several machines: `start` makes this machine a node, `stop` ends that, `drain` moves all buckets off a
 node. `status` shows which process owns which bucket, and who stands by; `move` lets another take a bucket over while
-all runs; `accept` lets the next owner have other settings of sites or another version.
+all runs; `upgrade` lets all shards run a new version, one by one; `accept` lets the next owner have other settings of
+sites or another version.
 """
 EPILOG = """\
 examples:
@@ -24,6 +27,7 @@ examples:
   dropanchor cluster status --config yards.toml
   dropanchor cluster move 017 --to machine-2 --config yards.toml
   dropanchor cluster drain machine-1 --config yards.toml              before you service it
+  dropanchor cluster upgrade --config yards.toml                      after a new version was installed everywhere
   dropanchor cluster accept 017 018 --config yards.toml               after the settings of the sites changed
 """
 MOVE_S = 15.0
@@ -43,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     move.add_argument("--to", default="", metavar="NODE", help="the node that takes it over (default: any)")
     accept = actions.add_parser("accept", help="let the next owner have other settings of sites, or another version")
     accept.add_argument("buckets", nargs="+", metavar="BUCKET")
-    for action in (status, drain, move, accept):
+    upgrade = actions.add_parser("upgrade", help="let all shards run the version that was installed, one by one")
+    cluster_upgrade.add_arguments(upgrade)
+    for action in (status, drain, move, accept, upgrade):
         add_database_options(action)
         action.set_defaults(act=_with_database)
 
@@ -61,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _with_database(arguments: argparse.Namespace) -> int:
-    actions = {"status": _status, "drain": _drain, "move": _move, "accept": _accept}
+    actions = {"status": _status, "drain": _drain, "move": _move, "accept": _accept, "upgrade": upgrade}
     with connect(url_of(arguments), "cluster") as connection:
         make_tables(connection)
         return actions[arguments.action](arguments, connection)
@@ -97,16 +103,11 @@ def _move(arguments: argparse.Namespace, connection: Connection) -> int:
     if not able and not (standbys and found.lease.takes_any):
         said = "; ".join(f"{name} (cannot take over: {why_not})" for name, why_not in standbys.items())
         return refuse(f"no standby{f' on {to}' if to else ''} of {bucket} can take over: {said or 'there is none'}")
-    leases.set_moving(connection, bucket, True, to)
-    end_s = time.monotonic() + MOVE_S
-    while time.monotonic() < end_s:
-        lease = leases.read(connection, bucket)
-        if lease is not None and lease.epoch > found.lease.epoch:
-            print(f"{bucket} is owned by {lease.owner} now, epoch {lease.epoch}")
-            return 0
-        time.sleep(POLL_S)
-    leases.set_moving(connection, bucket, False)
-    return refuse(f"no standby took {bucket} over within {MOVE_S:.0f} s; `dropanchor cluster status` says why")
+    lease = moved(connection, found.lease, to, MOVE_S)
+    if lease is None:
+        return refuse(f"no standby took {bucket} over within {MOVE_S:.0f} s; `dropanchor cluster status` says why")
+    print(f"{bucket} is owned by {lease.owner} now, epoch {lease.epoch}")
+    return 0
 
 
 def _standbys_on(node: str, connection: Connection, found: BucketStatus) -> dict[str, str]:

@@ -12,7 +12,7 @@ from typing import Any
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.commands.cluster_options import refuse
 from dropanchor_service.commands.options import add_log_option, positive
-from dropanchor_service.ownership.in_cluster import digest_of_sites, refuse_unfit
+from dropanchor_service.ownership.in_cluster import checkpoint_folder_of, digest_of_sites, refuse_unfit
 from dropanchor_service.runtime import logs
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
@@ -112,6 +112,7 @@ def _settings_of(arguments: argparse.Namespace) -> Settings:
     if settings.cluster.url is None:
         raise SettingsError("cluster.url: set the PostgreSQL database of the cluster")
     refuse_unfit(settings)
+    checkpoint_folder_of(settings)
     return settings
 
 

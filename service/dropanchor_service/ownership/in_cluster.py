@@ -6,22 +6,25 @@ import socket
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import zenoh
 from pydantic import ValidationError
 from starlette.types import ASGIApp
 
 from dropanchor_service.api.http.of_cluster import FromNodes, NamesOwner
+from dropanchor_service.checkpoints.format import CheckpointError
 from dropanchor_service.checkpoints.snapshot import ServiceState
 from dropanchor_service.cluster import leases, sentences
 from dropanchor_service.cluster.boot_clock import boot_s
+from dropanchor_service.cluster.checkpoint_objects import CheckpointObjects
 from dropanchor_service.cluster.database import Connection, DatabaseError, connect
 from dropanchor_service.cluster.leases import Claimant, Claimed
 from dropanchor_service.cluster.owner import Renewal
 from dropanchor_service.cluster.shared_state import CheckpointRow, save_document
 from dropanchor_service.cluster.standby import Standby
 from dropanchor_service.cluster.tenure import Standing, Tenure
+from dropanchor_service.cluster.versions import installed
 from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.ownership.address import address_of
@@ -32,6 +35,9 @@ from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.store import Sites
 from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.owner_token import ZenohOwner
+
+if TYPE_CHECKING:
+    from dropanchor_service.checkpoints.objects import ObjectFolder
 
 OF_THE_SITES = {
     *("engine", "site", "sites", "tags", "tag_defaults", "unknown_tags", "unproven_tags", "max_tags", "paper"),
@@ -54,6 +60,7 @@ class ClusterOwnership(Ownership):
     ) -> None:
         super().__init__(settings)
         refuse_unfit(settings)
+        self._objects = checkpoint_folder_of(settings)
         cluster = settings.cluster
         assert cluster.url is not None
         assert cluster.bucket is not None
@@ -63,31 +70,34 @@ class ClusterOwnership(Ownership):
         self._on_look = on_look
         self._node_secret = node_secret_of(cluster.node_secret)
         self._connect: Callable[[], Connection] = partial(connect, cluster.url, name)
-        self._who = Claimant(name, cluster.address or "", digest_of_sites(settings), cluster.lease_s)
+        self._who = Claimant(name, cluster.address or "", digest_of_sites(settings), cluster.lease_s, installed())
         self._claimed = claimed
         self._settings = settings
         self._standby: Standby | None = None
         self._tenure: Tenure | None = None
         self._token: ZenohOwner | None = None
-        self._row: CheckpointRow | None = None
+        self._kept: CheckpointRow | CheckpointObjects | None = None
         metrics.register(self.gauges)
 
     @property
     def gauges(self) -> ClusterGauges:
         return ClusterGauges(self._bucket, self._state)
 
-    def checkpoints(self, state: ServiceState) -> CheckpointRow:
-        self._row = CheckpointRow(self._connect, self._bucket, state.layout, state.decoded)
-        return self._row
+    def checkpoints(self, state: ServiceState) -> CheckpointRow | CheckpointObjects:
+        if self._objects is None:
+            self._kept = CheckpointRow(self._connect, self._bucket, state.layout, state.decoded)
+        else:
+            self._kept = CheckpointObjects(self._connect, self._bucket, self._objects, state.layout, state.decoded)
+        return self._kept
 
     def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
-        assert self._row is not None
-        claim, asked_s = self._claimed or self._waited(page, self._row.layout)
+        assert self._kept is not None
+        claim, asked_s = self._claimed or self._waited(page, self._kept.layout)
         if self._claimed is not None:
             self._show_address(claim.epoch, page)
         self._tenure = Tenure(claim.epoch, self._who.lease_s, boot_s, hears_others, asked_s)
         self._renewal = Renewal(self._connect, self._bucket, self._who.lease_s, self._tenure)
-        self._row.own(claim)
+        self._kept.own(claim)
         for site in self._sites:
             site.store.epoch = claim.epoch
         for document, kept in shared.items():
@@ -113,8 +123,8 @@ class ClusterOwnership(Ownership):
 
     def __exit__(self, *_: object) -> None:
         self._renewal.__exit__(None, None, None)
-        if self._row is not None:
-            self._row.close()
+        if self._kept is not None:
+            self._kept.close()
 
     @property
     def sentence(self) -> str:
@@ -162,6 +172,22 @@ class ClusterOwnership(Ownership):
 def digest_of_sites(settings: Settings) -> str:
     """Return a digest of the settings that all owners of a bucket must share."""
     return hashlib.blake2b(settings.model_dump_json(include=OF_THE_SITES).encode(), digest_size=8).hexdigest()
+
+
+def checkpoint_folder_of(settings: Settings) -> "ObjectFolder | None":
+    """Return the folder of the checkpoints, None if the database holds them. Raises SettingsError."""
+    url = settings.cluster.checkpoints
+    if url is None:
+        return None
+    try:
+        from dropanchor_service.checkpoints.objects import ObjectFolder
+
+        return ObjectFolder(url)
+    except ImportError as error:
+        sentence = "cluster.checkpoints needs the extra `s3`: pip install 'dropanchor-service[s3]'"
+        raise SettingsError(sentence) from error
+    except CheckpointError as error:
+        raise SettingsError(f"cluster.checkpoints: {error}") from error
 
 
 def refuse_unfit(settings: Settings) -> None:

@@ -36,6 +36,12 @@ class ClusterSettings(BaseModel):
     address: Annotated[str, Field(pattern=r"^https?://[^\s#]+$")] | None = Field(
         default=None, description="Where clients reach this process. A standby tells them the address of the owner."
     )
+    checkpoints: Annotated[str, Field(pattern=r"^[a-z0-9]+://[^@\s]+$")] | None = Field(
+        default=None,
+        description="Folder for the checkpoints that all processes reach, such as `s3://bucket/dropanchor` or "
+        "`file:///mnt/share/dropanchor`. It needs the extra `s3`, also for `file`. Address and credentials of a store "
+        "are those of its own settings, such as `AWS_ENDPOINT_URL`. Not set: the database holds them.",
+    )
     node_secret: Path | None = Field(
         default=None,
         description="File with a secret that the nodes of `dropanchor api` show to the services. Only whoever shows it "
@@ -47,6 +53,7 @@ class ClusterSettings(BaseModel):
 
     @model_validator(mode="after")
     def _a_bucket_needs_a_url(self) -> "ClusterSettings":
-        if self.url is None and self.bucket is not None:
-            raise ValueError("`bucket` is of a cluster: set `url`, too")
+        for name in ("bucket", "checkpoints"):
+            if self.url is None and getattr(self, name) is not None:
+                raise ValueError(f"`{name}` is of a cluster: set `url`, too")
         return self

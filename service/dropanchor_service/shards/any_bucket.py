@@ -10,6 +10,7 @@ from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import Connection, DatabaseError, make_tables, sentence_of
 from dropanchor_service.cluster.leases import ANY, Claimant, Claimed
+from dropanchor_service.cluster.versions import installed
 from dropanchor_service.cluster.watch import Lease, Watch, node_of, obstacle
 
 LOOK_S = 0.1
@@ -27,18 +28,22 @@ class Owned(NamedTuple):
     claimed: Claimed
 
 
+class AskedToEndError(Exception):
+    """Somebody has asked this shard to end, so that it starts again with the version that is installed."""
+
+
 class AnyStandby:
     """Looks at the leases of all buckets until it can claim one.
 
-    connect: raises DatabaseError. claimants: what to claim each bucket with; they all have the same name. layout: of
-    the checkpoints that this version reads.
+    connect: raises DatabaseError. claimants: what to claim each bucket with; they all have the same name and version.
+    layout: of the checkpoints that this version reads.
     """
 
     def __init__(self, connect: Callable[[], Connection], claimants: Mapping[str, Claimant], layout: str) -> None:
         self._connect = connect
         self._claimants = claimants
         self._layout = layout
-        self._name = next(iter(claimants.values())).name
+        self._name, self._version = next((who.name, who.version) for who in claimants.values())
         self._look_s = max(LOOK_S, len(claimants) / BUCKETS_PER_LOOK_S)
         self._order = sorted(claimants, key=self._preference)
         self._watches = {bucket: Watch(who.lease_s, who.name) for bucket, who in claimants.items()}
@@ -46,7 +51,7 @@ class AnyStandby:
         self._noted_s = 0.0
 
     def wait(self) -> Owned:
-        """Return the bucket that was claimed."""
+        """Return the bucket that was claimed. Raises AskedToEndError."""
         said = ""
         while True:
             try:
@@ -82,7 +87,9 @@ class AnyStandby:
         self._drained = nodes.is_drained(connection, node_of(self._name))
         found = [f"{bucket}: {why_not}" for bucket, why_not in sorted(whys.items()) if why_not is not None]
         why = "its node is drained" if self._drained else found[0] if found else None
-        leases.note_standby(connection, ANY, self._name, why)
+        leases.note_standby(connection, ANY, self._name, why, self._version, installed())
+        if nodes.has_to_end(connection, self._name):
+            raise AskedToEndError
 
     def _obstacle(self, lease: Lease) -> str | None:
         return obstacle(lease, self._claimants[lease.bucket].sites, self._layout)

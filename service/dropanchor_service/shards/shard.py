@@ -4,7 +4,6 @@ import gc
 import logging
 import os
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -26,26 +25,28 @@ from dropanchor_service.settings.buckets import buckets_in
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.served import settings_of_bucket
 from dropanchor_service.settings.sources import load_settings
-from dropanchor_service.shards.any_bucket import AnyStandby, Owned
+from dropanchor_service.shards.any_bucket import AnyStandby, AskedToEndError, Owned
+from dropanchor_service.shards.starting import BACK_OFF_S, EXIT_GONE, Starting
 from dropanchor_service.store import LatestPoses, Sites, SiteStore
 
-EXIT_GONE = 75
 LEAVE_S = 5.0  # that a process has to close what it has open
-BACK_OFF_S = 10.0  # before a process that failed ends: it is restarted at once
 CHECK_S = 0.25
 STUCK_S = 30.0  # without progress
 
 _log = logging.getLogger(__name__)
 
 
-def run_shard(name: str, config: Path, started: Callable[[], None]) -> None:
-    """Stand by, serve, and end the process. Nothing else may run in it. started: called before it stands by."""
+def run_shard(name: str, config: Path, starting: Starting) -> None:
+    """Stand by, serve, and end the process. Nothing else may run in it. starting: ends before it stands by."""
     try:
         settings = load_settings(config)
-        standby = _standby(settings, name)
-        started()
+        standby = _standby(settings, name, starting.version)
+        starting.end()
         _serve(settings, standby.wait(), name)
-    except Exception:
+    except AskedToEndError:
+        _log.info("%s ends, to start again with the version that is installed", name)
+    except Exception as error:
+        starting.failed(error)
         _log.exception("the shard %s has failed, and starts again in %.0f s", name, BACK_OFF_S)
         time.sleep(BACK_OFF_S)
     os._exit(EXIT_GONE)
@@ -56,21 +57,21 @@ def buckets_of(settings: Settings) -> list[str]:
     return buckets_in(settings.site_ids) or [settings.cluster.bucket or ""]
 
 
-def claimants_of(settings: Settings, name: str) -> dict[str, Claimant]:
-    """Return what a shard claims each bucket with."""
+def claimants_of(settings: Settings, name: str, version: str) -> dict[str, Claimant]:
+    """Return what a shard claims each bucket with. version: that it runs."""
     cluster = settings.cluster
     digests = {bucket: digest_of_sites(settings_of_bucket(settings, bucket)) for bucket in buckets_of(settings)}
-    return {bucket: Claimant(name, "", digest, cluster.lease_s) for bucket, digest in digests.items()}
+    return {bucket: Claimant(name, "", digest, cluster.lease_s, version) for bucket, digest in digests.items()}
 
 
-def _standby(settings: Settings, name: str) -> AnyStandby:
+def _standby(settings: Settings, name: str, version: str) -> AnyStandby:
     assert settings.cluster.url is not None
     engine = compiled_engine(settings, CompilationProgress())
     sites = Sites([(SiteStore(settings.site, {}), settings.quota)])
     layout = ServiceState(sites, LatestPoses(), GuardedEngine(engine, sites, Metrics()), Publishers()).layout
     gc.collect()
     gc.freeze()
-    claimants = claimants_of(settings, name)
+    claimants = claimants_of(settings, name, version)
     _log.info("%s stands by for any of %d buckets", name, len(claimants))
     return AnyStandby(partial(connect, settings.cluster.url, name), claimants, layout)
 

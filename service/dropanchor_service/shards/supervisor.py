@@ -8,14 +8,13 @@ from typing import Protocol
 from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import Connection, DatabaseError, make_tables, sentence_of
 from dropanchor_service.cluster.leases import HEAD
-from dropanchor_service.cluster.watch import Lease
+from dropanchor_service.cluster.watch import Lease, is_held
 from dropanchor_service.shards.placement import Hung, Move, Node, Placement, missing_shards
 
 HUNG_S = 20.0  # since it was heard
 START_S = 60.0  # much more than a process needs until it says that it starts
 MOVE_S = 10.0  # for a standby to take a bucket over
 REST_S = 1.0  # between two moves
-FRESH = 2.0  # times its length: an older lease has run out
 
 _log = logging.getLogger(__name__)
 
@@ -88,11 +87,11 @@ class Supervisor:
         self._drained = {row.name for row in nodes.read(connection) if row.is_drained}
         owned = {name: lease for name, lease in leases.read_all(connection).items() if lease.owner}
         standbys = nodes.standbys(connection)
-        fresh = {lease.owner for lease in owned.values() if _is_fresh(lease)}
+        fresh = {lease.owner for lease in owned.values() if is_held(lease)}
         self._kill_hung(running, {*fresh, *standbys}, now_s)
         placement = Placement(
             nodes=[replace(node, is_drained=node.name in self._drained) for node in alive],
-            owners={name: lease.owner for name, lease in owned.items() if _is_fresh(lease)},
+            owners={name: lease.owner for name, lease in owned.items() if is_held(lease)},
             standbys=[name for name, why_not in standbys.items() if not why_not],
         )
         self._move_one(connection, placement, owned, now_s)
@@ -138,7 +137,3 @@ class Supervisor:
             _log.warning("%s", sentence)
         elif not sentence:
             self._said = {each for each in self._said if not each.startswith(kind)}
-
-
-def _is_fresh(lease: Lease) -> bool:
-    return lease.age_s < FRESH * lease.lease_s

@@ -1,12 +1,15 @@
 """A standby of any bucket takes the first whose lease is free, and none while its node is drained."""
 
 from functools import partial
+from importlib.metadata import version
+from pathlib import Path
 from threading import Thread
 
 from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import connect
 from dropanchor_service.cluster.leases import Claimant
-from dropanchor_service.shards.any_bucket import AnyStandby, Owned
+from dropanchor_service.shards.any_bucket import AnyStandby, AskedToEndError, Owned
+from dropanchor_service.shards.starting import Starting
 from support.postgresql import needs_postgresql
 from support.zenoh_router import wait_until
 
@@ -74,3 +77,44 @@ def test_a_process_that_starts_on_a_drained_node_does_not_take_a_free_bucket(url
         assert found == []
         nodes.set_drained(connection, "a", False)
         wait_until(lambda: found)
+
+
+@needs_postgresql
+def test_a_shard_that_was_asked_to_end_does_so_once_and_no_longer_stands_by(url: str) -> None:
+    ended: list[str] = []
+
+    def wait() -> None:
+        try:
+            standby(url, "a/1", ("001",), "others").wait()
+        except AskedToEndError:
+            ended.append("a/1")
+
+    with connect(url, "test") as connection:
+        seen = leases.seen_or_new(connection, "001")
+        assert leases.claim(connection, seen, Claimant("gone/1", "", "sites", LEASE_S))
+        for _ in range(2):  # it starts again
+            Thread(target=wait, daemon=True).start()
+            wait_until(lambda: [shard.name for shard in nodes.waiting(connection)] == ["a/1"])
+            assert ended == []
+            nodes.ask_to_end(connection, "a/1")
+            wait_until(lambda: ended == ["a/1"])
+            assert nodes.waiting(connection) == []
+            ended.clear()
+
+
+@needs_postgresql
+def test_a_shard_that_cannot_start_says_why_in_its_row(url: str, tmp_path: Path) -> None:
+    config = tmp_path / "yards.toml"
+    config.write_text(f'cluster.url = "{url}"\ncluster.bucket = "001"\n')
+    with connect(url, "test") as connection:
+
+        def said() -> list[str]:
+            return [shard.obstacle for shard in nodes.waiting(connection)]
+
+        starting = Starting("a/1", config)
+        starting.begin()
+        wait_until(lambda: said() == ["it is starting"])
+        starting.failed(ImportError("No module\nnamed 'new'"))
+        wait_until(lambda: said() == ["it has failed: No module named 'new'"])
+        assert nodes.waiting(connection)[0].version == version("dropanchor-service")
+        starting.end()
