@@ -64,9 +64,9 @@ def shard(endpoint: str) -> Iterator[Candidate]:
         database = stack.enter_context(running_postgresql())
         cluster = stack.enter_context(running_cluster(database, endpoint, settings_of_tags()))
         stack.push(lambda *error: print(cluster.log()) if any(error) else None)
-        cluster.start("head", 2, "--head")
+        cluster.start("head", 12, "--head")
         wait_until(cluster.has_head, 60.0)
-        cluster.start("a", 3, "--join", "--shards", "1")
+        cluster.start("a", 13, "--join", "--shards", "1")
         wait_until(lambda: BUCKET in cluster.owners() and cluster.address(BUCKET), 120.0)
         name = cluster.owners()[BUCKET]
         wait_until(lambda: f"{name} serves {BUCKET} " in cluster.log(), 60.0)
