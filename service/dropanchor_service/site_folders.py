@@ -8,7 +8,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
-from dropanchor_service.persistence import Persistence, open_basemap, open_database, settings_of
+from dropanchor_service.persistence import Persistence, open_basemap, open_database, retention_of, settings_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
 
@@ -28,6 +28,8 @@ class SiteFolders:
         self.all = [
             Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns, database) for site in sites
         ]
+        self._has_history = any(one.tracks is not None for one in self.all)
+        self._decimation = retention_of(settings.history).decimation()
         self.basemap = open_basemap(settings, [site.store for site in sites])
         if tracks := [one.tracks for one in self.all if one.tracks is not None]:
             metrics.register(HistoryMetrics(*tracks))
@@ -62,7 +64,6 @@ class SiteFolders:
         to_sites = [one.observers for one in self.all]
         if len(to_sites) == 1:
             return to_sites[0]
-        has_history = any(one.tracks is not None for one in self.all)
 
         def on_messages(messages: Sequence[tuple[int, bytes, str, int]]) -> None:
             if not self._records():
@@ -74,11 +75,22 @@ class SiteFolders:
                 to_sites[site].messages(of_site)
 
         def on_poses(poses: Array) -> None:
-            if has_history or self._records():
+            self._keep(poses)
+            if self._records():
                 for site, of_site in self._sites.rows.by_site(poses):
-                    to_sites[site].poses(of_site)
+                    if (recorder := self.all[site].recorder) is not None:
+                        recorder.record_poses(of_site)
 
         return Observers(on_messages, on_poses)
+
+    def _keep(self, poses: Array) -> None:
+        """Pass poses to the histories. They are decimated together: that costs as much for one site as for many."""
+        if not self._has_history:
+            return
+        kept = self._decimation.select(poses)
+        for site, of_site in self._sites.rows.by_site(kept) if len(kept) else ():
+            if (tracks := self.all[site].tracks) is not None:
+                tracks.keep(of_site)
 
     def _records(self) -> bool:
         return any(one.recorder is not None and one.recorder.running is not None for one in self.all)

@@ -1,6 +1,8 @@
 """A program that measures what Zenoh alone costs.
 
 It takes every message of the fleet out of a channel, as the service does, copies key and payload, and drops them.
+
+Arguments: endpoint of a router, or "own" and the endpoint where this program is a router, as a service can be.
 """
 
 import sys
@@ -10,23 +12,23 @@ from typing import Any
 
 import zenoh
 
-from dropanchor_schemas.keys import all_tags
+from dropanchor_schemas.keys import all_sites
+from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.zenoh_io.channel import drain
 from dropanchor_service.zenoh_io.intake import CHANNEL_LENGTH, GATHER_S
+from dropanchor_service.zenoh_io.session import open_session
 from support.zenoh_router import connected_session
 
 
-def main(endpoint: str) -> None:
+def main(endpoint: str, own: bool) -> None:
     count = [0]
 
     def take_all(channel: Any) -> None:
         for sample in drain(channel, GATHER_S):
             count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
-    with connected_session(endpoint) as session:
-        subscriber = session.declare_subscriber(
-            all_tags("default", "samples"), zenoh.handlers.FifoChannel(CHANNEL_LENGTH)
-        )
+    with open_session(ZenohSettings(listen=(endpoint,))) if own else connected_session(endpoint) as session:
+        subscriber = session.declare_subscriber(all_sites("samples"), zenoh.handlers.FifoChannel(CHANNEL_LENGTH))
         thread = threading.Thread(target=take_all, args=(subscriber.handler,))
         thread.start()
         print("ready", flush=True)
@@ -37,4 +39,4 @@ def main(endpoint: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(sys.argv[-1], own=sys.argv[1] == "own")

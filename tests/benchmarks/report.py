@@ -6,7 +6,7 @@ from benchmarks.step import Figures
 from dropanchor_service.evaluation.results import PAGES, ROOT, Measured, write
 
 _PAGE = PAGES / "performance.md"
-_PAGE_OF = dict.fromkeys(("cluster", "hosts"), PAGES / "cluster.md")
+_PAGE_OF = dict.fromkeys(("cluster", "hosts", "shard"), PAGES / "cluster.md")
 """Tables that have a page of their own."""
 _WHOLE = ("estimation/fleet", "ingest", "zenoh_io")
 _CLUSTER = ("cluster", "shards", "ownership")
@@ -24,6 +24,7 @@ SOURCES = {
     "pose-json": ("answers",),
     "rest": ("answers", "api"),
     "sessions": _WHOLE,
+    "shard": (*_WHOLE, "cluster", "shards", "ownership", "checkpoints"),
     "small": (*_WHOLE, "runtime", "events", "delivery"),
     "sites": ("estimation/fleet", "ingest", "store"),
     "zones": ("zones",),

@@ -62,8 +62,8 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         assert f"the node b has {OLD}: install {NEW} there" in refused
         cluster.install("b", NEW)
         cluster.stop("head")
-        cluster.start("head", 2, "--head")
         wait_until(lambda: not cluster.head_sees_nodes())
+        cluster.start("head", 2, "--head")
         wait_until(lambda: head_is_back(cluster), START_S)
 
         upgraded_s = time.monotonic()

@@ -135,11 +135,15 @@ class Cluster:
         wait_until(lambda: not any(map(_runs, shards)), 60.0)
 
     def signal_shard(self, shard: str, bucket: str, how: signal.Signals) -> None:
-        """Send a signal to the process of a shard that serves a bucket: the name of its log ends with its number."""
+        """Send a signal to the process of a shard that serves a bucket."""
+        os.kill(self.process_of(shard, bucket), how)
+
+    def process_of(self, shard: str, bucket: str) -> int:
+        """Return the process of a shard that serves a bucket: the name of its log ends with its number."""
         logs = (self.folder / shard.partition("/")[0]).glob("ray/session_latest/logs/worker-*.err")
         serving = [log for log in logs if f"{shard} serves {bucket} " in log.read_text()]
         newest = max(serving, key=lambda log: log.stat().st_mtime)
-        os.kill(int(newest.stem.rpartition("-")[2]), how)
+        return int(newest.stem.rpartition("-")[2])
 
     def wait(self, name: str) -> int:
         """Wait until the process of a node ends, and return its exit code."""

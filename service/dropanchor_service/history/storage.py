@@ -6,6 +6,7 @@ from typing import Protocol
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.reader import TrackReader
+from dropanchor_service.store.decimation import Decimation
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,10 @@ class Retention:
     still_ns: int
     keep_ns: int
     max_bytes: int
+
+    def decimation(self) -> Decimation:
+        """Return what selects these poses, before the first one."""
+        return Decimation(self.period_ns, self.distance_m, self.still_ns)
 
 
 @dataclass

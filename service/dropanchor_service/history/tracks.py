@@ -10,7 +10,6 @@ from dropanchor_service.history.overview import Overview
 from dropanchor_service.history.records import StoredPoses
 from dropanchor_service.history.storage import Retention, Storage, Usage
 from dropanchor_service.runtime.background_writer import BackgroundWriter
-from dropanchor_service.store.decimation import Decimation
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 
@@ -28,7 +27,7 @@ class Tracks:
         self._storage = storage
         self._tags = tags
         self._site = site
-        self._decimation = Decimation(retention.period_ns, retention.distance_m, retention.still_ns)
+        self._decimation = retention.decimation()
         self.writer: BackgroundWriter[Array] = BackgroundWriter("history", self._write, WRITE_S, MAX_QUEUED_BYTES)
         self.written = 0
 
@@ -43,7 +42,10 @@ class Tracks:
 
     def offer(self, poses: Array) -> None:
         """Queue the poses worth keeping. poses: POSE, in order of time per row. Never blocks."""
-        kept = self._decimation.select(poses)
+        self.keep(self._decimation.select(poses))
+
+    def keep(self, kept: Array) -> None:
+        """Queue POSE that are decimated already. Never blocks."""
         if len(kept):
             self.writer.put(kept, kept.nbytes, len(kept))
 

@@ -6,6 +6,7 @@ the form is checked here, not the values.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,8 @@ def read_samples(read: Forms, chosen: Array) -> Decoded:
     imu, scalars = np.empty(counts[0], IMU_SAMPLE), np.empty(counts[1:].sum(), SCALAR)
     ends = np.cumsum(counts[1:])
     packed.read_samples(words, floats, read.forms, chosen, imu, scalars, ends - counts[1:])
-    decoded = Decoded(imu, *np.split(scalars, ends[:-1]), forms=read.forms, rejected=read.rejected)
+    columns = [scalars[begin:end] for begin, end in pairwise([0, *ends.tolist()])]
+    decoded = Decoded(imu, *columns, forms=read.forms, rejected=read.rejected)
     return _with_json(decoded, read.frames, chosen) if read.frames else decoded
 
 

@@ -150,9 +150,10 @@ class GuardedEngine:
             yield batch
 
     def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
-        rows = [column["row"] for column in samples.columns()]
-        self._reserve(max(int(column.max(initial=-1)) for column in rows) + 1)
-        return sorted({row for column in rows for row in column[~self._has_configured[column]].tolist()})
+        rows = [column["row"] for column in samples.columns() if len(column)]
+        self._reserve(max((int(column.max()) for column in rows), default=-1) + 1)
+        unknown = [column for column in rows if not self._has_configured[column].all()]
+        return sorted({row for column in unknown for row in column[~self._has_configured[column]].tolist()})
 
     def _reserve(self, rows: int) -> None:
         missing = rows - len(self._has_configured)

@@ -35,7 +35,8 @@ class Rejections:
 
     def count_unregistered(self, reason: Reason, messages: int) -> None:
         """Count rejected messages of tags without a row."""
-        self._metrics.rejected.labels(reason).inc(messages)
+        if messages:
+            self._metrics.rejected.labels(reason).inc(messages)
 
     def count_given_up(self, messages: int) -> None:
         """Count missing messages that the service no longer waits for."""

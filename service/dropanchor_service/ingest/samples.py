@@ -137,9 +137,11 @@ class SampleReader:
 
     def _note_unknown_anchors(self, decoded: Decoded, of_row: Array, arrived: Array) -> None:
         """Record ranges to anchors that their sites do not have. A site without anchors gets the first one."""
-        unknown = decoded.ranges[self._indices(decoded.ranges, of_row) < 0]
+        unknown = self._of_unknown_anchors(decoded.ranges, of_row)
+        if not len(unknown):
+            return
         if self._bind_first_anchors(unknown, decoded.anchor_names, of_row):
-            unknown = unknown[self._indices(unknown, of_row) < 0]
+            unknown = self._of_unknown_anchors(unknown, of_row)
         messages, first = np.unique(unknown["message"], return_index=True)
         for message, number in zip(messages.tolist(), unknown["anchor"][first].tolist(), strict=True):
             name, tag = decoded.anchor_names.get(number, str(number)), self._rows.at(int(of_row[message]))
@@ -157,6 +159,11 @@ class SampleReader:
         if any(bound):
             self._engine.follow_sites()
         return any(bound)
+
+    def _of_unknown_anchors(self, samples: Array, of_row: Array) -> Array:
+        unknown = self._indices(samples, of_row) < 0
+        found: Array = samples[unknown] if unknown.any() else samples[:0]
+        return found
 
     def _indices(self, samples: Array, of_row: Array) -> Array:
         """Return the engine's index of the anchor of each sample, -1 if the site of its tag lacks it."""

@@ -59,10 +59,11 @@ class IngestThread(Worker):
     def _run(self) -> None:
         self._turn()  # admits the listed tags before the first message
         while not self._stop.is_set():
-            if self._buffer.wait(self._longest_wait_s()) and self._buffer.depth < BACKLOG:
-                self._heard_s = time.monotonic()
-                # Gather messages, so that one call fuses many of them.
+            if self._buffer.depth < BACKLOG:
+                # Gather messages, so that one call fuses many of them. What arrives meanwhile wakes nobody.
                 self._stop.wait(self._turned_s + self._period_s - time.monotonic())
+            if self._buffer.wait(self._longest_wait_s()):
+                self._heard_s = time.monotonic()
             self._turn()
         self._turn()  # fuses what arrived before the stop
 

@@ -4,6 +4,7 @@ import gc
 import sys
 
 from dropanchor_service.runtime import open_files
+from dropanchor_service.runtime.memory import share_arenas
 
 # The garbage collector runs less often: messages are thousands of tuples without reference cycles.
 _GC_THRESHOLD = 10_000, 20, 20
@@ -12,5 +13,6 @@ _SWITCH_INTERVAL_S = 0.0005  # threads yield the interpreter soon, so that queri
 
 def prepare_to_serve() -> None:
     open_files.raise_limit()
+    share_arenas()
     gc.set_threshold(*_GC_THRESHOLD)
     sys.setswitchinterval(_SWITCH_INTERVAL_S)

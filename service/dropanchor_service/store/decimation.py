@@ -24,9 +24,8 @@ class FirstOfSlot:
         if (poses["row"][1:] < poses["row"][:-1]).any():
             poses = take(poses, np.argsort(poses["row"], kind="stable"))
         rows, slots = poses["row"], poses["t_ns"] // self._slot_ns
-        before = np.append(-1, slots[:-1])
-        begins = np.append(True, rows[1:] != rows[:-1])
-        before[begins] = self._slot[rows[begins]]
+        before = self._slot[rows]
+        np.copyto(before[1:], slots[:-1], where=rows[1:] == rows[:-1])
         self._slot[rows] = slots
         return take(poses, slots != before)
 

@@ -14,6 +14,7 @@ from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.records import enlarged, take
 
+FEW = 256  # entries up to which a dictionary counts faster than NumPy
 KINDS = tuple(kind.name for kind in kinds.KINDS)
 REASONS = tuple(Reason)
 
@@ -190,7 +191,9 @@ class Rows:
 
 def _count(column: Array, rows: Array) -> None:
     """Add one for every entry of `rows`. This is fast when equal entries stand side by side."""
-    if not len(rows):
+    if len(rows) <= FEW:
+        for row, count in Counter(rows.tolist()).items():
+            column[row] += count
         return
     ends = np.append(np.flatnonzero(rows[1:] != rows[:-1]), len(rows) - 1)
     np.add.at(column, rows[ends].astype(np.intp), np.diff(ends, prepend=-1).astype(column.dtype))

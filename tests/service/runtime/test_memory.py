@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dropanchor_service.runtime.memory import PERIOD_S, HeapTrimmer, give_back_files
+from support.commands import python
 
 
 def resident_bytes() -> int:
@@ -28,6 +29,30 @@ def test_free_memory_between_used_blocks_is_returned_once_per_period() -> None:
     assert not heap.trim()
     assert before - resident_bytes() > 50 * 2**20
     assert len(kept) == 100
+
+
+THREADS_ALLOCATE = """
+import ctypes, sys, threading
+from dropanchor_service.runtime.interpreter import prepare_to_serve
+prepare_to_serve()
+libc, all_there = ctypes.CDLL(None), threading.Barrier(13)
+libc.malloc.restype = libc.fdopen.restype = ctypes.c_void_p
+def allocate():
+    libc.malloc(ctypes.c_size_t(1000))
+    all_there.wait()
+for _ in range(12):
+    threading.Thread(target=allocate).start()
+all_there.wait()
+output = ctypes.c_void_p(libc.fdopen(1, b"w"))
+libc.malloc_info(0, output)
+libc.fflush(output)
+"""
+
+
+@pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_info"), reason="this C library has no malloc_info")
+def test_many_threads_share_two_arenas() -> None:
+    run = python("-c", THREADS_ALLOCATE)
+    assert run.stdout.count("<heap nr=") in (1, 2), run.stderr
 
 
 def protect(mapped: mmap.mmap, protection: int) -> None:

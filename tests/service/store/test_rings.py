@@ -1,10 +1,11 @@
 """Ring buffers keep the last records of every row; the pose history decimates poses."""
 
 import numpy as np
+import pytest
 
 from dropanchor_service.estimation.columns import POSE
 from dropanchor_service.store.pose_history import SPACING_NS, PoseHistory
-from dropanchor_service.store.rings import RowRings
+from dropanchor_service.store.rings import FEW, RowRings, rank_in_row
 
 RECORD = np.dtype([("row", "i4"), ("value", "i8")])
 
@@ -38,6 +39,14 @@ def test_with_more_rows_each_row_keeps_fewer_records_and_loses_only_the_oldest()
     rings.write(records((0, 10), (1, 6)))
     assert rings.of(0)["value"].tolist() == [8, 9, 10]
     assert rings.of(1)["value"].tolist() == [5, 6]
+
+
+@pytest.mark.parametrize("count", [0, 1, FEW, 4 * FEW])
+def test_ranks_of_few_entries_and_of_many_follow_one_rule(count: int) -> None:
+    rows = np.random.default_rng(count).integers(0, 9, count)
+    expected = [rows[:index].tolist().count(row) for index, row in enumerate(rows.tolist())]
+    assert rank_in_row(rows).tolist() == expected
+    assert rank_in_row(np.sort(rows)).tolist() == [number for row in range(9) for number in range((rows == row).sum())]
 
 
 def poses(*times_ns: int, row: int = 0) -> np.ndarray:

@@ -26,6 +26,14 @@ def test_repeated_rows_are_counted_each_time() -> None:
     assert tags.at(0).rejected == {"range_negative": 2}
 
 
+def test_a_batch_of_any_size_is_counted() -> None:
+    tags = TagTable()
+    tags.register("a"), tags.register("b")
+    for count in (3, 1000):
+        tags.rows.count_samples("imu", np.repeat([1, 0, 1], count))
+    assert [tags.at(row).samples["imu"] for row in (0, 1)] == [1003, 2006]
+
+
 def test_a_tag_that_never_sent_has_no_times_and_empty_counters() -> None:
     tag = TagTable().register("a")
     assert tag.first_heard_ns is None
