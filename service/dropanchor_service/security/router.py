@@ -5,7 +5,11 @@ from typing import Any
 
 from dropanchor_service.security.access_control import Holder, access_control, low_pass_filter
 
-LINK: dict[str, Any] = {"tx": {"lease": 4000, "keep_alive": 4}, "rx": {"max_message_size": 2**20}}
+BATCH_BYTES = 2**14  # of a network buffer; each connection has several, of 64 KiB by default
+LINK: dict[str, Any] = {
+    "tx": {"lease": 4000, "keep_alive": 4, "batch_size": BATCH_BYTES},
+    "rx": {"max_message_size": 2**20},
+}
 
 QUIET: dict[str, Any] = {
     # Without this, a router waits half a second for scouting even when scouting is off.
