@@ -27,6 +27,7 @@ from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
 from dropanchor_service.ingest.from_http import FromHttp
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
+from dropanchor_service.ingest.period import Period
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
@@ -98,6 +99,7 @@ class Service:
         self._publishers = Publishers()
         tracks = [one.tracks for one in self._serving.folders.all]
         self.answers = answers_of_sites(self.sites, self.latest, self.clock.now_ns, tracks, self._publishers)
+        self._period = Period(settings.ingest.period_ms * 1e-3)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self._register_gauges()
@@ -173,7 +175,7 @@ class Service:
             self._ingest,
             self._buffer,
             self.metrics,
-            self._settings.ingest.period_ms * 1e-3,
+            self._period,
             self._checkpoints.between_turns if self._checkpoints else lambda: None,
             self._ownership.may_serve,
         )
@@ -256,7 +258,7 @@ class Service:
             new_publisher_limit=caches.new_publisher_limit,
         )
         self._from_http.on_live = catch_up.on_live
-        return ZenohIntake(session, self.sites, self._ingest, catch_up, caches, self.metrics, self.clock)
+        return ZenohIntake(session, self.sites, self._ingest, catch_up, caches, self.metrics, self.clock, self._period)
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:
         """Return the thread of the HTTP server. Until the service is ready, it serves the page with the progress."""

@@ -15,16 +15,18 @@ import zenoh
 from dropanchor_schemas.keys import all_sites
 from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.zenoh_io.channel import drain
-from dropanchor_service.zenoh_io.intake import CHANNEL_LENGTH, GATHER_S
+from dropanchor_service.zenoh_io.intake import CHANNEL_LENGTH
 from dropanchor_service.zenoh_io.session import open_session
 from support.zenoh_router import connected_session
+
+GATHER_S = 0.02  # as a service with few tags does
 
 
 def main(endpoint: str, own: bool) -> None:
     count = [0]
 
     def take_all(channel: Any) -> None:
-        for sample in drain(channel, GATHER_S):
+        for sample in drain(channel, lambda: time.sleep(GATHER_S)):
             count[0] += len((str(sample.key_expr), bytes(sample.payload))) // 2
 
     with open_session(ZenohSettings(listen=(endpoint,))) if own else connected_session(endpoint) as session:

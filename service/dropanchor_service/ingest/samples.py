@@ -27,6 +27,7 @@ class SampleReader:
     """Reads the samples of messages, in the order of each publisher. Owned by one thread.
 
     window_ns: time that a message waits for those that its publisher numbered before it.
+    span_ns: between the oldest and the newest sample of a message: the least of the last batch.
     """
 
     def __init__(
@@ -38,6 +39,7 @@ class SampleReader:
         window_ns: int,
     ) -> None:
         self.window_ns = window_ns
+        self.span_ns = 0
         self._publishers = publishers
         self._sites = sites
         self._rows = sites.rows
@@ -109,7 +111,9 @@ class SampleReader:
     ) -> None:
         """Record when the samples of live tags arrived. ranges: those to anchors of the site."""
         oldest, newest = spans
-        live = due[(newest[due] >= 0) & ~decoded.forms["replay"][due].astype(bool)]
+        filled = due[newest[due] >= 0]
+        self.span_ns = int((newest[filled] - oldest[filled]).min(initial=MAX_T_NS))
+        live = filled[~decoded.forms["replay"][filled].astype(bool)]
         counts = np.bincount(ranges["message"], minlength=len(of_row))
         self._rows.arrivals.record(of_row[live], arrived[live], oldest[live], newest[live], counts[live])
 

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 
 from dropanchor_service.ingest.buffer import MessageBuffer
+from dropanchor_service.ingest.period import Period
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
@@ -23,7 +24,7 @@ MIN_MEASURED = 50  # messages of a turn whose duration predicts that of the next
 
 
 class IngestThread(Worker):
-    """Takes a turn every `period_s` while messages arrive, and while `may_turn`.
+    """Takes a turn every `period.current_s` while messages arrive, and while `may_turn`.
 
     between_turns: called after each turn, on the same thread.
     """
@@ -33,7 +34,7 @@ class IngestThread(Worker):
         ingest: Ingest,
         buffer: MessageBuffer,
         metrics: Metrics,
-        period_s: float,
+        period: Period,
         between_turns: Callable[[], None] = lambda: None,
         may_turn: MayServe = always,
     ) -> None:
@@ -42,7 +43,7 @@ class IngestThread(Worker):
         self._ingest = ingest
         self._buffer = buffer
         self._metrics = metrics
-        self._period_s = period_s
+        self._period = period
         self._between_turns = between_turns
         self._may_turn = may_turn
         self._turned_s = self._heard_s = time.monotonic()
@@ -61,7 +62,7 @@ class IngestThread(Worker):
         while not self._stop.is_set():
             if self._buffer.depth < BACKLOG:
                 # Gather messages, so that one call fuses many of them. What arrives meanwhile wakes nobody.
-                self._stop.wait(self._turned_s + self._period_s - time.monotonic())
+                self._stop.wait(self._turned_s + self._period.current_s - time.monotonic())
             if self._buffer.wait(self._longest_wait_s()):
                 self._heard_s = time.monotonic()
             self._turn()
@@ -73,19 +74,20 @@ class IngestThread(Worker):
         return IDLE_S if time.monotonic() - self._heard_s < CALM_S else CALM_IDLE_S
 
     def _turn(self) -> None:
-        self._turned_s = time.monotonic()
+        before_s, self._turned_s = self._turned_s, time.monotonic()
         if not self._may_turn():
             self._stop.wait(IDLE_S)
             return
         try:
             taken = self._ingest.turn(self._limit)
+            self._period.adapt(taken, self._turned_s - before_s, self._ingest.span_s)
             if taken >= MIN_MEASURED:
                 self._adapt(taken / (time.monotonic() - self._turned_s))
             self._between_turns()
         except Exception as error:
             self._metrics.faults.labels("ingest").inc()
             self._log.exception("ingest", error)
-            self._stop.wait(self._period_s)
+            self._stop.wait(self._period.current_s)
 
     def _adapt(self, messages_per_s: float) -> None:
         self._limit = min(max(round(TURN_S * messages_per_s), MIN_MESSAGES), MAX_MESSAGES)

@@ -75,6 +75,11 @@ class Ingest:
         """Return whether messages are pending, so that a turn may be due although nothing arrives."""
         return self._reader.pending > 0
 
+    @property
+    def span_s(self) -> float:
+        """Return the least time that a message with samples spanned, of those that the last turn fused."""
+        return self._reader.span_ns * 1e-9
+
     def turn(self, limit: int = MESSAGES_PER_TURN) -> int:
         """Process up to `limit` messages of registered tags. Return how many."""
         for site in self._engine.follow_sites():

@@ -6,6 +6,7 @@ wait 5 ms for it while another thread computes. Live messages would then queue i
 
 import logging
 import threading
+import time
 from types import TracebackType
 from typing import Any, Self
 
@@ -15,6 +16,7 @@ import zenoh.ext
 from dropanchor_schemas.keys import InvalidKeyError, samples_key
 from dropanchor_schemas.wire import payload_encoding
 from dropanchor_service.ingest.catch_up import CatchUp
+from dropanchor_service.ingest.period import Period
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
@@ -27,7 +29,6 @@ CHANNEL_LENGTH = 2**14  # messages between Zenoh's receive thread and ours
 HEALTH_CHANNEL_LENGTH = 2**12  # reports; a flood of them loses the oldest and delays no samples
 HEALTH_GATHER_S = 0.1
 TOKENS_PER_TAG = 2  # liveliness tokens that a site may have, for each tag that it admits
-GATHER_S = 0.005  # how long to collect messages before processing them together
 
 
 class ZenohIntake:
@@ -42,6 +43,7 @@ class ZenohIntake:
         caches: ZenohCaches,
         metrics: Metrics,
         clock: UtcClock,
+        period: Period,
     ) -> None:
         self._log = RareLog(logging.getLogger(__name__))
         self._session = session
@@ -49,6 +51,8 @@ class ZenohIntake:
         self._ingest = ingest
         self._metrics = metrics
         self._clock = clock
+        self._period = period
+        self._first_ns: int | None = None  # arrival of the first message of a batch
         self._catch_up = catch_up
         self._caches = caches
         self._declared: list[Any] = []
@@ -90,18 +94,23 @@ class ZenohIntake:
 
     def _receive_all(self, samples: Any) -> None:
         """Pass on messages until the subscriber is undeclared."""
-        for message in drain(samples, GATHER_S):
+        for message in drain(samples, self._gather):
             self._receive(message)
 
+    def _gather(self) -> None:
+        self._first_ns = self._clock.now_ns()
+        time.sleep(self._period.gathering_s)
+
     def _receive(self, message: zenoh.Sample) -> None:
-        now_ns, key = self._clock.now_ns(), str(message.key_expr)
+        now_ns, self._first_ns = self._first_ns or self._clock.now_ns(), None
+        key = str(message.key_expr)
         encoding = payload_encoding(str(message.encoding))
         if self._sites.serves(key):
             self._catch_up.on_live(key, bytes(message.payload), encoding, now_ns)
 
     def _receive_health(self, reports: Any) -> None:
         """Pass on health until the subscriber is undeclared."""
-        for report in drain(reports, HEALTH_GATHER_S):
+        for report in drain(reports, lambda: time.sleep(HEALTH_GATHER_S)):
             encoding, key = payload_encoding(str(report.encoding)).partition(";")[0], str(report.key_expr)
             if self._sites.serves(key):
                 self._ingest.health.put(key, bytes(report.payload), encoding, self._clock.now_ns())

@@ -15,6 +15,7 @@ from dropanchor_service.checkpoints import thread as checkpointer
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.thread import CheckpointThread
 from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.ingest.period import Period
 from dropanchor_service.ingest.thread import IngestThread
 from support.ingest import IngestBench, TransparentEngine
 from support.zenoh_router import wait_until
@@ -47,7 +48,7 @@ class CheckpointBench:
         checkpoint_folder = CheckpointFolder(folder / "checkpoints", state.layout, state.decoded)
         self.checkpoints = CheckpointThread(state, checkpoint_folder, self.bench.metrics, period_s=0.01)
         self.thread = IngestThread(
-            self.bench.ingest, self.bench.buffer, self.bench.metrics, 0.001, self.checkpoints.between_turns
+            self.bench.ingest, self.bench.buffer, self.bench.metrics, Period(0.001), self.checkpoints.between_turns
         )
 
     def start(self) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from dropanchor_schemas.wire import Frame, RangeSample
 from dropanchor_service.ingest import thread as ingest_thread
+from dropanchor_service.ingest.period import Period
 from dropanchor_service.ingest.thread import IngestThread
 from support.ingest import IngestBench
 from support.zenoh_router import wait_until
@@ -18,7 +19,7 @@ def frame(value: float) -> Frame:
 
 
 def thread_of(bench: IngestBench) -> IngestThread:
-    return IngestThread(bench.ingest, bench.buffer, bench.metrics, period_s=0.001)
+    return IngestThread(bench.ingest, bench.buffer, bench.metrics, Period(0.001))
 
 
 def test_messages_become_poses() -> None:
@@ -67,7 +68,7 @@ def test_a_thread_that_is_not_running_or_stuck_is_a_problem(monkeypatch: pytest.
 
 def test_no_turn_is_taken_while_the_process_may_not_serve() -> None:
     bench, may_turn = IngestBench(), threading.Event()
-    thread = IngestThread(bench.ingest, bench.buffer, bench.metrics, 0.001, may_turn=may_turn.is_set)
+    thread = IngestThread(bench.ingest, bench.buffer, bench.metrics, Period(0.001), may_turn=may_turn.is_set)
     thread.start()
     bench.put("a", frame(4.0))
     assert not may_turn.wait(0.3)

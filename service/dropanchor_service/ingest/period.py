@@ -1,0 +1,35 @@
+"""How long the ingest gathers messages between two turns.
+
+A turn costs nearly as much with one message as with fifty. While few messages arrive, turns lie further apart, but no
+more than half of the time for which tags gather samples before they send them.
+"""
+
+ENOUGH = 50  # messages of a turn, from which on a longer period saves little
+GROWTH, LONGEST_S = 5.0, 0.1  # limits of the period: so many times the shortest one, and this long
+GATHERING, GATHERING_S = 0.2, 0.02  # share of the period for which arriving messages are gathered, and its limit
+
+
+class Period:
+    """shortest_s: the period while many messages arrive, or messages that hold samples of a short time.
+
+    current_s: the period now.
+    """
+
+    def __init__(self, shortest_s: float) -> None:
+        self._shortest_s = self.current_s = shortest_s
+        self._longest_s = max(shortest_s, min(GROWTH * shortest_s, LONGEST_S))
+
+    def adapt(self, messages: int, elapsed_s: float, span_s: float) -> None:
+        """Follow a turn.
+
+        messages: that it took. elapsed_s: since the turn before. span_s: between the oldest and the newest sample of a
+        message, the least of this turn.
+        """
+        if messages:
+            wanted_s = min(elapsed_s * ENOUGH / messages, 0.5 * span_s, self._longest_s)
+            self.current_s = max(wanted_s, self._shortest_s)
+
+    @property
+    def gathering_s(self) -> float:
+        """How long arriving messages are gathered before they get their arrival times, which are wrong by so much."""
+        return min(GATHERING * self.current_s, GATHERING_S)
