@@ -65,7 +65,12 @@ def may_be_read(layout: str) -> bool:
 
 def described(dtypes: DTypes) -> dict[str, Any]:
     """Return the columns of arrays as values that JSON can hold."""
-    return {name: np.lib.format.dtype_to_descr(dtype) for name, dtype in dtypes.items()}
+    return {name: _described(dtype) for name, dtype in dtypes.items()}
+
+
+@cache
+def _described(dtype: np.dtype[Any]) -> Any:
+    return np.lib.format.dtype_to_descr(dtype)
 
 
 def dtypes_of(description: Mapping[str, Any]) -> DTypes:

@@ -1,5 +1,7 @@
 """Decimate poses: keep one per time slot, and fewer of a tag that stands still."""
 
+from array import array
+
 import numpy as np
 
 from dropanchor_service.estimation.columns import Array
@@ -11,23 +13,21 @@ class FirstOfSlot:
 
     def __init__(self, slot_ns: int) -> None:
         self._slot_ns = slot_ns
-        self._slot = np.zeros(0, np.int64)  # slot of the newest pose of each row
+        self._slots = array("q")  # by row: slot of its newest pose
 
     def select(self, poses: Array) -> Array:
-        """Return the first pose of each row and slot, ordered by row.
+        """Return the first pose of each row and slot.
 
         poses: POSE, not empty, in order of time per row.
         """
-        missing = int(poses["row"].max()) + 1 - len(self._slot)
-        if missing > 0:
-            self._slot = np.concatenate([self._slot, np.full(max(missing, len(self._slot)), -1)])
-        if (poses["row"][1:] < poses["row"][:-1]).any():
-            poses = take(poses, np.argsort(poses["row"], kind="stable"))
-        rows, slots = poses["row"], poses["t_ns"] // self._slot_ns
-        before = self._slot[rows]
-        np.copyto(before[1:], slots[:-1], where=rows[1:] == rows[:-1])
-        self._slot[rows] = slots
-        return take(poses, slots != before)
+        rows, slots = poses["row"].tolist(), (poses["t_ns"] // self._slot_ns).tolist()
+        self._slots.extend([-1] * (max(rows) + 1 - len(self._slots)))
+        firsts = []
+        for index, (row, slot) in enumerate(zip(rows, slots, strict=True)):
+            if self._slots[row] != slot:
+                self._slots[row] = slot
+                firsts.append(index)
+        return take(poses, firsts)
 
 
 class Decimation:

@@ -6,7 +6,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.records import enlarged, put, take
 
 MIN_DEPTH = 2  # records per row, however many rows there are
-FEW = 32  # entries up to which a loop of Python is the faster one
+FEW = 128  # entries up to which a loop of Python is the faster one
 
 
 class RowRings:
@@ -72,10 +72,11 @@ def rank_in_row(rows: Array) -> Array:
 def _rank_of_few(rows: Array) -> Array:
     """Return `rank_in_row` without NumPy's cost of a call, which is most of that of a few entries."""
     found: dict[int, int] = {}
-    ranks = np.empty(len(rows), np.int64)
-    for index, row in enumerate(rows.tolist()):
-        ranks[index] = found[row] = found.get(row, -1) + 1
-    return ranks
+    ranks = []
+    for row in rows.tolist():
+        found[row] = rank = found.get(row, -1) + 1
+        ranks.append(rank)
+    return np.array(ranks, np.int64)
 
 
 def _rank_in_run(rows: Array) -> Array:

@@ -14,7 +14,7 @@ from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.records import enlarged, take
 
-FEW = 256  # entries up to which a dictionary counts faster than NumPy
+FEW = 128  # entries up to which a dictionary counts faster than NumPy
 KINDS = tuple(kind.name for kind in kinds.KINDS)
 REASONS = tuple(Reason)
 
@@ -195,8 +195,10 @@ def _count(column: Array, rows: Array) -> None:
         for row, count in Counter(rows.tolist()).items():
             column[row] += count
         return
-    ends = np.append(np.flatnonzero(rows[1:] != rows[:-1]), len(rows) - 1)
-    np.add.at(column, rows[ends].astype(np.intp), np.diff(ends, prepend=-1).astype(column.dtype))
+    ends = np.concatenate([np.flatnonzero(rows[1:] != rows[:-1]), [len(rows) - 1]])
+    counts = ends + 1
+    counts[1:] -= counts[:-1].copy()
+    np.add.at(column, rows[ends].astype(np.intp), counts.astype(column.dtype))
 
 
 def _named(names: tuple[str, ...], counts: Array) -> Counter[str]:
