@@ -37,27 +37,36 @@ class ZenohPoses(PeriodicPublisher):
         self._tag_version = 0
         self._frame_version = 0
         self._frame_due_s = 0.0
-        sites.latest.on_change(self.wake)
+        self._is_matched = False
+        sites.latest.on_change(self._on_change)
 
     def __enter__(self) -> Self:
         tags, frames = self._keys()
         self._tag_publisher = self._session.declare_publisher(tags)
         self._frame_publisher = self._session.declare_publisher(frames)
         # The first subscriber gets a frame of what there is.
-        self._listener = self._frame_publisher.declare_matching_listener(
-            zenoh.handlers.Callback(self._on_matching, indirect=False)
-        )
+        self._listeners = [
+            publisher.declare_matching_listener(zenoh.handlers.Callback(self._on_matching, indirect=False))
+            for publisher in (self._tag_publisher, self._frame_publisher)
+        ]
         self.wake()
         return super().__enter__()
 
+    def _on_change(self) -> None:
+        if self._is_matched:
+            self.wake()
+
     def _on_matching(self, _: zenoh.MatchingStatus) -> None:
+        if not self._is_matched:
+            self._tag_version, self._is_matched = self._sites.latest.version, True
         self.wake()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         super().__exit__(kind, error, traceback)
-        self._listener.undeclare()
+        for listener in self._listeners:
+            listener.undeclare()
         for publisher in (self._tag_publisher, self._frame_publisher, *self._of_site.values()):
             publisher.undeclare()
 
@@ -70,6 +79,7 @@ class ZenohPoses(PeriodicPublisher):
 
     def publish(self) -> None:
         """Put the poses of the tags that have changed, and the frame of all poses when it is due."""
+        self._is_matched = _has_subscribers(self._tag_publisher) or _has_subscribers(self._frame_publisher)
         self._put_tags()
         self._put_frame()
 
