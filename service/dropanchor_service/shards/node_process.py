@@ -21,7 +21,7 @@ from dropanchor_service.shards.supervisor import Supervisor
 EXIT_DIED = 1
 EXIT_GONE = 75
 START_S = 60.0  # for Ray, and for a head that a node waits for
-LEAVE_S = 30.0  # for its buckets to move
+LEAVE_S = 60.0  # for its buckets to move, two to three seconds each
 POLL_S = 0.2
 
 Connect = Callable[[], Connection]
