@@ -35,6 +35,7 @@ from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.ownership.choose import ownership_of
+from dropanchor_service.ownership.processed import Processed
 from dropanchor_service.persistence import open_sites
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.supervision import Supervision
@@ -101,6 +102,7 @@ class Service:
         self.answers = answers_of_sites(self.sites, self.latest, self.clock.now_ns, tracks, self._publishers)
         self._period = Period(settings.ingest.period_ms * 1e-3)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
+        self._processed = Processed(lambda: self._buffer.depth, self._buffer.wake)
         self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
         self._register_gauges()
 
@@ -176,9 +178,14 @@ class Service:
             self._buffer,
             self.metrics,
             self._period,
-            self._checkpoints.between_turns if self._checkpoints else lambda: None,
+            self._between_turns,
             self._ownership.may_serve,
         )
+
+    def _between_turns(self) -> None:
+        if self._checkpoints is not None:
+            self._checkpoints.between_turns()
+        self._processed.between_turns()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -243,13 +250,14 @@ class Service:
             *self._ownership.zenoh_parts(session),
             self._intake(session),
             ZenohAnswers(session, self.answers, service_id, self.metrics, may_serve),
-            ZenohPoses(session, self.answers, self.metrics, may_serve),
+            ZenohPoses(session, self.answers, self.metrics, self._ownership.may_publish),
             ZenohRemoteSettings(session, self.sites, self.metrics, may_serve),
             ZenohEvents(session, self._serving.zone_events.stores, self.metrics, may_serve),
         ]
 
     def _intake(self, session: zenoh.Session) -> ZenohIntake:
-        caches = ZenohCaches(session, self.sites, self.metrics, self.clock, self._ownership.caught_up)
+        caught_up = partial(self._ownership.caught_up, self._processed.wait)
+        caches = ZenohCaches(session, self.sites, self.metrics, self.clock, caught_up)
         catch_up = CatchUp(
             self._buffer,
             expected=[self.sites.samples_key(tag.row) for tag in self.sites.rows.all() if self.sites.is_served(tag)],

@@ -25,7 +25,7 @@ from dropanchor_tag_client.publisher import declare_publisher
 from dropanchor_tag_client.simulator.live import tag_name
 from support.zenoh_router import connected_session
 
-LONGEST_S = 1200.0
+LONGEST_S = 1800.0
 MOTIONS = 6  # distinct ones; tag i moves like i % MOTIONS
 CACHED = 600  # messages of a tag: two minutes
 SLOTS = 20  # bursts in the time between two messages of a tag

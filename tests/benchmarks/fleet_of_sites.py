@@ -18,6 +18,10 @@ class FleetOfSites:
         self._program = program
         program.send_line(self.start_ns)
 
+    @property
+    def process(self) -> int:
+        return self._program.process.pid
+
     def go(self) -> None:
         self._program.send_line("go")
 

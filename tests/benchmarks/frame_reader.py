@@ -20,16 +20,17 @@ ROUNDING_NS = 2_000_000  # of the ages in a frame
 class FrameReader:
     """Reads frames, and drops those of former owners.
 
-    dropped: frames of former owners. of_two_owners: frames that were accepted after one of a later owner of the same
-    bucket. backwards: accepted frames whose newest pose is older than that of the frame before it.
+    of_other_sites: frames that were accepted after one of a later owner of the same bucket, which was of another site.
+    backwards: accepted frames whose newest pose is older than that of the frame before it.
     """
 
     def __init__(self, sites: Iterable[str]) -> None:
-        self.dropped = self.of_two_owners = self.backwards = 0
+        self.of_other_sites = self.backwards = 0
+        self._dropped = self._accepted = 0  # frames of former owners of a site
         self._sites = list(sites)
         self._fence = EpochFence()
         self._newest_ns: dict[str, int] = defaultdict(int)  # by site
-        self._highest: dict[str, int] = defaultdict(int)  # epoch of an accepted frame, by bucket
+        self._highest: dict[str, int] = defaultdict(int)  # epoch of a frame, by bucket and by site
         self._news_s: dict[str, list[float]] = defaultdict(list)  # by site
         self._lock = Lock()
 
@@ -38,6 +39,12 @@ class FrameReader:
         subscriber = session.declare_subscriber(keys.poses_of_all_sites(), self._on_frame)
         yield self
         subscriber.undeclare()
+
+    @property
+    def former(self) -> tuple[int, int]:
+        """How many frames of former owners of a site were dropped so far, and how many were accepted."""
+        with self._lock:
+            return self._dropped, self._accepted
 
     def are_current(self, since_s: float) -> bool:
         """Return whether every site has had news since then."""
@@ -62,13 +69,14 @@ class FrameReader:
                 self._note(site, newest_ns)
 
     def _accepts(self, site: str, epoch: int) -> bool:
-        if not self._fence.accepts(site, epoch):
-            self.dropped += 1
-            return False
-        bucket = bucket_of(site)
-        self.of_two_owners += epoch < self._highest[bucket]
-        self._highest[bucket] = max(self._highest[bucket], epoch)
-        return True
+        accepts, bucket = self._fence.accepts(site, epoch), bucket_of(site)
+        is_former = epoch < self._highest[site]
+        self._dropped += not accepts
+        self._accepted += accepts and is_former
+        self.of_other_sites += accepts and epoch < self._highest[bucket]
+        for each in (site, bucket):
+            self._highest[each] = max(self._highest[each], epoch)
+        return accepts
 
     def _note(self, site: str, newest_ns: int) -> None:
         before_ns = self._newest_ns[site]

@@ -23,6 +23,10 @@ class RouterCell:
         assert any("ready at" in line for line in process.stderr), "the router did not start"
         return process
 
+    @property
+    def process(self) -> int:
+        return self._process.pid
+
     def kill(self) -> None:
         self._process.kill()
         self._process.communicate()

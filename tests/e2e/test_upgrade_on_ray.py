@@ -40,7 +40,7 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         for node in ("head", "a", "b"):
             cluster.install(node, OLD)
         cluster.start("head", 2, "--head")
-        wait_until(cluster.head_works, START_S)
+        wait_until(cluster.has_head, START_S)
         cluster.start("a", 3, "--join", "--shards", "2")
         wait_until(lambda: len(cluster.owners()) == 2, START_S)
         cluster.start("b", 4, "--join", "--shards", "1")

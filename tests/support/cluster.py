@@ -117,7 +117,7 @@ class Cluster:
     def send(self, name: str, how: signal.Signals) -> None:
         """Send a signal to all processes of a node."""
         process = self._processes[name]
-        for number in [process.pid, *_descendants(process.pid)]:
+        for number in [process.pid, *descendants(process.pid)]:
             with suppress(ProcessLookupError):
                 os.kill(number, how)
 
@@ -128,11 +128,17 @@ class Cluster:
 
     def kill_raylet(self, name: str) -> None:
         """Kill the process of Ray that starts the shards of a node, and wait until they have ended."""
-        every = _descendants(self._processes[name].pid).items()
+        every = descendants(self._processes[name].pid).items()
         raylet = next(number for number, line in every if "raylet/raylet" in line)
-        shards = _descendants(raylet)
+        shards = descendants(raylet)
         os.kill(raylet, signal.SIGKILL)
         wait_until(lambda: not any(map(_runs, shards)), 60.0)
+
+    def processes(self) -> dict[int, str]:
+        """Return all processes of all nodes, each with its command line."""
+        started = [process.pid for process in self._processes.values()]
+        below = [item for number in started for item in descendants(number).items()]
+        return dict.fromkeys(started, "") | dict(below)
 
     def signal_shard(self, shard: str, bucket: str, how: signal.Signals) -> None:
         """Send a signal to the process of a shard that serves a bucket."""
@@ -155,13 +161,9 @@ class Cluster:
 
     def has_head(self) -> bool:
         """Return whether a head has renewed its lease a moment ago."""
-        statement = """SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND owner <> '' AND renewals > 0
+        statement = """SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND owner <> ''
             AND renewed > clock_timestamp() - interval '2 s'"""
         return bool(self._rows(statement))
-
-    def head_works(self) -> bool:
-        """Return whether the head has Ray: it claims its lease before that."""
-        return bool(self._rows("SELECT 1 FROM dropanchor_lease WHERE bucket = '@head' AND renewals > 0"))
 
     def head_sees_nodes(self) -> bool:
         """Return whether the head has seen a node lately."""
@@ -215,13 +217,13 @@ def _runs(process: int) -> bool:
         return False
 
 
-def _descendants(process: int) -> dict[int, str]:
+def descendants(process: int) -> dict[int, str]:
     """Return the children of a process, theirs and so on, each with its command line."""
     found: dict[int, str] = {}
     with suppress(OSError):
         for child in Path(f"/proc/{process}/task/{process}/children").read_text().split():
             found[int(child)] = Path(f"/proc/{child}/cmdline").read_bytes().replace(b"\0", b" ").decode()
-            found |= _descendants(int(child))
+            found |= descendants(int(child))
     return found
 
 

@@ -77,13 +77,15 @@ class Claim:
     """What a new owner has.
 
     checkpoint: its bytes, empty if the database has none. documents: what people have changed, by name. object: name of
-    the checkpoint where checkpoints are objects; it counts only if `checkpoint` is empty.
+    the checkpoint where checkpoints are objects; it counts only if `checkpoint` is empty. was_moved: the former owner
+    serves until its successor has caught up.
     """
 
     epoch: int
     checkpoint: bytes
     documents: dict[str, bytes]
     object: str = ""
+    was_moved: bool = False
 
 
 class Claimed(NamedTuple):
@@ -149,7 +151,7 @@ def claim(connection: Connection, seen: Lease, who: Claimant) -> Claim | None:
         assert row is not None
         connection.execute("DELETE FROM dropanchor_standby WHERE name = %s", [who.name])
         documents = {name: bytes(text) for name, text in connection.execute(_FENCE_DOCUMENTS, values, binary=True)}
-    return Claim(seen.epoch + 1, bytes(row[0]), documents, row[1])
+    return Claim(seen.epoch + 1, bytes(row[0]), documents, row[1], seen.is_moving)
 
 
 def renew(connection: Connection, bucket: str, epoch: int) -> bool:

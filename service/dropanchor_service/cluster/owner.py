@@ -10,7 +10,7 @@ from typing import Self
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster.boot_clock import boot_s
 from dropanchor_service.cluster.database import Connection, DatabaseError, sentence_of
-from dropanchor_service.cluster.tenure import Tenure
+from dropanchor_service.cluster.tenure import Standing, Tenure
 from dropanchor_service.runtime.worker import Worker
 
 RENEWALS = 4  # per lease
@@ -63,6 +63,8 @@ class Renewal(Worker):
             self._stop.wait(self._lease_s / RENEWALS)
 
     def _renew(self) -> None:
+        if self._tenure.standing is Standing.LEAVING:
+            return  # until a successor shows its token; the bucket may have moved on to another one meanwhile
         asked_s = boot_s()
         if self._connection is None:
             self._connection = self._connect()

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from enum import Enum
 from threading import Lock
 
-HAND_OVER_S = 5.0  # that a successor has before the former owner leaves
+HAND_OVER_S = 10.0  # that a successor has before the former owner leaves
 GIVE_UP_S = 10.0  # in doubt: then the process ends, and its restart begins as a standby
 FROZEN = 0.5  # of the lease: a longer pause between two ticks means that this process did not run
 

@@ -64,8 +64,12 @@ class Ownership:
         """Return whether poses may leave this process now."""
         return True
 
-    def caught_up(self) -> None:
-        """Note that this process has what the former owner had."""
+    def may_publish(self) -> bool:
+        """Return whether poses may be published now, for readers who hear other owners of the sites, too."""
+        return self.may_serve()
+
+    def caught_up(self, processed: Callable[[], object]) -> None:
+        """Note that this process has what the former owner had. processed: waits until that has become poses."""
 
     def impairments(self) -> Sequence[str]:
         """Return what does not work although this process serves the sites."""

@@ -75,6 +75,7 @@ class ClusterOwnership(Ownership):
         self._settings = settings
         self._standby: Standby | None = None
         self._tenure: Tenure | None = None
+        self._follows = False  # the former owner publishes until this process has caught up
         self._token: ZenohOwner | None = None
         self._kept: CheckpointRow | CheckpointObjects | None = None
         metrics.register(self.gauges)
@@ -96,6 +97,7 @@ class ClusterOwnership(Ownership):
         if self._claimed is not None:
             self._show_address(claim.epoch, page)
         self._tenure = Tenure(claim.epoch, self._who.lease_s, boot_s, hears_others, asked_s)
+        self._follows = claim.was_moved
         self._renewal = Renewal(self._connect, self._bucket, self._who.lease_s, self._tenure)
         self._kept.own(claim)
         for site in self._sites:
@@ -143,7 +145,13 @@ class ClusterOwnership(Ownership):
     def may_serve(self) -> bool:
         return self._tenure is not None and self._tenure.may_serve
 
-    def caught_up(self) -> None:
+    def may_publish(self) -> bool:
+        return not self._follows and self.may_serve()
+
+    def caught_up(self, processed: Callable[[], object]) -> None:
+        if self._follows:
+            processed()  # readers drop the poses of the former owner from the first pose of this one on
+            self._follows = False
         if self._token is not None:
             self._token.announce()
 

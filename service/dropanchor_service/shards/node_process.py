@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import Connection, DatabaseError, make_tables
-from dropanchor_service.cluster.head import HeadError, become_head, head_of
-from dropanchor_service.cluster.watch import node_of
+from dropanchor_service.cluster.head import HeadError, become_head, free_lease, head_to_join
+from dropanchor_service.cluster.watch import Lease, node_of
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.runtime.systemd import Systemd
 from dropanchor_service.shards.on_ray import OnRay
@@ -20,8 +20,8 @@ from dropanchor_service.shards.supervisor import Supervisor
 
 EXIT_DIED = 1
 EXIT_GONE = 75
-START_S = 60.0  # for Ray
-LEAVE_S = 30.0  # for its buckets to move
+START_S = 60.0  # for Ray, and for a head that a node waits for
+LEAVE_S = 60.0  # for its buckets to move, two to three seconds each
 POLL_S = 0.2
 
 Connect = Callable[[], Connection]
@@ -31,12 +31,14 @@ _log = logging.getLogger(__name__)
 
 
 class Head(NamedTuple):
-    """The head. name: of its node. ray: address and port of Ray. address: of this machine. epoch: of its lease."""
+    """Who is to be the head. name: of its node. ray: address and port of Ray. address: of this machine. free: the lease
+    to claim once Ray runs. sites: digest of the settings of all sites."""
 
     name: str
     ray: str
     address: str
-    epoch: int
+    free: Lease
+    sites: str
 
 
 def run_node(node: RayNode, connect: Connect, sites: str) -> int:
@@ -66,7 +68,7 @@ def supervise(name: str, ray: str, address: str, connect: Connect, sites: str) -
     """Be the head of nodes that something else starts; see `run_node`. ray: its address and port."""
     with connect() as connection:
         make_tables(connection)
-        head = Head(name, ray, address, become_head(connection, name, ray, sites))
+        head = Head(name, ray, address, free_lease(connection), sites)
     with interrupts() as interrupt, interrupt.raising():
         return _be_head(head, connect, lambda: True)
 
@@ -77,9 +79,9 @@ def _agreed(node: RayNode, connect: Connect, sites: str) -> tuple[Head | None, s
         make_tables(connection)
         if node.head is None:
             at = f"{node.address}:{node.port}"
-            head = Head(node.name, at, node.address, become_head(connection, node.name, at, sites))
+            head = Head(node.name, at, node.address, free_lease(connection), sites)
         else:
-            found = head_of(connection, sites)
+            found = head_to_join(connection, sites, START_S)
             head, at = None, node.head or found.address
         if node.shards:
             nodes.set_drained(connection, node.name, False)
@@ -88,7 +90,9 @@ def _agreed(node: RayNode, connect: Connect, sites: str) -> tuple[Head | None, s
 
 def _be_head(head: Head, connect: Connect, is_alive: Callable[[], bool]) -> int:
     with _connected(head, is_alive) as on_ray, interrupts() as interrupt:
-        supervisor = Supervisor(on_ray, connect, head.epoch)
+        with connect() as connection:
+            epoch = become_head(connection, head.free, head.name, head.ray, head.sites)
+        supervisor = Supervisor(on_ray, connect, epoch)
 
         def turn() -> bool:
             if is_alive():

@@ -9,8 +9,9 @@ import ray
 from ray.util import get_node_ip_address, list_named_actors
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+from dropanchor_service.cluster.watch import node_of
 from dropanchor_service.shards.actor import ShardActor
-from dropanchor_service.shards.placement import Node, node_of_shard
+from dropanchor_service.shards.placement import Node
 
 __all__ = ["OnRay", "get_node_ip_address"]
 
@@ -70,7 +71,7 @@ class OnRay:
         It takes nothing of the resource that counts the shards of a node. If the head dies while Ray makes the process
         of a shard, nobody gives back what the process would have taken, and a shard in its place would wait for ever.
         """
-        alive = self._nodes[node_of_shard(name)]
+        alive = self._nodes[node_of(name)]
         actor: Any = ray.remote(ShardActor)
         actor.options(
             name=self._full(name),
@@ -91,5 +92,5 @@ class OnRay:
 
     def _full(self, name: str) -> str:
         """Return the name of an actor. After a restart of its node, the shard is another actor."""
-        alive = self._nodes.get(node_of_shard(name))
+        alive = self._nodes.get(node_of(name))
         return f"{name} {'' if alive is None else alive.number}"

@@ -9,6 +9,8 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from dropanchor_service.cluster.watch import node_of
+
 UNEVEN = 2  # buckets by which the loads of two nodes differ before one moves
 
 
@@ -39,15 +41,15 @@ class Placement:
     def load(self) -> Counter[str]:
         """Return the number of buckets of each node that is alive."""
         alive = {node.name for node in self.nodes}
-        return Counter(node for owner in self.owners.values() if (node := node_of_shard(owner)) in alive)
+        return Counter(node for owner in self.owners.values() if (node := node_of(owner)) in alive)
 
     def next_move(self) -> Move | None:
         """Return what to move: first off a node that is drained, then from a full node to an emptier one."""
-        waiting = Counter(map(node_of_shard, self.standbys))
+        waiting = Counter(map(node_of, self.standbys))
         able = [node for node in self.nodes if not node.is_drained and waiting[node.name]]
         load = self.load()
         for bucket, owner in sorted(self.owners.items()):
-            source = self._node(node_of_shard(owner))
+            source = self._node(node_of(owner))
             targets = [node for node in able if node is not source]
             if source is None or not targets:
                 continue
@@ -75,11 +77,6 @@ def _is_uneven(load: Mapping[str, int], source: Node, target: Node) -> bool:
     difference = load.get(source.name, 0) - load.get(target.name, 0)
     fuller_after = (load.get(target.name, 0) + 1) / target.shards
     return difference >= UNEVEN and fuller_after < load.get(source.name, 0) / source.shards
-
-
-def node_of_shard(shard: str) -> str:
-    """Return the node of a shard, such as `machine-1` of `machine-1/3`."""
-    return shard.partition("/")[0]
 
 
 def missing_shards(node: Node, running: Collection[str]) -> list[str]:

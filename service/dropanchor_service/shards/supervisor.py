@@ -15,6 +15,7 @@ HUNG_S = 20.0  # since it was heard
 START_S = 60.0  # much more than a process needs until it says that it starts
 MOVE_S = 10.0  # for a standby to take a bucket over
 REST_S = 1.0  # between two moves
+SETTLED = 3  # renewals of the lease, in about a second, by which an owner has caught up
 
 _log = logging.getLogger(__name__)
 
@@ -113,7 +114,7 @@ class Supervisor:
                 leases.set_moving(connection, move.bucket, False)
                 _log.warning("no standby on %s took %s over", move.to, move.bucket)
             self._move, self._rests_until_s = None, now_s + REST_S
-        if now_s < self._rests_until_s or any(lease.is_moving for lease in owned.values()):
+        if now_s < self._rests_until_s or any(map(_changes_hands, owned.values())):
             return
         found = placement.next_move()
         if found is not None:
@@ -137,3 +138,8 @@ class Supervisor:
             _log.warning("%s", sentence)
         elif not sentence:
             self._said = {each for each in self._said if not each.startswith(kind)}
+
+
+def _changes_hands(lease: Lease) -> bool:
+    """Return whether a bucket is moving, or has an owner that may still be catching up."""
+    return lease.is_moving or (is_held(lease) and lease.renewals < SETTLED)

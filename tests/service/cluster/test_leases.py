@@ -2,6 +2,7 @@
 
 import re
 import threading
+import time
 from functools import partial
 
 import numpy as np
@@ -21,7 +22,11 @@ from support.zenoh_router import wait_until
 
 pytestmark = needs_postgresql
 LEASE_S = 2.0  # a thread that does not run for half as long counts as frozen
-A, B = Claimant("a", "https://a.example", "s", LEASE_S), Claimant("b", "", "s", LEASE_S)
+A, B, C = (
+    Claimant("a", "https://a.example", "s", LEASE_S),
+    Claimant("b", "", "s", LEASE_S),
+    Claimant("c", "", "s", LEASE_S),
+)
 
 FULL_DISK = """
 CREATE FUNCTION full_disk() RETURNS trigger LANGUAGE plpgsql AS
@@ -146,12 +151,17 @@ def test_an_owner_renews_and_gives_its_bucket_back_when_it_stops(database: Postg
 
 def test_a_lease_that_was_moved_is_left_only_when_the_successor_is_there(database: Postgresql) -> None:
     claim = claimed(database, "moved")
-    tenure = Tenure(claim.epoch, 2.0, lambda: 0.0, lambda: True, asked_s=0.0)
+    tenure = Tenure(claim.epoch, 2.0, lambda: 0.0, lambda: True, asked_s=0.0)  # time stands still
     with Renewal(partial(connect, database.url(), "a"), "moved", 0.2, tenure):
         with connect(database.url(), "b") as connection:
             leases.set_moving(connection, "moved", True)
         successor = claimed(database, "moved", B)
         wait_until(lambda: tenure.standing is Standing.LEAVING)
+        with connect(database.url(), "c") as connection:  # before the successor is ready, it moves on
+            leases.set_moving(connection, "moved", True)
+        claimed(database, "moved", C)
+        time.sleep(0.5)  # ten renewals, which must not end it
+        assert tenure.standing is Standing.LEAVING
         tenure.saw_epoch(successor.epoch)
         wait_until(lambda: tenure.standing is Standing.LOST)
 

@@ -11,8 +11,9 @@ from dropanchor_service.api.routes import event_examples
 from dropanchor_service.checkpoints import layouts
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster import standby as standby_module
-from dropanchor_service.cluster.database import connect
-from dropanchor_service.cluster.leases import Claimant
+from dropanchor_service.cluster.boot_clock import boot_s
+from dropanchor_service.cluster.database import connect, make_tables
+from dropanchor_service.cluster.leases import Claimant, Claimed
 from dropanchor_service.cluster.shared_state import CheckpointRow
 from dropanchor_service.cluster.standby import Standby
 from dropanchor_service.metrics.registry import Metrics
@@ -111,6 +112,29 @@ def test_a_standby_with_other_sites_or_another_layout_says_so_and_waits_until_it
         with reach() as also:
             leases.accept_any(also, "yard")
         assert standby.wait(lambda: None)[0].epoch == 2
+
+
+@needs_postgresql
+@pytest.mark.parametrize("moves", [True, False])
+def test_a_new_owner_publishes_nothing_while_its_predecessor_does(moves: bool, tmp_path: Path) -> None:
+    with running_postgresql() as database:
+        with connect(database.url(), "b") as connection:
+            make_tables(connection)
+            leases.seen_or_new(connection, "yard")
+            leases.set_moving(connection, "yard", moves)
+            seen = leases.read(connection, "yard")
+            assert seen is not None
+            claim = leases.claim(connection, seen, Claimant("b", "", "sites", 60.0))
+            assert claim is not None
+        settings = in_cluster(cluster={"url": database.url(), "bucket": "yard"}, zenoh={"connect": ["tcp/r:7447"]})
+        owner = ownership_of(settings, make_sites(), Metrics(), lambda: None, Claimed(claim, boot_s()))
+        owner.checkpoints(Drive(tmp_path).state)
+        owner.stand_by("http://127.0.0.1:8080", {}, lambda: True)
+        before = owner.may_serve(), owner.may_publish()
+        while_processing: list[bool] = []
+        owner.caught_up(lambda: while_processing.append(owner.may_publish()))
+        assert (before, while_processing) == (((True, False), [False]) if moves else ((True, True), []))
+        assert owner.may_publish()
 
 
 @needs_postgresql

@@ -7,7 +7,7 @@ import pytest
 from dropanchor_service.cli import main
 from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import connect
-from dropanchor_service.cluster.head import become_head
+from dropanchor_service.cluster.head import become_head, free_lease
 from dropanchor_service.cluster.leases import ANY, Claimant
 from dropanchor_service.commands.cluster_upgrade import seen_in
 from support.postgresql import needs_postgresql
@@ -35,7 +35,7 @@ def test_status_move_drain_and_accept_say_what_is(
 
     assert said("status") == (0, "there are no buckets yet: no process has been started\n")
     with connect(url, "test") as connection:
-        become_head(connection, "head", "10.0.0.1:6379", "sites")
+        become_head(connection, free_lease(connection), "head", "10.0.0.1:6379", "sites")
         for name, shards in (("a", 2), ("b", 1)):
             nodes.note(connection, name, shards)
         seen = leases.seen_or_new(connection, "017")
@@ -84,7 +84,7 @@ def test_upgrade_says_what_hinders_it_and_changes_nothing(
 
     with connect(url, "test") as connection:
         assert "no head sees a node" in said()[1]
-        become_head(connection, "head", "10.0.0.1:6379", "sites")
+        become_head(connection, free_lease(connection), "head", "10.0.0.1:6379", "sites")
         nodes.note(connection, "a", 2)
         seen = leases.seen_or_new(connection, "017")
         assert leases.claim(connection, seen, Claimant("a/1", "http://a:1", "", 60.0, "0.1.0"))

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dropanchor_service.shards.placement import Hung, Move, Node, Placement, missing_shards, node_of_shard
+from dropanchor_service.cluster.watch import node_of
+from dropanchor_service.shards.placement import Hung, Move, Node, Placement, missing_shards
 
 A, B, C = Node("a", 4), Node("b", 4), Node("c", 4)
 
@@ -51,7 +52,7 @@ def test_moves_come_to_an_end_and_leave_loads_even(shards: list[int], owned: lis
         move = placed(nodes, **counts).next_move()
         if move is None:
             break
-        source = node_of_shard(placed(nodes, **counts).owners[move.bucket])
+        source = node_of(placed(nodes, **counts).owners[move.bucket])
         counts[source] -= 1
         counts[move.to] += 1
     else:

@@ -7,11 +7,11 @@ import pytest
 
 from dropanchor_service.cluster import leases, nodes
 from dropanchor_service.cluster.database import Connection, connect
-from dropanchor_service.cluster.head import HeadError, become_head, head_of
+from dropanchor_service.cluster.head import HeadError, become_head, free_lease, head_of
 from dropanchor_service.cluster.leases import ANY, Claimant
 from dropanchor_service.cluster.watch import Watch
 from dropanchor_service.shards.placement import Node
-from dropanchor_service.shards.supervisor import HUNG_S, MOVE_S, Supervisor
+from dropanchor_service.shards.supervisor import HUNG_S, MOVE_S, SETTLED, Supervisor
 from support.postgresql import needs_postgresql
 
 pytestmark = needs_postgresql
@@ -38,9 +38,12 @@ class Ray:
         self.killed.append(name)
 
 
-def own(connection: Connection, bucket: str, shard: str) -> None:
+def own(connection: Connection, bucket: str, shard: str, renewals: int = SETTLED) -> None:
     seen = leases.seen_or_new(connection, bucket)
-    assert leases.claim(connection, seen, Claimant(shard, "", "", 60.0))
+    claim = leases.claim(connection, seen, Claimant(shard, "", "", 60.0))
+    assert claim is not None
+    for _ in range(renewals):
+        leases.renew(connection, bucket, claim.epoch)
 
 
 def moving(connection: Connection) -> dict[str, str]:
@@ -53,14 +56,17 @@ def test_shards_start_buckets_move_one_after_another_and_hung_shards_end(
     reach = partial(connect, url, "head")
     ray = Ray(Node("a", 2), Node("b", 2))
     with reach() as connection:
-        supervisor = Supervisor(ray, reach, become_head(connection, "head", "h:6379", "sites"))
+        supervisor = Supervisor(ray, reach, become_head(connection, free_lease(connection), "head", "h:6379", "sites"))
         supervisor.turn(0.0)
         assert ray.running == ["a/1", "a/2", "b/1", "b/2"]
         assert [(row.name, row.shards) for row in nodes.read(connection)] == [("a", 2), ("b", 2)]
         own(connection, "001", "a/1")
-        own(connection, "002", "a/2")
+        own(connection, "002", "a/2", renewals=SETTLED - 1)
         for name in ("b/1", "b/2"):
             leases.note_standby(connection, ANY, name, None)
+        supervisor.turn(1.0)
+        assert moving(connection) == {}  # the owner of 002 may be catching up
+        leases.renew(connection, "002", 1)
         supervisor.turn(1.0)
         assert moving(connection) == {"001": "b"}
         other = leases.read(connection, "001")
@@ -95,18 +101,21 @@ def test_of_two_heads_one_is_refused_and_a_node_must_have_what_the_head_has(
     with reach() as connection:
         with pytest.raises(HeadError, match="no head runs"):
             head_of(connection, "sites")
-        supervisor = Supervisor(Ray(), reach, become_head(connection, "one", "10.0.0.1:6379", "sites"))
+        free = free_lease(connection)
+        supervisor = Supervisor(Ray(), reach, become_head(connection, free, "one", "10.0.0.1:6379", "sites"))
+        with pytest.raises(HeadError, match=r"one is the head of this cluster, at 10\.0\.0\.1:6379: --join it"):
+            become_head(connection, free, "two", "10.0.0.2:6379", "sites")
         assert head_of(connection, "sites").address == "10.0.0.1:6379"
         monkeypatch.setattr("dropanchor_service.cluster.head.time.sleep", lambda _: supervisor.turn(0.0))
         with pytest.raises(HeadError, match=r"one is the head of this cluster, at 10\.0\.0\.1:6379: --join it"):
-            become_head(connection, "two", "10.0.0.2:6379", "sites")
+            free_lease(connection)
         with pytest.raises(HeadError, match="settings of sites and tags are not those of the head one"):
             head_of(connection, "others")
         monkeypatch.setattr("dropanchor_service.cluster.head.version", lambda _: "0.0.9")
         with pytest.raises(HeadError, match=r"the head one has version .*, this machine 0\.0\.9: install the same"):
             head_of(connection, "sites")
         supervisor.give_back()
-        become_head(connection, "two", "10.0.0.2:6379", "sites")
+        become_head(connection, free_lease(connection), "two", "10.0.0.2:6379", "sites")
         supervisor.turn(1.0)
         assert not supervisor.is_head
     supervisor.close()
