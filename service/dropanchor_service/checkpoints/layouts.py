@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import orjson
 
-VERSION = 2
+VERSION = 3
 """Number of the layout that this version writes. Raise it when a column of the state changes, in its name, its type or
 its meaning: `migrations.py` says what else to do."""
 READ_BEFORE = 2
