@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from dropanchor_service.estimation.fleet.frontend.attitude import (
     ATTITUDE,
+    TILT_SD,
     correct_tilt,
     predict_attitude,
 )
@@ -26,12 +27,16 @@ def follow(a: Any, t: Array, acc: Array, gyro: Array, rest_until: float, q: Arra
         q[k] = a.q
 
 
-def attitude_of(m: Motion, start: Array, rest_until: float = -1.0) -> tuple[Array, Array]:
-    """Return the quaternions (n, 4) and the row after the motion. start: (w, x, y, z)."""
+def attitude_of(m: Motion, start: Array, rest_until: float = -1.0, bias_std: float = 0.0) -> tuple[Array, Array]:
+    """Return the quaternions (n, 4) and the row after the motion.
+
+    start: (w, x, y, z). bias_std: rad/s, how well the bias of the gyroscope is known at first.
+    """
     row = np.zeros(1, ATTITUDE)
     row[0]["q"] = start
     row[0]["gyro"] = m.gyro[0]
     row[0]["gravity"] = G0
+    row[0]["tilt_cov"] = TILT_SD**2, 0.0, bias_std**2
     q = np.empty((len(m.t), 4))
     follow(row[0], m.t, m.acc, m.gyro, rest_until, q)
     return q, row[0]

@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, add_sample, close_node, start_frontend
+from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
 from dropanchor_service.estimation.fleet.frontend.node import NODE
+from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
 from support.imu import Motion
 
 Array = NDArray[Any]

@@ -8,10 +8,10 @@ from dropanchor_service.estimation.fleet.belief.pool import make_pool, release, 
 from dropanchor_service.estimation.fleet.belief.step import advance
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.assembly import assemble_nodes
-from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
+from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of, stuck_ranges_of
 from dropanchor_service.estimation.fleet.tuning import Tuning
 

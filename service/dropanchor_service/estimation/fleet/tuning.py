@@ -35,6 +35,7 @@ class Tuning(NamedTuple):
     acc_bias_std: float = 0.11  # m/s^2
     left_bias_std: float = 0.2  # m/s^2, larger: an arc tilts the sideways axis for seconds
     acc_bias_roughness: float = 0.7  # s: its variance grows by this times dv_var / dt, the roughness of the motion
+    bending_roughness: float = 0.05  # (m/s)^2/s of it, up to which ramps of the speed count: they bend the tilt
     acc_bias_tau: float = 5.0  # s
     range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays
     q_range_bias: float = 1e-5  # m^2/s

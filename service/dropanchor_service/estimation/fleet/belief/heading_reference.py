@@ -15,6 +15,19 @@ def add_reference_error(P: Floats, std: float, yaw_from_reference: bool) -> None
 
 
 @njit(nogil=True)
+def follow_reference(decay: float, before: float, after: float) -> tuple[float, float]:
+    """Return decay and growth of the error of a reference whose variance goes from `before` to `after`, rad^2.
+
+    decay: that of an error that does not learn. A Kalman filter of a constant has cov(error after, error before) =
+    variance after: what the reference learns shrinks the error that the hypotheses share with it.
+    """
+    if after < before:
+        decay *= after / before
+        return decay, after - decay * decay * before
+    return decay, after * (1.0 - decay * decay) + after - before
+
+
+@njit(nogil=True)
 def add_common_rotation(P: Floats, std: float) -> None:
     """Add an error of the reference, sd in rad, that turned bearing and yaw together about the anchor."""
     v = std * std

@@ -91,6 +91,7 @@ HEADING: Final = np.dtype(
     [
         ("model", np.uint8),  # of the error of the reference in use
         ("north", np.float64),  # rad, constant error of the reference, learned from a given start heading
+        ("slow_var", np.float64),  # rad^2, of the slow error of a magnetometer at the node before; 0: none
         ("in_site_frame", np.uint8),  # 1: yaw counts from east; 0: the x axis is the first direction of travel
         ("bank_started", np.uint8),
         ("bank_mean", np.float64, (BANK, 3)),  # yaw rad, gyroscope bias rad/s, slow error rad

@@ -10,6 +10,7 @@ from dropanchor_service.estimation.fleet.belief.heading_models import (
     is_heading_std_given,
     model_parameters,
     predict_models,
+    reference_error,
     reset_models,
     update_models,
 )
@@ -161,6 +162,9 @@ def update_with_heading(work: Hypotheses, count: int, row: Row, node: Node, t: T
         if row.heading.model != PLATFORM_MODEL or work[h].heading_class == EXACT:
             white, _, _ = class_reference_error(row, work[h].heading_class, node.heading_var, t)
             update_heading(work[h], scratch, node.heading - row.heading.north, white)
+    if row.heading.model == MAGNETOMETER_MODEL:
+        _, slow, _ = reference_error(row, node.heading_var)
+        row.heading.slow_var = slow * slow
     return count
 
 
@@ -209,11 +213,17 @@ def _enter_site_frame(work: Hypotheses, count: int, row: Row, node: Node, t: Tun
 def _adopt_magnetic_heading(work: Hypotheses, count: int, row: Row, node: Node) -> bool:
     """Let yaw count from the magnetometer from now on. Return whether that was done.
 
-    With a given start the constant error of the magnetometer is not known: it is taken to agree with the yaw of now,
-    and the error of that yaw becomes one of the mounting angle. That waits until the magnetometer is better than the
-    yaw.
+    With a given start heading the constant error of the magnetometer is not known: it is taken to agree with the yaw of
+    now, and the error of that yaw becomes one of the mounting angle. That waits until the magnetometer is better than
+    the yaw. Otherwise the hypotheses have headings all around, among which the magnetometer decides.
     """
     heading, best = row.heading, work[best_of(work, count)]
+    if not math.isfinite(row.start.heading):
+        heading.model = MAGNETOMETER_MODEL
+        _, slow, _ = reference_error(row, node.heading_var)
+        for h in range(count):
+            add_reference_error(work[h].cov, slow, False)
+        return True
     if node.heading_var > best.cov[YAW, YAW]:
         return False
     heading.model = MAGNETOMETER_MODEL

@@ -14,7 +14,8 @@ import math
 from typing import Any
 
 from dropanchor_service.estimation.fleet.belief.carried import fill_carried_noise
-from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error
+from dropanchor_service.estimation.fleet.belief.heading_models import class_reference_error, reference_error
+from dropanchor_service.estimation.fleet.belief.heading_reference import follow_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     DRIFTING,
@@ -168,8 +169,9 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     growth[YAW] = node.dyaw_var
     rough = 0.0
     if math.isfinite(node.dv_var):
-        growth[V] = node.dv_var + t.q_speed * dt
-        rough = node.dv_var / dt if dt > 0.0 else 0.0
+        unsteady = node.dv_var - node.motion_var
+        growth[V] = unsteady + t.q_speed * dt
+        rough = max(unsteady, min(node.dv_var, t.bending_roughness * dt)) / dt if dt > 0.0 else 0.0
     else:
         growth[V] = t.q_speed_no_acc * dt
     growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
@@ -192,11 +194,13 @@ def fill_class_noise(decay: Floats, growth: Floats, node: Node, row: Row, headin
     if row.heading.model == MAGNETOMETER_MODEL and node.heading_kind != ABSOLUTE_HEADING:
         decay[REFERENCE], growth[REFERENCE] = 1.0, 0.0
         return
-    _, std, tau = class_reference_error(
-        row, heading_class, node.heading_var if math.isfinite(node.heading_var) else 1.0, t
-    )
-    decay[REFERENCE] = math.exp(-node.dt_s / tau)
-    growth[REFERENCE] = std**2 * (1.0 - decay[REFERENCE] ** 2)
+    heading_var = node.heading_var if math.isfinite(node.heading_var) else 1.0
+    _, std, tau = class_reference_error(row, heading_class, heading_var, t)
+    before = after = std**2
+    if row.heading.model == MAGNETOMETER_MODEL and row.heading.slow_var > 0.0:
+        _, slow, _ = reference_error(row, heading_var)
+        before += row.heading.slow_var - slow * slow
+    decay[REFERENCE], growth[REFERENCE] = follow_reference(math.exp(-node.dt_s / tau), before, after)
 
 
 @njit(nogil=True)

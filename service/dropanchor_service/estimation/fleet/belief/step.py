@@ -208,6 +208,7 @@ def _reset_row(row: Row, pool: Pool) -> None:
     row.start.collected_s = 0.0
     row.heading.bank_started = 0
     row.heading.model = 0
+    row.heading.slow_var = 0.0
     row.heading.in_site_frame = 0
     row.publication.resolved = 0
     row.publication.state = INITIALISING

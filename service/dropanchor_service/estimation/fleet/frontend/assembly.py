@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.event import HEADING_EVENT, Event
-from dropanchor_service.estimation.fleet.frontend.inertial import Frontend, add_sample, close_node
+from dropanchor_service.estimation.fleet.frontend.inertial import add_sample, close_node
 from dropanchor_service.estimation.fleet.frontend.lever import apply_lever
 from dropanchor_service.estimation.fleet.frontend.node import NO_MEASUREMENT, RANGE, Node, Nodes
 from dropanchor_service.estimation.fleet.frontend.platform import (
@@ -17,6 +17,7 @@ from dropanchor_service.estimation.fleet.frontend.platform import (
     fill_platform_node,
     use_platform_heading,
 )
+from dropanchor_service.estimation.fleet.frontend.state import Frontend
 
 MAX_NODE_NS: Final = 150_000_000  # ns, of a node: with ranges at 10 Hz, every node ends with one
 AUTO, IMU_ONLY, PLATFORM_ONLY = 0, 1, 2

@@ -14,6 +14,10 @@ A ramp of the speed and the centripetal acceleration of an arc last for seconds 
 known, |e| is therefore bounded, so that an acceleration bends it no faster than a small tilt would, and a sample
 teaches the size of gravity by the same weight as the tilt. The bound grows with the roughness of the ride: steps have
 peaks on one side, and clipping these would shift their mean.
+
+A tag that has not rested does not know the bias of its gyroscope, and k_i alone would take minutes to find it. A Kalman
+filter of tilt error and bias (P += F P F^T + Q, then Joseph's form with the gains in use) therefore gives a larger gain
+of the bias while that is unknown. Its measurement noise grows with the roughness of the ride, as the accelerations do.
 """
 
 import math
@@ -31,6 +35,7 @@ ATTITUDE = np.dtype(
         ("bias", "f8", 3),  # rad/s
         ("gravity", "f8"),  # |a| when nothing accelerates, m/s^2
         ("age", "f8"),  # s of accelerometer seen
+        ("tilt_cov", "f8", 3),  # of tilt error and bias, about any level axis: rad^2, rad^2/s, (rad/s)^2
     ]
 )
 Attitude: TypeAlias = Any  # a record of ATTITUDE
@@ -41,10 +46,15 @@ TAU_BIAS = 40.0  # s, of the bias that tilt teaches
 TAU_GRAVITY = 30.0  # s
 SETTLE = 1.0  # s of running mean after switch-on
 SETTLED = 2.0 * TAU  # s, age from which the tilt is known
+TILT_SD = 0.045  # rad, of the tilt that the first samples give
+TILT_WALK, BIAS_WALK = 1e-5, 2e-9  # rad^2/s, (rad/s)^2/s
+TILT_NOISE, TILT_NOISE_REST = 5e-3, 1e-3  # rad^2 s, of an accelerometer that says where up is
+ROUGH_NOISE = 0.5  # rad^2 s per (m/s^2)^2 of roughness
 BOUND = 0.1  # rad, of a deviation from a known tilt on a smooth ride
 SHAKING = 2.0  # standard deviations of the acceleration that are added to it
 GRAVITY_WEIGHT = 0.02  # least weight of a sample for the size of gravity, so that a wrong one is found again
 FULL_WEIGHT, NO_WEIGHT = 0.1, 0.2  # relative deviation of |a|
+NO_TIME = 1e-6  # s
 VERTICAL = 0.01  # smallest cos^2 of pitch at which yaw still has a rate
 SMALL_ANGLE = 0.04  # rad^2: below, two terms of the series are exact to 1e-9
 
@@ -101,11 +111,29 @@ def level_attitude(q: Array, ax: float, ay: float, az: float) -> None:
 def predict_attitude(a: Attitude, dt: float, gyro: Array, rest: bool) -> None:
     """Predict over dt, s, with the mean of the last and this rate, rad/s. At confirmed rest only keep the rate."""
     if not rest:
+        P = a.tilt_cov
+        P[0] += 2.0 * P[1] * dt + P[2] * dt * dt + TILT_WALK * dt
+        P[1] += P[2] * dt
+        P[2] += BIAS_WALK * dt
         x = 0.5 * (a.gyro[0] + gyro[0]) - a.bias[0]
         y = 0.5 * (a.gyro[1] + gyro[1]) - a.bias[1]
         z = 0.5 * (a.gyro[2] + gyro[2]) - a.bias[2]
         rotate_by(a.q, x * dt, y * dt, z * dt)
     a.gyro[0], a.gyro[1], a.gyro[2] = gyro[0], gyro[1], gyro[2]
+
+
+@njit(cache=True, nogil=True)
+def update_tilt_cov(P: Array, variance: float, k: float, ki: float, rest: bool) -> float:
+    """Update with a sample of this variance, rad^2, whose gain for the tilt is k.
+
+    Return the gain for the bias: ki, or more while the bias is unknown. At rest the gyroscope tells it, and not a tilt.
+    """
+    tilt, cov, bias = P[0], P[1], P[2]
+    ki = 0.0 if rest else max(ki, cov / (tilt + variance))
+    P[0] = (1.0 - k) * (1.0 - k) * tilt + k * k * variance
+    P[1] = (1.0 - k) * (cov - ki * tilt) + k * ki * variance
+    P[2] = bias - 2.0 * ki * cov + ki * ki * (tilt + variance)
+    return ki
 
 
 @njit(cache=True, nogil=True)
@@ -137,8 +165,10 @@ def correct_tilt(
         scale = bound / max(math.sqrt(ex * ex + ey * ey + ez * ez), bound)
         ex, ey, ez = scale * ex, scale * ey, scale * ez
     rotate_by(a.q, k * ex, k * ey, k * ez)
-    if a.age > TAU:
-        ki = weight * dt / (tau * TAU_BIAS)
+    if a.age > SETTLE:
+        ki = weight * dt / (tau * TAU_BIAS) if a.age > TAU else 0.0
+        noise = TILT_NOISE_REST if rest else TILT_NOISE + ROUGH_NOISE * roughness
+        ki = update_tilt_cov(a.tilt_cov, noise / max(weight * dt, NO_TIME), k, ki, rest)
         a.bias[0] -= ki * ex
         a.bias[1] -= ki * ey
         a.bias[2] -= ki * ez

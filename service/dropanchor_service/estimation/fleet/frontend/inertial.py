@@ -9,42 +9,31 @@ start, zero arbitrary (RELATIVE_HEADING), with the variance it has gathered sinc
 """
 
 import math
-from typing import Any, TypeAlias
-
-import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import (
-    ATTITUDE,
     TAU,
+    TILT_SD,
     correct_tilt,
-    level_attitude,
     predict_attitude,
     up_in_body,
     yaw_of,
     yaw_rate_of,
 )
 from dropanchor_service.estimation.fleet.frontend.carrying import (
-    AUTO,
-    CARRYING,
     VEHICLE,
     add_carried_sample,
     carried_rate,
     carried_yaw,
     decide_motion,
     fill_carried_node,
-    start_carrying,
     tilt_tau,
     yaw_of_carried,
 )
-from dropanchor_service.estimation.fleet.frontend.magnetometer import (
-    MAGNETOMETER,
-    north_of,
-    spread_yaw_on_arc,
-    update_magnetometer,
-)
+from dropanchor_service.estimation.fleet.frontend.field import forget_turning, spread_yaw_on_arc
+from dropanchor_service.estimation.fleet.frontend.magnetometer import north_of, update_magnetometer
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
     MOVING,
@@ -57,43 +46,17 @@ from dropanchor_service.estimation.fleet.frontend.preintegration import (
     GYRO_NOISE,
     GYRO_SCALE,
     HORIZON,
-    PREINTEGRATION,
     add_acceleration,
     end_node,
     unobserved_turn_var,
 )
 from dropanchor_service.estimation.fleet.frontend.standstill import (
     CONFIRM,
-    STANDSTILL,
     at_rest,
-    start_standstill,
     update_gyro_bias,
     update_standstill_detector,
 )
-
-FRONTEND = np.dtype(
-    [
-        ("attitude", ATTITUDE),
-        ("standstill", STANDSTILL),
-        ("magnetometer", MAGNETOMETER),
-        ("preintegration", PREINTEGRATION),
-        ("carrying", CARRYING),
-        ("hard_iron", "f8"),  # prior sd of the magnetometer's hard iron, in units of the field
-        ("declination", "f8"),  # rad, of magnetic north, positive east
-        ("t_imu", "i8"),  # ns, of the last IMU sample
-        ("t_node", "i8"),  # ns, end of the last node
-        ("bias_end", "f8"),  # rad/s, the gyroscope's bias about the vertical when the last node ended
-        ("running", "u1"),  # 0: no sample yet
-        ("absolute", "u1"),  # 1: the heading is referred to north
-        ("turned", "f8"),  # rad since start, net
-        ("drift_var", "f8"),  # rad^2, of yaw since start
-        ("drift_cov", "f8"),  # rad^2/s, of yaw with the gyroscope's bias
-        ("last", "f8", 6),  # acc and gyro of the last sample
-        ("frozen_s", "f8"),  # s for which it has been the same
-    ],
-    align=True,
-)
-Frontend: TypeAlias = Any  # a record of FRONTEND
+from dropanchor_service.estimation.fleet.frontend.state import Frontend, start_at
 
 GAP = 0.5  # s: a longer silence is not integrated over
 FROZEN = 0.25  # s of samples that are equal to the last bit: no sensor is so quiet, its driver repeats itself
@@ -104,67 +67,28 @@ HEADING_FLOOR = 2e-4  # rad^2: tilt and mounting, 0.8 deg
 
 
 @njit(cache=True, nogil=True)
-def start_frontend(f: Frontend, hard_iron: float, declination: float, motion: int = AUTO) -> None:
-    """Reset the front-end.
-
-    hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
-    declination: rad, true minus magnetic north, positive east. motion: the setting.
-    """
-    f.running = 0
-    f.carrying.motion = motion
-    f.t_node = 0
-    f.absolute = 0
-    f.hard_iron = hard_iron
-    f.declination = declination
-    f.turned = 0.0
-    f.drift_var = 0.0
-    f.drift_cov = 0.0
-    f.magnetometer.unit = 0.0
-
-
-@njit(cache=True, nogil=True)
-def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
-    """Level the attitude with the first sample and begin the first node there."""
-    a, p, s = f.attitude, f.preintegration, f.standstill
-    a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
-    a.gyro[:] = gyro
-    a.bias[:] = 0.0
-    f.bias_end = 0.0
-    a.age = 0.0
-    a.gravity = 9.80665
-    start_standstill(s, acc, gyro)
-    p.V[:] = 0.0
-    p.a[:] = 0.0
-    p.V_end[:] = 0.0
-    p.acc_var = 0.0
-    p.yaw_rate = 0.0
-    p.yaw_end = 0.0
-    p.gap_s = 0.0
-    p.extrapolated_s = 0.0
-    p.no_acc_s = 0.0
-    p.tilt_gain = 0.0
-    f.magnetometer.elapsed = 0.0
-    f.magnetometer.count = 0.0
-    f.magnetometer.sum_m[:] = 0.0
-    f.magnetometer.sum_R[:] = 0.0
-    start_carrying(f.carrying, a.gravity, f.carrying.motion)
-    if math.isfinite(acc[0] + acc[1] + acc[2]):
-        level_attitude(a.q, acc[0], acc[1], acc[2])
-    f.t_imu = t_ns
-    if f.t_node == 0:
-        f.t_node = t_ns
-    f.running = 1
-
-
-@njit(cache=True, nogil=True)
 def lose_yaw_over_gap(f: Frontend, gap: float) -> None:
     """Add to the variance of yaw what it may have turned in `gap` s without samples."""
     f.preintegration.gap_s += max(0.0, gap - f.preintegration.extrapolated_s)
     f.standstill.quiet = 0.0
     f.attitude.age = min(f.attitude.age, TAU)  # the tilt is another one, too
+    f.attitude.tilt_cov[0], f.attitude.tilt_cov[1] = TILT_SD * TILT_SD, 0.0
     if f.magnetometer.unit > 0.0:
         spread_yaw_on_arc(f.magnetometer, unobserved_turn_var(gap))
     f.drift_var += unobserved_turn_var(gap)
+
+
+@njit(cache=True, nogil=True)
+def learn_gyro_bias(f: Frontend, dt: float, gyro: Array) -> None:
+    """Learn the gyroscope's bias at rest. Tilt and north then know how well it is known."""
+    before, P = f.standstill.bias_var, f.attitude.tilt_cov
+    update_gyro_bias(f.standstill, dt, gyro, f.attitude.bias)
+    variance = f.standstill.bias_var
+    if variance >= before:
+        return
+    if variance < P[2]:
+        P[1], P[2] = 0.0, variance
+    forget_turning(f.magnetometer, variance)
 
 
 @njit(cache=True, nogil=True)
@@ -205,16 +129,16 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
         s.quiet = 0.0
         p.no_acc_s += dt
     if c.carried == 0:  # the hand of somebody who stands turns slowly, which is no bias
-        update_gyro_bias(s, dt, gyro, a.bias)
+        learn_gyro_bias(f, dt, gyro)
     rest = s.quiet > CONFIRM and c.carried == 0
     predict_attitude(a, dt, gyro, rest)
     if heard:
         p.tilt_gain += correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
-        add_acceleration(p, dt, a.q, acc, a.gravity, s.acc_var)
+        add_acceleration(p, dt, a.q, acc, a.gravity, s)
         if c.motion != VEHICLE:
             add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)
     p.yaw_rate = 0.0 if rest else carried_rate(a) if c.carried == 1 else yaw_rate_of(a)
-    update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron)
+    update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron, s.bias_var)
 
 
 @njit(cache=True, nogil=True)
@@ -250,6 +174,7 @@ def fill_unknown(dt: float, node: Node) -> None:
     node.dyaw, node.dyaw_var = 0.0, unobserved_turn_var(dt)
     node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
     node.dv_forward, node.dv_left, node.dv_var, node.tilt_gain = 0.0, 0.0, math.inf, 0.0
+    node.motion_var = 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.rest = MOVING
     node.unobserved_s = dt

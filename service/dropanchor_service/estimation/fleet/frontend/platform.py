@@ -12,7 +12,6 @@ import numpy as np
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import yaw_of
-from dropanchor_service.estimation.fleet.frontend.inertial import Frontend
 from dropanchor_service.estimation.fleet.frontend.node import (
     DERIVED_HEADING,
     MEASURED_HEADING,
@@ -21,6 +20,7 @@ from dropanchor_service.estimation.fleet.frontend.node import (
     NOT_MOVED,
     Node,
 )
+from dropanchor_service.estimation.fleet.frontend.state import Frontend
 
 PLATFORM = np.dtype(
     [

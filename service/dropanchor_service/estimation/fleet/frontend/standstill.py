@@ -20,6 +20,7 @@ from dropanchor_service.estimation.fleet.compiled import njit
 STANDSTILL = np.dtype(
     [
         ("mean", "f8", 6),  # of acc and gyro, exponentially weighted
+        ("deviation", "f8", 3),  # m/s^2, of the last acc from its mean; its squares average to acc_var
         ("acc_var", "f8"),  # sum over the axes, (m/s^2)^2
         ("gyro_bias_var", "f8"),  # sum over the axes, (rad/s)^2
         ("seen", "f8"),  # s of samples seen, up to a limit
@@ -55,6 +56,7 @@ def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
     for i in range(3):
         s.mean[i] = acc[i] if math.isfinite(acc[i]) else 0.0
         s.mean[3 + i] = gyro[i]
+    s.deviation[:] = 0.0
     s.acc_var = 0.0
     s.gyro_bias_var = 0.0
     s.seen = 0.0
@@ -67,10 +69,10 @@ def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
 
 @njit(cache=True, nogil=True)
 def update_channel(s: Standstill, k: float, i: int, value: float) -> float:
-    """Update the exponentially weighted mean of channel i. Return the squared deviation to be averaged."""
+    """Update the exponentially weighted mean of channel i. Return the deviation whose square is to be averaged."""
     d = value - s.mean[i]
     s.mean[i] += k * d
-    return (1.0 - k) * d * d  # type: ignore[no-any-return]
+    return math.sqrt(1.0 - k) * d  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
@@ -80,8 +82,11 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
         return
     k = dt / (min(s.seen, TAU) + dt)
     s.seen += dt
-    va = update_channel(s, k, 0, acc[0]) + update_channel(s, k, 1, acc[1]) + update_channel(s, k, 2, acc[2])
-    vg = update_channel(s, k, 3, gyro[0]) + update_channel(s, k, 4, gyro[1]) + update_channel(s, k, 5, gyro[2])
+    va = vg = 0.0
+    for i in range(3):
+        s.deviation[i] = update_channel(s, k, i, acc[i])
+        va += s.deviation[i] ** 2
+        vg += update_channel(s, k, 3 + i, gyro[i]) ** 2
     s.acc_var += k * (va - s.acc_var)
     s.gyro_bias_var += k * (vg - s.gyro_bias_var)
     x, y, z = s.mean[3] - bias[0], s.mean[4] - bias[1], s.mean[5] - bias[2]

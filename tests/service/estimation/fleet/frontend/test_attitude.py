@@ -13,6 +13,7 @@ from dropanchor_service.estimation.fleet.frontend.attitude import (
     TAU,
     down_weight,
     rotate_by,
+    update_tilt_cov,
     yaw_of,
 )
 from dropanchor_service.estimation.paper.attitude import AttitudeFilter, AttitudeParameters
@@ -127,3 +128,36 @@ def test_the_readable_filter_agrees_on_the_same_six_axis_samples() -> None:
         theirs.append(readable.q)
     q, _ = attitude_of(m, np.array(theirs[0]))
     assert angle_between(q, rotations(np.array(theirs))).max() < math.radians(1.5)
+
+
+def drifting(acc_std: float) -> tuple[Array, Array]:
+    """Return tilt errors (n,) rad and learned biases (3,) after 40 s level with a gyroscope bias of 0.01 rad/s."""
+    m = synthesise(np.arange(0, 40, 0.01), lambda t: np.zeros((len(t), 3)))
+    m.gyro += [0.01, 0.0, 0.0]
+    m.acc += np.random.default_rng(3).normal(0.0, acc_std, m.acc.shape)
+    q, row = attitude_of(m, wxyz(m.attitude[0]), bias_std=0.01)
+    return angle_between(q, m.attitude), row["bias"]
+
+
+def test_an_unknown_bias_of_the_gyroscope_is_learned_on_a_smooth_ride_without_any_rest() -> None:
+    errors, bias = drifting(0.05)
+    assert errors[2000:].max() < 0.02  # 0.01 rad/s * TAU = 0.06 with the gains of a known bias
+    assert bias == pytest.approx([0.01, 0.0, 0.0], abs=0.002)
+
+
+def test_the_covariance_of_tilt_and_bias_is_that_of_their_errors() -> None:
+    rng = np.random.default_rng(5)
+    errors = []
+    for _ in range(500):
+        P = np.array([0.04, 0.0, 1e-4])
+        tilt, bias = rng.normal(0, 0.2), rng.normal(0, 0.01)
+        for _ in range(200):
+            tilt += bias * 0.1
+            P[:] = P[0] + 0.2 * P[1] + 0.01 * P[2], P[1] + 0.1 * P[2], P[2]
+            k = 0.1 / 6.1
+            ki = update_tilt_cov(P, 0.05, k, 1e-4, False)
+            e = tilt + rng.normal(0, math.sqrt(0.05))
+            tilt, bias = tilt - k * e, bias - ki * e
+        errors.append([tilt, bias])
+    found = np.mean(np.square(errors), axis=0)
+    assert found == pytest.approx([P[0], P[2]], rel=0.15)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dropanchor_service.estimation.fleet.frontend.inertial import FRONTEND, start_frontend
 from dropanchor_service.estimation.fleet.frontend.node import NODE
+from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
 from support.frontend import drive, nanoseconds, new_frontend, run
 from support.imu import Motion, synthesise, turning
 

@@ -1,0 +1,93 @@
+"""What the front-end of one tag knows, and how it begins."""
+
+import math
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.attitude import ATTITUDE, TILT_SD, level_attitude
+from dropanchor_service.estimation.fleet.frontend.carrying import AUTO, CARRYING, start_carrying
+from dropanchor_service.estimation.fleet.frontend.field import MAGNETOMETER
+from dropanchor_service.estimation.fleet.frontend.preintegration import PREINTEGRATION
+from dropanchor_service.estimation.fleet.frontend.standstill import BIAS_SD, STANDSTILL, start_standstill
+
+FRONTEND = np.dtype(
+    [
+        ("attitude", ATTITUDE),
+        ("standstill", STANDSTILL),
+        ("magnetometer", MAGNETOMETER),
+        ("preintegration", PREINTEGRATION),
+        ("carrying", CARRYING),
+        ("hard_iron", "f8"),  # prior sd of the magnetometer's hard iron, in units of the field
+        ("declination", "f8"),  # rad, of magnetic north, positive east
+        ("t_imu", "i8"),  # ns, of the last IMU sample
+        ("t_node", "i8"),  # ns, end of the last node
+        ("bias_end", "f8"),  # rad/s, the gyroscope's bias about the vertical when the last node ended
+        ("running", "u1"),  # 0: no sample yet
+        ("absolute", "u1"),  # 1: the heading is referred to north
+        ("turned", "f8"),  # rad since start, net
+        ("drift_var", "f8"),  # rad^2, of yaw since start
+        ("drift_cov", "f8"),  # rad^2/s, of yaw with the gyroscope's bias
+        ("last", "f8", 6),  # acc and gyro of the last sample
+        ("frozen_s", "f8"),  # s for which it has been the same
+    ],
+    align=True,
+)
+Frontend: TypeAlias = Any  # a record of FRONTEND
+
+
+@njit(cache=True, nogil=True)
+def start_frontend(f: Frontend, hard_iron: float, declination: float, motion: int = AUTO) -> None:
+    """Reset the front-end.
+
+    hard_iron: prior sd of the magnetometer's offset in units of the field; 1 for a bare one, 0.05 for a calibrated one.
+    declination: rad, true minus magnetic north, positive east. motion: the setting.
+    """
+    f.running = 0
+    f.carrying.motion = motion
+    f.t_node = 0
+    f.absolute = 0
+    f.hard_iron = hard_iron
+    f.declination = declination
+    f.attitude.age = 0.0
+    f.attitude.tilt_cov[0], f.attitude.tilt_cov[1], f.attitude.tilt_cov[2] = TILT_SD * TILT_SD, 0.0, BIAS_SD * BIAS_SD
+    f.turned = 0.0
+    f.drift_var = 0.0
+    f.drift_cov = 0.0
+    f.magnetometer.unit = 0.0
+
+
+@njit(cache=True, nogil=True)
+def start_at(f: Frontend, t_ns: int, acc: Array, gyro: Array) -> None:
+    """Level the attitude with the first sample and begin the first node there."""
+    a, p, s = f.attitude, f.preintegration, f.standstill
+    a.q[0], a.q[1], a.q[2], a.q[3] = 1.0, 0.0, 0.0, 0.0
+    a.gyro[:] = gyro
+    a.bias[:] = 0.0
+    f.bias_end = 0.0
+    a.gravity = 9.80665
+    start_standstill(s, acc, gyro)
+    p.V[:] = 0.0
+    p.a[:] = 0.0
+    p.V_end[:] = 0.0
+    p.acc_var = 0.0
+    p.shaking[:] = 0.0
+    p.yaw_rate = 0.0
+    p.yaw_end = 0.0
+    p.gap_s = 0.0
+    p.extrapolated_s = 0.0
+    p.no_acc_s = 0.0
+    p.tilt_gain = 0.0
+    f.magnetometer.elapsed = 0.0
+    f.magnetometer.count = 0.0
+    f.magnetometer.sum_m[:] = 0.0
+    f.magnetometer.sum_R[:] = 0.0
+    start_carrying(f.carrying, a.gravity, f.carrying.motion)
+    if math.isfinite(acc[0] + acc[1] + acc[2]):
+        level_attitude(a.q, acc[0], acc[1], acc[2])
+    f.t_imu = t_ns
+    if f.t_node == 0:
+        f.t_node = t_ns
+    f.running = 1
