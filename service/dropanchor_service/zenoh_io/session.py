@@ -1,8 +1,6 @@
 """Open the Zenoh session of the service: its own router, or a client of an external one."""
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,6 @@ from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.router import LINK, QUIET, router_transport
 from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.zenoh_io import receive_threads
-from dropanchor_service.zenoh_io.prompt_closing import PromptClosing
 
 ATTEMPT_S = 1.0
 
@@ -22,19 +19,10 @@ class ZenohError(Exception):
     """The session cannot be opened; the message says what to check."""
 
 
-@contextmanager
-def open_session(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> Iterator[zenoh.Session]:
-    """Open a session with these settings until the block ends. Raises ZenohError."""
-    if settings.connect:
-        with _opened(settings, credentials) as session:
-            yield session
-    else:
+def open_session(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> zenoh.Session:
+    """Open a session with these settings. Raises ZenohError."""
+    if not settings.connect:
         receive_threads.set_receive_threads()
-        with _opened(settings, credentials) as session, PromptClosing(session):
-            yield session
-
-
-def _opened(settings: ZenohSettings, credentials: SecurityFolder | None) -> zenoh.Session:
     try:
         return zenoh.open(_config(settings, credentials))
     except zenoh.ZError as error:

@@ -1,9 +1,8 @@
 """The number of receive threads of a router after a client has connected."""
 
-import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from subprocess import PIPE, Popen
 
@@ -17,11 +16,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="counts threads 
 
 
 def receive_threads(pid: int) -> int:
-    count = 0
-    for thread in os.listdir(f"/proc/{pid}/task"):
-        with suppress(OSError):  # it has ended meanwhile
-            count += Path(f"/proc/{pid}/task/{thread}/comm").read_text().startswith(("acc-", "rx-"))
-    return count
+    names = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/comm")]
+    return sum(name.startswith("rx-") for name in names)
 
 
 @contextmanager
@@ -38,7 +34,7 @@ def router(endpoint: str, **more: str) -> Iterator[int]:
             process.kill()
 
 
-def test_a_router_has_few_receive_threads() -> None:
+def test_a_router_has_enough_receive_threads() -> None:
     endpoint = free_endpoint()
     with router(endpoint) as pid, connected_session(endpoint):
         wait_until(lambda: receive_threads(pid) == COUNT)
@@ -46,15 +42,12 @@ def test_a_router_has_few_receive_threads() -> None:
 
 def test_the_environment_variable_overrides_the_number() -> None:
     endpoint = free_endpoint()
-    with (
-        router(endpoint, **{VARIABLE: "(rx: (handover: acc), acc: (worker_threads: 3))"}) as pid,
-        connected_session(endpoint),
-    ):
+    with router(endpoint, **{VARIABLE: "(rx: (worker_threads: 3))"}) as pid, connected_session(endpoint):
         wait_until(lambda: receive_threads(pid) == 3)
 
 
 @pytest.mark.parametrize("subcommand", ["serve", "demo"])
-def test_a_service_with_the_router_inside_has_few_receive_threads(
+def test_a_service_with_the_router_inside_has_enough_receive_threads(
     subcommand: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv(VARIABLE, raising=False)
