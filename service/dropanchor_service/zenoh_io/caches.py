@@ -23,6 +23,7 @@ from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.store import Sites
 from dropanchor_service.zenoh_io.channel import drain
+from dropanchor_service.zenoh_io.open_queries import REPLIES, OpenQueries
 from dropanchor_service.zenoh_io.silent_tags import SilentTags
 
 ANSWER_S = 2.0
@@ -34,7 +35,8 @@ RETRY_S = 0.1  # pause before the same tag is asked again
 SILENT_S = 1.0  # after it came back online, until a tag counts as silent
 CHECK_S = 1.0  # between two searches for tags that have fallen silent
 CHECKED_TAGS = 20  # of these at a time, so that a service that is stuck asks few
-REPLIES = 2**16  # queue length; a full queue would block the receive thread and delay live messages
+POLL_S = 0.005  # between two looks at the replies to open queries
+MAX_OPEN = 64  # queries at a time; more would fill the links, on which live messages are dropped then
 
 _log = logging.getLogger(__name__)
 
@@ -61,6 +63,8 @@ class ZenohCaches:
         self._clock = clock
         self._on_first_round = on_first_round
         self._later: deque[tuple[float, str, int]] = deque()  # queries to repeat: when, key, missing
+        self._asked: deque[tuple[str, int]] = deque()  # queries that wait for others to end: key, missing
+        self._open = OpenQueries()
         self._returned: deque[tuple[float, str, int]] = deque()  # tags online again: when to look, key, last heard ns
         self._silent_tags = SilentTags(sites.rows)
         self._next_check_s = 0.0
@@ -90,7 +94,7 @@ class ZenohCaches:
         """Ask the caches of a tag for `missing` messages (0: unknown), on the thread; a retry waits for a moment."""
         if retries:
             self._later.append((time.monotonic() + RETRY_S, key, missing))
-        self._tasks.put(self._ask_later if retries else partial(self._ask, key, missing))
+        self._tasks.put(self._ask_later if retries else partial(self._asked.append, (key, missing)))
 
     def ask_if_silent(self, key: str) -> None:
         """Ask the caches of a tag that came online and sends nothing, for what it sent while it was away.
@@ -104,16 +108,28 @@ class ZenohCaches:
     def _run(self) -> None:
         while True:
             try:
-                task = self._tasks.get(timeout=RETRY_S if self._later or self._returned else CHECK_S)
+                task = self._tasks.get(timeout=self._pause_s())
             except Empty:
                 task = self._on_idle
             if task is None:
                 return
             try:
                 task()
+                self._poll()
             except Exception as error:
                 self._metrics.faults.labels("caches").inc()
                 self._rare.exception("caches", error)
+
+    def _pause_s(self) -> float:
+        if self._open:
+            return POLL_S
+        return RETRY_S if self._later or self._returned else CHECK_S
+
+    def _poll(self) -> None:
+        """Pass on replies, and ask what had to wait for others to be answered."""
+        self._open.poll()
+        while self._asked and len(self._open) < MAX_OPEN:
+            self._ask(*self._asked.popleft())
 
     def _on_idle(self) -> None:
         self._ask_later()
@@ -129,7 +145,7 @@ class ZenohCaches:
         """
         for row in self._silent_tags.take(self._clock.now_ns(), CHECKED_TAGS):
             key = self._sites.samples_key(row)
-            self._get(key, 1, zenoh.handlers.Callback(partial(self._on_newest, key)))
+            self._open.add(self._get(key, 1), partial(self._on_newest, key))
 
     def _on_newest(self, key: str, reply: Any) -> None:
         message = reply.ok
@@ -140,7 +156,7 @@ class ZenohCaches:
         """Repeat the queries that are due, and ask the caches of tags that came back and are silent."""
         while self._later and self._later[0][0] <= time.monotonic():
             _, key, missing = self._later.popleft()
-            self._ask(key, missing)
+            self._asked.append((key, missing))
         while self._returned and self._returned[0][0] <= time.monotonic():
             _, key, heard_ns = self._returned.popleft()
             if self._last_heard_ns(key) == heard_ns:
@@ -149,8 +165,7 @@ class ZenohCaches:
     def _ask_all(self) -> None:
         limit, asked_s = min(self._typical_limit(), self._limit(self._newest_ns)), time.monotonic()
         try:
-            replies = self._get(self._sites.all_tags("samples"), limit, zenoh.handlers.FifoChannel(REPLIES))
-            for reply in drain(replies):
+            for reply in drain(self._get(self._sites.all_tags("samples"), limit)):
                 self._on_reply(reply)
         finally:
             self._finish(partial(self._catch_up.on_first_round_answer, limit), asked_s)
@@ -159,18 +174,17 @@ class ZenohCaches:
     def _ask(self, key: str, missing: int) -> None:
         limit = MIN_MESSAGES + missing if missing else self._limit(self._last_heard_ns(key))
         answered = partial(self._catch_up.on_answer, key, limit)
-        done = partial(self._tasks.put, partial(self._finish, answered, time.monotonic()))
         try:
-            self._get(key, limit, zenoh.handlers.Callback(self._on_reply, done))
+            self._open.add(self._get(key, limit), self._on_reply, partial(self._finish, answered, time.monotonic()))
         except zenoh.ZError:
             answered()
             raise
 
-    def _get(self, samples: str, limit: int, handler: Any) -> Any:
-        """Query the caches of these keys for their newest `limit` messages."""
+    def _get(self, samples: str, limit: int) -> Any:
+        """Query the caches of these keys for their newest `limit` messages. Return the channel of the replies."""
         return self._session.get(
             f"{samples}/@adv/**?_max={limit}",
-            handler,
+            zenoh.handlers.FifoChannel(REPLIES),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             accept_replies=zenoh.ReplyKeyExpr.ANY,

@@ -4,6 +4,7 @@ Each wait releases the interpreter lock, and getting it back takes time. A batch
 """
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from typing import Any
 
 import zenoh
@@ -20,13 +21,12 @@ def drain(channel: Any, gather: Callable[[], None] = lambda: None) -> Iterator[A
         except zenoh.ZError:
             return
         gather()
-        while entry is not None:
-            yield entry
-            entry = _next(channel)
+        yield entry
+        with suppress(zenoh.ZError):
+            yield from drain_now(channel)
 
 
-def _next(channel: Any) -> Any:
-    try:
-        return channel.try_recv()
-    except zenoh.ZError:
-        return None
+def drain_now(channel: Any) -> Iterator[Any]:
+    """Yield the entries that a channel has now. Raises ZError if there are none and it is closed."""
+    while (entry := channel.try_recv()) is not None:
+        yield entry
