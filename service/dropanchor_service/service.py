@@ -24,11 +24,12 @@ from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.estimation.columns import Engine
 from dropanchor_service.ingest.admission import Admission
 from dropanchor_service.ingest.buffer import MessageBuffer
-from dropanchor_service.ingest.catch_up import CatchUp, sequence_states
+from dropanchor_service.ingest.catch_up import CatchUp
 from dropanchor_service.ingest.from_http import FromHttp
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.period import Period
 from dropanchor_service.ingest.publishers import Publishers
+from dropanchor_service.ingest.sequence_states import sequence_states
 from dropanchor_service.ingest.thread import IngestThread
 from dropanchor_service.ingest.turn import Ingest
 from dropanchor_service.metrics.health import HealthGauges
@@ -266,6 +267,7 @@ class Service:
             new_publisher_limit=caches.new_publisher_limit,
         )
         self._from_http.on_live = catch_up.on_live
+        self._ingest.ask_on_gap(catch_up.on_gap)
         return ZenohIntake(session, self.sites, self._ingest, catch_up, caches, self.metrics, self.clock, self._period)
 
     def _http_thread(self, bound: socket.socket) -> HttpThread:

@@ -81,11 +81,12 @@ class Publishers:
     def times(self, times: Array) -> None:
         self._times = times.copy()
 
-    def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int) -> Sequenced:
+    def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int, fresh: int | None = None) -> Sequenced:
         """Put messages into the order of their publishers.
 
         forms: FORM. rows: of their tags. arrivals: ns, ascending. due_ns: give up on messages that are missing before
-        one that arrived by then.
+        one that arrived by then. fresh: those from this index on are new; what is missing before them is not given up,
+        since the caches may have it (None: there are none).
         """
         self._grow(rows)
         n = len(rows)
@@ -96,7 +97,8 @@ class Publishers:
         if pending:
             behind = np.flatnonzero(verdicts == sequences.PENDING)
             ordered = behind[np.lexsort((distances[behind], slots[behind]))]
-            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_ns, verdicts)
+            first = n if fresh is None else fresh
+            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_ns, first, verdicts)
             due = np.concatenate([due, ordered[verdicts[ordered] == sequences.PASS]])
         again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.PENDING))
         return Sequenced(due, waiting, again, missing, slots)

@@ -1,7 +1,7 @@
 """Turn messages of admitted tags into samples for an engine: decode, put in order, screen, map clocks."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.kernels.values import shift_times, time_spans
-from dropanchor_service.ingest.publishers import Publishers
+from dropanchor_service.ingest.publishers import Publishers, Sequenced
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
@@ -22,12 +22,31 @@ from dropanchor_service.store.rings import rank_in_row
 REORDER_BYTES = 2**26
 _DTYPES = [column.dtype for column in SampleBatch().columns()]
 
+OnGap = Callable[[str, list[Message]], bool]
+"""Takes messages of the tag with this key that came before one with a smaller number, and appends them to the buffer
+again once that one cannot come any more. Returns whether it does so."""
+
+
+@dataclass(frozen=True)
+class Ordered:
+    """Messages in the order of their publishers, as `SampleReader.batches` takes them.
+
+    taken: messages that `on_gap` has not kept. of_row, arrived: of all messages in `forms`, which may have waited.
+    """
+
+    taken: list[Message]
+    forms: Forms
+    sequenced: Sequenced
+    of_row: Array
+    arrived: Array
+
 
 class SampleReader:
     """Reads the samples of messages, in the order of each publisher. Owned by one thread.
 
     window_ns: time that a message waits for those that its publisher numbered before it.
     span_ns: between the oldest and the newest sample of a message: the least of the last batch.
+    on_gap: is offered messages behind a gap. Those that it does not take wait here.
     """
 
     def __init__(
@@ -40,6 +59,7 @@ class SampleReader:
     ) -> None:
         self.window_ns = window_ns
         self.span_ns = 0
+        self.on_gap: OnGap = lambda *_: False
         self._publishers = publishers
         self._sites = sites
         self._rows = sites.rows
@@ -52,25 +72,43 @@ class SampleReader:
         """Number of messages that wait for one numbered before them."""
         return len(self._reorder)
 
-    def batches(self, fresh: list[Message], now_ns: int) -> Iterator[SampleBatch]:
-        """Yield the samples of all messages that are due, fresh or pending.
-
-        A batch holds at most one message of each tag, so that the result for a message does not depend on which others
-        arrived with it.
-        """
+    def put_in_order(self, fresh: list[Message], now_ns: int) -> Ordered:
+        """Find the messages that are due, fresh or pending, and let the others wait."""
         due_ns = self._due_ns(fresh, now_ns)
         messages = [*self._reorder.take_due(fresh, due_ns), *fresh] if self.pending else fresh
-        if not messages:
-            return
-        rows, payloads, encodings, arrivals = zip(*messages, strict=True)
+        rows, payloads, encodings, arrivals = zip(*messages, strict=True) if messages else ((), (), (), ())
         read = self._forms(payloads, encodings)
         of_row, arrived = np.array(rows, np.int32), np.array(arrivals, np.int64)
         for reason in {reason for _, reason in read.rejected}:
             self._rejections.count_rejected(reason, of_row[[index for index, why in read.rejected if why == reason]])
-        sequenced = self._publishers.sequence(read.forms, of_row, arrived, due_ns)
+        waited = len(messages) - len(fresh)
+        sequenced = self._publishers.sequence(read.forms, of_row, arrived, due_ns, waited)
         self._rejections.count_given_up(sequenced.missing)
-        self._reorder.add([messages[index] for index in sequenced.pending.tolist()])
         self._rejections.count_rejected(Reason.DUPLICATE, of_row[sequenced.duplicates])
+        waiting = sequenced.pending.tolist()
+        kept = self._kept_on_gap([index for index in waiting if index >= waited], messages) if waiting else set()
+        self._reorder.add([messages[index] for index in waiting if index not in kept])
+        taken = [messages[index] for index in range(waited, len(messages)) if index not in kept] if kept else fresh
+        return Ordered(taken, read, sequenced, of_row, arrived)
+
+    def _kept_on_gap(self, waiting: list[int], messages: list[Message]) -> set[int]:
+        """Offer fresh messages behind a gap to `on_gap`. Return those that it keeps, as indices."""
+        by_row: dict[int, list[int]] = {}
+        for index in waiting:
+            by_row.setdefault(messages[index][0], []).append(index)
+        key_of, kept = self._sites.samples_key, set[int]()
+        for row, of_tag in by_row.items():
+            if self.on_gap(key_of(row), [messages[index] for index in of_tag]):
+                kept.update(of_tag)
+        return kept
+
+    def batches(self, ordered: Ordered) -> Iterator[SampleBatch]:
+        """Yield the samples of the messages that are due.
+
+        A batch holds at most one message of each tag, so that the result for a message does not depend on which others
+        arrived with it.
+        """
+        read, sequenced, of_row, arrived = ordered.forms, ordered.sequenced, ordered.of_row, ordered.arrived
         for due in _one_per_row(sequenced.due, of_row):
             decoded, rejected = screen(read_samples(read, due))
             of_batch = replace(sequenced, due=due)

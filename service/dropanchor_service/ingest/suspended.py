@@ -1,6 +1,6 @@
-"""Messages that wait for the answers of caches: their numbers, their sizes, and the order in which to release them."""
+"""Messages that wait for the answers of caches: their numbers and sizes, what is missing, and the order of release."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from dropanchor_schemas.samples import decode_json
@@ -27,6 +27,36 @@ class Suspended(NamedTuple):
 
 def size_of(message: Suspended) -> int:
     return len(message.payload) + MESSAGE_OVERHEAD
+
+
+def distances(suspended: Iterable[Suspended], states: Mapping[int, SequenceState]) -> dict[int, set[int]]:
+    """Return the numbers of the messages to fuse, by the boot id of their publisher.
+
+    They are relative to the expected one or, for a new publisher, to its first suspended one.
+    """
+    found: dict[int, set[int]] = {}
+    first: dict[int, SequenceState] = {}
+    for message in suspended:
+        if message.number:
+            boot_id, sequence, _ = message.number
+            origin = states.get(boot_id) or first.setdefault(boot_id, SequenceState(sequence, 0))
+            ahead = origin.ahead(sequence)
+            if ahead >= 0 or boot_id in first:
+                found.setdefault(boot_id, set()).add(ahead)
+    return found
+
+
+def missing(numbers: Iterable[Number], states: Mapping[int, SequenceState], new_publisher_limit: int) -> int:
+    """Return the largest number of messages that one of the tag's publishers has sent and that were not fused.
+
+    numbers: of suspended messages. new_publisher_limit: bounds the result for a publisher without a state.
+    """
+
+    def missing_to(number: Number) -> int:
+        known = states.get(number.boot_id)
+        return max(0, known.ahead(number.sequence)) + 1 if known else min(number.sequence + 1, new_publisher_limit)
+
+    return max(map(missing_to, numbers), default=0)
 
 
 _Numbered = tuple[Number, Suspended]

@@ -18,7 +18,7 @@ from dropanchor_service.ingest.health import HealthIntake
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.rejections import Rejections
-from dropanchor_service.ingest.samples import SampleReader
+from dropanchor_service.ingest.samples import OnGap, Ordered, SampleReader
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.clock import UtcClock
 from dropanchor_service.store import LatestPoses, Sites, Tag
@@ -70,6 +70,10 @@ class Ingest:
         self._announced.append(key)
         self._buffer.wake()
 
+    def ask_on_gap(self, on_gap: OnGap) -> None:
+        """Offer messages behind a gap to `on_gap` from now on."""
+        self._reader.on_gap = on_gap
+
     @property
     def has_pending(self) -> bool:
         """Return whether messages are pending, so that a turn may be due although nothing arrives."""
@@ -93,13 +97,19 @@ class Ingest:
         self._forget_deleted_tags()
         of_known, of_deleted = self._split(fresh)
         messages = [*kept, *of_known, *self._admitted([*of_deleted, *unregistered])]
+        if messages or self.has_pending:
+            now_ns = self._clock.now_ns()
+            ordered = self._reader.put_in_order(messages, now_ns)
+            self._note(ordered.taken)
+            self._fuse(ordered, now_ns)
+        return len(fresh)
+
+    def _note(self, messages: list[Message]) -> None:
+        """Count messages and show them to the observers."""
         if messages:
             self._notify(self._observers.messages, messages)
             self._metrics.messages.inc(len(messages))
             self._rows.count_messages(np.array([message[0] for message in messages], np.int32), messages[-1][3])
-        if messages or self.has_pending:
-            self._fuse(messages)
-        return len(fresh)
 
     def _admit_announced(self) -> None:
         while self._announced:
@@ -152,12 +162,11 @@ class Ingest:
         for payload, encoding, arrival_ns in self._admission.take_kept(tag):
             yield tag.row, payload, encoding, arrival_ns
 
-    def _fuse(self, messages: list[Message]) -> None:
-        now_ns = self._clock.now_ns()
-        for samples in self._reader.batches(messages, now_ns):
+    def _fuse(self, ordered: Ordered, now_ns: int) -> None:
+        for samples in self._reader.batches(ordered):
             self._fuse_batch(self._outside_quarantine(samples, now_ns), now_ns)
-        if messages:
-            self._metrics.delay_seconds.observe((self._clock.now_ns() - messages[0][3]) * 1e-9)
+        if ordered.taken:
+            self._metrics.delay_seconds.observe((self._clock.now_ns() - ordered.taken[0][3]) * 1e-9)
 
     def _fuse_batch(self, samples: SampleBatch, now_ns: int) -> None:
         for kind, column in zip(KINDS, samples.columns(), strict=True):

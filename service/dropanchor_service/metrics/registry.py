@@ -33,10 +33,13 @@ class Metrics:
         )
         self.poses = counter("dropanchor_poses", "Poses that the estimators produced.")
         self.misses = counter(
-            "dropanchor_missed_messages", "Messages that a publisher numbered but that can no longer be retrieved."
+            "dropanchor_missed_messages",
+            "Messages that Zenoh noticed to be missing and did not recover. The service then asks the caches of the "
+            "tag itself; what it does not get either is given up.",
         )
         self.given_up = counter(
-            "dropanchor_given_up_messages", "Messages missing from a publisher's sequence that did not arrive in time."
+            "dropanchor_given_up_messages",
+            "Messages missing from a publisher's sequence that neither arrived in time nor were in its cache.",
         )
         self.faults = counter("dropanchor_faults", "Internal errors, by place.", ["where"])
         self.estimator_seconds = duration("dropanchor_estimator_seconds", "Time to fuse one batch of samples.")

@@ -32,7 +32,11 @@ TOKENS_PER_TAG = 2  # liveliness tokens that a site may have, for each tag that 
 
 
 class ZenohIntake:
-    """Subscribes to the samples while it is open. Missed messages are fetched from the publishers' caches."""
+    """Subscribes to the samples while it is open.
+
+    Zenoh fetches missed messages from the publishers' caches. It holds back those that follow until it has an answer,
+    for ten seconds at most: the Python API has no setting for that. For what it does not get, see `CatchUp.on_gap`.
+    """
 
     def __init__(
         self,
@@ -117,7 +121,10 @@ class ZenohIntake:
 
     def _on_miss(self, miss: zenoh.ext.Miss) -> None:
         self._metrics.misses.inc(miss.nb)
-        self._log.warning("messages are lost", f"{miss.nb} messages of one publisher are no longer in its cache")
+        text = (
+            f"Zenoh did not recover {miss.nb} messages of one publisher; if they are numbered, its cache is asked again"
+        )
+        self._log.warning("messages are missing", text)
 
     def _on_token(self, message: zenoh.Sample) -> None:
         try:

@@ -39,15 +39,23 @@ class InterruptedBuffer(MessageBuffer):
 
 
 class CatchUpBench:
-    """A catch-up that expects the tags a and b, and the messages that it releases."""
+    """A catch-up that expects the tags a and b, and the messages that it releases. now_s: its clock."""
 
     def __init__(self, states: Mapping[str, Mapping[int, SequenceState]] = MappingProxyType({})) -> None:
         self.asked: list[str] = []
         self.missing: list[int] = []
+        self.now_s = 0.0
         self._buffer = InterruptedBuffer()
         for row, key in enumerate((A, B, NEW)):
             self._buffer.admit(key, row)
-        self.catch_up = CatchUp(self._buffer, [A, B], lambda key: states.get(key, {}), self._ask, new_publisher_limit=4)
+        self.catch_up = CatchUp(
+            self._buffer,
+            [A, B],
+            lambda key: states.get(key, {}),
+            self._ask,
+            new_publisher_limit=4,
+            now_s=lambda: self.now_s,
+        )
 
     def _ask(self, key: str, missing: int, _retries: int) -> None:
         self.asked.append(key)
@@ -86,3 +94,14 @@ def cached(bench: CatchUpBench, *sequences: int, boot_id: int = 1, key: str = A)
     for sequence in sequences:
         content = payload(sequence, measured_ns(sequence), boot_id)
         bench.catch_up.on_cached(key, content, ENCODING_PACKED, T0 + 100 * S)
+
+
+def behind_a_gap(bench: CatchUpBench, *sequences: int, boot_id: int = 1, key: str = A) -> bool:
+    """Offer messages that came before one with a smaller number. Return whether they are suspended."""
+    return bench.catch_up.on_gap(
+        key,
+        [
+            (0, payload(sequence, measured_ns(sequence), boot_id), ENCODING_PACKED, measured_ns(sequence) + 20_000_000)
+            for sequence in sequences
+        ],
+    )

@@ -164,13 +164,15 @@ def _force(publisher: Any, sequence: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def release(ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any, due_ns: int, verdicts: Any) -> int:
+def release(
+    ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any, due_ns: int, fresh: int, verdicts: Any
+) -> int:
     """Judge the pending messages again, in the order of their numbers. Return how many missing ones are given up.
 
     All messages up to one that has waited long enough pass, and so do those that follow without a gap.
 
     ordered: the pending messages by publisher, then number. due_ns: messages that arrived by then have waited long
-    enough.
+    enough, unless they come from a publisher that is RUNNING and are among those from index `fresh` on.
     """
     missing = 0
     begin = 0
@@ -178,8 +180,10 @@ def release(ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any
         slot, end, forced = slots[ordered[begin]], begin, begin
         publisher = publishers[slot]
         while end < len(ordered) and slots[ordered[end]] == slot:
+            newest = ordered[end]
             end += 1
-            if publisher.gap_allowed or arrivals[ordered[end - 1]] <= due_ns:
+            may_be_asked_for = newest >= fresh and publisher.status == RUNNING
+            if publisher.gap_allowed or (arrivals[newest] <= due_ns and not may_be_asked_for):
                 forced = end
         for k in range(begin, end):
             i = ordered[k]
