@@ -24,6 +24,10 @@ class Tuning(NamedTuple):
     platform_slip_tau: float = 1.0  # s
     aligned_std: float = 0.05  # rad, mounting angle of a tag whose body axis points along the course
     aligned_log_prior: float = 3.0
+    mount_cell: float = 0.3  # rad, between the guesses of a mounting angle that nobody told
+    mount_cells: int = 7  # guesses on each side
+    mount_straight: float = 0.5  # share of tags that point about ahead
+    mount_any: float = 0.05  # share of tags that may point anywhere in these cells
     gyro_bias_std: float = 0.02  # rad/s, residual bias
     drift_std: float = 0.006  # rad/s, of a platform's heading that drifts
     drift_log_prior: float = 0.0

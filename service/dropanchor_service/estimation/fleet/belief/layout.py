@@ -44,7 +44,7 @@ EXACT: Final = 0  # no more than the heading model says
 OWN_ERROR: Final = 1  # the heading reference has a slow error of its own, or drifts
 DRIFTING: Final = 2  # the gyroscope drifts and the heading does not
 CLASSES: Final = 3
-FAMILIES: Final = 2 * CLASSES  # each of them, with and without a body axis along the course
+FAMILIES: Final = 3 * CLASSES  # each of them: a body axis along the course, any, and one quite unlike the best guess
 
 SETTINGS: Final = np.dtype(
     [

@@ -4,6 +4,7 @@ import math
 
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.layout import (
+    MAX_HYPOTHESES,
     MOUNT,
     PHI,
     WORKING_HYPOTHESES,
@@ -13,13 +14,16 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Hypothesis,
     N,
     R,
+    Row,
     V,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.tuning import Tuning
 
 SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
 SPLIT_SHIFT = 1.0576  # standard deviations
 SPLIT_REMOVED = 0.549  # share of the variance
+MERGED_MOUNTS = 0.2  # rad, by which two mounting angles differ at most that are merged
 ALIKE = 2.0  # ratio of two variances that are alike
 
 
@@ -109,6 +113,32 @@ def are_aligned_alike(work: Hypotheses, count: int) -> bool:
 
 
 @njit(nogil=True)
+def is_mounted_otherwise(a: Hypothesis, b: Hypothesis) -> bool:
+    """Return whether two hypotheses take the body to be mounted in two quite different ways."""
+    return bool(abs(wrap(a.mean[MOUNT] - b.mean[MOUNT])) > 2.0 * MERGED_MOUNTS)
+
+
+@njit(nogil=True)
+def are_mounted_alike(work: Hypotheses, count: int) -> bool:
+    """Return whether no hypothesis takes the body to be mounted quite differently from the best one."""
+    best, others = work[best_of(work, count)], 0
+    for h in range(count):
+        others += is_mounted_otherwise(work[h], best)
+    return bool(others == 0)
+
+
+@njit(nogil=True)
+def max_hypotheses(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
+    """Return how many hypotheses the row may have now: more while several guesses of its mount are open."""
+    if row.publication.resolved == 1:
+        most = t.tracking_hypotheses if row.walk.carried == 0 else t.walk_hypotheses
+        if row.walk.carried == 0 and not are_mounted_alike(work, count):
+            return 4 * most
+        return most if are_aligned_alike(work, count) else 2 * most
+    return t.coarse_hypotheses if row.start.coarse == 1 else MAX_HYPOTHESES
+
+
+@njit(nogil=True)
 def _know_mount_alike(a: Hypothesis, b: Hypothesis) -> bool:
     """Return whether two hypotheses know the mounting angle about as well, if only one took the body as aligned.
 
@@ -126,6 +156,7 @@ def _are_close(work: Hypotheses, a: int, b: int, distance: float) -> bool:
         or work[a].nlos != work[b].nlos
         or work[a].reverse != work[b].reverse
         or not _know_mount_alike(work[a], work[b])
+        or abs(wrap(work[a].mean[MOUNT] - work[b].mean[MOUNT])) > MERGED_MOUNTS
     ):
         return False
     P = work[a].cov

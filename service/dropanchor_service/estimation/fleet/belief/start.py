@@ -30,7 +30,8 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
+from dropanchor_service.estimation.fleet.belief.mixture import best_of
+from dropanchor_service.estimation.fleet.belief.mounting import add_aligned, fan_mounts
 from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
 from dropanchor_service.estimation.fleet.belief.states import NO_HEADING_YET, NO_RANGE
 from dropanchor_service.estimation.fleet.compiled import njit
@@ -110,19 +111,6 @@ def choose_model(row: Row, node: Node, t: Tuning) -> None:
 
 
 @njit(nogil=True)
-def _add_aligned(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
-    """Copy all hypotheses for a body axis along the course, where it mostly is. Return the number of copies."""
-    if row.settings.mount_angle_std <= t.aligned_std:
-        return 0
-    for h in range(count):
-        copy_hypothesis(work, h, count + h)
-        work[count + h].cov[MOUNT, MOUNT] = t.aligned_std**2
-        work[count + h].aligned = 1
-        work[count + h].log_weight += t.aligned_log_prior
-    return count
-
-
-@njit(nogil=True)
 def _bearings(row: Row, t: Tuning) -> int:
     """Return the number of directions of a ring."""
     return t.coarse_bearings if row.start.coarse == 1 else t.start_bearings
@@ -156,10 +144,12 @@ def start_known(work: Hypotheses, row: Row, anchor: Anchor, node: Node, t: Tunin
             work[h].log_weight = -0.5 * turned * turned / (gap.yaw_var + unobserved_turn_var(gap.turn_s))
     row.heading.in_site_frame = 0 if start.after_gap == 1 and gap.relative == 1 else 1
     if not is_in_site_frame(node.heading_kind):
-        return ring + _add_aligned(work, ring, row, t)
-    _, slow, _ = reference_error(row, node.heading_var)
-    add_reference_error(work[0].cov, slow, not given)
-    return ring + add_own_error_class(work, 0, ring, row, t, not given)
+        count = ring + add_aligned(work, ring, row, t)
+    else:
+        _, slow, _ = reference_error(row, node.heading_var)
+        add_reference_error(work[0].cov, slow, not given)
+        count = ring + add_own_error_class(work, 0, ring, row, t, not given)
+    return count + fan_mounts(work, count, row, t) if ring == 1 else count
 
 
 @njit(nogil=True)

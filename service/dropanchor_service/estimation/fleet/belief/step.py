@@ -34,9 +34,9 @@ from dropanchor_service.estimation.fleet.belief.measurements import (
 )
 from dropanchor_service.estimation.fleet.belief.mixture import (
     all_finite,
-    are_aligned_alike,
     best_of,
     keep_heaviest,
+    max_hypotheses,
     merge,
     normalise,
     prune,
@@ -113,15 +113,6 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
 
 
 @njit(nogil=True)
-def _max_hypotheses(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
-    """Return how many hypotheses the row may have now: twice as many while two guesses of its mount are open."""
-    if row.publication.resolved == 1:
-        most = t.tracking_hypotheses if row.walk.carried == 0 else t.walk_hypotheses
-        return most if are_aligned_alike(work, count) else 2 * most
-    return t.coarse_hypotheses if row.start.coarse == 1 else MAX_HYPOTHESES
-
-
-@njit(nogil=True)
 def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floats, t: Tuning) -> int:
     """Normalise and prune; now and then merge, split and keep both heading classes. Return the count."""
     normalise(work, count)
@@ -138,7 +129,7 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floa
             if row.walk.carried == 1:
                 angle = t.walk_split_angle
             count = split(work, count, angle, SPLIT_DEPTH)
-        count = keep_heaviest(work, count, _max_hypotheses(work, count, row, t))
+        count = keep_heaviest(work, count, max_hypotheses(work, count, row, t))
     if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
         row.since_class_check_s = 0.0
         count = keep_both_classes(work, count, row, node, PH, t)

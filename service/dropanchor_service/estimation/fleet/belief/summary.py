@@ -18,7 +18,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Scratch,
     V,
 )
-from dropanchor_service.estimation.fleet.belief.mixture import angle_variance, best_of
+from dropanchor_service.estimation.fleet.belief.mixture import angle_variance, best_of, is_mounted_otherwise
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
@@ -182,15 +182,15 @@ def spread_over_all(work: Hypotheses, count: int, scratch: Scratch) -> None:
 
 
 @njit(nogil=True)
-def _family(one: Hypothesis) -> int:
+def _family(one: Hypothesis, head: Hypothesis) -> int:
     """Return the number of the heading class and the guess of the mounting angle that a hypothesis belongs to."""
-    return int(one.heading_class + CLASSES * one.aligned)
+    return int(one.heading_class + CLASSES * (2 if is_mounted_otherwise(one, head) else one.aligned))
 
 
 @njit(nogil=True)
 def _counts(one: Hypothesis, head: Hypothesis) -> bool:
     """Return whether a hypothesis counts: all of other families, of the head's family only its mode."""
-    return bool(one.in_mode or _family(one) != _family(head))
+    return bool(one.in_mode or _family(one, head) != _family(head, head))
 
 
 @njit(nogil=True)
@@ -206,12 +206,12 @@ def spread_over_families(work: Hypotheses, count: int, head: int, scratch: Scrat
     scratch.cov[:] = 0.0
     for h in range(count):
         if _counts(work[h], work[head]):
-            share[_family(work[h])] += work[h].weight
+            share[_family(work[h], work[head])] += work[h].weight
     families = 0
     for family in range(FAMILIES):
         families += share[family] > rejected_weight
     for h in range(count):
-        of_family = share[_family(work[h])]
+        of_family = share[_family(work[h], work[head])]
         if of_family > rejected_weight and _counts(work[h], work[head]):
             _add_moments(work[h], work[h].weight / (of_family * families), x, y, course, scratch)
     mean[0], mean[1], mean[2] = x, y, course

@@ -13,7 +13,7 @@ from dropanchor_service.estimation.columns import State, default_settings
 from dropanchor_service.estimation.fleet.belief.layout import ROW
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.configure import configure_row
-from dropanchor_service.estimation.fleet.frontend.node import RELATIVE_HEADING
+from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, RELATIVE_HEADING
 from dropanchor_service.evaluation.accuracy import nees
 from support.fleet_tracks import CALIBRATED, Drive, drive, rows_of, run, track
 
@@ -119,23 +119,24 @@ def test_after_a_wrong_turn_of_belief_an_exact_heading_is_tried_again() -> None:
     assert np.median([distance(b, d)[-80:].mean() for b, d in runs]) < 0.6
 
 
-def mounted(seed: int, angle: float) -> Drive:
-    """Return a drive of a tag whose body points to the right of its course by this angle, with a gyroscope alone."""
+def mounted(seed: int, angle: float, heading_kind: int) -> Drive:
+    """Return a drive of a tag whose body points to the right of its course by this angle."""
     truth = drive(seed)
     nodes = truth.nodes
     forward, left = nodes["dv_forward"].copy(), nodes["dv_left"].copy()
     nodes["dv_forward"] = forward * np.cos(angle) - left * np.sin(angle)
     nodes["dv_left"] = forward * np.sin(angle) + left * np.cos(angle)
     nodes["heading"] -= angle
-    nodes["heading_kind"] = RELATIVE_HEADING
+    nodes["heading_kind"] = heading_kind
     return truth
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.4])
-def test_an_untold_mounting_angle_is_in_the_ellipse_from_the_start(angle: float) -> None:
+@pytest.mark.parametrize("heading_kind", [RELATIVE_HEADING, MEASURED_HEADING])
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.4])
+def test_an_untold_mounting_angle_is_in_the_ellipse_from_the_start(angle: float, heading_kind: int) -> None:
     held = []
     for seed in range(2000, 2012):
-        truth = mounted(seed, angle)
+        truth = mounted(seed, angle, heading_kind)
         settings = default_settings()
         settings["range_std"], settings["start_known"], settings["start_x"] = 0.1, True, 10.0
         settings["start_y"], settings["start_heading"] = 0.0, truth.nodes["heading"][0]
