@@ -157,6 +157,11 @@ class MessageBuffer:
         """Number of messages in the buffer."""
         return len(self._messages) + len(self._unregistered)
 
+    @property
+    def is_overloaded(self) -> bool:
+        """Whether messages come faster than `drain` takes them, for a while now."""
+        return self._overloaded
+
     def _append_unregistered(self, message: UnregisteredMessage) -> None:
         self._unregistered.append(message)
         self._unregistered_bytes += _size(message)

@@ -97,13 +97,13 @@ class CatchUp:
         """Suspend messages that came before one with a smaller number, and ask the tag's caches for what is missing.
 
         Return whether they are suspended. They are not if the caches were asked for the same gap before, or are known
-        not to answer.
+        not to answer, or in an overload, which answers would make worse.
         """
         suspended = [Suspended(key, *message[1:], number_of(message[1], message[2])) for message in messages]
         states = self._states_of(key)
         numbers = [message.number for message in suspended if message.number and message.number.boot_id in states]
         with self._lock:
-            if self._first_round:
+            if self._first_round or self._buffer.is_overloaded:
                 return False
             self._releasing.get(key, set()).difference_update(message.number for message in suspended)  # they came back
             if key not in self._suspended:
@@ -251,7 +251,8 @@ class CatchUp:
         with self._lock:
             waiting = self._suspended.keys() - self._releasing.keys()
             taken = {key: self._suspended[key] for key in keys if key in waiting}
-            cached = any(self._cached[key] or self._retries[key] or key in self._with_gap for key in taken)
+            # What fills gaps is little, and it must not hide an overload from the buffer.
+            cached = any(self._cached[key] or self._retries[key] for key in taken.keys() - self._with_gap)
             self._suspended |= {key: [] for key in taken}
             self._releasing |= {key: set() for key in taken}
         released = [

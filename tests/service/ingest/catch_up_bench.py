@@ -64,6 +64,18 @@ class CatchUpBench:
     def before(self, sequence: int, happens: Callable[[], None]) -> None:
         self._buffer.before[payload(sequence, measured_ns(sequence))] = happens
 
+    @property
+    def is_overloaded(self) -> bool:
+        return self._buffer.is_overloaded
+
+    def flood(self, first: int, last: int) -> None:
+        """Send five messages of a tag in each tenth of a second from `first` to `last`, and take one of them."""
+        for tenth in range(first, last):
+            now_ns = measured_ns(tenth)
+            for _ in range(5):
+                self._buffer.append(A, payload(tenth, now_ns), ENCODING_PACKED, now_ns)
+            self._buffer.drain(1, now_ns)
+
     def released(self) -> list[Released]:
         messages, _ = self._buffer.drain(1000)
         forms = read_forms([m[1] for m in messages], [m[2] for m in messages]).forms

@@ -124,3 +124,20 @@ def test_messages_that_come_back_while_they_are_released_are_not_lost() -> None:
     answer(bench)
     assert bench.sequences() == [6, 7, 6]
     assert bench.asked == [NEW]
+
+
+def test_in_an_overload_no_cache_is_asked_for_a_gap() -> None:
+    bench = bench_of_a_running_tag()
+    bench.flood(0, 20)
+    assert bench.is_overloaded
+    assert not behind_a_gap(bench, 6, key=NEW)
+    assert bench.asked == []
+
+
+def test_an_answer_for_a_gap_does_not_end_an_overload() -> None:
+    bench = bench_of_a_running_tag()
+    assert behind_a_gap(bench, 6, key=NEW)
+    bench.flood(0, 20)
+    answer(bench, 4, 5)
+    bench.flood(20, 21)
+    assert bench.is_overloaded
