@@ -2,10 +2,12 @@
 
 import csv
 import time
+from functools import partial
 from pathlib import Path
 
 import httpx
 import pytest
+import zenoh
 
 from dropanchor_schemas import keys
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, encode_json, encode_packed
@@ -31,8 +33,10 @@ def test_a_replayed_recording_gives_the_live_poses_even_after_a_kill(
     with running_service(*options) as service, connected_session(service.zenoh) as session:
         for step in range(10):
             frame = straight_north(20, end_ns + step * 2 * S, speed_mps=0.5)
-            session.put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
-            session.put(keys.samples_key("default", "b"), encode_json(frame), encoding=ENCODING_JSON)
+            # A put that may be dropped is dropped on a busy machine after a millisecond.
+            put = partial(session.put, congestion_control=zenoh.CongestionControl.BLOCK)
+            put(keys.samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
+            put(keys.samples_key("default", "b"), encode_json(frame), encoding=ENCODING_JSON)
         wait_until(lambda: service.metric("dropanchor_poses_total") >= 380, 120.0)
         live = service.get("/api/v1/poses")["poses"]
         httpx.put(f"{service.url}/api/v1/tags/a/settings", json={}).raise_for_status()
