@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Self
 import zenoh
 from fastapi import FastAPI
 
+from dropanchor_schemas.keys import tag_alive_key
 from dropanchor_service.answers.of_sites import answers_of_sites
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
@@ -104,7 +105,8 @@ class Service:
         self._period = Period(settings.ingest.period_ms * 1e-3)
         self._buffer = MessageBuffer(int(settings.ingest.buffer_mib * 2**20), round(settings.ingest.max_wait_ms * 1e6))
         self._processed = Processed(lambda: self._buffer.depth, self._buffer.wake)
-        self._link = ZenohLink(settings.zenoh, self._zenoh_parts, self._credentials)
+        watched = tag_alive_key(settings.site_ids[0], "-")
+        self._link = ZenohLink(settings.zenoh, self._zenoh_parts, watched, self._credentials)
         self._register_gauges()
 
     def _register_gauges(self) -> None:
@@ -219,8 +221,8 @@ class Service:
 
     @property
     def makes_progress(self) -> bool:
-        """Whether samples are processed as they arrive."""
-        return self._thread.problem is None
+        """Whether samples arrive and are processed."""
+        return self._thread.problem is None and not self._link.is_deaf
 
     def _dead_threads(self) -> list[str]:
         threads = {"http": self._http.is_alive, "ingest": self._thread.is_alive}

@@ -145,11 +145,13 @@ class ZenohCaches:
         """
         for row in self._silent_tags.take(self._clock.now_ns(), CHECKED_TAGS):
             key = self._sites.samples_key(row)
-            self._open.add(self._get(key, 1), partial(self._on_newest, key))
+            self._open.add(self._get(key, 1), partial(self._on_newest, key, row))
 
-    def _on_newest(self, key: str, reply: Any) -> None:
+    def _on_newest(self, key: str, row: int, reply: Any) -> None:
         message = reply.ok
-        if message is not None:
+        if message is None:  # no cache has answered in time
+            self._silent_tags.return_again(row)
+        else:
             self._catch_up.on_newest(key, bytes(message.payload), payload_encoding(str(message.encoding)))
 
     def _ask_later(self) -> None:

@@ -9,7 +9,8 @@ SILENT_NS = 1_000_000_000
 
 
 class SilentTags:
-    """Returns each tag once per silence. What was heard before this object was created does not count."""
+    """Returns each tag once per silence, or until somebody knew about it. What was heard before this object was created
+    does not count."""
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
@@ -31,3 +32,7 @@ class SilentTags:
         self._known_ns[rows] = heard_ns[rows]
         found: list[int] = rows.tolist()
         return found
+
+    def return_again(self, row: int) -> None:
+        """Return this tag once more if it is still silent."""
+        self._known_ns[row] = 0

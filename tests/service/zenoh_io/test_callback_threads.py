@@ -27,7 +27,7 @@ def test_the_parts_of_the_service_are_not_opened_by_a_daemon(router_endpoint: st
         daemons.append(threading.current_thread().daemon)
         return []
 
-    with ZenohLink(ZenohSettings(connect=(router_endpoint,)), parts):
+    with ZenohLink(ZenohSettings(connect=(router_endpoint,)), parts, samples_key("default", "-")):
         wait_until(lambda: daemons)
     assert daemons == [False]
 

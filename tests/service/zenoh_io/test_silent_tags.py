@@ -29,6 +29,15 @@ def test_a_tag_is_returned_once_when_it_falls_silent_and_again_after_its_next_me
     assert silent.take(22 * S, 10) == [0]
 
 
+def test_a_tag_that_nobody_knew_about_is_returned_again() -> None:
+    tags, silent = fleet("a")
+    heard(tags, "a", 10 * S)
+    assert silent.take(12 * S, 10) == [0]
+    silent.return_again(0)
+    assert silent.take(13 * S, 10) == [0]
+    assert silent.take(14 * S, 10) == []
+
+
 def test_what_an_earlier_process_heard_and_tags_that_are_offline_are_not_returned() -> None:
     tags, _ = fleet("a", "b")
     heard(tags, "a", 10 * S)
