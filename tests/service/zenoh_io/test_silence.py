@@ -27,12 +27,12 @@ class Cache:
         self._queryable = session.declare_queryable(f"{KEY}/@adv/**", self._on_query, complete=True)
 
     def _on_query(self, query: zenoh.Query) -> None:
-        if "_max=1" not in str(query.parameters):
+        if not str(query.parameters).startswith("_max=1;"):
             return
         if not self._late:
-            self._late.append(query)
-            return
-        query.reply(KEY, b"newest")
+            self._late.append(query)  # it stays open
+        else:
+            query.reply(KEY, b"newest")
 
 
 class NewestMessages(CatchUp):
