@@ -28,6 +28,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 from dropanchor_service.estimation.fleet.belief.update import project, update_pda
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
+from dropanchor_service.estimation.fleet.frontend.preintegration import ONE_WAY
 
 BOUND: Final = 3.0  # standard deviations beyond which a sideways increment is a skid or a bump and counts less
 SMOOTH: Final = 0.015  # (m/s)^2/s, roughness of dv above which the sideways axis tells more of jolts than of the course
@@ -57,7 +58,17 @@ def lateral_residual(s: Floats, node: Node, H: Floats) -> float:
 @njit(nogil=True)
 def is_lateral_known(node: Node) -> bool:
     """Return whether the node has a sideways increment of velocity of a tag that moves smoothly."""
-    return bool(node.rest == MOVING and node.dt_s > 0.0 and node.dv_var < SMOOTH * node.dt_s)
+    return bool(node.rest == MOVING and node.dt_s > 0.0 and sideways_var(node) < SMOOTH * node.dt_s)
+
+
+@njit(nogil=True)
+def sideways_var(node: Node) -> float:
+    """Return the variance of the increment across the course from the roughness of the ride, (m/s)^2.
+
+    What shakes along almost one direction only is a vehicle that speeds up and brakes, and tells where its course is.
+    """
+    across = node.dv_var - node.motion_var
+    return float(across if across < (1.0 - ONE_WAY) * node.dv_var else node.dv_var)
 
 
 @njit(nogil=True)
@@ -65,7 +76,7 @@ def lateral_variance(s: Floats, node: Node, row: Row, slip_std: float) -> float:
     """Return the variance of that increment, (m/s)^2. A change of the slip is an increment of velocity, too."""
     shared_var = SHARE**2 * (node.dv_forward**2 + node.dv_left**2)
     slip_var = slip_std**2 * 2.0 * node.dt_s / row.settings.slip_tau
-    return float(node.dv_var + s[V] * s[V] * (node.dyaw_var + slip_var) + shared_var + MIN_VAR)
+    return float(sideways_var(node) + s[V] * s[V] * (node.dyaw_var + slip_var) + shared_var + MIN_VAR)
 
 
 @njit(nogil=True)

@@ -47,7 +47,7 @@ UNOBSERVED_RATE = 1.0  # rad/s, sd of the rate of a tag whose IMU is silent
 ACC_FLOOR = 2e-4  # (m/s)^2/s
 ACC_ROUGH = 0.03  # s: what of the roughness leaks into the integral, measured on recordings
 ROUGH_TAU = 3.0  # s
-MOST_MOTION = 0.95  # of the roughness
+ONE_WAY = 0.95  # share of the roughness along one direction, up to which the rest is doubtful
 NO_DIRECTION = 1e-6  # cosine of the pitch, at least
 ROUGH_GROWTH, ROUGH_START = 4.0, 0.1  # a sample counts for so many times the roughness plus this, (m/s^2)^2, at most
 UNOBSERVED_ACC = 1.0  # m/s^2, sd of the acceleration of a tag whose IMU is silent
@@ -106,6 +106,19 @@ def add_acceleration(p: Preintegration, dt: float, q: Array, acc: Array, gravity
 
 
 @njit(cache=True, nogil=True)
+def motion_in(p: Preintegration) -> float:
+    """Return what of the roughness is motion of the vehicle, (m/s^2)^2: `ONE_WAY` of it at most, unless more is.
+
+    The horizontal covariance cuts large samples more than `acc_var` does, so that share comes from its shape.
+    """
+    one_way = math.hypot(p.shaking[0] - p.shaking[2], 2.0 * p.shaking[1])
+    both = p.shaking[0] + p.shaking[2]
+    if one_way > ONE_WAY * both:
+        return p.acc_var * one_way / both  # type: ignore[no-any-return]
+    return min(one_way, ONE_WAY * p.acc_var)  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True)
 def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node) -> float:
     """Fill dyaw and dv of a node that lasts dt and ends `ahead` s after the last IMU sample. Return psi at its end."""
     reach = min(ahead, HORIZON)
@@ -125,8 +138,7 @@ def end_node(p: Preintegration, yaw: float, ahead: float, dt: float, node: Node)
     node.dv_var = (
         math.inf if p.no_acc_s > 0.0 else (ACC_FLOOR + ACC_ROUGH * p.acc_var) * dt + unobserved_speed_var(gap_s)
     )
-    one_way = math.hypot(p.shaking[0] - p.shaking[2], 2.0 * p.shaking[1])
-    node.motion_var = ACC_ROUGH * min(one_way, MOST_MOTION * p.acc_var) * dt
+    node.motion_var = ACC_ROUGH * motion_in(p) * dt
     p.yaw_end = wrap(end)
     p.V_end[0], p.V_end[1] = vx, vy
     p.gap_s = 0.0

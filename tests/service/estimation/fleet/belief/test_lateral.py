@@ -74,3 +74,25 @@ def test_a_rough_ride_says_nothing_sideways(roughness: float, used: bool) -> Non
     node = node_of(dt=0.1)
     node["dv_var"] = roughness * 0.1
     assert is_lateral_known(node) is used
+
+
+@pytest.mark.parametrize(("motion", "used"), [(0.999, True), (0.9, False)])
+def test_a_ride_that_is_rough_only_along_its_course_still_says_something_sideways(motion: float, used: bool) -> None:
+    node = node_of(dt=0.1)
+    node["dv_var"], node["motion_var"] = 0.1 * 0.5, 0.1 * 0.5 * motion
+    assert is_lateral_known(node) is used
+
+
+def test_a_tag_that_speeds_up_and_brakes_all_the_time_learns_its_mounting_angle() -> None:
+    row = row_of()
+    P = np.diag(np.full(N, 1e-4))
+    P[MOUNT, MOUNT], P[LEFT_BIAS, LEFT_BIAS] = 0.25, 0.04
+    one, scratch = hypothesis_of(state_of(0.0, 0.0), P)
+    for k in range(20):
+        before, after = (1.0, 1.2) if k % 2 else (1.2, 1.0)
+        node = driven(before, after, 0.0, 0.4)
+        node["dv_var"], node["motion_var"] = 0.1 * 0.5, 0.1 * 0.4995
+        one["mean"][V] = after
+        update_lateral(one, scratch, node, row, 0.02)
+    assert one["mean"][MOUNT] == pytest.approx(0.4, abs=0.05)
+    assert one["cov"][MOUNT, MOUNT] < 0.02

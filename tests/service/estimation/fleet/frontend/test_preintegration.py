@@ -83,10 +83,10 @@ def test_a_rough_ride_has_a_larger_velocity_variance_than_a_smooth_one() -> None
     assert b["dv_var"][-1] > 3 * a["dv_var"][-1]
 
 
-def shaken(directions: Array) -> Array:
-    """Return the nodes of a body that yaws while it shakes along these axes of its own, (k, 3)."""
+def shaken(directions: Array, std: float = 0.6) -> Array:
+    """Return the nodes of a body that yaws while it shakes along these axes of its own, (k, 3), by `std` m/s^2."""
     m = synthesise(np.arange(0, 20, 0.01), lambda t: turning(t, 0.4, 0.1))
-    m.acc += np.random.default_rng(4).normal(0, 0.6, (len(m.t), len(directions))) @ directions
+    m.acc += np.random.default_rng(4).normal(0, std, (len(m.t), len(directions))) @ directions
     return run(new_frontend(), m, np.arange(0.1, 19.9, 0.1))
 
 
@@ -95,6 +95,11 @@ def test_what_shakes_along_one_level_direction_is_motion_and_not_noise() -> None
     shares = [float(nodes["motion_var"][-1] / nodes["dv_var"][-1]) for nodes in (along, round_about, upward)]
     assert shares[0] > 0.85
     assert max(shares[1:]) < 0.15
+
+
+def test_almost_all_of_what_shakes_along_one_level_direction_only_is_motion() -> None:
+    nodes = shaken(np.array([[0.8, 0.6, 0.0]]), 5.0)
+    assert nodes["motion_var"][-1] > 0.99 * nodes["dv_var"][-1]
 
 
 def test_a_ramp_of_the_speed_is_no_roughness() -> None:
