@@ -69,12 +69,31 @@ def follow_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning)
     if node.carried == 0:
         _set_down(work, count, row, t)
         return count
-    if row.publication.resolved == 1:
+    return _pick_up(work, count, row, node, t)
+
+
+@njit(nogil=True)
+def start_carried(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> int:
+    """Make the first hypotheses those of a carried tag. Return their count."""
+    row.walk.carried = 1
+    if row.start.known == 1 and row.start.after_gap == 0:
+        s, P = work[0].mean, work[0].cov
+        row.walk.x, row.walk.y = s[R] * math.cos(s[PHI]), s[R] * math.sin(s[PHI])
+        row.walk.var = P[R, R] + s[R] ** 2 * P[PHI, PHI]
         return _pick_up(work, count, row, node, t)
     for h in range(count):
         _become_carried(work[h], node, t)
         widen_common_mount(work[h].cov, row)
     return count
+
+
+@njit(nogil=True)
+def was_walked_off(row: Row, node: Node) -> bool:
+    """Return whether a person carries a tag whose place was not known when the steps began.
+
+    Its hypotheses are those of a vehicle that the steps accelerated, and no others are left.
+    """
+    return bool(node.carried == 1 and row.walk.carried == 0 and row.publication.resolved == 0)
 
 
 @njit(nogil=True)
@@ -162,7 +181,7 @@ def _see_again(one: Hypothesis, row: Row) -> None:
 def _walk_from_origin(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
     """Move the hypothesis from where the tag stood last by the steps since, along its course."""
     s, P, walk = one.mean, one.cov, row.walk
-    course = s[YAW] + s[MOUNT] + s[SLIP]
+    course = s[YAW] + node.dyaw + s[MOUNT] + s[SLIP]  # the node is predicted later
     x, y = walk.x + node.walked * math.cos(course), walk.y + node.walked * math.sin(course)
     variance = walk.var + t.walk_start_var + (t.walk_start_share * node.walked) ** 2
     s[R], s[PHI] = max(math.hypot(x, y), 0.1), math.atan2(y, x)

@@ -2,7 +2,12 @@
 
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.carried import follow_motion, update_with_steps
+from dropanchor_service.estimation.fleet.belief.carried import (
+    follow_motion,
+    start_carried,
+    update_with_steps,
+    was_walked_off,
+)
 from dropanchor_service.estimation.fleet.belief.gap import (
     accumulate_gap,
     is_stuck,
@@ -237,7 +242,7 @@ def _advance_row(
     """Take one node into the row, which starts or starts again where it must. Return the count of hypotheses."""
     if count > 0:
         accumulate_gap(work, count, row, node)
-        if not is_track_lost(row, node):
+        if not is_track_lost(row, node) and not was_walked_off(row, node):
             count = _run_node(work, count, row, node, anchors, t, scratch, belief)
             if count == 0:
                 _reset_after_fault(row, pool)
@@ -250,6 +255,8 @@ def _advance_row(
     if row.gap.unobserved_s > 0.0:
         restart_from_gap(row, anchors[row.anchor])
     count = collect_start(work, row, node, anchors, t)
+    if count > 0 and node.carried == 1:
+        count = start_carried(work, count, row, node, t)
     for h in range(count):
         mirror(work[h].cov)
     return count

@@ -45,6 +45,7 @@ SIMILAR = 0.35  # relative deviation of an interval from the mean
 REGULAR_STEPS = 3
 FORGET = 1.5  # s of steps in the mean speed
 STEP_LENGTH = 0.362  # m per (m/s^2)^(1/3)
+FIRST_STEP = 0.5  # of its length: the way of somebody who stood until its peak
 
 
 @njit(cache=True, nogil=True)
@@ -104,6 +105,7 @@ def _end_step(g: Gait) -> bool:
     swing = g.peak - g.trough
     if interval > MAX_INTERVAL:
         g.regular, g.interval, g.swing = 0, 0.0, swing
+        g.walked = FIRST_STEP * _length(swing)
     else:
         first = g.interval == 0.0
         similar = swing > MIN_SWING and (first or abs(interval - g.interval) < SIMILAR * g.interval)
@@ -111,12 +113,18 @@ def _end_step(g: Gait) -> bool:
         g.interval = interval if first else g.interval + 0.3 * (interval - g.interval)
         g.swing += 0.3 * (swing - g.swing)
         kept = math.exp(-interval / FORGET)
-        length = STEP_LENGTH * swing ** (1.0 / 3.0)
+        length = _length(swing)
         g.walked += length
         g.length_sum = g.length_sum * kept + length
         g.time_sum = g.time_sum * kept + interval
     g.since_step_s = g.since_peak_s
     return True
+
+
+@njit(cache=True, nogil=True)
+def _length(swing: float) -> float:
+    """Return the length of a step, m, from its W, m/s^2."""
+    return STEP_LENGTH * max(swing, 0.0) ** (1.0 / 3.0)
 
 
 @njit(cache=True, nogil=True)

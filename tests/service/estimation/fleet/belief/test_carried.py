@@ -1,6 +1,7 @@
 """A tag in a hand: what its steps teach, how it may be held, and when it is taken for carried."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from dropanchor_service.estimation.columns import Motion
 from dropanchor_service.estimation.fleet.belief.carried import (
     follow_motion,
+    start_carried,
     update_gait_angle,
     update_step_speed,
     update_with_steps,
@@ -34,6 +36,7 @@ from dropanchor_service.evaluation.product.work import Result, run_row, run_tags
 from support.belief import STATE, hypothesis_of, node_of
 
 SEEDS = range(5910, 5918)
+POCKETS = [5102, 5104, 5109, 5113]  # of which the device swings far when its steps are recognised
 T = Tuning()
 
 
@@ -80,6 +83,7 @@ def row_of_a_walk(walked: float) -> tuple[Any, Any, Any]:
     row["publication"]["resolved"] = 1
     row["settings"]["mount_angle_std"] = 0.5
     row["walk"]["x"], row["walk"]["var"] = 10.0, 0.01
+    node["dyaw"] = 0.0
     work[0]["mean"][:] = 0.0
     work[0]["mean"][R] = 10.0
     work[0]["cov"][:] = np.eye(N) * 0.01
@@ -98,6 +102,25 @@ def test_a_device_that_is_picked_up_may_be_held_in_any_way_and_its_carrier_is_wh
     r, phi = work["mean"][:count, R], work["mean"][:count, PHI]
     np.testing.assert_allclose(r * np.cos(phi), 10.0 + 2.0 * np.cos(mount), atol=1e-9)
     np.testing.assert_allclose(r * np.sin(phi), 2.0 * np.sin(mount), atol=1e-9)
+
+
+def test_a_turn_of_the_device_in_the_node_of_the_pick_up_turns_where_the_steps_led_as_it_turns_the_course() -> None:
+    row, work, node = row_of_a_walk(2.0)
+    node["dyaw"] = 2.0
+    count = follow_motion(work, 1, row, node, T.record()[0])
+    course = node["dyaw"] + work["mean"][:count, MOUNT]
+    r, phi = work["mean"][:count, R], work["mean"][:count, PHI]
+    np.testing.assert_allclose(r * np.cos(phi), 10.0 + 2.0 * np.cos(course), atol=1e-9)
+    np.testing.assert_allclose(r * np.sin(phi), 2.0 * np.sin(course), atol=1e-9)
+
+
+def test_who_is_carried_from_a_given_start_may_be_held_in_any_way_there() -> None:
+    row, work, node = row_of_a_walk(0.0)
+    row["start"]["known"], row["publication"]["resolved"] = 1, 0
+    row["walk"]["x"], row["walk"]["var"] = 0.0, 0.0
+    assert start_carried(work, 1, row, node, T.record()[0]) == T.grips
+    np.testing.assert_allclose(work["mean"][: T.grips, R], 10.0)
+    np.testing.assert_allclose(work["mean"][: T.grips, PHI], 0.0)
 
 
 def test_a_known_mounting_angle_is_kept() -> None:
@@ -124,16 +147,16 @@ def test_after_a_quick_turn_the_device_may_have_turned_and_not_its_carrier() -> 
     assert work["log_weight"][1] == pytest.approx(T.device_turn_log_prior)
 
 
-def runs_of(name: str, motion: Motion = Motion.AUTO) -> tuple[Any, list[TagRun]]:
+def runs_of(name: str, motion: Motion = Motion.AUTO, seeds: Iterable[int] = SEEDS) -> tuple[Any, list[TagRun]]:
     (row,) = selected(simulated_rows(), [name])
-    runs = [tag_run(row, one) for one in sources(row, SEEDS)]
+    runs = [tag_run(row, one) for one in sources(row, seeds)]
     for run in runs:
         run.settings["motion"] = motion
     return row, runs
 
 
-def result_of(name: str) -> Result:
-    return run_row(*runs_of(name))
+def result_of(name: str, motion: Motion = Motion.AUTO, seeds: Iterable[int] = SEEDS) -> Result:
+    return run_row(*runs_of(name, motion, seeds))
 
 
 def carried(name: str, motion: Motion) -> Any:
@@ -173,3 +196,19 @@ def test_a_walk_is_followed_and_the_ellipse_holds_the_truth_while_tracking(carry
     assert score.rmse[0] < limit
     assert score.coverage >= 0.93
     assert score.tracking_share > 0.25
+
+
+def test_a_walk_with_a_device_in_a_pocket_begins_where_it_stood() -> None:
+    assert result_of("walk-pocket/6-axis/nothing/known", seeds=POCKETS).score.coverage > 0.8
+
+
+def test_what_a_vehicle_would_have_done_does_not_outlive_the_first_steps() -> None:
+    result = result_of("walk-pocket/6-axis/nothing/unknown", seeds=[5112, 5124, 5125, 5126])
+    assert max(tag.worst_sigma for tag in result.tags) < 5.0
+
+
+def test_a_tag_that_is_said_to_be_carried_tracks_from_its_start() -> None:
+    score = result_of("walk-hand/6-axis/nothing/known", Motion.CARRIED).score
+    assert score.rmse[0] < 4.0
+    assert score.coverage >= 0.93
+    assert score.tracking_share > 0.8
