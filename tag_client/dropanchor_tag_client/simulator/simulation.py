@@ -8,7 +8,7 @@ import numpy as np
 from dropanchor_tag_client.simulator.imu import GRAVITY, Attitude, Imu, ImuUnit, draw_unit, quaternions, turned
 from dropanchor_tag_client.simulator.noise import Stream, stream
 from dropanchor_tag_client.simulator.ranging import AnchorPlace, Ranges, sample_times
-from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, Scalars
+from dropanchor_tag_client.simulator.scalar import AT_REST_MPS, Scalars, backward_rate
 from dropanchor_tag_client.simulator.scenarios import trajectory
 from dropanchor_tag_client.simulator.sensors import SensorModels
 from dropanchor_tag_client.simulator.trajectory import Array, Trajectory
@@ -52,12 +52,13 @@ class Simulation:
         """Return the scalar samples as those of a level IMU without a magnetometer (NaN).
 
         Its x axis points along the heading. The scalar sensors do not measure the acceleration to the left of the
-        course, so it is the true v·w.
+        course, so it is the true v·w, over the same time as the turn and the acceleration along it.
         """
         n = len(self.scalars.t_s)
         zero = np.zeros(n)
         mount = self.truth.course - self.truth.heading
-        acc = turned(self.scalars.acceleration_mps2, self.truth.v * self.truth.w, zero + GRAVITY, mount)
+        left = self.truth.v * backward_rate(self.truth.course, float(self.truth.t_s[1] - self.truth.t_s[0]))
+        acc = turned(self.scalars.acceleration_mps2, left, zero + GRAVITY, mount)
         return Imu(
             self.scalars.t_s, acc, np.column_stack([zero, zero, self.scalars.gyro_radps]), np.full((n, 3), np.nan)
         )

@@ -212,3 +212,9 @@ def test_the_level_imu_of_a_turned_body_has_the_axes_of_its_heading() -> None:
     expected = np.column_stack([np.cos(0.6) * along - np.sin(0.6) * left, np.sin(0.6) * along + np.cos(0.6) * left])
     np.testing.assert_allclose(turned.level_imu().acc[:, :2], expected, atol=1e-9)
     assert np.abs(expected[:, 1] - left).max() > 0.5
+
+
+def test_the_left_axis_of_a_level_imu_is_what_turns_the_speed_along_the_course() -> None:
+    run = simulate("P", 5000, noiseless())
+    dt, imu = float(run.truth.t_s[1] - run.truth.t_s[0]), run.level_imu()
+    np.testing.assert_allclose(imu.acc[1:, 1] * dt, run.truth.v[1:] * imu.gyro[1:, 2] * dt, atol=1e-9)
