@@ -61,6 +61,7 @@ class Tuning(NamedTuple):
     own_error_std: float = 0.15  # rad
     own_error_tau: float = 60.0  # s
     split_angle: float = 0.08  # rad
+    split_curvature: float = 0.4  # of the range rate, over the errors of angle and speed, from which on it is split
     coarse_split_angle: float = 0.2  # rad, of a tag that starts again after a gap, until it is resolved
     coarse_hypotheses: int = 48  # hypotheses of such a tag
     coarse_bearings: int = 24
@@ -68,7 +69,7 @@ class Tuning(NamedTuple):
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
     merge_distance_at_rest: float = 1.0  # the same, of a tag at rest
     merge_light: float = 0.5  # growth of its square per unit of log weight that the lighter one lacks
-    tracking_hypotheses: int = 32
+    tracking_hypotheses: int = 48
     prune_depth: float = 10.0  # log weight below the best
     rest_std: float = 0.02  # m/s
     rest_gyro_std: float = 0.003  # rad/s

@@ -7,6 +7,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     MAX_HYPOTHESES,
     MOUNT,
     PHI,
+    SLIP,
     WORKING_HYPOTHESES,
     YAW,
     Floats,
@@ -24,6 +25,7 @@ SPLIT_CENTRE, SPLIT_SIDE = 0.5496, 0.2252  # weights of the three parts
 SPLIT_SHIFT = 1.0576  # standard deviations
 SPLIT_REMOVED = 0.549  # share of the variance
 MERGED_MOUNTS = 0.2  # rad, by which two mounting angles differ at most that are merged
+LEAST_RATE = 0.01  # m/s, error of a range rate below which nothing is split
 ALIKE = 2.0  # ratio of two variances that are alike
 
 
@@ -101,6 +103,20 @@ def keep_heaviest(work: Hypotheses, count: int, most: int) -> int:
 def angle_variance(P: Floats) -> float:
     """Return the variance, rad^2, of course (without slip) minus bearing: the angle that makes a step non-linear."""
     return float(P[YAW, YAW] + P[MOUNT, MOUNT] + P[PHI, PHI] + 2.0 * (P[YAW, MOUNT] - P[YAW, PHI] - P[MOUNT, PHI]))
+
+
+@njit(nogil=True)
+def curvature(one: Hypothesis, variance: float) -> float:
+    """Return how far from linear the range rate v cos a is over the errors of the speed v and the angle a.
+
+    It is their product, |sin a| sd(v) sd(a), over what a linear update takes the error of the rate for. A tag that
+    travels across the line of sight with a slowly learned speed has 0.3 and more. variance: rad^2, of a.
+    """
+    s, P = one.mean, one.cov
+    a = s[YAW] + s[MOUNT] + s[SLIP] - s[PHI]
+    c, turned = math.cos(a), s[V] * math.sin(a)
+    rate = c * c * P[V, V] + turned * turned * variance - 2.0 * c * turned * (P[V, YAW] + P[V, MOUNT] - P[V, PHI])
+    return abs(math.sin(a)) * math.sqrt(max(P[V, V] * variance, 0.0) / (max(rate, 0.0) + LEAST_RATE**2))
 
 
 @njit(nogil=True)
@@ -224,15 +240,25 @@ def _merge_close(work: Hypotheses, count: int, ia: int, distance: float, light: 
 
 
 @njit(nogil=True)
-def split(work: Hypotheses, count: int, angle: float, depth: float) -> int:
+def may_split_curved(work: Hypotheses, count: int, row: Row) -> bool:
+    """Return whether a vehicle's hypotheses are split by their curvature: not while they must cover a wide guess."""
+    vehicle = row.publication.resolved == 1 and row.walk.carried == 0 and row.start.coarse == 0
+    return bool(vehicle and are_aligned_alike(work, count) and are_mounted_alike(work, count))
+
+
+@njit(nogil=True)
+def split(work: Hypotheses, count: int, angle: float, curved: float, depth: float) -> int:
     """Split hypotheses whose angle is wider than `angle`, rad, into three along it. Return the count.
+
+    A narrower angle is split, too, where the curvature exceeds `curved`.
 
     The weights and shifts below, and a variance along the angle of 0.451 of what it was, keep the first two moments.
     """
     floor = work[best_of(work, count)].log_weight - depth
     for h in range(count):
         variance = angle_variance(work[h].cov)
-        if variance > angle * angle and work[h].log_weight > floor and count + 2 <= WORKING_HYPOTHESES:
+        wide = variance > angle * angle or curvature(work[h], variance) > curved
+        if wide and work[h].log_weight > floor and count + 2 <= WORKING_HYPOTHESES:
             _split_one(work, h, count, variance)
             count += 2
     return count

@@ -1,5 +1,6 @@
 """Run the pose belief of many rows over a batch of nodes, in one compiled call."""
 
+import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.belief.carried import (
@@ -42,6 +43,7 @@ from dropanchor_service.estimation.fleet.belief.mixture import (
     best_of,
     keep_heaviest,
     max_hypotheses,
+    may_split_curved,
     merge,
     normalise,
     prune,
@@ -133,7 +135,8 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floa
             angle = t.coarse_split_angle if row.start.coarse == 1 else t.split_angle
             if row.walk.carried == 1:
                 angle = t.walk_split_angle
-            count = split(work, count, angle, SPLIT_DEPTH)
+            curved = t.split_curvature if may_split_curved(work, count, row) else math.inf
+            count = split(work, count, angle, curved, SPLIT_DEPTH)
         count = keep_heaviest(work, count, max_hypotheses(work, count, row, t))
     if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
         row.since_class_check_s = 0.0

@@ -1,0 +1,23 @@
+"""Tags of the simulator that were once surely in the wrong place. No pose with `tracking` may be 5 deviations off."""
+
+import pytest
+
+from dropanchor_service.evaluation.product.rows import selected, simulated_rows
+from dropanchor_service.evaluation.product.runs import sources, tag_run
+from dropanchor_service.evaluation.product.work import run_row
+
+
+def worst_sigma(name: str, seed: int) -> float:
+    """Return the largest normalised error of the poses with `tracking` of one tag."""
+    (row,) = selected(simulated_rows(), [name])
+    (run,) = sources(row, range(seed, seed + 1))
+    return run_row(row, [tag_run(row, run)]).tags[0].worst_sigma
+
+
+@pytest.mark.parametrize("start", ["known", "unknown"])
+def test_a_slow_tag_that_crosses_the_line_of_sight_for_long_is_not_lost(start: str) -> None:
+    assert worst_sigma(f"C5/scalar/everything/{start}", 5111) < 5.0
+
+
+def test_a_tag_that_passes_close_to_the_anchor_keeps_its_light_hypotheses() -> None:
+    assert worst_sigma("OU/scalar/everything/unknown", 5130) < 5.0
