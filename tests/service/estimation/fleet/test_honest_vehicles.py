@@ -19,5 +19,10 @@ def test_a_slow_tag_that_crosses_the_line_of_sight_for_long_is_not_lost(start: s
     assert worst_sigma(f"C5/scalar/everything/{start}", 5111) < 5.0
 
 
+@pytest.mark.parametrize("row", ["9-axis/everything/known", "9-axis/everything/unknown", "6-axis/everything/known"])
+def test_a_tag_that_may_reverse_does_not_follow_its_mirror_image_past_the_anchor(row: str) -> None:
+    assert worst_sigma(f"forklift/{row}", 5152) < 5.0
+
+
 def test_a_tag_that_passes_close_to_the_anchor_keeps_its_light_hypotheses() -> None:
     assert worst_sigma("OU/scalar/everything/unknown", 5130) < 5.0

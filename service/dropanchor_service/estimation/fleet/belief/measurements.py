@@ -82,6 +82,7 @@ def update_with_range(
     clear = range_variance(row, node, anchor)
     power, p, mean, std = t.likelihood_power, t.outlier_probability, t.outlier_mean, t.outlier_std
     speed_max = settings.speed_max
+    either = settings.reverse_allowed == 1 and not math.isfinite(node.dv_var)
     if node.carried == 1:
         clear *= t.walk_range_factor
         power, p, mean, std = (
@@ -103,8 +104,8 @@ def update_with_range(
         work[h].log_weight += power * out[0]
         if s[R] < 0.0:
             s[R] = NEAREST
-        low = -settings.speed_max if settings.reverse_allowed == 1 or work[h].reverse == 1 else -t.reverse_slack
-        high = speed_max if work[h].reverse == 0 else t.reverse_slack
+        low = -settings.speed_max if either or work[h].reverse == 1 else -t.reverse_slack
+        high = speed_max if either or work[h].reverse == 0 else t.reverse_slack
         work[h].log_weight += truncate_speed(s, P, scratch.PH, low, high)
         if h == best:
             y, S, p_outlier = e, out[1], out[2]

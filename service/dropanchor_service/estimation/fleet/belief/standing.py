@@ -16,7 +16,7 @@ QUIET_TAU: Final = 10.0  # s, over which the share of quiet motion is averaged
 QUIET_START, QUIET_MIN = 0.05, 0.005  # that share before any motion, and the least of it
 STOOD_S: Final = 0.1  # s of rest after which a tag may drive off in the other direction
 SLOW: Final = 0.2  # m/s, of a tag that hardly moves
-AHEAD_AGAIN_EVERY: Final = 0.5  # s
+SLOW_EVERY: Final = 0.5  # s
 EVEN: Final = -0.7  # log of one half
 TURNABOUT_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis is not offered the other direction
 
@@ -52,32 +52,45 @@ def offer_turnabout(work: Hypotheses, count: int, row: Row, node: Node, t: Tunin
         for h in range(count):
             work[h].reverse = 0
         return count
-    if row.settings.reverse_allowed == 1 or node.carried == 1:
+    if node.carried == 1 or not math.isfinite(node.dv_var):
         return count
     row.since_turnabout_s += node.dt_s
-    count = _offer_ahead_again(work, count, row)
-    if not math.isfinite(node.dv_var) or not stood:
+    count = _offer_while_slow(work, count, row, t)
+    if not stood:
         return count
+    prior = 0.0 if row.settings.reverse_allowed == 1 else t.reverse_log_prior
     floor = work[best_of(work, count)].log_weight - TURNABOUT_DEPTH
     for h in range(count):
         if work[h].log_weight > floor and count < MAX_HYPOTHESES:
-            copy_hypothesis(work, h, count)
-            work[count].reverse = 1 - work[h].reverse
-            work[count].log_weight += t.reverse_log_prior
-            count += 1
+            count = _add_turned(work, h, count, prior)
     return count
 
 
 @njit(nogil=True)
-def _offer_ahead_again(work: Hypotheses, count: int, row: Row) -> int:
-    """Let a tag that has slowed down while it reversed drive ahead, whether it stands or not. Return the count."""
-    if row.since_turnabout_s < AHEAD_AGAIN_EVERY:
+def _add_turned(work: Hypotheses, source: int, target: int, log_prior: float) -> int:
+    """Copy `source` for the other direction. Return the count of hypotheses."""
+    copy_hypothesis(work, source, target)
+    work[target].reverse = 1 - work[source].reverse
+    work[target].log_weight += log_prior
+    return target + 1
+
+
+@njit(nogil=True)
+def _offer_while_slow(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
+    """Let a tag turn back that has slowed down, whether it stands or not. Return the count of hypotheses.
+
+    One that reverses may drive ahead; one that drives ahead may reverse only if the operator says that it does.
+    """
+    if row.since_turnabout_s < SLOW_EVERY:
         return count
+    allowed = row.settings.reverse_allowed == 1
     for h in range(count):
-        if work[h].reverse == 1 and work[h].mean[V] > -SLOW / 2 and count < MAX_HYPOTHESES:
+        s, deviation = work[h].mean, math.sqrt(work[h].cov[V, V])
+        if work[h].reverse == 1 and s[V] > -SLOW / 2 and count < MAX_HYPOTHESES:
             row.since_turnabout_s = 0.0
             work[h].log_weight += EVEN
-            copy_hypothesis(work, h, count)
-            work[count].reverse = 0
-            count += 1
+            count = _add_turned(work, h, count, 0.0)
+        elif allowed and work[h].reverse == 0 and s[V] < max(SLOW / 2, deviation) and count < MAX_HYPOTHESES:
+            row.since_turnabout_s = 0.0
+            count = _add_turned(work, h, count, t.reverse_log_prior)
     return count

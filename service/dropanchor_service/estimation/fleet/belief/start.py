@@ -175,6 +175,7 @@ def _start_ring(
                 s[R], s[PHI] = horizontal, cell * i
                 _spread_ring(P, row, cell, relative)
                 s[V] = 0.0 if at_rest else (1.0 - 2.0 * g) * speed_cell * (k + 0.5)
+                work[h].reverse = g
                 P[V, V] = REST_SPEED_VAR if at_rest else (speed_cell / 2.0) ** 2
                 if not relative and is_in_site_frame(node.heading_kind):
                     _, slow, _ = reference_error(row, node.heading_var)

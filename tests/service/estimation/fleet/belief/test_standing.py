@@ -86,3 +86,15 @@ def test_a_tag_that_reverses_before_its_start_is_found_is_followed_as_well() -> 
         beliefs = run(rows_of(1, known=False), make_pool(512), d.nodes)
         assert beliefs["state"][100] != State.TRACKING  # when it turns back
         assert np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y)[-60:].max() < 1.0
+
+
+def test_a_tag_that_may_reverse_is_followed_when_it_turns_back_without_a_stop() -> None:
+    for seed in range(3000, 3004):
+        d = there_and_back(seed)
+        d.nodes["rest"][20:] = MOVING  # no standstill is seen
+        rows = rows_of(1, known=True)
+        rows["settings"]["reverse_allowed"] = 1
+        beliefs = run(rows, make_pool(512), d.nodes)
+        assert beliefs["speed"][150] == pytest.approx(-1.0, abs=0.3)
+        assert beliefs["speed"][-1] == pytest.approx(1.2, abs=0.3)
+        assert np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y).max() < 1.0
