@@ -26,3 +26,7 @@ def test_a_tag_that_may_reverse_does_not_follow_its_mirror_image_past_the_anchor
 
 def test_a_tag_that_passes_close_to_the_anchor_keeps_its_light_hypotheses() -> None:
     assert worst_sigma("OU/scalar/everything/unknown", 5130) < 5.0
+
+
+def test_a_tag_with_fast_ranges_is_not_found_before_it_moves() -> None:
+    assert worst_sigma("S5-100Hz/scalar/everything/unknown", 5132) < 5.0

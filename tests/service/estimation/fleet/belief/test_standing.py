@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import State, default_settings
-from dropanchor_service.estimation.fleet.belief.layout import N, V
+from dropanchor_service.estimation.fleet.belief.layout import PHI, N, V
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.standing import judge_standstill
 from dropanchor_service.estimation.fleet.configure import configure_row
@@ -98,3 +98,18 @@ def test_a_tag_that_may_reverse_is_followed_when_it_turns_back_without_a_stop() 
         assert beliefs["speed"][150] == pytest.approx(-1.0, abs=0.3)
         assert beliefs["speed"][-1] == pytest.approx(1.2, abs=0.3)
         assert np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y).max() < 1.0
+
+
+def test_a_tag_that_stands_with_an_unknown_start_may_be_in_every_direction() -> None:
+    """Ranges at 100 Hz that do not change favour speeds across the line of sight until the standstill is seen."""
+    rng = np.random.default_rng(3000)
+    nodes = np.repeat(there_and_back(3000).nodes[:1], 100)
+    nodes["dt_s"], nodes["t_ns"] = 0.01, np.arange(100) * 10_000_000
+    nodes["z"], nodes["rest"] = 10.0 + 0.1 * rng.standard_normal(100), np.where(np.arange(100) < 55, MOVING, RESTING)
+    rows, pool = rows_of(1, known=False), make_pool(512)
+    run(rows, pool, nodes)
+    axis, slot = 0j, rows["first_slot"][0]
+    for _ in range(rows["count"][0]):
+        axis += np.exp(pool[slot]["log_weight"] + 2j * pool[slot]["mean"][PHI])
+        slot = pool[slot]["next"]
+    assert abs(axis) < 0.2  # 0 if all directions are equally likely, 1 if only one and its opposite are left
