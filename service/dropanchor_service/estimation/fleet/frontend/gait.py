@@ -124,7 +124,7 @@ def _end_step(g: Gait) -> bool:
 @njit(cache=True, nogil=True)
 def _length(swing: float) -> float:
     """Return the length of a step, m, from its W, m/s^2."""
-    return STEP_LENGTH * max(swing, 0.0) ** (1.0 / 3.0)
+    return float(STEP_LENGTH * max(swing, 0.0) ** (1.0 / 3.0))
 
 
 @njit(cache=True, nogil=True)

@@ -1,7 +1,7 @@
 """A tag in a hand: what its steps teach, how it may be held, and when it is taken for carried."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -147,7 +147,7 @@ def test_after_a_quick_turn_the_device_may_have_turned_and_not_its_carrier() -> 
     assert work["log_weight"][1] == pytest.approx(T.device_turn_log_prior)
 
 
-def runs_of(name: str, motion: Motion = Motion.AUTO, seeds: Iterable[int] = SEEDS) -> tuple[Any, list[TagRun]]:
+def runs_of(name: str, motion: Motion = Motion.AUTO, seeds: Sequence[int] = SEEDS) -> tuple[Any, list[TagRun]]:
     (row,) = selected(simulated_rows(), [name])
     runs = [tag_run(row, one) for one in sources(row, seeds)]
     for run in runs:
@@ -155,7 +155,7 @@ def runs_of(name: str, motion: Motion = Motion.AUTO, seeds: Iterable[int] = SEED
     return row, runs
 
 
-def result_of(name: str, motion: Motion = Motion.AUTO, seeds: Iterable[int] = SEEDS) -> Result:
+def result_of(name: str, motion: Motion = Motion.AUTO, seeds: Sequence[int] = SEEDS) -> Result:
     return run_row(*runs_of(name, motion, seeds))
 
 
