@@ -54,9 +54,7 @@ class CatchUp:
         self._asked_s: dict[str, float] = {}  # when the caches of a suspended key were first asked
         self._gaps = Gaps()
         self._with_gap: set[str] = set()  # keys that are suspended because of a gap
-        self._releasing: dict[
-            str, set[Number | None]
-        ] = {}  # keys whose messages are on their way to the buffer, and which
+        self._releasing: dict[str, set[Number | None]] = {}  # messages of a key that are on their way to the buffer
         self._silent: set[str] = set()  # keys whose caches exist, so that an empty answer is none
         self._bytes = 0
 
