@@ -95,7 +95,7 @@ def _serve(settings: Settings, owned: Owned, name: str) -> None:
         heap.trim()
         time.sleep(CHECK_S)
         stuck_since_s = None if service.makes_progress else stuck_since_s or time.monotonic()
-    _log.warning("%s ends: %s", name, service.gone or "; ".join(service.problems()) or "a part of it was stuck")
+    _log.warning("%s ends: %s", name, service.gone or "a part of it has died or is stuck")
     end = Timer(LEAVE_S, partial(os._exit, EXIT_GONE))
     end.daemon = True
     end.start()
