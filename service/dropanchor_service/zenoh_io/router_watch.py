@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 class RouterWatch:
     """Asks for liveliness tokens now and then, until `stop` is set. The router answers even if there are none.
 
-    key: of the tokens. A router that has never answered may forbid the query, and counts as well.
+    key: of the tokens. A router that has never answered may forbid the query, so it is not taken for a dead one.
     """
 
     def __init__(self, session: zenoh.Session, key: str, stop: threading.Event) -> None:
