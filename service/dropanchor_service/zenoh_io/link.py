@@ -20,9 +20,9 @@ _log = logging.getLogger(__name__)
 
 
 class ZenohLink:
-    """Opens a session, and then the parts that use it. Retries in the background while the router does not answer, and
-    then watches whether it still does.
+    """Opens a session, and then the parts that use it.
 
+    Retries in the background while the router does not answer, and then watches whether it still does.
     watched: key of a token that this session may ask for. Entering raises ZenohError where a retry would not help.
     """
 

@@ -9,8 +9,10 @@ SILENT_NS = 1_000_000_000
 
 
 class SilentTags:
-    """Returns each tag once per silence, and once more after `return_again`. What was heard before this object was
-    created does not count."""
+    """Returns each tag once per silence, and once more after `return_again`.
+
+    What was heard before this object was created does not count.
+    """
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows

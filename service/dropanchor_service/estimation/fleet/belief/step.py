@@ -267,13 +267,7 @@ def _advance_row(
 
 @njit(nogil=True, cache=True)
 def advance(
-    rows: Rows,
-    pool: Pool,
-    nodes: Nodes,
-    anchors: Anchors,
-    tuning: TuningRecord,
-    workspace: Rows,
-    beliefs: Beliefs,
+    rows: Rows, pool: Pool, nodes: Nodes, anchors: Anchors, tuning: TuningRecord, workspace: Rows, beliefs: Beliefs
 ) -> int:
     """Run the nodes and write one belief per node. The nodes of one row are in order of time.
 

@@ -57,11 +57,15 @@ def row_of() -> Any:
     return rows[0]
 
 
-def test_one_ramp_of_the_speed_teaches_the_mounting_angle() -> None:
-    row = row_of()
+def unmounted() -> tuple[Any, Any]:
+    """A hypothesis whose mounting angle is good to 0.5 rad, and its scratch."""
     P = np.diag(np.full(N, 1e-4))
     P[MOUNT, MOUNT], P[LEFT_BIAS, LEFT_BIAS] = 0.25, 0.04
-    one, scratch = hypothesis_of(state_of(0.0, 0.0), P)
+    return hypothesis_of(state_of(0.0, 0.0), P)
+
+
+def test_one_ramp_of_the_speed_teaches_the_mounting_angle() -> None:
+    row, (one, scratch) = row_of(), unmounted()
     for k in range(10):
         one["mean"][V] = 0.3 * (k + 1)
         update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row, 0.1)
@@ -84,10 +88,7 @@ def test_a_ride_that_is_rough_only_along_its_course_still_says_something_sideway
 
 
 def test_a_tag_that_speeds_up_and_brakes_all_the_time_learns_its_mounting_angle() -> None:
-    row = row_of()
-    P = np.diag(np.full(N, 1e-4))
-    P[MOUNT, MOUNT], P[LEFT_BIAS, LEFT_BIAS] = 0.25, 0.04
-    one, scratch = hypothesis_of(state_of(0.0, 0.0), P)
+    row, (one, scratch) = row_of(), unmounted()
     for k in range(20):
         before, after = (1.0, 1.2) if k % 2 else (1.2, 1.0)
         node = driven(before, after, 0.0, 0.4)
