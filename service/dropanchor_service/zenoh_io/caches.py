@@ -27,8 +27,9 @@ from dropanchor_service.zenoh_io.open_queries import REPLIES, OpenQueries
 from dropanchor_service.zenoh_io.silent_tags import SilentTags
 
 ANSWER_S = 2.0
-MIN_MESSAGES = 100  # that a cache is asked for
+MIN_MESSAGES = 100  # that a cache is asked for where nobody knows the rate of its tag
 MESSAGES_PER_S = 200  # asked for in addition, per second of silence; no publisher sends as many
+SPARE_MESSAGES = 20  # asked for in addition where it is known; what is missing then is asked for again
 RATE_QUANTILE = 0.9  # of the tags' rates; the first round covers these tags, the others are asked again
 MARGIN = 1.2  # on the number of messages that a rate predicts
 RETRY_S = 0.1  # pause before the same tag is asked again
@@ -36,6 +37,9 @@ SILENT_S = 1.0  # after it came back online, until a tag counts as silent
 CHECK_S = 1.0  # between two searches for tags that have fallen silent
 CHECKED_TAGS = 20  # of these at a time, so that a service that is stuck asks few
 POLL_S = 0.005  # between two looks at the replies to open queries
+# A tag's heartbeats come from the thread that watches its socket. In one queue with replies that wait for the socket, a
+# heartbeat waits too, and then nobody watches. The replies have the priority of the query.
+BEHIND_LIVE_MESSAGES = zenoh.Priority.DATA_LOW
 MAX_OPEN = 64  # queries at a time; more would fill the links, on which live messages are dropped then
 
 _log = logging.getLogger(__name__)
@@ -174,7 +178,7 @@ class ZenohCaches:
             self._on_first_round()
 
     def _ask(self, key: str, missing: int) -> None:
-        limit = MIN_MESSAGES + missing if missing else self._limit(self._last_heard_ns(key))
+        limit = SPARE_MESSAGES + missing if missing else self._predicted(key)
         answered = partial(self._catch_up.on_answer, key, limit)
         try:
             self._open.add(self._get(key, limit), self._on_reply, partial(self._finish, answered, time.monotonic()))
@@ -190,6 +194,7 @@ class ZenohCaches:
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             accept_replies=zenoh.ReplyKeyExpr.ANY,
+            priority=BEHIND_LIVE_MESSAGES,
             timeout=ANSWER_S,
         )
 
@@ -199,9 +204,18 @@ class ZenohCaches:
         heard = counts[counts["messages"] > 0]
         if not len(heard):
             return MIN_MESSAGES
-        heard_s = np.maximum((heard["last_heard_ns"] - heard["first_heard_ns"]) * 1e-9, 1.0)
-        rate = float(np.quantile(heard["messages"] / heard_s, RATE_QUANTILE))
-        return MIN_MESSAGES // 5 + round(MARGIN * rate * self._silent_s(self._newest_ns))
+        return self._sent_since(self._newest_ns, float(np.quantile(_rates(heard), RATE_QUANTILE)))
+
+    def _predicted(self, key: str) -> int:
+        """Return how many messages a tag has sent since it was last heard, at its former rate."""
+        tag = self._sites.tag_of(key)
+        if tag is None or not tag.last_heard_ns:
+            return self._limit(0)
+        counts = tag.rows.counts(tag.row)
+        return min(self._sent_since(tag.last_heard_ns, float(_rates(counts))), self._limit(tag.last_heard_ns))
+
+    def _sent_since(self, heard_ns: int, rate: float) -> int:
+        return SPARE_MESSAGES + round(MARGIN * rate * self._silent_s(heard_ns))
 
     def _last_heard_ns(self, key: str) -> int:
         tag = self._sites.tag_of(key)
@@ -226,3 +240,8 @@ class ZenohCaches:
         self._metrics.caught_up.inc(messages)
         if messages:
             _log.debug("the caches answered in %.2f s and added %d messages", time.monotonic() - asked_s, messages)
+
+
+def _rates(counts: Any) -> Any:
+    """Return the messages per second of tags that were heard."""
+    return counts["messages"] / np.maximum((counts["last_heard_ns"] - counts["first_heard_ns"]) * 1e-9, 1.0)
