@@ -71,8 +71,11 @@ def test_answers_of_a_cache_come_behind_live_messages(router_endpoint: str) -> N
         publisher.put(b"live")
         caches = ZenohCaches(session, make_sites(), Metrics(), ManualClock())
         found: list[zenoh.Priority] = []
-        wait_until(
-            lambda: found.extend(reply.ok.priority for reply in caches._get(key_of("a"), 1) if reply.ok) or found
-        )
+
+        def has_answered() -> bool:
+            found.extend(reply.ok.priority for reply in caches._get(key_of("a"), 1) if reply.ok)
+            return bool(found)
+
+        wait_until(has_answered)
         publisher.undeclare()
     assert found == [zenoh.Priority.DATA_LOW]
