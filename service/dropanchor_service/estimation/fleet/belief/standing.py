@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI
-from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES, Hypotheses, Hypothesis, Row, V
+from dropanchor_service.estimation.fleet.belief.layout import MAX_HYPOTHESES, Hypotheses, Row, V
 from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, RESTING, Node
@@ -12,31 +12,40 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 SPEEDS: Final = 2.5  # m/s, over which the speed of a moving tag is spread
 CERTAIN: Final = 3.0  # standard deviations from zero at which a tag certainly moves
+LIKELY: Final = 0.01  # weight from which on a hypothesis may deny that the tag moves
 QUIET_TAU: Final = 10.0  # s, over which the share of quiet motion is averaged
 QUIET_START, QUIET_MIN = 0.05, 0.005  # that share before any motion, and the least of it
 STOOD_S: Final = 0.1  # s of rest after which a tag may drive off in the other direction
 SLOW: Final = 0.2  # m/s, of a tag that hardly moves
 SLOW_EVERY: Final = 0.5  # s
 EVEN: Final = -0.7  # log of one half
+REFUSED: Final = 4.0  # standard deviations of speed in the other direction that are not noise
 TURNABOUT_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis is not offered the other direction
 
 
 @njit(nogil=True)
-def judge_standstill(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
-    """Take the node's rest back if the tag more likely rolls. one: the best hypothesis, before the node.
+def judge_standstill(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> None:
+    """Take the node's rest back if the tag more likely rolls. work: before the node.
 
-    A smooth ride at constant speed looks like rest to accelerometer and gyroscope. So the speed decides, and how often
+    A smooth ride at constant speed looks like rest to accelerometer and gyroscope. So the speeds decide, and how often
     this tag has looked like that while it certainly moved:
 
-        N(0; speed, variance)  against  P(quiet | moving) / SPEEDS
+        mean of N(0; speed, variance) over the hypotheses  against  P(quiet | moving) / SPEEDS
     """
-    speed, variance = one.mean[V], one.cov[V, V] + t.rest_std**2
     quiet = node.rest == RESTING
-    if abs(speed) > max(CERTAIN * math.sqrt(variance), SLOW):
+    if not quiet and row.quiet_share == QUIET_MIN:
+        return
+    total, at_rest, certain = 0.0, 0.0, True
+    for h in range(count):
+        weight, speed, variance = math.exp(work[h].log_weight), work[h].mean[V], work[h].cov[V, V] + t.rest_std**2
+        total += weight
+        at_rest += weight * math.exp(-0.5 * speed * speed / variance) / math.sqrt(TWO_PI * variance)
+        if abs(speed) <= max(CERTAIN * math.sqrt(variance), SLOW) and weight > LIKELY:
+            certain = False
+    if certain:
         share = node.dt_s / (QUIET_TAU + node.dt_s)
         row.quiet_share = max(row.quiet_share + share * (quiet - row.quiet_share), QUIET_MIN)
-    at_rest = -0.5 * speed * speed / variance - 0.5 * math.log(TWO_PI * variance)
-    if quiet and at_rest < math.log(row.quiet_share / SPEEDS):
+    if quiet and at_rest < total * row.quiet_share / SPEEDS:
         node.rest = MOVING
 
 
@@ -63,6 +72,21 @@ def offer_turnabout(work: Hypotheses, count: int, row: Row, node: Node, t: Tunin
     for h in range(count):
         if work[h].log_weight > floor and count < MAX_HYPOTHESES:
             count = _add_turned(work, h, count, prior)
+    return count
+
+
+@njit(nogil=True)
+def offer_refused(work: Hypotheses, count: int, node: Node, t: Tuning) -> int:
+    """Let a tag turn back whose accelerometer says so, though no rest was seen: some stops are too short.
+
+    Call it before the speed is truncated to the direction of each hypothesis. Return the count of hypotheses.
+    """
+    if node.carried == 1 or not math.isfinite(node.dv_var):
+        return count
+    for h in range(count):
+        ahead = work[h].mean[V] if work[h].reverse == 0 else -work[h].mean[V]
+        if ahead + t.reverse_slack < -REFUSED * math.sqrt(work[h].cov[V, V]) and count < MAX_HYPOTHESES:
+            count = _add_turned(work, h, count, t.reverse_log_prior)
     return count
 
 

@@ -67,7 +67,7 @@ from dropanchor_service.estimation.fleet.belief.predict import (
 )
 from dropanchor_service.estimation.fleet.belief.publish import publish
 from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of
-from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_turnabout
+from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_refused, offer_turnabout
 from dropanchor_service.estimation.fleet.belief.start import (
     collect_start,
     is_in_site_frame,
@@ -148,7 +148,7 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floa
 def _follow_motion_of(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> int:
     """Predict all hypotheses over the node, and fuse its heading, rest and steps. Return their count."""
     count = follow_motion(work, count, row, node, t)
-    judge_standstill(work[best_of(work, count)], row, node, t)
+    judge_standstill(work, count, row, node, t)
     count = offer_turnabout(work, count, row, node, t)
     _predict_all(work, count, row, node, t, scratch)
     if is_in_site_frame(node.heading_kind):
@@ -171,6 +171,7 @@ def _fuse_measurement(
         if row.heading.in_site_frame == 0:
             return count
     if node.kind == RANGE and row.anchor >= 0 and not belief.stuck:
+        count = offer_refused(work, count, node, t)
         update_with_range(work, count, row, node, anchors, t, scratch, belief)
         row.since_range_s = 0.0
         count = propose_alternatives(work, count, row, t)
@@ -205,16 +206,13 @@ def _reset_row(row: Row, pool: Pool) -> None:
     release(row, pool)
     row.start.range_count = 0
     row.start.collected_s = 0.0
-    row.heading.bank_started = 0
-    row.heading.model = 0
+    row.heading.bank_started = row.heading.model = row.heading.in_site_frame = 0
     row.heading.slow_var = 0.0
-    row.heading.in_site_frame = 0
     row.publication.resolved = 0
     row.publication.state = INITIALISING
     row.publication.information[:] = 0.0
     row.publication.resolved_s = 0.0
-    row.nlos.misfit = 0.0
-    row.nlos.misfit_s = 0.0
+    row.nlos.misfit = row.nlos.misfit_s = 0.0
     row.nlos.widened = 0
     row.walk.carried = 0
     row.walk.var = 0.0

@@ -6,27 +6,28 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.columns import State, default_settings
-from dropanchor_service.estimation.fleet.belief.layout import PHI, N, V
+from dropanchor_service.estimation.fleet.belief.layout import PHI, V, make_workspace
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
 from dropanchor_service.estimation.fleet.belief.standing import judge_standstill
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, RESTING
 from dropanchor_service.estimation.fleet.tuning import Tuning
-from support.belief import STATE, hypothesis_of, node_of
+from support.belief import node_of
 from support.fleet_tracks import DT, Drive, rows_of, run, sense
 
 
-def judged(speed: float, std: float, quiet_share: float | None = None) -> int:
-    """Return what a node of rest is after it was judged by this speed, m/s."""
+def judged(*speeds: tuple[float, float, float], quiet_share: float | None = None) -> int:
+    """Return what a node of rest is after it was judged. speeds: weight, m/s and its deviation of each hypothesis."""
     rows = np.zeros(1, configure_row(default_settings(), Tuning()).dtype)
     rows[0] = configure_row(default_settings(), Tuning())
     if quiet_share is not None:
         rows[0]["quiet_share"] = quiet_share
-    s, P = STATE.copy(), np.diag(np.full(N, 1e-4))
-    s[V], P[V, V] = speed, std**2
+    work = make_workspace()[0]["hypotheses"]
+    for one, (weight, speed, std) in zip(work, speeds, strict=False):
+        one["mean"][V], one["cov"][V, V], one["log_weight"] = speed, std**2, np.log(weight)
     node = node_of()
     node["rest"] = RESTING
-    judge_standstill(hypothesis_of(s, P)[0], rows[0], node, Tuning())
+    judge_standstill(work, len(speeds), rows[0], node, Tuning())
     return int(node["rest"])
 
 
@@ -35,12 +36,18 @@ def judged(speed: float, std: float, quiet_share: float | None = None) -> int:
     [(2.0, 0.1, MOVING), (2.0, 2.0, RESTING), (0.05, 0.05, RESTING), (0.5, 0.1, MOVING), (0.5, 0.4, RESTING)],
 )
 def test_a_speed_that_is_far_from_zero_refutes_a_rest(speed: float, std: float, rest: int) -> None:
-    assert judged(speed, std) == rest
+    assert judged((1.0, speed, std)) == rest
 
 
 def test_a_tag_that_rides_without_vibration_needs_less_to_refute_a_rest() -> None:
-    assert judged(0.4, 0.17, quiet_share=0.005) == RESTING
-    assert judged(0.4, 0.17, quiet_share=0.9) == MOVING
+    assert judged((1.0, 0.4, 0.17), quiet_share=0.005) == RESTING
+    assert judged((1.0, 0.4, 0.17), quiet_share=0.9) == MOVING
+
+
+def test_a_rest_that_another_hypothesis_explains_is_one() -> None:
+    fast, slow = (0.6, 0.8, 0.2), (0.2, 0.15, 0.18)
+    assert judged(fast, quiet_share=0.05) == MOVING
+    assert judged(fast, slow, quiet_share=0.05) == RESTING
 
 
 def there_and_back(seed: int, unconfirmed: int = 0) -> Drive:
@@ -98,6 +105,16 @@ def test_a_tag_that_may_reverse_is_followed_when_it_turns_back_without_a_stop() 
         assert beliefs["speed"][150] == pytest.approx(-1.0, abs=0.3)
         assert beliefs["speed"][-1] == pytest.approx(1.2, abs=0.3)
         assert np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y).max() < 1.0
+
+
+def test_an_accelerometer_that_clearly_refuses_the_direction_is_believed_without_a_seen_stop() -> None:
+    errors = []
+    for seed in range(3000, 3006):
+        d = there_and_back(seed)
+        d.nodes["rest"][20:] = MOVING  # no standstill is seen
+        beliefs = run(rows_of(1, known=True), make_pool(512), d.nodes)
+        errors.append(np.hypot(beliefs["x"] - d.x, beliefs["y"] - d.y).max())
+    assert np.median(errors) < 1.2
 
 
 def test_a_tag_that_stands_with_an_unknown_start_may_be_in_every_direction() -> None:
