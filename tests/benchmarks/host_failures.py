@@ -10,7 +10,7 @@ from support.hosts import Hosts
 from support.postgresql import Postgresql
 from support.zenoh_router import wait_until
 
-FROZEN_S, CUT_S, ROUTER_GONE_S, HEAD_GONE_S, DATABASE_GONE_S = 20.0, 25.0, 3.0, 5.0, 8.0
+CALM_S, FROZEN_S, CUT_S, ROUTER_GONE_S, HEAD_GONE_S, DATABASE_GONE_S = 20.0, 20.0, 25.0, 3.0, 5.0, 8.0
 BUSY_S, UPGRADE_S = 240.0, 900.0  # longest waits, on a busy machine
 OLD, NEW = "8.1.0", "8.2.0"
 
@@ -27,6 +27,7 @@ class HostFailures:
 
     def all(self) -> None:
         measure = self._trial.measure
+        measure(f"nothing for {CALM_S:.0f} s", self._nothing)  # what the machine itself adds to the others
         measure("planned move", self._move)
         measure("kill -9 of a shard", self._kill_shard)
         measure(f"a shard frozen for {FROZEN_S:.0f} s", self._freeze_shard)
@@ -38,6 +39,9 @@ class HostFailures:
         measure(f"PostgreSQL gone for {DATABASE_GONE_S:.0f} s", self._database_away)
         measure(f"the router gone for {ROUTER_GONE_S:.0f} s", self._router_away)
         measure("`cluster upgrade` of all shards", self._upgrade)
+
+    def _nothing(self, _: str, __: str) -> None:
+        time.sleep(CALM_S)
 
     def _move(self, node: str, _: str) -> None:
         to = next(name for name in NODES if name != node)
