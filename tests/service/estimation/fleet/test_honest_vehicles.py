@@ -30,3 +30,8 @@ def test_a_tag_that_passes_close_to_the_anchor_keeps_its_light_hypotheses() -> N
 
 def test_a_tag_with_fast_ranges_is_not_found_before_it_moves() -> None:
     assert worst_sigma("S5-100Hz/scalar/everything/unknown", 5132) < 5.0
+
+
+@pytest.mark.parametrize("told", ["everything", "mount", "nothing"])
+def test_a_tag_that_rolls_smoothly_across_the_line_of_sight_is_not_taken_for_standing(told: str) -> None:
+    assert worst_sigma(f"rolling/9-axis/{told}/unknown", 5207) < 5.0

@@ -13,6 +13,7 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
+from dropanchor_service.estimation.fleet.belief.heading_reference import restart_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     GAIT_OFFSET,
@@ -37,7 +38,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
 from dropanchor_service.estimation.fleet.belief.mixture import best_of, copy_hypothesis
 from dropanchor_service.estimation.fleet.belief.update import gaussian, project, update_component, update_pda
 from dropanchor_service.estimation.fleet.compiled import njit
-from dropanchor_service.estimation.fleet.frontend.node import Node
+from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 USUAL_SPEED: Final = 1.2  # m/s, of a walk
@@ -69,6 +70,8 @@ def follow_motion(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning)
     if node.carried == 0:
         _set_down(work, count, row, t)
         return count
+    if node.heading_kind == MEASURED_HEADING:
+        restart_reference(work[best_of(work, count)], row, node.heading - node.dyaw, node.heading_var)
     return _pick_up(work, count, row, node, t)
 
 

@@ -1,6 +1,17 @@
 """How an error of the heading reference enters the covariance of a hypothesis."""
 
-from dropanchor_service.estimation.fleet.belief.layout import MOUNT, PHI, REFERENCE, YAW, Floats, N
+from dropanchor_service.estimation.fleet.angles import wrap
+from dropanchor_service.estimation.fleet.belief.layout import (
+    EXACT,
+    MOUNT,
+    PHI,
+    REFERENCE,
+    YAW,
+    Floats,
+    Hypothesis,
+    N,
+    Row,
+)
 from dropanchor_service.estimation.fleet.compiled import njit
 
 
@@ -70,3 +81,19 @@ def adopt_reference(P: Floats, variance: float) -> None:
         P[MOUNT, i] -= P[YAW, i]
     for i in range(N):
         P[i, MOUNT] -= P[i, YAW]
+
+
+@njit(nogil=True)
+def restart_reference(one: Hypothesis, row: Row, yaw: float, variance: float) -> None:
+    """Take the yaw, rad, from the reference, and forget what the errors of both seemed to be.
+
+    The yaw of a vehicle is the azimuth of a body axis. Where that axis is upright, it turns by anything, and the
+    reference and the gyroscope were blamed for it.
+    """
+    s, P = one.mean, one.cov
+    one.heading_class = EXACT
+    s[YAW], s[REFERENCE] = wrap(yaw), 0.0
+    for i in range(N):
+        P[YAW, i] = P[i, YAW] = P[REFERENCE, i] = P[i, REFERENCE] = 0.0
+    P[YAW, YAW] = variance
+    row.heading.bank_started = row.heading.model = 0

@@ -15,6 +15,7 @@ from dropanchor_service.estimation.fleet.frontend.platform import (
     add_reading,
     detect_first_motion,
     fill_platform_node,
+    refer_readings,
     use_platform_heading,
 )
 from dropanchor_service.estimation.fleet.frontend.state import Frontend
@@ -32,9 +33,12 @@ def _close(front: Frontend, platform: Platform, row: Any, t_ns: int, node: Node)
     node.lag_s = 0.0
     if front.running == 1:
         newest = max(t_ns, front.t_imu, front.t_node)
+        carried = front.carrying.carried
         close_node(front, newest, node)
         node.t_ns = newest
         if row.settings.heading_source == PLATFORM_ONLY:
+            if front.carrying.carried != carried:
+                refer_readings(platform, front)
             use_platform_heading(platform, front, node)
     else:
         newest = max(t_ns, platform.t_node)

@@ -12,6 +12,7 @@ import numpy as np
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.attitude import yaw_of
+from dropanchor_service.estimation.fleet.frontend.carrying import carried_yaw
 from dropanchor_service.estimation.fleet.frontend.node import (
     DERIVED_HEADING,
     MEASURED_HEADING,
@@ -59,7 +60,8 @@ def add_reading(p: Platform, front: Frontend, t_ns: int, heading: float, std: fl
         p.node_heading = heading
     p.t_heading, p.heading, p.std = t_ns, heading, std
     if front.running == 1:
-        lead = wrap(heading - yaw_of(front.attitude.q))
+        q, c = front.attitude.q, front.carrying
+        lead = wrap(heading - (carried_yaw(c, q) if c.carried == 1 else yaw_of(q)))  # as `close_node` tells the yaw
         p.readings += 1
         p.gyro_offset += wrap(lead - p.gyro_offset) / p.readings
 
@@ -100,6 +102,13 @@ def detect_first_motion(p: Platform, node: Node, z: float, std: float) -> None:
         p.moved = 1
     if p.moved == 0 and node.dt_s > 0.0:
         node.rest = NOT_MOVED
+
+
+@njit(nogil=True)
+def refer_readings(p: Platform, front: Frontend) -> None:
+    """Refer the readings of a node to the yaw at its end, by the last of them: another yaw begins there."""
+    p.readings = min(p.readings, 1)
+    p.gyro_offset = wrap(p.heading - front.preintegration.yaw_end)
 
 
 @njit(nogil=True)

@@ -2,7 +2,8 @@
 
 A tag is quiet while the exponentially weighted standard deviations of accelerometer and gyroscope and the mean rotation
 are small. It is at rest when it has been quiet for HOLD seconds. Where an accelerometer's own noise is as large as the
-limit, its variance falls below it for tenths of a second, in motion as well: time near the limit counts a third.
+limit, its variance falls below it for tenths of a second, in motion as well: time near the limit counts a third, and no
+rest begins before the variance is far below the limit.
 The gyroscope's bias is learned in blocks of rest, and only from blocks that another block of rest followed, so that
 neither the end nor the start of a motion counts. The first rest after switch-on has no motion before it: it is used
 sooner, in shorter blocks, with the noise that the gyroscope shows. Many tags rest for no more than a second.
@@ -39,6 +40,7 @@ CLEAR, DOUBT = 0.8, 3.0  # share of the limit's variance above which quiet count
 GYRO_SD = 0.05  # rad/s, likewise
 RATE = 0.08  # rad/s, of the mean rotation before the bias is known
 RATE_KNOWN = 0.02  # rad/s, afterwards
+SURE = 0.55  # share of the limit's variance above which no rest begins
 HOLD = 0.2  # s of quiet that make rest
 CONFIRM = 0.5  # s of quiet before the bias is learned
 BLOCK = 0.5  # s
@@ -92,8 +94,10 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
     x, y, z = s.mean[3] - bias[0], s.mean[4] - bias[1], s.mean[5] - bias[2]
     limit = RATE_KNOWN + min(RATE, 3.0 * math.sqrt(s.bias_var))
     calm = s.acc_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
-    clear = s.acc_var < CLEAR * ACC_SD * ACC_SD
-    s.quiet = s.quiet + (dt if clear else dt / DOUBT) if calm and s.seen > TAU else 0.0
+    share = s.acc_var / (ACC_SD * ACC_SD)
+    quiet = s.quiet + (dt if share < CLEAR else dt / DOUBT) if calm and s.seen > TAU else 0.0
+    if not s.quiet <= HOLD < quiet or share < SURE:
+        s.quiet = quiet
     if s.quiet == 0.0 and s.seen > TAU:
         s.moved = 1
 

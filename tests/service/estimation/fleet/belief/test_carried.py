@@ -18,7 +18,9 @@ from dropanchor_service.estimation.fleet.belief.carried import (
 from dropanchor_service.estimation.fleet.belief.layout import (
     GAIT_OFFSET,
     MOUNT,
+    OWN_ERROR,
     PHI,
+    REFERENCE,
     ROW,
     SLIP,
     STEP_SCALE,
@@ -29,6 +31,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     make_workspace,
 )
 from dropanchor_service.estimation.fleet.engine import FleetEngine
+from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from dropanchor_service.evaluation.product.rows import selected, simulated_rows
 from dropanchor_service.evaluation.product.runs import TagRun, sources, tag_run
@@ -123,6 +126,19 @@ def test_who_is_carried_from_a_given_start_may_be_held_in_any_way_there() -> Non
     np.testing.assert_allclose(work["mean"][: T.grips, PHI], 0.0)
 
 
+def test_what_a_vehicle_took_for_an_error_of_the_platforms_heading_is_forgotten() -> None:
+    row, work, node = row_of_a_walk(2.0)
+    row["heading"]["bank_started"], row["heading"]["model"] = 1, 1
+    work[0]["heading_class"] = OWN_ERROR
+    work[0]["mean"][YAW], work[0]["mean"][REFERENCE] = -2.0, 6.0
+    node["heading_kind"], node["heading"], node["heading_var"], node["dyaw"] = MEASURED_HEADING, 1.0, 0.01, 0.3
+    count = follow_motion(work, 1, row, node, T.record()[0])
+    np.testing.assert_allclose(work["mean"][:count, YAW] + node["dyaw"], 1.0)
+    np.testing.assert_array_equal(work["mean"][:count, REFERENCE], 0.0)
+    np.testing.assert_array_equal(work["heading_class"][:count], 0)
+    assert (row["heading"]["bank_started"], row["heading"]["model"]) == (0, 0)
+
+
 def test_a_known_mounting_angle_is_kept() -> None:
     row, work, node = row_of_a_walk(1.0)
     row["settings"]["mount_angle_std"] = 0.02
@@ -200,6 +216,10 @@ def test_a_walk_is_followed_and_the_ellipse_holds_the_truth_while_tracking(carry
 
 def test_a_walk_with_a_device_in_a_pocket_begins_where_it_stood() -> None:
     assert result_of("walk-pocket/6-axis/nothing/known", seeds=POCKETS).score.coverage > 0.8
+
+
+def test_a_walk_with_a_device_in_a_pocket_follows_the_platforms_heading() -> None:
+    assert result_of("walk-pocket/scalar/nothing/known", seeds=[5207, 5213, 5226, 5232]).score.coverage > 0.9
 
 
 def test_what_a_vehicle_would_have_done_does_not_outlive_the_first_steps() -> None:
