@@ -237,7 +237,7 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
     if node.kind == RANGE and node.anchor == row.anchor:
         start.ranges[start.range_count % START_RANGES] = start_distance(row, node.z)
         start.range_count += 1
-    many = start.range_count >= START_RANGES and start.collected_s >= STANDSTILL_S
+    many = (start.range_count >= START_RANGES or node.rest == RESTING) and start.collected_s >= STANDSTILL_S
     enough = many or start.collected_s >= COLLECT_S
     if start.range_count < MIN_RANGES or not enough:
         row.publication.reason = NO_RANGE
