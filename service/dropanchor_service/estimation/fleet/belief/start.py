@@ -50,7 +50,7 @@ from dropanchor_service.estimation.fleet.frontend.preintegration import unobserv
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 MIN_RANGES: Final = 5  # ranges that an unknown start needs at least
-COLLECT_S: Final = 1.0  # s over which it collects them, unless START_RANGES come sooner
+COLLECT_S: Final = 1.0  # s over which it collects them, unless it stands or START_RANGES come sooner
 STANDSTILL_S: Final = 0.7  # s that it waits at least, so that a standstill is seen
 RELATIVE_COURSE_VAR: Final = 1e-4  # rad^2, of a course that is the x axis of its frame
 ADOPT_VAR: Final = 0.04  # rad^2, of north below which poses are in the site frame
@@ -237,8 +237,8 @@ def collect_start(work: Hypotheses, row: Row, node: Node, anchors: Anchors, t: T
     if node.kind == RANGE and node.anchor == row.anchor:
         start.ranges[start.range_count % START_RANGES] = start_distance(row, node.z)
         start.range_count += 1
-    many = start.range_count >= START_RANGES and start.collected_s >= STANDSTILL_S
-    enough = many or start.collected_s >= COLLECT_S
+    sooner = node.rest == RESTING or start.range_count >= START_RANGES
+    enough = (sooner and start.collected_s >= STANDSTILL_S) or start.collected_s >= COLLECT_S
     if start.range_count < MIN_RANGES or not enough:
         row.publication.reason = NO_RANGE
         return 0

@@ -188,12 +188,6 @@ def _family(one: Hypothesis, head: Hypothesis) -> int:
 
 
 @njit(nogil=True)
-def _counts(one: Hypothesis, head: Hypothesis) -> bool:
-    """Return whether a hypothesis counts: all of other families, of the head's family only its mode."""
-    return bool(one.in_mode or _family(one, head) != _family(head, head))
-
-
-@njit(nogil=True)
 def spread_over_families(work: Hypotheses, count: int, head: int, scratch: Scratch, rejected_weight: float) -> None:
     """Set scratch.cov to the mean over all families above `rejected_weight`, about scratch.mean.
 
@@ -205,14 +199,13 @@ def spread_over_families(work: Hypotheses, count: int, head: int, scratch: Scrat
     share[:] = 0.0
     scratch.cov[:] = 0.0
     for h in range(count):
-        if _counts(work[h], work[head]):
-            share[_family(work[h], work[head])] += work[h].weight
+        share[_family(work[h], work[head])] += work[h].weight
     families = 0
     for family in range(FAMILIES):
         families += share[family] > rejected_weight
     for h in range(count):
         of_family = share[_family(work[h], work[head])]
-        if of_family > rejected_weight and _counts(work[h], work[head]):
+        if of_family > rejected_weight:
             _add_moments(work[h], work[h].weight / (of_family * families), x, y, course, scratch)
     mean[0], mean[1], mean[2] = x, y, course
 

@@ -117,6 +117,18 @@ def test_an_accelerometer_that_clearly_refuses_the_direction_is_believed_without
     assert np.median(errors) < 1.2
 
 
+def test_a_tag_that_is_seen_to_stand_starts_before_it_drives_off() -> None:
+    """Once it drives, a ring would have to guess its speed."""
+    rows, pool = rows_of(1, known=False), make_pool(512)
+    run(rows, pool, there_and_back(3000).nodes[:8])
+    speeds, slot = [], rows["first_slot"][0]
+    for _ in range(rows["count"][0]):
+        speeds.append(abs(pool[slot]["mean"][V]))
+        slot = pool[slot]["next"]
+    assert len(speeds) == Tuning().start_bearings
+    assert max(speeds) < 0.02
+
+
 def test_a_tag_that_stands_with_an_unknown_start_may_be_in_every_direction() -> None:
     """Ranges at 100 Hz that do not change favour speeds across the line of sight until the standstill is seen."""
     rng = np.random.default_rng(3000)
