@@ -96,7 +96,7 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
     calm = s.acc_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
     share = s.acc_var / (ACC_SD * ACC_SD)
     quiet = s.quiet + (dt if share < CLEAR else dt / DOUBT) if calm and s.seen > TAU else 0.0
-    if not s.quiet <= HOLD < quiet or share < SURE:
+    if not s.quiet <= HOLD < quiet or share < SURE:  # else this sample would begin a rest near the limit
         s.quiet = quiet
     if s.quiet == 0.0 and s.seen > TAU:
         s.moved = 1
