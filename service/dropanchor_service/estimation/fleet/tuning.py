@@ -69,7 +69,6 @@ class Tuning(NamedTuple):
     merge_distance: float = 0.5  # standard deviations, of hypotheses of equal weight
     merge_distance_at_rest: float = 1.0  # the same, of a tag at rest
     merge_light: float = 0.5  # growth of its square per unit of log weight that the lighter one lacks
-    tracking_hypotheses: int = 48
     prune_depth: float = 10.0  # log weight below the best
     rest_std: float = 0.02  # m/s
     rest_gyro_std: float = 0.003  # rad/s

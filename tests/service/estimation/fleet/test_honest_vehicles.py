@@ -28,6 +28,11 @@ def test_a_tag_that_passes_close_to_the_anchor_keeps_its_light_hypotheses() -> N
     assert worst_sigma("OU/scalar/everything/unknown", 5130) < 5.0
 
 
+@pytest.mark.parametrize("row", ["scalar/nothing/known", "9-axis/everything/known", "6-axis/everything/unknown"])
+def test_a_tag_that_passes_the_anchor_on_a_side_that_it_does_not_know_keeps_both(row: str) -> None:
+    assert worst_sigma(f"OU/{row}", 21086) < 5.0
+
+
 def test_a_tag_with_fast_ranges_is_not_found_before_it_moves() -> None:
     assert worst_sigma("S5-100Hz/scalar/everything/unknown", 5132) < 5.0
 

@@ -144,13 +144,10 @@ def are_mounted_alike(work: Hypotheses, count: int) -> bool:
 
 
 @njit(nogil=True)
-def max_hypotheses(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
-    """Return how many hypotheses the row may have now: more while several guesses of its mount are open."""
+def max_hypotheses(row: Row, t: Tuning) -> int:
+    """Return how many hypotheses the row may have now. A carried tag has fewer, whose ellipse is widened instead."""
     if row.publication.resolved == 1:
-        most = t.tracking_hypotheses if row.walk.carried == 0 else t.walk_hypotheses
-        if row.walk.carried == 0 and not are_mounted_alike(work, count):
-            return 4 * most
-        return most if are_aligned_alike(work, count) else 2 * most
+        return MAX_HYPOTHESES if row.walk.carried == 0 else t.walk_hypotheses
     return t.coarse_hypotheses if row.start.coarse == 1 else MAX_HYPOTHESES
 
 

@@ -137,7 +137,7 @@ def _reduce_mixture(work: Hypotheses, count: int, row: Row, node: Node, PH: Floa
                 angle = t.walk_split_angle
             curved = t.split_curvature if may_split_curved(work, count, row) else math.inf
             count = split(work, count, angle, curved, SPLIT_DEPTH)
-        count = keep_heaviest(work, count, max_hypotheses(work, count, row, t))
+        count = keep_heaviest(work, count, max_hypotheses(row, t))
     if row.since_class_check_s >= CHECK_CLASSES_EVERY and uses_heading(row, node):
         row.since_class_check_s = 0.0
         count = keep_both_classes(work, count, row, node, PH, t)
