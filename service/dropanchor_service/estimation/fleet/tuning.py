@@ -41,6 +41,7 @@ class Tuning(NamedTuple):
     acc_bias_roughness: float = 0.7  # s: its variance grows by this times dv_var / dt, the roughness of the motion
     bending_roughness: float = 0.05  # (m/s)^2/s of it, up to which ramps of the speed count: they bend the tilt
     acc_bias_tau: float = 5.0  # s
+    bending_s: float = 2.0  # s for which an arc bends the tilt of a mount in one direction, unless it is rigid
     range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays
     q_range_bias: float = 1e-5  # m^2/s
     q_nlos: float = 0.02  # m^2/s, range bias without line of sight

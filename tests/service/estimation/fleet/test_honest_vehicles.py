@@ -40,3 +40,12 @@ def test_a_tag_with_fast_ranges_is_not_found_before_it_moves() -> None:
 @pytest.mark.parametrize("told", ["everything", "mount", "nothing"])
 def test_a_tag_that_rolls_smoothly_across_the_line_of_sight_is_not_taken_for_standing(told: str) -> None:
     assert worst_sigma(f"rolling/9-axis/{told}/unknown", 5207) < 5.0
+
+
+@pytest.mark.parametrize("start", ["known", "unknown"])
+def test_a_tag_that_starts_in_an_arc_allows_for_the_tilt_that_it_bends(start: str) -> None:
+    assert worst_sigma(f"M5/scalar/nothing/{start}", 5212) < 5.0
+
+
+def test_a_tag_with_an_unknown_start_soon_finds_its_mount_rigid() -> None:
+    assert worst_sigma("M5/6-axis/mount/unknown", 21015) < 5.0

@@ -49,16 +49,15 @@ def slip_std_of(row: Row) -> float:
 def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None:
     """Weigh what a node tells of the mount. one: the best hypothesis, before the node.
 
-    A hand, or a cart on grass, moves sideways more than a rigid mount explains. While several hypotheses compete, the
-    innovations tell of a wrong hypothesis and not of the mount.
+    A hand, or a cart on grass, moves sideways more than a rigid mount explains. While several hypotheses compete, large
+    innovations tell of a wrong hypothesis and not of jolts. Small ones still tell of a rigid mount.
     """
-    if row.publication.resolved == 0:
-        return
     s, mount, settings = one.mean, row.mount, row.settings
     e = lateral_residual(s, node, scratch.H)
     S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, RIGID_SLIP)
-    share = node.dt_s / (JOLTS_TAU + node.dt_s)
-    mount.lateral_misfit += share * (min(e * e / S, JOLTS_CLIP) - mount.lateral_misfit)
+    if row.publication.resolved == 1:
+        share = node.dt_s / (JOLTS_TAU + node.dt_s)
+        mount.lateral_misfit += share * (min(e * e / S, JOLTS_CLIP) - mount.lateral_misfit)
     loose = S + (settings.slip_std**2 - RIGID_SLIP**2) * s[V] * s[V] * 2.0 * node.dt_s / settings.slip_tau
     if loose > TELLING * S:
         ratio = 0.5 * (math.log(loose / S) - e * e * (1.0 / S - 1.0 / loose))
@@ -68,9 +67,12 @@ def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None
 
 @njit(nogil=True)
 def decide_mount(work: Hypotheses, count: int, row: Row, scratch: Scratch) -> None:
-    """Put the mount of a row in the class that its log odds tell, with hysteresis."""
+    """Put the mount of a row in the class that its log odds tell, with hysteresis.
+
+    None becomes rigid whose sideways axis tells of jolts: a device in a hand looked rigid between them.
+    """
     mount = row.mount
-    if mount.rigid == 0 and mount.rigid_log_odds > RIGID_ABOVE:
+    if mount.rigid == 0 and mount.rigid_log_odds > RIGID_ABOVE and tells_course(row):
         mount.rigid = 1
         if row.settings.slip_given == 0:
             for h in range(count):

@@ -18,7 +18,7 @@ from dropanchor_service.estimation.fleet.belief.gap import (
     restart_from_gap,
 )
 from dropanchor_service.estimation.fleet.belief.heading_classes import keep_both_classes
-from dropanchor_service.estimation.fleet.belief.lateral import update_lateral
+from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, update_lateral
 from dropanchor_service.estimation.fleet.belief.layout import (
     CLASSES,
     MAX_HYPOTHESES,
@@ -75,7 +75,7 @@ from dropanchor_service.estimation.fleet.belief.start import (
     uses_heading,
 )
 from dropanchor_service.estimation.fleet.belief.states import FAULT, INITIALISING
-from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, predict_tilt
+from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, follow_tilt
 from dropanchor_service.estimation.fleet.belief.update import update_standstill
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, MOVING, RANGE, Node, Nodes
@@ -101,7 +101,8 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
     lateral, slip_std = follow_mount(work, count, row, node, scratch), slip_std_of(row)
-    tilts = slip_std <= RIGID_SLIP and bends_tilt(node)
+    rigid = slip_std <= RIGID_SLIP
+    bends = bends_tilt(node) and (rigid or is_lateral_known(node))
     fill_noise(decay, growth, node, row, t)
     for heading_class in range(CLASSES):
         filled = False
@@ -113,8 +114,8 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 predict_state(work[h].mean, node, decay, F)
                 predict_covariance(work[h].cov, F, decay, FP)
                 add_process_noise(work[h].mean, work[h].cov, F, growth, node, t, work[h].nlos)
-                if tilts:
-                    predict_tilt(work[h].mean, work[h].cov, node)
+                if bends:
+                    follow_tilt(work[h].mean, work[h].cov, node, rigid, t)
                 if lateral:
                     update_lateral(work[h], scratch, node, row, slip_std)
 

@@ -8,6 +8,9 @@ body moves it from one axis to the other:
 
 Without this an arc of seconds ends up as a bias of the forward axis, where no range corrects it while the tag travels
 across the line of sight. What a ramp of the speed takes is left to the noise of the biases.
+
+On a mount that may be loose the direction of that error is not known, and its size is: the arc adds to the variance of
+both biases, as noise of the size k v w / dt that keeps its direction for some seconds.
 """
 
 import math
@@ -15,12 +18,22 @@ import math
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, Floats, N, V
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
+from dropanchor_service.estimation.fleet.tuning import Tuning
 
 
 @njit(nogil=True)
 def bends_tilt(node: Node) -> bool:
     """Return whether the accelerometer of a ground vehicle was used over the node while it moved."""
     return bool(node.rest == MOVING and node.carried == 0 and node.dt_s > 0.0 and math.isfinite(node.dv_var))
+
+
+@njit(nogil=True)
+def follow_tilt(s: Floats, P: Floats, node: Node, rigid: bool, t: Tuning) -> None:
+    """Take what the tilt filter made of the node into a state that was predicted over it."""
+    if rigid:
+        predict_tilt(s, P, node)
+    else:
+        widen_tilt(s, P, node, t)
 
 
 @njit(nogil=True)
@@ -38,3 +51,13 @@ def predict_tilt(s: Floats, P: Floats, node: Node) -> None:
     for i in range(N):
         a, b = P[ACC_BIAS, i], P[LEFT_BIAS, i] + by_speed * P[V, i] + by_gyro * P[GYRO_BIAS, i]
         P[ACC_BIAS, i], P[LEFT_BIAS, i] = c * a + n * b, c * b - n * a
+
+
+@njit(nogil=True)
+def widen_tilt(s: Floats, P: Floats, node: Node, t: Tuning) -> None:
+    """Add to the covariance of a state, predicted over the node, what an arc may bend on a mount that may be loose."""
+    w = node.dyaw - s[GYRO_BIAS] * node.dt_s
+    bent = node.tilt_gain * s[V] * w / node.dt_s
+    variance = bent * bent * 2.0 * t.bending_s / node.dt_s
+    P[ACC_BIAS, ACC_BIAS] += variance
+    P[LEFT_BIAS, LEFT_BIAS] += variance

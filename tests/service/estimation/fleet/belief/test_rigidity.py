@@ -96,11 +96,22 @@ def test_a_tag_that_sways_more_than_a_rigid_mount_does_stops_teaching_sideways()
     assert not tells_course(shaken)
 
 
-def test_the_mount_is_not_judged_while_hypotheses_compete() -> None:
+def test_while_hypotheses_compete_a_mount_may_be_found_rigid_but_not_shaken() -> None:
+    row = row_of(resolved=False)
+    drive(row, slip_std=0.0)
+    assert slip_std_of(row) == RIGID_SLIP
     row = row_of(resolved=False)
     drive(row, slip_std=0.0, bumps=0.3)
     assert tells_course(row)
-    assert row["mount"]["rigid_log_odds"] == 0.0
+    assert slip_std_of(row) == pytest.approx(0.1)
+
+
+def test_a_mount_is_not_found_rigid_while_its_sideways_axis_tells_of_jolts() -> None:
+    row = row_of()
+    row["mount"]["rigid_log_odds"] = 10.0
+    drive(row, slip_std=0.0, seconds=1.0, bumps=0.3)
+    assert not tells_course(row)
+    assert slip_std_of(row) == pytest.approx(0.1)
 
 
 def test_what_a_hypothesis_took_for_slip_is_its_mounting_angle_when_the_mount_is_found_rigid() -> None:

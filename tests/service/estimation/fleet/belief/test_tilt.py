@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, N, V
-from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, predict_tilt
+from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, predict_tilt, widen_tilt
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, jacobian_fd, node_of
 from support.frontend import new_frontend, run
@@ -39,28 +39,69 @@ def ride(seconds: float = 24.0) -> Motion:
     return motion
 
 
-def test_the_biases_follow_what_an_arc_and_a_sharp_turn_do_to_the_tilt() -> None:
-    """The mean error of a second of increments is predicted to more than a half; the rest is decay and noise."""
-    ends = np.arange(0.1, 23.9, 0.1)
-    nodes = run(new_frontend(), ride(), ends).view(np.recarray)
+def arc_nodes() -> Any:
+    """The nodes of `ride` from the start of the arc on, 0.1 s each."""
+    return run(new_frontend(), ride(), np.arange(0.1, 23.9, 0.1)).view(np.recarray)[40:]
+
+
+def before(second: float) -> slice:
+    """Which of these nodes lie in the second before this time."""
+    return slice(round(10 * (second - STARTS - 1.0)), round(10 * (second - STARTS)))
+
+
+def error_of(node: Any) -> tuple[float, float]:
+    """Return the error of the accelerations along and across the course, m/s^2, at the constant speed of `ride`."""
+    half = node.dyaw / 2
+    along = node.dv_forward * math.cos(half) + node.dv_left * math.sin(half)
+    across = node.dv_left * math.cos(half) - node.dv_forward * math.sin(half)
+    return along / node.dt_s, (across - 2.0 * SPEED * math.sin(half)) / node.dt_s
+
+
+def state_of() -> tuple[Any, Any]:
+    """Return a state with the speed of `ride`, and a covariance of zero."""
     s, P = np.zeros(N), np.zeros((N, N))
     s[V] = SPEED
+    return s, P
+
+
+def test_the_biases_follow_what_an_arc_and_a_sharp_turn_do_to_the_tilt() -> None:
+    """The mean error of a second of increments is predicted to more than a half; the rest is decay and noise."""
+    s, P = state_of()
     wrong: list[Any] = []
     predicted: list[Any] = []
-    for node in nodes[40:]:
+    for node in arc_nodes():
         assert bends_tilt(node)
         s[[ACC_BIAS, LEFT_BIAS]] *= math.exp(-node.dt_s / Tuning().acc_bias_tau)  # as `predict_state` does
         predict_tilt(s, P, node)
-        half = node.dyaw / 2
-        along = node.dv_forward * math.cos(half) + node.dv_left * math.sin(half)
-        across = node.dv_left * math.cos(half) - node.dv_forward * math.sin(half)
-        wrong.append((along / node.dt_s, (across - 2.0 * SPEED * math.sin(half)) / node.dt_s))
+        wrong.append(error_of(node))
         predicted.append((s[ACC_BIAS], s[LEFT_BIAS]))
     for second in (14.0, 18.0, 21.5):  # in the arc twice, and after the sharp turn
-        around = slice(round(10 * (second - STARTS - 1.0)), round(10 * (second - STARTS)))
-        true, told = np.mean(wrong[around], axis=0), np.mean(predicted[around], axis=0)
+        true, told = np.mean(wrong[before(second)], axis=0), np.mean(predicted[before(second)], axis=0)
         assert np.hypot(*true) > 0.2
         assert np.hypot(*(true - told)) < 0.5 * np.hypot(*true)
+
+
+def test_on_a_mount_that_may_be_loose_the_variance_holds_what_an_arc_bends() -> None:
+    """In the arc the forward axis is wrong by more than 2.5 of its usual deviations, and by less than 1.5 of these."""
+    (s, P), t = state_of(), Tuning()
+    deviations: list[float] = []
+    wrong: list[float] = []
+    for node in arc_nodes():
+        kept = math.exp(-2.0 * node.dt_s / t.acc_bias_tau)
+        P[ACC_BIAS, ACC_BIAS] = kept * P[ACC_BIAS, ACC_BIAS] + (1.0 - kept) * t.acc_bias_std**2  # as `fill_noise` does
+        widen_tilt(s, P, node, t)
+        wrong.append(error_of(node)[0])
+        deviations.append(math.sqrt(P[ACC_BIAS, ACC_BIAS]))
+    error = max(abs(np.mean(wrong[before(at)])) for at in (14.0, 18.0))
+    assert error > 2.5 * t.acc_bias_std
+    assert error < 1.5 * min(deviations[k] for k in range(90, 140))
+
+
+def test_what_goes_straight_on_keeps_its_variance() -> None:
+    (s, P), node = state_of(), node_of(dyaw=0.0)
+    node["tilt_gain"] = 0.02
+    widen_tilt(s, P, node, Tuning())
+    assert not P.any()
 
 
 @pytest.mark.parametrize("dyaw", [-0.4, 0.0, 0.06])
