@@ -7,6 +7,8 @@ declares the callback is one.
 import threading
 from typing import Any
 
+import zenoh
+
 from dropanchor_schemas.keys import samples_key
 from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.catch_up import CatchUp
@@ -46,6 +48,8 @@ def test_no_daemon_receives_what_caches_answer(router_endpoint: str) -> None:
     with connected_session(router_endpoint) as session, TagClient("a", connect=router_endpoint) as tag:
         tag.publish_range(1, 1.0)
         tag.flush()
+        # Until the router knows the tag's cache: the service asks it once here, and would get no answer before.
+        wait_until(lambda: list(session.get(f"{key}/@adv/**", accept_replies=zenoh.ReplyKeyExpr.ANY)))
         caches = ZenohCaches(session, make_sites(), Metrics(), UtcClock())
         catch_up = RecordingCatchUp(MessageBuffer(1000), [], lambda _: {}, caches.ask, 10)
         catch_up.daemons = []
