@@ -49,3 +49,12 @@ def test_a_tag_that_starts_in_an_arc_allows_for_the_tilt_that_it_bends(start: st
 
 def test_a_tag_with_an_unknown_start_soon_finds_its_mount_rigid() -> None:
     assert worst_sigma("M5/6-axis/mount/unknown", 21015) < 5.0
+
+
+@pytest.mark.parametrize("row", ["9-axis/nothing/unknown", "6-axis/mount/unknown"])
+def test_a_tag_that_backs_off_after_a_stop_that_nobody_saw_turns_back(row: str) -> None:
+    assert worst_sigma(f"forklift/{row}", 21247) < 5.0
+
+
+def test_a_light_hypothesis_drives_off_backwards_too() -> None:
+    assert worst_sigma("forklift/9-axis/nothing/known", 21063) < 5.0

@@ -19,8 +19,8 @@ STOOD_S: Final = 0.1  # s of rest after which a tag may drive off in the other d
 SLOW: Final = 0.2  # m/s, of a tag that hardly moves
 SLOW_EVERY: Final = 0.5  # s
 EVEN: Final = -0.7  # log of one half
-REFUSED: Final = 4.0  # standard deviations of speed in the other direction that are not noise
-TURNABOUT_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis is not offered the other direction
+REFUSED: Final = 2.0  # standard deviations of speed in the other direction that are not noise
+TURNABOUT_DEPTH: Final = 8.0  # log weight below the best at which a hypothesis is not offered the other direction
 
 
 @njit(nogil=True)
