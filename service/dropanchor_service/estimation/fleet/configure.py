@@ -10,7 +10,7 @@ from dropanchor_service.estimation.fleet.belief.layout import ROW, SETTINGS
 from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
-RANGE_STD = 0.1  # m
+RANGE_STD = 0.15  # m
 HEIGHT_STD = 0.15  # m
 START_STD = 0.1  # m
 START_HEADING_STD = 0.05  # rad

@@ -43,7 +43,7 @@ class Tuning(NamedTuple):
     acc_bias_tau: float = 5.0  # s
     bending_s: float = 2.0  # s for which an arc bends the tilt of a mount in one direction, unless it is rigid
     range_bias_std: float = 0.15  # m, of an uncalibrated tag and anchor pair: antenna delays
-    q_range_bias: float = 1e-5  # m^2/s
+    range_bias_tau: float = 25.0  # s in which the bias becomes another one, with the place and the attitude
     q_nlos: float = 0.02  # m^2/s, range bias without line of sight
     likelihood_power: float = 0.7
     outlier_probability: float = 0.02

@@ -43,6 +43,18 @@ def test_a_tag_that_rolls_smoothly_across_the_line_of_sight_is_not_taken_for_sta
 
 
 @pytest.mark.parametrize("start", ["known", "unknown"])
+def test_a_tag_that_rolls_smoothly_across_the_line_of_sight_keeps_its_speed(start: str) -> None:
+    assert (
+        worst_sigma(f"rolling/scalar/everything/{start}", 5207) < 10.0
+    )  # 101 if the tilt that it bends is not allowed for
+
+
+@pytest.mark.parametrize("seed", [5013, 5017])
+def test_a_gyroscope_whose_bias_is_not_known_may_have_tilted_a_smooth_ride(seed: int) -> None:
+    assert worst_sigma("rolling/9-axis/everything/unknown", seed) < 5.0
+
+
+@pytest.mark.parametrize("start", ["known", "unknown"])
 def test_a_tag_that_starts_in_an_arc_allows_for_the_tilt_that_it_bends(start: str) -> None:
     assert worst_sigma(f"M5/scalar/nothing/{start}", 5212) < 5.0
 

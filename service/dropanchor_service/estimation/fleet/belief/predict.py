@@ -35,6 +35,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     V,
 )
 from dropanchor_service.estimation.fleet.belief.rigidity import slip_std_of
+from dropanchor_service.estimation.fleet.belief.tilt import tilting_growth
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import ABSOLUTE_HEADING, MEASURED_HEADING, NO_HEADING, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -177,9 +178,10 @@ def fill_noise(decay: Floats, growth: Floats, node: Node, row: Row, t: Tuning) -
     growth[MOUNT] = t.q_mount * dt if row.settings.mount_angle_std > 0.0 else 0.0
     growth[SLIP] = slip_std_of(row) ** 2 * (1.0 - decay[SLIP] ** 2)
     lost, rough_var = 1.0 - decay[ACC_BIAS] ** 2, t.acc_bias_roughness * rough
-    growth[ACC_BIAS] = (t.acc_bias_std**2 + rough_var) * lost
-    growth[LEFT_BIAS] = (t.left_bias_std**2 + rough_var) * lost
-    growth[RANGE_BIAS] = t.q_range_bias * dt if row.settings.range_bias_std > 0.0 else 0.0
+    tilted = tilting_growth(node, rough)
+    growth[ACC_BIAS] = (t.acc_bias_std**2 + rough_var) * lost + tilted
+    growth[LEFT_BIAS] = (t.left_bias_std**2 + rough_var) * lost + tilted
+    growth[RANGE_BIAS] = row.settings.range_bias_std**2 * -math.expm1(-2.0 * dt / t.range_bias_tau)
     if node.carried == 1:
         fill_carried_noise(decay, growth, dt, row, t)
 
@@ -204,14 +206,20 @@ def fill_class_noise(decay: Floats, growth: Floats, node: Node, row: Row, headin
 
 
 @njit(nogil=True)
-def add_process_noise(s: Floats, P: Floats, F: Floats, growth: Floats, node: Node, t: Tuning, nlos: int) -> None:
-    """Add the process noise of one node to P. F is that of `predict_state`."""
-    dt = node.dt_s
+def add_process_noise(
+    s: Floats, P: Floats, F: Floats, growth: Floats, node: Node, row: Row, t: Tuning, nlos: int
+) -> None:
+    """Add the process noise of one node to P. F is that of `predict_state`.
+
+    The variance of the range bias grows to that of an unknown one at most, however long a tag is tracked.
+    """
+    dt, bias_var = node.dt_s, row.settings.range_bias_std**2
+    known = max(0.0, 1.0 - P[RANGE_BIAS, RANGE_BIAS] / bias_var) if bias_var > 0.0 else 0.0
     q_position = t.q_position if node.carried == 0 else t.walk_position_q
     P[R, R] += q_position * dt
     P[PHI, PHI] += q_position * dt / max(s[R], 0.1) ** 2
     for i in range(2, N):
-        P[i, i] += growth[i]
+        P[i, i] += growth[i] if i != RANGE_BIAS else growth[i] * known
     if not math.isfinite(node.dv_var) and node.carried == 0:
         P[V, V] += t.q_speed_no_acc_moving * min(abs(s[V]), 1.0) ** 2 * dt
     if nlos == 1:

@@ -113,7 +113,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                     filled = True
                 predict_state(work[h].mean, node, decay, F)
                 predict_covariance(work[h].cov, F, decay, FP)
-                add_process_noise(work[h].mean, work[h].cov, F, growth, node, t, work[h].nlos)
+                add_process_noise(work[h].mean, work[h].cov, F, growth, node, row, t, work[h].nlos)
                 if bends:
                     follow_tilt(work[h].mean, work[h].cov, node, rigid, t)
                 if lateral:

@@ -11,14 +11,33 @@ across the line of sight. What a ramp of the speed takes is left to the noise of
 
 On a mount that may be loose the direction of that error is not known, and its size is: the arc adds to the variance of
 both biases, as noise of the size k v w / dt that keeps its direction for some seconds.
+
+A gyroscope that no rest has taught has a bias, and under it the tilt filter settles at TAU times the bias. The
+front-end knows the variance of that tilt. It goes to both biases within TILTING_S on a smooth ride. On a rough one the
+noise of the accelerations already holds what the tilt does in that time.
 """
 
 import math
+from typing import Final
 
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, Floats, N, V
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
+from dropanchor_service.estimation.fleet.frontend.preintegration import G0
 from dropanchor_service.estimation.fleet.tuning import Tuning
+
+TILTING_S: Final = 25.0  # s, in which the biases gain the whole tilt of an unknown gyroscope
+ROUGH: Final = 2e-3  # (m/s)^2/s, roughness from which on they gain nothing of it
+
+
+@njit(nogil=True)
+def tilting_growth(node: Node, rough: float) -> float:
+    """Return what the variance of both biases gains over the node by a gyroscope whose bias is not known, (m/s^2)^2.
+
+    rough is what the noise of the accelerations adds to the speed, (m/s)^2/s.
+    """
+    smooth = max(0.0, 1.0 - rough / ROUGH)
+    return float(smooth * G0 * G0 * node.gyro_tilt_var * -math.expm1(-2.0 * node.dt_s / TILTING_S))
 
 
 @njit(nogil=True)

@@ -172,7 +172,7 @@ def fill_unknown(dt: float, node: Node) -> None:
     """Fill a node before the first IMU sample."""
     node.dt_s = dt
     node.dyaw, node.dyaw_var = 0.0, unobserved_turn_var(dt)
-    node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
+    node.gyro_bias_var, node.gyro_bias_step, node.gyro_tilt_var = 0.0, 0.0, 0.0
     node.dv_forward, node.dv_left, node.dv_var, node.tilt_gain = 0.0, 0.0, math.inf, 0.0
     node.motion_var = 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
@@ -182,12 +182,14 @@ def fill_unknown(dt: float, node: Node) -> None:
 
 @njit(cache=True, nogil=True)
 def fill_gyro_bias(f: Frontend, node: Node) -> None:
-    """Fill the variance of the gyroscope's bias about the vertical, and its change in this node."""
+    """Fill the variance of the gyroscope's bias about the vertical, its change in this node, and the tilt it causes."""
     x, y, z = up_in_body(f.attitude.q)
     bias = x * f.attitude.bias[0] + y * f.attitude.bias[1] + z * f.attitude.bias[2]
     node.gyro_bias_var = f.standstill.bias_var
     node.gyro_bias_step = bias - f.bias_end if at_rest(f.standstill) else 0.0
     f.bias_end = bias
+    _, cov, variance = f.attitude.tilt_cov
+    node.gyro_tilt_var = cov * cov / variance if variance > 0.0 else 0.0
 
 
 @njit(cache=True, nogil=True)

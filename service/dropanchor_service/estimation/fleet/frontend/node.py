@@ -38,6 +38,7 @@ NODE: Final = np.dtype(
         ("dv_left", np.float64),  # m/s
         ("swing_forward", np.float64),  # m, of the tag about the point that follows the course, in the same frame
         ("swing_left", np.float64),  # m
+        ("gyro_tilt_var", np.float64),  # rad^2, of the tilt that the unknown bias of the gyroscope causes
         ("tilt_gain", np.float64),  # share of the acceleration that the tilt took for gravity in the interval
         ("dv_var", np.float64),  # (m/s)^2, inf without an accelerometer
         ("motion_var", np.float64),  # (m/s)^2, what of dv_var is motion of the vehicle: it shakes along one direction

@@ -71,7 +71,7 @@ def fill_platform_node(p: Platform, t_ns: int, node: Node) -> None:
     """Fill a node from the platform alone: no acceleration, and yaw from the increments of the heading."""
     node.dv_forward, node.dv_left, node.dv_var = 0.0, 0.0, math.inf
     node.dyaw, node.dyaw_var, node.dt_s, node.rest = 0.0, 0.0, 0.0, MOVING
-    node.gyro_bias_var, node.gyro_bias_step = 0.0, 0.0
+    node.gyro_bias_var, node.gyro_bias_step, node.gyro_tilt_var = 0.0, 0.0, 0.0
     node.heading, node.heading_var, node.heading_kind = 0.0, math.inf, NO_HEADING
     node.unobserved_s = 0.0
     if p.reading_count == 0:

@@ -85,7 +85,7 @@ def _predict(
         m[j] += decay[j] * d[j]
     P[:] = track.cov[k - 1]
     predict_covariance(P, F, decay, A)
-    add_process_noise(s, P, F, growth, node, t, track.nlos[k])
+    add_process_noise(s, P, F, growth, node, row, t, track.nlos[k])
     if track.nlos[k] != track.nlos[k - 1]:
         P[RANGE_BIAS, RANGE_BIAS] += NLOS_STD**2
     if changes:

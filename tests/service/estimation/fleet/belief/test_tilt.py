@@ -7,13 +7,22 @@ import numpy as np
 import pytest
 
 from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, N, V
-from dropanchor_service.estimation.fleet.belief.tilt import bends_tilt, predict_tilt, widen_tilt
+from dropanchor_service.estimation.fleet.belief.tilt import (
+    TILTING_S,
+    bends_tilt,
+    predict_tilt,
+    tilting_growth,
+    widen_tilt,
+)
+from dropanchor_service.estimation.fleet.frontend.attitude import TAU
+from dropanchor_service.estimation.fleet.frontend.preintegration import G0
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, jacobian_fd, node_of
 from support.frontend import new_frontend, run
 from support.imu import Motion, synthesise
 
 SPEED, RATE, STARTS, TURNS, SHARPLY = 2.0, 0.3, 4.0, 20.0, 20.5  # m/s, rad/s, s: an arc, then a right angle
+ROLLING, VIBRATING = 4e-4, 8e-3  # (m/s)^2/s, roughness of the simulator's rollers and of its other vehicles
 
 
 def yaw_rate_at(t: Any) -> Any:
@@ -102,6 +111,33 @@ def test_what_goes_straight_on_keeps_its_variance() -> None:
     node["tilt_gain"] = 0.02
     widen_tilt(s, P, node, Tuning())
     assert not P.any()
+
+
+def tilt_std_of(node: Any) -> float:
+    """Standard deviation of the tilt that the gyroscope's unknown bias causes, rad."""
+    return math.sqrt(float(node.gyro_tilt_var))
+
+
+def test_the_unknown_bias_of_a_gyroscope_tilts_by_its_size_times_six_seconds_until_a_rest_has_taught_it() -> None:
+    nodes = run(new_frontend(), ride(), np.arange(0.1, 23.9, 0.1)).view(np.recarray)
+    assert tilt_std_of(nodes[1]) < 0.3 * tilt_std_of(nodes[38])  # it takes time to tilt
+    bias_std = math.sqrt(nodes[38].gyro_bias_var)
+    assert 0.25 * TAU * bias_std < tilt_std_of(nodes[38]) < 1.01 * TAU * bias_std
+    still = synthesise(np.arange(0.0, 8.0, 0.01), lambda at: np.zeros((len(at), 3)), lambda at: np.zeros((len(at), 3)))
+    rng = np.random.default_rng(5)
+    still.acc += rng.normal(0.0, 0.02, still.acc.shape)
+    still.gyro += rng.normal(0.0, 0.002, still.gyro.shape)
+    rested = run(new_frontend(), still, np.arange(0.1, 7.9, 0.1)).view(np.recarray)
+    assert tilt_std_of(rested[-1]) < 0.1 * tilt_std_of(nodes[38])
+
+
+def test_the_biases_gain_that_tilt_on_a_smooth_ride_and_nothing_on_a_rough_one() -> None:
+    node = node_of()
+    assert tilting_growth(node, 0.0) == 0.0
+    node["gyro_tilt_var"] = 0.05**2
+    full = (0.05 * G0) ** 2 * -math.expm1(-2.0 * 0.1 / TILTING_S)
+    assert 0.7 * full < tilting_growth(node, ROLLING) < tilting_growth(node, 0.0) == pytest.approx(full)
+    assert tilting_growth(node, VIBRATING) == 0.0
 
 
 @pytest.mark.parametrize("dyaw", [-0.4, 0.0, 0.06])
