@@ -40,6 +40,7 @@ CARRYING: Final = np.dtype(
         ("shift", "f8"),  # rad
         ("rate", "f8"),  # rad/s, low-passed yaw rate
         ("turn", "f8"),  # rad, of the turn under way
+        ("since_rest_s", "f8"),  # s since it was last quiet
         ("since_speed_s", "f8"),
         ("since_direction_s", "f8"),
     ]
@@ -58,6 +59,8 @@ TURN_RATE, TURN_TAU, LEAST_TURN = 0.5, 0.3, 0.4  # rad/s, s, rad: a quick turn
 SETTLE = 1.0  # s after a quick turn that the direction of the steps needs in addition
 STEADY_RATE = 0.25  # rad/s, below which the direction of the steps is used
 LEAST_COHERENCE = 0.3
+SET_OFF, FIRST_SWING = 2.0, 0.8  # s after a rest, m/s^2: what looks like a step may begin a walk
+SECOND_STEP = 0.8  # s, within which another one then comes
 CALM = 0.25  # (m/s^2)^2, variance of the acceleration of somebody who stands
 
 
@@ -72,7 +75,7 @@ def start_carrying(c: Carrying, size: float, motion: int) -> None:
     c.carried = 0
     c.share = 1.0
     c.shift = c.rate = c.turn = 0.0
-    c.since_speed_s = c.since_direction_s = 0.0
+    c.since_rest_s = c.since_speed_s = c.since_direction_s = 0.0
 
 
 @njit(cache=True, nogil=True)
@@ -80,6 +83,7 @@ def add_carried_sample(c: Carrying, dt: float, acc: Array, a: Array, q: Array, g
     """Take one acceleration: acc (body frame), a (its horizontal part, level frame), m/s^2."""
     size = math.sqrt(acc[0] * acc[0] + acc[1] * acc[1] + acc[2] * acc[2])
     add_step_sample(c.gait, dt, size)
+    c.since_rest_s = c.since_rest_s + dt if moves else 0.0
     if c.carried == 0:
         return
     ux, uy, uz = up_in_body(q)
@@ -151,7 +155,7 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
     """Fill what the node of a carried tag has beside its yaw, rad. acc_var: that of `standstill`."""
     node.carried = c.carried
     node.walked = c.gait.walked
-    node.stepping = 1 if c.gait.regular > 0 else 0
+    node.stepping = 1 if c.gait.regular > 0 or _sets_off(c) else 0
     if c.carried == 0:
         return
     node.dv_var = math.inf
@@ -168,6 +172,14 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
         if coherence > LEAST_COHERENCE and abs(c.rate) < STEADY_RATE:
             node.gait_angle, node.gait_coherence = wrap(azimuth - yaw), coherence
             c.since_direction_s = 0.0
+
+
+@njit(cache=True, nogil=True)
+def _sets_off(c: Carrying) -> bool:
+    """Return whether a tag that has just been at rest may have made the first step of a walk."""
+    g = c.gait
+    stepped = g.walked > 0.0 and g.swing > FIRST_SWING and g.since_step_s < SECOND_STEP
+    return bool(stepped and c.since_rest_s < SET_OFF + g.since_step_s)
 
 
 @njit(cache=True, nogil=True)

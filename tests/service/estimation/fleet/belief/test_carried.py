@@ -218,6 +218,11 @@ def test_a_walk_with_a_device_in_a_pocket_begins_where_it_stood() -> None:
     assert result_of("walk-pocket/6-axis/nothing/known", seeds=POCKETS).score.coverage > 0.8
 
 
+def test_what_looks_like_a_step_after_a_rest_makes_the_place_ambiguous_before_the_model_of_a_vehicle_is_wrong() -> None:
+    result = result_of("walk-pocket/6-axis/nothing/known", seeds=[5110, 5113, 5116, 5126, 5127, 5131])
+    assert max(tag.worst_sigma for tag in result.tags) < 5.0
+
+
 def test_a_walk_with_a_device_in_a_pocket_follows_the_platforms_heading() -> None:
     assert result_of("walk-pocket/scalar/nothing/known", seeds=[5207, 5213, 5226, 5232]).score.coverage > 0.9
 
