@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 import orjson
 
-from dropanchor_service.checkpoints.layouts import DTypes, described, dtypes_of, first_dtypes
+from dropanchor_service.checkpoints.layouts import DTypes, described, dtypes_of
 from dropanchor_service.estimation.columns import Array
 
 _DIGEST_BYTES = 32
@@ -80,8 +80,9 @@ def decoded(whole: bytes) -> tuple[str, Snapshot]:
         raise CheckpointError("it is damaged (its checksum is wrong)")
     start = whole.index(b"\n") + 1
     header = orjson.loads(content[:start])
-    dtypes = dtypes_of(header["columns"]) if "columns" in header else first_dtypes()
-    arrays = _arrays(header["shapes"], content[start:], dtypes)
+    if "columns" not in header:  # the first layout, which had no number
+        raise UnreadableLayoutError(f"its layout is {header['layout']}, which this version does not read any more")
+    arrays = _arrays(header["shapes"], content[start:], dtypes_of(header["columns"]))
     return header["layout"], Snapshot(dict(arrays), header["document"])
 
 

@@ -7,20 +7,16 @@ import hashlib
 import re
 from collections.abc import Mapping
 from functools import cache
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
-import orjson
 
-VERSION = 3
+VERSION = 4
 """Number of the layout that this version writes. Raise it when a column of the state changes, in its name, its type or
 its meaning: `migrations.py` says what else to do."""
 READ_BEFORE = 2
 """How many layouts before its own a version reads."""
 
-_FIRST = "fa8bf211067538b1"
-"""Name of the first layout, which had no number. Its files do not list their columns: `version_1.json` does."""
 _NUMBERED = re.compile(r"([1-9]\d*)-[0-9a-f]{16}")
 
 DTypes = Mapping[str, np.dtype[Any]]
@@ -34,8 +30,6 @@ def name_of(dtypes: DTypes) -> str:
 
 def version_of(layout: str) -> int | None:
     """Return the number of a layout, None if this version does not know its name."""
-    if layout == _FIRST:
-        return 1
     numbered = _NUMBERED.fullmatch(layout)
     return None if numbered is None else int(numbered[1])
 
@@ -76,12 +70,6 @@ def _described(dtype: np.dtype[Any]) -> Any:
 def dtypes_of(description: Mapping[str, Any]) -> DTypes:
     """Return what `described` was given."""
     return {name: np.lib.format.descr_to_dtype(_as_written(columns)) for name, columns in description.items()}
-
-
-@cache
-def first_dtypes() -> DTypes:
-    """Return the dtypes of the first layout."""
-    return dtypes_of(orjson.loads(files(__package__).joinpath("version_1.json").read_bytes()))
 
 
 def _as_written(columns: Any) -> Any:

@@ -1,9 +1,11 @@
 """A service goes on from what the versions before it have written, with nothing lost."""
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import orjson
 import pytest
 from numpy.lib.recfunctions import append_fields, drop_fields, repack_fields
 
@@ -17,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "3-19db03eed00eb68b"
+LAYOUT = "4-b71de955e0b23b69"
 READ = range(max(1, layouts.VERSION - layouts.READ_BEFORE), layouts.VERSION)
 
 
@@ -139,6 +141,12 @@ def test_no_other_layout_is_read(layout: str, tmp_path: Path) -> None:
     _, found = decoded(golden(layouts.VERSION - 1))
     with pytest.raises(UnreadableLayoutError, match=f"its layout is {layout}, but this version uses {state.layout}"):
         state.decoded(b"".join(encoded(found, layout)))
+
+
+def test_the_first_layout_which_does_not_list_its_columns_is_not_read_any_more() -> None:
+    header = orjson.dumps({"layout": "fa8bf211067538b1", "shapes": {}, "document": {}}) + b"\n"
+    with pytest.raises(UnreadableLayoutError, match="its layout is fa8bf211067538b1, which this version does not read"):
+        decoded(header + hashlib.blake2b(header, digest_size=32).digest())
 
 
 def test_a_checkpoint_without_the_settings_of_its_tags_is_refused() -> None:
