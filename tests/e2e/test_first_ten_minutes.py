@@ -101,7 +101,7 @@ def test_a_recording_replayed_at_ten_times_the_speed_is_tracked_and_ages_after_i
     recording = write_square(tmp_path)
     config = tmp_path / "service.toml"
     start = "{ x = 10, y = 0, heading_rad = 1.5708 }"
-    config.write_text(f'[[site.anchors]]\nid = "A"\nx = 2\ny = -3\n[tags.cart]\nstart = {start}\n')
+    config.write_text(f'[[site.anchors]]\nid = "A"\nx = 2\ny = -3\n[tags.cart]\nrange_std_m = 0.1\nstart = {start}\n')
     with running_service("--config", str(config)) as service:
         words = ["replay", str(recording), "--tag", "cart", "--anchor", "A", "--speed", "10"]
         replay = [sys.executable, "-m", "dropanchor_tag_client", *words, "--connect", service.zenoh]

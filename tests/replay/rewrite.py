@@ -6,12 +6,15 @@ diff of the expected files says what it is. Read that diff before you commit it,
 
 import sys
 
-from replay.outputs import REPLAYS, write_expected
-from replay.samples import write_samples
-from replay.scenarios import SCENARIOS
+from support.kernel_cache import use_cache_of_these_sources
 
 
 def main() -> None:
+    use_cache_of_these_sources()
+    from replay.outputs import REPLAYS, write_expected
+    from replay.samples import write_samples
+    from replay.scenarios import SCENARIOS
+
     if "--samples" in sys.argv[1:]:
         for name, scenario in SCENARIOS.items():
             write_samples(name, scenario)

@@ -9,6 +9,7 @@ import pytest
 from dropanchor_schemas.zones import Zone
 from dropanchor_service.api.routes import event_examples
 from dropanchor_service.checkpoints import layouts
+from dropanchor_service.checkpoints.format import decoded
 from dropanchor_service.cluster import leases
 from dropanchor_service.cluster import standby as standby_module
 from dropanchor_service.cluster.boot_clock import boot_s
@@ -141,10 +142,12 @@ def test_a_new_owner_publishes_nothing_while_its_predecessor_does(moves: bool, t
 def test_a_standby_takes_over_from_the_version_before_it_with_all_tracks(tmp_path: Path) -> None:
     with running_postgresql() as database, database.connect() as connection:
         reach, state = partial(connect, database.url(), "new"), Drive(tmp_path).state
-        first = Standby(reach, "yard", Claimant("old", "", "sites", 0.5), "fa8bf211067538b1")
+        whole = golden(layouts.VERSION - 1)
+        before, _ = decoded(whole)
+        first = Standby(reach, "yard", Claimant("old", "", "sites", 0.5), before)
         assert first.wait(lambda: None)[0].epoch == 1
         save = "UPDATE dropanchor_checkpoint SET layout = %s, content = %b"
-        connection.execute(save, ["fa8bf211067538b1", golden(1)], binary=True)
+        connection.execute(save, [before, whole], binary=True)
         standby = Standby(reach, "yard", Claimant("new", "", "sites", 0.5), state.layout)
         row = CheckpointRow(reach, "yard", state.layout, state.decoded)
         row.own(standby.wait(lambda: None)[0])
