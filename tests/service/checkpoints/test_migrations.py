@@ -20,7 +20,7 @@ from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
 LAYOUT = "4-b71de955e0b23b69"
-READ = range(max(1, layouts.VERSION - layouts.READ_BEFORE), layouts.VERSION)
+READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 
 def reloaded(folder: Path, whole: bytes) -> Drive:

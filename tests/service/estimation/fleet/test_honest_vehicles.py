@@ -1,4 +1,7 @@
-"""Tags of the simulator that were once surely in the wrong place. No pose with `tracking` may be 5 deviations off."""
+"""Tags of the simulator that were once surely in the wrong place. No pose with `tracking` may be 5 deviations off.
+
+Where 5 is not reached, the limit is the next one, and a comment says what it was before.
+"""
 
 import pytest
 
@@ -44,9 +47,7 @@ def test_a_tag_that_rolls_smoothly_across_the_line_of_sight_is_not_taken_for_sta
 
 @pytest.mark.parametrize("start", ["known", "unknown"])
 def test_a_tag_that_rolls_smoothly_across_the_line_of_sight_keeps_its_speed(start: str) -> None:
-    assert (
-        worst_sigma(f"rolling/scalar/everything/{start}", 5207) < 10.0
-    )  # 101 if the tilt that it bends is not allowed for
+    assert worst_sigma(f"rolling/scalar/everything/{start}", 5207) < 10.0  # 7.7; 101 before tilting_growth
 
 
 @pytest.mark.parametrize("seed", [5013, 5017])
