@@ -13,7 +13,7 @@ import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.angles import TWO_PI, wrap
-from dropanchor_service.estimation.fleet.belief.heading_reference import restart_reference
+from dropanchor_service.estimation.fleet.belief.heading_reference import is_of_another_axis, restart_reference
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     GAIT_OFFSET,
@@ -45,6 +45,7 @@ USUAL_SPEED: Final = 1.2  # m/s, of a walk
 LEAST_SCALE_SPEED: Final = 0.1  # m/s
 FLIPPED, ANYWHERE = 0.05, 0.05  # shares of gait angles that point backwards, or anywhere
 BRANCH_DEPTH: Final = 4.0  # log weight below the best at which a hypothesis gets no child
+ANY_DIRECTION_VAR: Final = math.pi**2  # rad^2, so wide that one direction is hardly likelier than another
 RING_MOUNT_STD: Final = 1.2  # rad, of the mounting angle of somebody's device, as one Gaussian
 MOUNT_KNOWN: Final = 0.3  # rad, of a mounting angle that the operator knows
 
@@ -85,7 +86,7 @@ def start_carried(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning)
         row.walk.var = P[R, R] + s[R] ** 2 * P[PHI, PHI]
         return _pick_up(work, count, row, node, t)
     for h in range(count):
-        _become_carried(work[h], node, t)
+        _become_carried(work[h], row, node, t)
         widen_common_mount(work[h].cov, row)
     return count
 
@@ -113,7 +114,7 @@ def _clear(P: Floats, i: int, variance: float) -> None:
 
 
 @njit(nogil=True)
-def _become_carried(one: Hypothesis, node: Node, t: Tuning) -> None:
+def _become_carried(one: Hypothesis, row: Row, node: Node, t: Tuning) -> None:
     """Replace what a vehicle's hypothesis says of speed, slip and accelerometer."""
     s, P = one.mean, one.cov
     one.reverse = one.aligned = 0
@@ -121,7 +122,7 @@ def _become_carried(one: Hypothesis, node: Node, t: Tuning) -> None:
         s[i] = 0.0
     _clear(P, V, t.walk_speed_std**2)
     _clear(P, SLIP, t.sway_std**2)
-    _clear(P, GAIT_OFFSET, t.gait_offset_std**2)
+    _clear(P, GAIT_OFFSET, ANY_DIRECTION_VAR if is_of_another_axis(row, node) else t.gait_offset_std**2)
     _clear(P, STEP_SCALE, t.step_scale_std**2)
     _clear(P, GYRO_BIAS, t.walk_gyro_bias_std**2)  # a rest in the hand, or shaking, may have taught a wrong one
     s[V] = USUAL_SPEED if node.walked > 0.0 else 0.0
@@ -149,7 +150,7 @@ def _pick_up(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning) -> i
     copy_hypothesis(work, best_of(work, count), 0)
     one = work[0]
     one.log_weight = 0.0
-    _become_carried(one, node, t)
+    _become_carried(one, row, node, t)
     _see_again(one, row)
     known = row.settings.mount_angle_std < MOUNT_KNOWN
     cells = 1 if known else t.grips

@@ -1,5 +1,7 @@
 """How an error of the heading reference enters the covariance of a hypothesis."""
 
+import math
+
 from dropanchor_service.estimation.fleet.angles import wrap
 from dropanchor_service.estimation.fleet.belief.layout import (
     EXACT,
@@ -13,6 +15,7 @@ from dropanchor_service.estimation.fleet.belief.layout import (
     Row,
 )
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.node import MEASURED_HEADING, Node
 
 
 @njit(nogil=True)
@@ -81,6 +84,16 @@ def adopt_reference(P: Floats, variance: float) -> None:
         P[MOUNT, i] -= P[YAW, i]
     for i in range(N):
         P[i, MOUNT] -= P[i, YAW]
+
+
+@njit(nogil=True)
+def is_of_another_axis(row: Row, node: Node) -> bool:
+    """Return whether the yaw counts from what others call the heading of a carried tag whose body x axis is upright.
+
+    That axis has no azimuth. They mean another one of the device, or where its carrier looks.
+    """
+    told = node.heading_kind == MEASURED_HEADING or math.isfinite(row.start.heading)
+    return bool(node.upright == 1 and told)
 
 
 @njit(nogil=True)

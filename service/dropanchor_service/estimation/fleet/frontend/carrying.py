@@ -20,6 +20,7 @@ from dropanchor_service.estimation.fleet.frontend.attitude import TAU, Attitude,
 from dropanchor_service.estimation.fleet.frontend.gait import (
     GAIT,
     MAX_INTERVAL,
+    MIN_SWING,
     REGULAR_STEPS,
     add_step_sample,
     start_gait,
@@ -54,13 +55,16 @@ TAU_ROUGH = 54.0  # s added to the time constant of the tilt at FULL_ROUGHNESS
 FULL_ROUGHNESS = 1.0  # (m/s^2)^2
 NEAR = 0.3  # cosine of the angle between up and u0 below which there is a new u0
 UPSIDE_DOWN = -0.9
+UPRIGHT = 0.8  # upward component of body x above which it has no azimuth
 SPEED_EVERY, DIRECTION_EVERY = 0.5, 1.5  # s
 TURN_RATE, TURN_TAU, LEAST_TURN = 0.5, 0.3, 0.4  # rad/s, s, rad: a quick turn
 SETTLE = 1.0  # s after a quick turn that the direction of the steps needs in addition
 STEADY_RATE = 0.25  # rad/s, below which the direction of the steps is used
 LEAST_COHERENCE = 0.3
-SET_OFF, FIRST_SWING = 2.0, 0.8  # s after a rest, m/s^2: what looks like a step may begin a walk
+SET_OFF, FIRST_SWING = 4.0, 0.8  # s after a rest, m/s^2: what looks like a step may begin a walk
+RISING = 2.0  # m/s^2, of a swing that is not over: it may become a first step
 SECOND_STEP = 0.8  # s, within which another one then comes
+SLOW_WALK = 1.0  # m/s, that a walk of irregular steps may have had
 CALM = 0.25  # (m/s^2)^2, variance of the acceleration of somebody who stands
 
 
@@ -161,6 +165,7 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
     node.dv_var = math.inf
     walks = c.gait.since_step_s < MAX_INTERVAL
     node.stands = 1 if not walks and acc_var < CALM else 0
+    node.upright = 1 if abs(c.up[0]) > UPRIGHT else 0
     _fill_turn(c, node)
     c.since_speed_s += node.dt_s
     c.since_direction_s += node.dt_s
@@ -176,10 +181,13 @@ def fill_carried_node(c: Carrying, yaw: float, acc_var: float, node: Node) -> No
 
 @njit(cache=True, nogil=True)
 def _sets_off(c: Carrying) -> bool:
-    """Return whether a tag that has just been at rest may have made the first step of a walk."""
+    """Return whether a tag that was at rest may have begun a walk, of steps still too few or irregular to tell."""
     g = c.gait
-    stepped = g.walked > 0.0 and g.swing > FIRST_SWING and g.since_step_s < SECOND_STEP
-    return bool(stepped and c.since_rest_s < SET_OFF + g.since_step_s)
+    if g.walked == 0.0:
+        return bool(g.falling == 0 and g.peak - g.trough > RISING and c.since_rest_s < SET_OFF)
+    stepped = g.swing > FIRST_SWING and g.since_step_s < SECOND_STEP
+    walked_s = g.walked / SLOW_WALK if g.swing > MIN_SWING else 0.0
+    return bool(stepped and c.since_rest_s < SET_OFF + walked_s + g.since_step_s)
 
 
 @njit(cache=True, nogil=True)

@@ -54,6 +54,7 @@ NODE: Final = np.dtype(
         ("lag_s", np.float64),  # s by which the measurement is older than the end of the interval
         ("carried", np.uint8),  # 1: a person carries the tag; what follows is then filled
         ("stepping", np.uint8),  # 1: steps seem to have begun, and may turn out to be those of a person
+        ("upright", np.uint8),  # 1: body x is upright, so the azimuth of another axis is told as its heading
         ("stands", np.uint8),  # 1: no step for a while, and calm
         ("walked", np.float64),  # m since the person last stood; also of a tag that is not yet known to be carried
         ("step_speed", np.float64),  # m/s, from the steps; 0: none
