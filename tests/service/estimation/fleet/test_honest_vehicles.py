@@ -55,6 +55,13 @@ def test_a_gyroscope_whose_bias_is_not_known_may_have_tilted_a_smooth_ride(seed:
     assert worst_sigma("rolling/9-axis/everything/unknown", seed) < 5.0
 
 
+@pytest.mark.parametrize(
+    ("row", "seed"), [("mount/known", 21997), ("everything/unknown", 21911), ("nothing/known", 21926)]
+)
+def test_a_level_ride_teaches_a_bias_that_no_rest_does(row: str, seed: int) -> None:
+    assert worst_sigma(f"rolling/9-axis/{row}", seed) < 5.0
+
+
 @pytest.mark.parametrize("start", ["known", "unknown"])
 def test_a_tag_that_starts_in_an_arc_allows_for_the_tilt_that_it_bends(start: str) -> None:
     assert worst_sigma(f"M5/scalar/nothing/{start}", 5212) < 5.0

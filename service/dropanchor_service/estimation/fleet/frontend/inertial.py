@@ -33,6 +33,7 @@ from dropanchor_service.estimation.fleet.frontend.carrying import (
     yaw_of_carried,
 )
 from dropanchor_service.estimation.fleet.frontend.field import forget_turning, spread_yaw_on_arc
+from dropanchor_service.estimation.fleet.frontend.level_ride import learn_from_level_ride
 from dropanchor_service.estimation.fleet.frontend.magnetometer import north_of, update_magnetometer
 from dropanchor_service.estimation.fleet.frontend.node import (
     ABSOLUTE_HEADING,
@@ -79,8 +80,10 @@ def lose_yaw_over_gap(f: Frontend, gap: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def learn_gyro_bias(f: Frontend, dt: float, gyro: Array) -> None:
-    """Learn the gyroscope's bias at rest. Tilt and north then know how well it is known."""
+def learn_gyro_bias(f: Frontend, dt: float, gyro: Array, heard: bool) -> None:
+    """Learn the gyroscope's bias at rest or on a level ride. Tilt and north then know how well a rest told it."""
+    if heard and f.standstill.quiet <= CONFIRM:
+        learn_from_level_ride(f.attitude, f.standstill, dt, gyro)
     before, P = f.standstill.bias_var, f.attitude.tilt_cov
     update_gyro_bias(f.standstill, dt, gyro, f.attitude.bias)
     variance = f.standstill.bias_var
@@ -129,7 +132,7 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
         s.quiet = 0.0
         p.no_acc_s += dt
     if c.carried == 0:  # the hand of somebody who stands turns slowly, which is no bias
-        learn_gyro_bias(f, dt, gyro)
+        learn_gyro_bias(f, dt, gyro, heard)
     rest = s.quiet > CONFIRM and c.carried == 0
     predict_attitude(a, dt, gyro, rest)
     if heard:

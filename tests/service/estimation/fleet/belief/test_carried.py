@@ -236,7 +236,9 @@ def test_a_walk_is_followed_and_the_ellipse_holds_the_truth_while_tracking(carry
 
 
 def test_a_walk_with_a_device_in_a_pocket_begins_where_it_stood() -> None:
-    assert result_of("walk-pocket/6-axis/nothing/known", seeds=POCKETS).score.coverage > 0.95
+    result = result_of("walk-pocket/6-axis/nothing/known", seeds=POCKETS)
+    assert max(tag.worst_sigma for tag in result.tags) < 5.0
+    assert result.score.coverage >= 0.93
 
 
 @pytest.mark.parametrize("sensors", ["9-axis", "6-axis"])
