@@ -78,3 +78,8 @@ def test_a_tag_that_backs_off_after_a_stop_that_nobody_saw_turns_back(row: str) 
 
 def test_a_light_hypothesis_drives_off_backwards_too() -> None:
     assert worst_sigma("forklift/9-axis/nothing/known", 21063) < 5.0
+
+
+@pytest.mark.parametrize(("motion", "seed"), [("C5", 5187), ("C5", 5141), ("rolling", 5192), ("rolling", 5157)])
+def test_a_place_with_rivals_is_not_tracked(motion: str, seed: int) -> None:
+    assert worst_sigma(f"{motion}/9-axis/nothing/known", seed) < 5.0

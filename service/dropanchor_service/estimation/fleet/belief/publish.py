@@ -30,7 +30,8 @@ from dropanchor_service.estimation.fleet.frontend.node import RANGE, Node
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 DOMINANT: Final = 0.9  # weight of a mode above which the others hardly matter
-UNRESOLVED_S: Final = 1.0  # s without a dominant mode after which the row is ambiguous again
+DOMINANT_AGAIN: Final = 0.95  # the same, of a row that is ambiguous: it does not flicker
+UNRESOLVED_S: Final = 1.0  # s without a dominant mode after which one has to explain all ranges anew
 RERESOLVE_AFTER: Final = 3.0  # s without a range after which one mode has to explain the ranges anew
 COASTING_AFTER, RANGES_LOST_AFTER = 1.5, 30.0  # s without a range
 IMU_DEGRADED_AFTER, IMU_LOST_AFTER = 0.5, 10.0  # s that no sensor observed
@@ -56,7 +57,7 @@ def publish(
     widen_by_reference(row, mean, cov)
     _update_resolved(row, node, p_mode, relative, r, t)
     undecided = node.stepping == 1 and row.walk.carried == 0
-    _set_state(row, undecided, relative, _sigma_pos(cov), r, work[head].nlos == 1)
+    _set_state(row, _has_rivals(row, p_mode), undecided, relative, _sigma_pos(cov), r, work[head].nlos == 1)
     if row.publication.resolved == 0 or p_mode < DOMINANT or row.walk.carried == 1:
         spread_over_all(work, count, scratch)
     else:
@@ -115,7 +116,15 @@ def _update_resolved(row: Row, node: Node, p_mode: float, relative: float, r: fl
 
 
 @njit(nogil=True)
-def _set_state(row: Row, undecided: bool, relative: float, sigma: float, r: float, nlos: bool) -> None:
+def _has_rivals(row: Row, p_mode: float) -> bool:
+    """Return whether another mode than the published one may be the right one."""
+    publication = row.publication
+    doubted = publication.state == AMBIGUOUS and publication.reason == SEVERAL_MODES
+    return bool(publication.resolved == 0 or p_mode < (DOMINANT_AGAIN if doubted else DOMINANT))
+
+
+@njit(nogil=True)
+def _set_state(row: Row, rivals: bool, undecided: bool, relative: float, sigma: float, r: float, nlos: bool) -> None:
     """Set state and reason of the publication. The first condition that holds decides."""
     publication, unobserved_s = row.publication, row.gap.unobserved_s
     if row.since_range_s > RANGES_LOST_AFTER:
@@ -126,7 +135,7 @@ def _set_state(row: Row, undecided: bool, relative: float, sigma: float, r: floa
         publication.state, publication.reason = DEGRADED, IMU_MISSING
     elif row.since_range_s > COASTING_AFTER and (publication.resolved == 1 or publication.state == COASTING):
         publication.state, publication.reason = COASTING, RANGES_MISSING
-    elif publication.resolved == 0:
+    elif rivals:
         publication.state, publication.reason = AMBIGUOUS, SEVERAL_MODES
     elif sigma > max(LARGE_M, LARGE_SHARE * r):
         # A mode that is small without the rotation about the anchor lacks only the heading.

@@ -5,9 +5,13 @@ from typing import Any
 import numpy as np
 
 from dropanchor_service.estimation.columns import State, StateReason
+from dropanchor_service.estimation.fleet.belief.layout import BELIEF, PHI, N, make_workspace
 from dropanchor_service.estimation.fleet.belief.pool import make_pool
+from dropanchor_service.estimation.fleet.belief.publish import publish
 from dropanchor_service.estimation.fleet.frontend.node import NO_HEADING
-from support.fleet_tracks import drive, rows_of, run, track
+from dropanchor_service.estimation.fleet.tuning import Tuning
+from support.belief import STATE, node_of
+from support.fleet_tracks import ANCHORS, drive, rows_of, run, track
 
 
 def judged(beliefs: Any) -> list[tuple[State, StateReason]]:
@@ -49,6 +53,28 @@ def test_ranges_that_contradict_the_track_degrade_it() -> None:
     nodes["z"][150:200] += np.random.default_rng(1).uniform(3.0, 9.0, 50)
     seen = set(judged(run(rows_of(1, known=True), make_pool(512), nodes)[150:200]))
     assert (State.DEGRADED, StateReason.RANGES_REJECTED) in seen
+
+
+def test_a_tag_is_ambiguous_while_its_best_mode_has_a_rival_and_returns_when_it_is_clearly_the_best() -> None:
+    row = rows_of(1, known=True).view(np.recarray)[0]
+    row["publication"]["resolved"] = 1
+    states = []
+    for weight in (0.99, 0.91, 0.89, 0.94, 0.96, 0.91):
+        space = make_workspace()[0]
+        for one, share, bearing in zip(space["hypotheses"][:2], (weight, 1.0 - weight), (0.0, 2.0), strict=True):
+            one["mean"], one["cov"], one["log_weight"] = STATE, 1e-4 * np.eye(N), np.log(share)
+            one["mean"][PHI] = bearing
+        belief = np.zeros(1, BELIEF).view(np.recarray)[0]
+        publish(space["hypotheses"], 2, row, node_of(), ANCHORS, Tuning().record()[0], belief, space["scratch"])
+        states.append((round(float(belief["p_mode"]), 2), State(row["publication"]["state"])))
+    assert states == [
+        (0.99, State.TRACKING),
+        (0.91, State.TRACKING),
+        (0.89, State.AMBIGUOUS),
+        (0.94, State.AMBIGUOUS),
+        (0.96, State.TRACKING),
+        (0.91, State.TRACKING),
+    ]
 
 
 def test_numbers_that_break_a_row_start_it_afresh() -> None:
