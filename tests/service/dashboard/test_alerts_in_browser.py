@@ -62,6 +62,7 @@ def test_an_e_mail_is_made_tested_edited_and_deleted(chromium: Browser) -> None:
         alerts.get_by_role("button", name="Edit early-shift").click()
         form.get_by_role("button", name="Delete…").click()
         page.page.get_by_role("button", name="Delete destination").click()
+        expect(alerts.get_by_role("button", name="Edit early-shift")).to_be_hidden()
         expect(alerts).to_contain_text("Events go to nobody yet.")
         assert page.errors == []
     assert not place.parts.destinations.all
