@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "4-b71de955e0b23b69"
+LAYOUT = "5-dcbff2d9259af49a"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 

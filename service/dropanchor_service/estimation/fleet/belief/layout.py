@@ -142,6 +142,8 @@ MOUNTING: Final = np.dtype(
         ("rigid", np.uint8),  # 1: nothing speaks for a loose mount
         ("rigid_log_odds", np.float64),
         ("lateral_misfit", np.float64),  # mean square of the sideways innovation of a rigid mount, in its variance
+        ("lateral_along", np.float64),  # the same of its derivative by the mounting angle, 1/rad^2
+        ("lateral_cross", np.float64),  # mean product of the two, 1/rad
     ]
 )
 

@@ -8,13 +8,16 @@ increment of velocity across the body, so the innovation of `lateral` has anothe
 
 and the log likelihood ratio of the innovations decides. It does not count where the two variances are alike, as at low
 speed or on a rough ride: there, an error of the noise model would decide.
+
+A mounting angle that is wrong by d moves a share tan d of each change of the speed to the sideways axis. The
+correlation of the two tells such a tag from one that jolts.
 """
 
 import math
 from typing import Final
 
 from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, lateral_residual, lateral_variance
-from dropanchor_service.estimation.fleet.belief.layout import SLIP, Hypotheses, Hypothesis, Row, Scratch, V
+from dropanchor_service.estimation.fleet.belief.layout import MOUNT, SLIP, Hypotheses, Hypothesis, Row, Scratch, V
 from dropanchor_service.estimation.fleet.belief.mixture import best_of
 from dropanchor_service.estimation.fleet.belief.update import project, update_pda
 from dropanchor_service.estimation.fleet.compiled import njit
@@ -24,6 +27,8 @@ RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
 JOLTS_BELOW: Final = 0.35  # mean square of its normalised innovation below which the axis tells of the course
 JOLTS_TAU: Final = 5.0  # s
 JOLTS_CLIP: Final = 25.0  # limit of what one innovation counts
+ASKEW_MISFIT: Final = 1.5  # mean square of it above which the mounting angle is doubted
+ASKEW_SHARE: Final = 0.5  # and share of it that another mounting angle would explain
 TELLING: Final = 2.0  # ratio of the two variances from which on an innovation tells between the classes
 POWER: Final = 0.3  # of each likelihood: the errors of consecutive nodes are alike
 LEAST: Final = -10.0  # log likelihood ratio of one node: a skid is no loose mount
@@ -36,6 +41,14 @@ LOOSE_BELOW: Final = 0.0  # and at which it is loose again
 def tells_course(row: Row) -> bool:
     """Return whether the sideways axis tells of the course and not of jolts: only then it may correct the belief."""
     return bool(row.mount.lateral_misfit < JOLTS_BELOW)
+
+
+@njit(nogil=True)
+def is_askew(row: Row) -> bool:
+    """Return whether the tag moves sideways as if its mounting angle were another one. Jolts have no such direction."""
+    mount = row.mount
+    explained = mount.lateral_cross**2 > ASKEW_SHARE * mount.lateral_along * mount.lateral_misfit
+    return bool(mount.lateral_misfit > ASKEW_MISFIT and explained)
 
 
 @njit(nogil=True)
@@ -57,7 +70,10 @@ def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None
     S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, RIGID_SLIP)
     if row.publication.resolved == 1:
         share = node.dt_s / (JOLTS_TAU + node.dt_s)
-        mount.lateral_misfit += share * (min(e * e / S, JOLTS_CLIP) - mount.lateral_misfit)
+        weight = 1.0 / max(S, e * e / JOLTS_CLIP)
+        mount.lateral_misfit += share * (weight * e * e - mount.lateral_misfit)
+        mount.lateral_along += share * (weight * scratch.H[MOUNT] ** 2 - mount.lateral_along)
+        mount.lateral_cross += share * (weight * scratch.H[MOUNT] * e - mount.lateral_cross)
     loose = S + (settings.slip_std**2 - RIGID_SLIP**2) * s[V] * s[V] * 2.0 * node.dt_s / settings.slip_tau
     if loose > TELLING * S:
         ratio = 0.5 * (math.log(loose / S) - e * e * (1.0 / S - 1.0 / loose))

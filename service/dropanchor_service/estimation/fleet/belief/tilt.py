@@ -1,13 +1,16 @@
 """Predict the error of the tilt over a node: the biases of a rigid accelerometer are mostly that.
 
-The tilt filter takes a share k of each acceleration for gravity (`correct_tilt`). What it takes in an arc is known: the
-acceleration across the course is v w / dt. The error (b_a, b_l) keeps its direction in the room, so a turn by w of the
-body moves it from one axis to the other:
+The tilt filter takes a share k of each acceleration for gravity (`correct_tilt`). What it takes is known: with f, the
+change of the speed, the acceleration is f / dt along the course and v w / dt across it. The error (b_a, b_l) keeps its
+direction in the room, so a turn by w of the body moves it from one axis to the other:
 
-    b_l <- b_l - k v w / dt,   (b_a, b_l) <- rotation by -w of (b_a, b_l).
+    b_a <- b_a - k f / dt,   b_l <- b_l - k v w / dt,   (b_a, b_l) <- rotation by -w of (b_a, b_l).
+
+f is what is measured less b_a dt. That part of k is limited to what b_a itself decays by (`fill_noise`): while the tilt
+settles, k is large, and an error of b_a would grow.
 
 Without this an arc of seconds ends up as a bias of the forward axis, where no range corrects it while the tag travels
-across the line of sight. What a ramp of the speed takes is left to the noise of the biases.
+across the line of sight, and a tag that brakes hard backs off with a bias of 0.4 m/s^2.
 
 On a mount that may be loose the direction of that error is not known, and its size is: the arc adds to the variance of
 both biases, as noise of the size k v w / dt that keeps its direction for some seconds.
@@ -20,8 +23,18 @@ noise of the accelerations already holds what the tilt does in that time.
 import math
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIAS, LEFT_BIAS, Floats, N, V
+from dropanchor_service.estimation.fleet.belief.layout import (
+    ACC_BIAS,
+    GYRO_BIAS,
+    LEFT_BIAS,
+    MOUNT,
+    SLIP,
+    Floats,
+    N,
+    V,
+)
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.attitude import TAU
 from dropanchor_service.estimation.fleet.frontend.node import MOVING, Node
 from dropanchor_service.estimation.fleet.frontend.preintegration import G0
 from dropanchor_service.estimation.fleet.tuning import Tuning
@@ -59,16 +72,23 @@ def follow_tilt(s: Floats, P: Floats, node: Node, rigid: bool, t: Tuning) -> Non
 def predict_tilt(s: Floats, P: Floats, node: Node) -> None:
     """Predict the biases of a rigid mount, and their covariance, in a state that was predicted over the node."""
     w = node.dyaw - s[GYRO_BIAS] * node.dt_s
-    share = node.tilt_gain / node.dt_s
+    share, course = node.tilt_gain / node.dt_s, s[MOUNT] + s[SLIP] + w / 2
+    cc, sc = math.cos(course), math.sin(course)
+    along, across = node.dv_forward * cc + node.dv_left * sc, node.dv_left * cc - node.dv_forward * sc
+    by_bias, by_course = 1.0 + min(node.tilt_gain, node.dt_s / TAU), -share * across
     by_speed, by_gyro = -share * w, node.tilt_gain * s[V]
     c, n = math.cos(w), math.sin(w)
-    a, b = s[ACC_BIAS], s[LEFT_BIAS] - share * w * s[V]
+    a, b = by_bias * s[ACC_BIAS] - share * along, s[LEFT_BIAS] - share * w * s[V]
     s[ACC_BIAS], s[LEFT_BIAS] = c * a + n * b, c * b - n * a
     for i in range(N):
-        a, b = P[i, ACC_BIAS], P[i, LEFT_BIAS] + by_speed * P[i, V] + by_gyro * P[i, GYRO_BIAS]
+        turned = P[i, MOUNT] + P[i, SLIP] - P[i, GYRO_BIAS] * node.dt_s / 2
+        a = by_bias * P[i, ACC_BIAS] + by_course * turned
+        b = P[i, LEFT_BIAS] + by_speed * P[i, V] + by_gyro * P[i, GYRO_BIAS]
         P[i, ACC_BIAS], P[i, LEFT_BIAS] = c * a + n * b, c * b - n * a
     for i in range(N):
-        a, b = P[ACC_BIAS, i], P[LEFT_BIAS, i] + by_speed * P[V, i] + by_gyro * P[GYRO_BIAS, i]
+        turned = P[MOUNT, i] + P[SLIP, i] - P[GYRO_BIAS, i] * node.dt_s / 2
+        a = by_bias * P[ACC_BIAS, i] + by_course * turned
+        b = P[LEFT_BIAS, i] + by_speed * P[V, i] + by_gyro * P[GYRO_BIAS, i]
         P[ACC_BIAS, i], P[LEFT_BIAS, i] = c * a + n * b, c * b - n * a
 
 

@@ -136,7 +136,8 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
     rest = s.quiet > CONFIRM and c.carried == 0
     predict_attitude(a, dt, gyro, rest)
     if heard:
-        p.tilt_gain += correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
+        taken = correct_tilt(a, dt, acc[0], acc[1], acc[2], rest, p.acc_var, tilt_tau(c, p.acc_var))
+        p.tilt_gain += 0.0 if rest else taken
         add_acceleration(p, dt, a.q, acc, a.gravity, s)
         if c.motion != VEHICLE:
             add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)

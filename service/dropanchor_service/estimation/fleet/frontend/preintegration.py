@@ -33,7 +33,7 @@ PREINTEGRATION = np.dtype(
         ("V_end", "f8", 2),
         ("gap_s", "f8"),  # s without usable IMU since the last node
         ("extrapolated_s", "f8"),  # s since the last IMU sample that earlier nodes have already counted as silent
-        ("tilt_gain", "f8"),  # share of the acceleration that the tilt took for gravity since the last node
+        ("tilt_gain", "f8"),  # share of the acceleration that the tilt took for gravity since the last node, in motion
         ("no_acc_s", "f8"),  # s without usable accelerometer since the last node
     ]
 )

@@ -6,8 +6,11 @@ limit, its variance falls below it for tenths of a second, in motion as well: ti
 rest begins before the variance is far below the limit.
 The gyroscope's bias is learned in blocks of rest, and only from blocks that another block of rest followed, so that
 neither the end nor the start of a motion counts. The first rest after switch-on has no motion before it: it is used
-sooner, in shorter blocks, with the noise that the gyroscope shows. Many tags rest for no more than a second.
-Bias: scalar Kalman filter per axis, P += Q dt, block mean of rate with variance R.
+sooner, in shorter blocks. Many tags rest for no more than a second.
+Bias: scalar Kalman filter per axis, P += Q dt, block mean of rate with variance R, from the noise that it shows.
+
+Hard braking leaves a hundred times the limit in a variance and keeps a stop from being seen for a second. So the
+detector has a mean of its own, which a jump starts anew, and a variance that counts no sample for more than `MOST`.
 """
 
 import math
@@ -23,6 +26,8 @@ STANDSTILL = np.dtype(
         ("mean", "f8", 6),  # of acc and gyro, exponentially weighted
         ("deviation", "f8", 3),  # m/s^2, of the last acc from its mean; its squares average to acc_var
         ("acc_var", "f8"),  # sum over the axes, (m/s^2)^2
+        ("still", "f8", 3),  # m/s^2, mean of acc since its last jump
+        ("still_var", "f8"),  # (m/s^2)^2, about that mean, bounded
         ("gyro_bias_var", "f8"),  # sum over the axes, (rad/s)^2
         ("seen", "f8"),  # s of samples seen, up to a limit
         ("quiet", "f8"),  # s of quiet
@@ -36,6 +41,8 @@ Standstill: TypeAlias = Any  # a record of STANDSTILL
 
 TAU = 0.12  # s
 ACC_SD = 0.08  # m/s^2, root of the sum over three axes: 0.045 per axis
+JUMP = 0.5  # m/s^2, deviation of an axis that no tag at rest shows
+MOST = 4.0  # times the limit's variance
 CLEAR, DOUBT = 0.8, 3.0  # share of the limit's variance above which quiet counts only a third
 GYRO_SD = 0.05  # rad/s, likewise
 RATE = 0.08  # rad/s, of the mean rotation before the bias is known
@@ -46,9 +53,9 @@ CONFIRM = 0.5  # s of quiet before the bias is learned
 BLOCK = 0.5  # s
 FIRST_CONFIRM, FIRST_BLOCK = 0.2, 0.15  # s, of the rest at switch-on
 BIAS_SD = 0.01  # rad/s, at switch-on
-BIAS_WALK = 2e-9  # (rad/s)^2/s: 0.16 deg/s in an hour
-BIAS_NOISE = 4e-6  # (rad/s)^2 s: of a block mean, times its length
-FIRST_NOISE = 4e-7  # (rad/s)^2 s: the least of it at switch-on
+BIAS_WALK = 4e-8  # (rad/s)^2/s: 0.04 deg/s in 10 s, as while it warms by some degrees
+BIAS_NOISE = 4e-6  # (rad/s)^2 s: of a block mean, times its length, at most
+LEAST_NOISE = 4e-7  # (rad/s)^2 s: and at least
 WHITE = 3.0  # times the variance of white noise as large as what is seen
 
 
@@ -58,6 +65,8 @@ def start_standstill(s: Standstill, acc: Array, gyro: Array) -> None:
     for i in range(3):
         s.mean[i] = acc[i] if math.isfinite(acc[i]) else 0.0
         s.mean[3 + i] = gyro[i]
+    s.still[:] = s.mean[:3]
+    s.still_var = 0.0
     s.deviation[:] = 0.0
     s.acc_var = 0.0
     s.gyro_bias_var = 0.0
@@ -78,6 +87,17 @@ def update_channel(s: Standstill, k: float, i: int, value: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def update_still(s: Standstill, k: float, acc: Array) -> None:
+    """Update the mean since the last jump, and the variance about it."""
+    square = 0.0
+    for i in range(3):
+        d = acc[i] - s.still[i]
+        s.still[i] += d if abs(d) > JUMP else k * d
+        square += (1.0 - k) * d * d
+    s.still_var += k * (min(square, MOST * ACC_SD * ACC_SD) - s.still_var)
+
+
+@njit(cache=True, nogil=True)
 def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array, bias: Array) -> None:
     """Update with one IMU sample. Then `s.quiet` is the time, s, for which the tag has been quiet."""
     if dt == 0.0:
@@ -89,12 +109,15 @@ def update_standstill_detector(s: Standstill, dt: float, acc: Array, gyro: Array
         s.deviation[i] = update_channel(s, k, i, acc[i])
         va += s.deviation[i] ** 2
         vg += update_channel(s, k, 3 + i, gyro[i]) ** 2
+    update_still(s, k, acc)
     s.acc_var += k * (va - s.acc_var)
     s.gyro_bias_var += k * (vg - s.gyro_bias_var)
     x, y, z = s.mean[3] - bias[0], s.mean[4] - bias[1], s.mean[5] - bias[2]
     limit = RATE_KNOWN + min(RATE, 3.0 * math.sqrt(s.bias_var))
-    calm = s.acc_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
-    share = s.acc_var / (ACC_SD * ACC_SD)
+    calm = (
+        s.still_var < ACC_SD * ACC_SD and s.gyro_bias_var < GYRO_SD * GYRO_SD and x * x + y * y + z * z < limit * limit
+    )
+    share = s.still_var / (ACC_SD * ACC_SD)
     quiet = s.quiet + (dt if share < CLEAR else dt / DOUBT) if calm and s.seen > TAU else 0.0
     if not s.quiet <= HOLD < quiet or share < SURE:  # else this sample would begin a rest near the limit
         s.quiet = quiet
@@ -111,15 +134,13 @@ def at_rest(s: Standstill) -> bool:
 @njit(cache=True, nogil=True)
 def block_noise(s: Standstill, dt: float) -> float:
     """Return the variance of the mean rate of a block of rest times its length, (rad/s)^2 s."""
-    if s.moved == 1:
-        return BIAS_NOISE
-    return min(BIAS_NOISE, FIRST_NOISE + WHITE * s.gyro_bias_var / 3.0 * dt)  # type: ignore[no-any-return]
+    return min(BIAS_NOISE, LEAST_NOISE + WHITE * s.gyro_bias_var / 3.0 * dt)  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
 def update_gyro_bias(s: Standstill, dt: float, gyro: Array, bias: Array) -> None:
     """Update `bias` from confirmed rest. Call it with every sample."""
-    s.bias_var += BIAS_WALK * dt
+    s.bias_var = min(s.bias_var + BIAS_WALK * dt, BIAS_SD * BIAS_SD)
     if s.quiet < (CONFIRM if s.moved == 1 else FIRST_CONFIRM):
         s.block[0] = 0.0
         s.last[0] = 0.0

@@ -11,6 +11,7 @@ from dropanchor_service.estimation.fleet.belief.layout import ACC_BIAS, GYRO_BIA
 from dropanchor_service.estimation.fleet.belief.rigidity import (
     RIGID_SLIP,
     decide_mount,
+    is_askew,
     judge_mount,
     slip_std_of,
     tells_course,
@@ -127,3 +128,30 @@ def test_what_a_hypothesis_took_for_slip_is_its_mounting_angle_when_the_mount_is
     assert work[0]["mean"][MOUNT] == pytest.approx(0.3, abs=0.02)
     assert abs(work[0]["mean"][SLIP]) < 0.01
     assert work[0]["cov"][SLIP, SLIP] < RIGID_SLIP**2
+
+
+def speed_up_and_brake(row: Any, askew: float, jolts: float = 0.0, seconds: float = 10.0) -> None:
+    """Judge a straight drive at changing speed on a mount that is `askew` rad off the angle of the belief."""
+    rng = np.random.default_rng(12)
+    for k in range(round(seconds / DT)):
+        change = 0.2 * math.sin(0.4 * k)
+        left = change * -math.sin(askew) + rng.normal(0.0, jolts)
+        node = node_of(dt=DT, dyaw=0.0, forward=change * math.cos(askew), left=left)
+        one, scratch = hypothesis_of(course_keeping(2.0), np.diag(np.full(N, 1e-6)))
+        judge_mount(one, scratch, node, row)
+
+
+@pytest.mark.parametrize("askew", [-0.9, 0.6])
+def test_a_mount_that_is_another_than_believed_shows_in_each_change_of_the_speed(askew: float) -> None:
+    row = row_of()
+    speed_up_and_brake(row, askew)
+    assert is_askew(row)
+
+
+def test_neither_a_right_mounting_angle_nor_jolts_are_taken_for_another_angle() -> None:
+    right, jolted = row_of(), row_of()
+    speed_up_and_brake(right, 0.0)
+    speed_up_and_brake(jolted, 0.0, jolts=0.2)
+    assert jolted["mount"]["lateral_misfit"] > 2.0
+    assert not is_askew(right)
+    assert not is_askew(jolted)

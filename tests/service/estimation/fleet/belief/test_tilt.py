@@ -90,6 +90,36 @@ def test_the_biases_follow_what_an_arc_and_a_sharp_turn_do_to_the_tilt() -> None
         assert np.hypot(*(true - told)) < 0.5 * np.hypot(*true)
 
 
+def braking_nodes() -> Any:
+    """The nodes of a tag that starts at 2 m/s^2, drives on and backs off at 3 m/s^2, 0.1 s each."""
+    t = np.arange(0.0, 10.5, 0.01)
+
+    def acceleration(at: Any) -> Any:
+        ahead = np.where((at >= 4.0) & (at < 5.5), 2.0, 0.0) - np.where((at >= 8.0) & (at < 9.5), 3.0, 0.0)
+        return np.column_stack([ahead, np.zeros_like(at), np.zeros_like(at)])
+
+    motion, rng = synthesise(t, lambda at: np.zeros((len(at), 3)), acceleration), np.random.default_rng(6)
+    motion.acc += rng.normal(0.0, 0.2, motion.acc.shape)
+    motion.gyro += rng.normal(0.0, 0.01, motion.gyro.shape)
+    return run(new_frontend(), motion, np.arange(0.1, 10.4, 0.1)).view(np.recarray)
+
+
+def test_the_forward_bias_follows_what_starting_and_backing_off_do_to_the_tilt() -> None:
+    (s, P), nodes = state_of(), braking_nodes()
+    told: list[float] = []
+    for node in nodes:
+        s[ACC_BIAS] *= math.exp(-node.dt_s / Tuning().acc_bias_tau)  # as `predict_state` does
+        predict_tilt(s, P, node)
+        told.append(s[ACC_BIAS])
+    wrong = nodes.dv_forward / np.maximum(nodes.dt_s, 1e-3)  # where the speed is constant
+    cruising, before_backing, backing = slice(58, 66), slice(70, 78), slice(96, None)
+    assert np.mean(wrong[cruising]) < -0.25
+    assert np.mean(told[cruising]) == pytest.approx(np.mean(wrong[cruising]), rel=0.4)
+    change = np.mean(wrong[backing]) - np.mean(wrong[before_backing])
+    assert change > 0.35
+    assert np.mean(told[backing]) - np.mean(told[before_backing]) == pytest.approx(change, rel=0.4)
+
+
 def test_on_a_mount_that_may_be_loose_the_variance_holds_what_an_arc_bends() -> None:
     """In the arc the forward axis is wrong by more than 2.5 of its usual deviations, and by less than 1.5 of these."""
     (s, P), t = state_of(), Tuning()

@@ -64,6 +64,23 @@ def test_rest_begins_within_a_second_and_ends_within_a_tenth() -> None:
     assert not rest[1010:].any()
 
 
+def test_a_stop_after_hard_braking_is_seen_within_six_tenths() -> None:
+    braking, still = noise(13, 80, 0.1, 0.005), noise(14, 200, 0.014, 0.002)
+    braking[0][:, 0] -= 4.0 * np.sin(np.linspace(0.0, np.pi, 80))
+    acc, gyro = (np.concatenate([braking[i], still[i]]) for i in (0, 1))
+    rest, _, _ = watched(acc, gyro)
+    assert not rest[:85].any()
+    assert rest[140:].all()
+
+
+def test_each_rest_teaches_a_bias_that_has_wandered_since_the_last_one() -> None:
+    moving, first, later = noise(15, 3000, 0.3, 0.05), noise(16, 300, 0.014, 0.005), noise(17, 300, 0.014, 0.005, 0.002)
+    acc, gyro = (np.concatenate([first[i], moving[i], later[i]]) for i in (0, 1))
+    _, bias, row = watched(acc, gyro)
+    assert bias[2] == pytest.approx(0.002, abs=8e-4)
+    assert abs(bias[2] - 0.002) < 2.5 * np.sqrt(row["bias_var"])
+
+
 @pytest.mark.parametrize("dt", [0.005, 0.01, 0.052])
 def test_the_bias_is_learned_at_rest_at_any_rate_of_samples(dt: float) -> None:
     acc, gyro = noise(6, int(6 / dt), 0.014, 0.003)
