@@ -27,8 +27,8 @@ RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
 JOLTS_BELOW: Final = 0.35  # mean square of its normalised innovation below which the axis tells of the course
 JOLTS_TAU: Final = 5.0  # s
 JOLTS_CLIP: Final = 25.0  # limit of what one innovation counts
-ASKEW_MISFIT: Final = 1.5  # mean square of it above which the mounting angle is doubted
-ASKEW_SHARE: Final = 0.5  # and share of it that another mounting angle would explain
+ASKEW_MISFIT: Final = 1.5  # mean square of it above which another mounting angle makes the tag ambiguous
+ASKEW_SHARE: Final = 0.5  # share of it that another mounting angle explains at least, if it is that and no jolts
 TELLING: Final = 2.0  # ratio of the two variances from which on an innovation tells between the classes
 POWER: Final = 0.3  # of each likelihood: the errors of consecutive nodes are alike
 LEAST: Final = -10.0  # log likelihood ratio of one node: a skid is no loose mount
@@ -38,17 +38,22 @@ LOOSE_BELOW: Final = 0.0  # and at which it is loose again
 
 
 @njit(nogil=True)
+def _shows_other_angle(row: Row) -> bool:
+    """Return whether another mounting angle would explain most of what the tag moves sideways. Jolts have no angle."""
+    mount = row.mount
+    return bool(mount.lateral_cross**2 > ASKEW_SHARE * mount.lateral_along * mount.lateral_misfit)
+
+
+@njit(nogil=True)
 def tells_course(row: Row) -> bool:
     """Return whether the sideways axis tells of the course and not of jolts: only then it may correct the belief."""
-    return bool(row.mount.lateral_misfit < JOLTS_BELOW)
+    return bool(row.mount.lateral_misfit < JOLTS_BELOW or _shows_other_angle(row))
 
 
 @njit(nogil=True)
 def is_askew(row: Row) -> bool:
-    """Return whether the tag moves sideways as if its mounting angle were another one. Jolts have no such direction."""
-    mount = row.mount
-    explained = mount.lateral_cross**2 > ASKEW_SHARE * mount.lateral_along * mount.lateral_misfit
-    return bool(mount.lateral_misfit > ASKEW_MISFIT and explained)
+    """Return whether the mounting angle of the belief is wrong, by what the sideways axis measures."""
+    return bool(row.mount.lateral_misfit > ASKEW_MISFIT and _shows_other_angle(row))
 
 
 @njit(nogil=True)

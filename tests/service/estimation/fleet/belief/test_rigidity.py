@@ -146,6 +146,7 @@ def test_a_mount_that_is_another_than_believed_shows_in_each_change_of_the_speed
     row = row_of()
     speed_up_and_brake(row, askew)
     assert is_askew(row)
+    assert tells_course(row)  # so that the belief may learn the angle
 
 
 def test_neither_a_right_mounting_angle_nor_jolts_are_taken_for_another_angle() -> None:
@@ -155,3 +156,4 @@ def test_neither_a_right_mounting_angle_nor_jolts_are_taken_for_another_angle() 
     assert jolted["mount"]["lateral_misfit"] > 2.0
     assert not is_askew(right)
     assert not is_askew(jolted)
+    assert not tells_course(jolted)
