@@ -72,6 +72,7 @@ def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
         assert f"b/1: {OLD} -> {NEW}\n" in stopped.stdout
         assert "b/1" in cluster.owners().values()
         cluster.install("a", NEW)
+        wait_until(lambda: cluster.installed_on("a") == {NEW}, START_S)
         done = cluster.run("upgrade", limit_s=LIMIT_S)
         assert done.stdout.endswith(f"All 3 shards run {NEW}.\n"), done.stdout + done.stderr
         ended_s = time.monotonic()

@@ -179,6 +179,13 @@ class Cluster:
             AND bucket = '*' AND obstacle = '' AND name NOT IN (SELECT owner FROM dropanchor_lease)"""
         return sorted(name for (name,) in self._rows(statement))
 
+    def installed_on(self, node: str) -> set[str]:
+        """Return what the shards of a node say would run after a new start. They look about once a second."""
+        rows = self._rows(
+            "SELECT name, installed FROM dropanchor_standby WHERE seen > clock_timestamp() - interval '2 s'"
+        )
+        return {str(version) for name, version in rows if str(name).startswith(f"{node}/")}
+
     def _rows(self, statement: str) -> list[tuple[Any, ...]]:
         with suppress(UndefinedTable):  # the first process makes the tables
             return self._database.run(self._database.url(), statement)
