@@ -116,7 +116,7 @@ def test_a_recording_replayed_at_ten_times_the_speed_is_tracked_and_ages_after_i
             process.wait()
         seen = list({pose["t_ns"]: pose for pose in seen}.values())  # one of each, however often it was asked for
         placed = seen[next(i for i, pose in enumerate(seen) if pose["state"] == "tracking") :]
-        assert "lost" not in {pose["state"] for pose in placed}
+        assert {pose["state"] for pose in placed} <= {"tracking", "ambiguous", "coasting"}  # ambiguous after a corner
         assert sum(pose["state"] == "tracking" for pose in placed) > 0.7 * len(placed) > 9
         assert max(abs(pose["age_s"]) for pose in placed) < 5.0
         assert placed[-1]["t_ns"] - placed[0]["t_ns"] > 40e9  # the times of the poses are those of the recording

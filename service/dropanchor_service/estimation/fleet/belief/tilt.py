@@ -6,8 +6,8 @@ direction in the room, so a turn by w of the body moves it from one axis to the 
 
     b_a <- b_a - k f / dt,   b_l <- b_l - k v w / dt,   (b_a, b_l) <- rotation by -w of (b_a, b_l).
 
-f is what is measured less b_a dt. That part of k is limited to what b_a itself decays by (`fill_noise`): while the tilt
-settles, k is large, and an error of b_a would grow.
+f is the measured change less b_a dt. For that b_a, k counts as dt / TAU at most, about what b_a decays by
+(`fill_noise`): while the tilt settles, k is larger, and an error of b_a would grow.
 
 Without this an arc of seconds ends up as a bias of the forward axis, where no range corrects it while the tag travels
 across the line of sight, and a tag that brakes hard backs off with a bias of 0.4 m/s^2.

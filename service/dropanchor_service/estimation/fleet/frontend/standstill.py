@@ -88,7 +88,7 @@ def update_channel(s: Standstill, k: float, i: int, value: float) -> float:
 
 @njit(cache=True, nogil=True)
 def update_still(s: Standstill, k: float, acc: Array) -> None:
-    """Update the mean since the last jump, and the variance about it."""
+    """Update `still`, the mean since the last jump, and `still_var` about it. acc: (3,), m/s^2; k: gain, 0 to 1."""
     square = 0.0
     for i in range(3):
         d = acc[i] - s.still[i]
