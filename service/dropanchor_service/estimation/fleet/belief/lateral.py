@@ -8,6 +8,9 @@ the node and l = dv_left cos c - dv_forward sin c across it, and the mean speed 
 
 A wrong mounting angle makes a ramp of the speed leak into l, which the ranges see only through a product of speed and
 time. A turn compares the speed with the centripetal acceleration.
+
+On a rigid mount that nobody told, l also weighs the hypotheses: they have different mounting angles, and l tells these
+apart before the ranges do. Where the angle is told, they differ by what the biases hide, and l weighs none.
 """
 
 import math
@@ -34,6 +37,14 @@ BOUND: Final = 3.0  # standard deviations beyond which a sideways increment is a
 SMOOTH: Final = 0.015  # (m/s)^2/s, roughness of dv above which the sideways axis tells more of jolts than of the course
 MIN_VAR: Final = 1e-6  # (m/s)^2
 SHARE: Final = 0.05  # of the increment, error of scale and timing: the body turns while a sharp turn is integrated
+POWER: Final = 0.3  # of each likelihood of l: the errors of consecutive nodes are alike
+
+
+@njit(nogil=True)
+def increments(node: Node, c: float) -> tuple[float, float]:
+    """Return the increments of velocity along and across a course that is c from the body axis, m/s."""
+    cc, sc = math.cos(c), math.sin(c)
+    return node.dv_forward * cc + node.dv_left * sc, node.dv_left * cc - node.dv_forward * sc
 
 
 @njit(nogil=True)
@@ -41,10 +52,8 @@ def lateral_residual(s: Floats, node: Node, H: Floats) -> float:
     """Return 2 u sin(w/2) + b_l dt - l, m/s, of a state at the end of the node, and fill H with its derivative."""
     dt = node.dt_s
     w = node.dyaw - s[GYRO_BIAS] * dt
-    c = s[MOUNT] + s[SLIP] + w / 2
-    cc, sc, half = math.cos(c), math.sin(c), math.sin(w / 2)
-    along = node.dv_forward * cc + node.dv_left * sc
-    across = node.dv_left * cc - node.dv_forward * sc
+    half = math.sin(w / 2)
+    along, across = increments(node, s[MOUNT] + s[SLIP] + w / 2)
     u = s[V] - (along - s[ACC_BIAS] * dt) / 2
     H[:] = 0.0
     H[V] = 2.0 * half
@@ -80,13 +89,16 @@ def lateral_variance(s: Floats, node: Node, row: Row, slip_std: float) -> float:
 
 
 @njit(nogil=True)
-def update_lateral(one: Hypothesis, scratch: Scratch, node: Node, row: Row, slip_std: float) -> None:
+def update_lateral(one: Hypothesis, scratch: Scratch, node: Node, row: Row, slip_std: float, power: float) -> None:
     """Update one hypothesis, predicted over the node, with the sideways increment of its velocity.
 
-    slip_std: rad, of the mount in use. An increment beyond `BOUND` counts as one of that size.
+    slip_std: rad, of the mount in use. power: of the likelihood in the weight, 0 to 1. An increment beyond `BOUND`
+    counts as one of that size.
     """
     s = one.mean
     e = -lateral_residual(s, node, scratch.H)
     S = project(one.cov, scratch.H, scratch.PH) + lateral_variance(s, node, row, slip_std)
     S = max(S, e * e / BOUND**2)
+    if power > 0.0:
+        one.log_weight -= 0.5 * power * (math.log(S) + e * e / S)
     update_pda(s, one.cov, scratch.PH, S, e, 1.0)

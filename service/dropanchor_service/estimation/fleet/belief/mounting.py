@@ -10,9 +10,15 @@ from dropanchor_service.estimation.fleet.tuning import Tuning
 
 
 @njit(nogil=True)
+def is_mount_untold(row: Row, t: Tuning) -> bool:
+    """Return whether the mounting angle is no better known than that of a body axis along the course."""
+    return bool(row.settings.mount_angle_std > t.aligned_std)
+
+
+@njit(nogil=True)
 def add_aligned(work: Hypotheses, count: int, row: Row, t: Tuning) -> int:
     """Copy all hypotheses for a body axis along the course, where it mostly is. Return the number of copies."""
-    if row.settings.mount_angle_std <= t.aligned_std:
+    if not is_mount_untold(row, t):
         return 0
     for h in range(count):
         copy_hypothesis(work, h, count + h)

@@ -16,12 +16,19 @@ correlation of the two tells such a tag from one that jolts.
 import math
 from typing import Final
 
-from dropanchor_service.estimation.fleet.belief.lateral import is_lateral_known, lateral_residual, lateral_variance
+from dropanchor_service.estimation.fleet.belief.lateral import (
+    POWER,
+    is_lateral_known,
+    lateral_residual,
+    lateral_variance,
+)
 from dropanchor_service.estimation.fleet.belief.layout import MOUNT, SLIP, Hypotheses, Hypothesis, Row, Scratch, V
 from dropanchor_service.estimation.fleet.belief.mixture import best_of
+from dropanchor_service.estimation.fleet.belief.mounting import is_mount_untold
 from dropanchor_service.estimation.fleet.belief.update import project, update_pda
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.fleet.frontend.node import Node
+from dropanchor_service.estimation.fleet.tuning import Tuning
 
 RIGID_SLIP: Final = 0.02  # rad, of a rigid mount
 JOLTS_BELOW: Final = 0.35  # mean square of its normalised innovation below which the axis tells of the course
@@ -30,10 +37,9 @@ JOLTS_CLIP: Final = 25.0  # limit of what one innovation counts
 ASKEW_MISFIT: Final = 1.5  # mean square of it above which another mounting angle makes the tag ambiguous
 ASKEW_SHARE: Final = 0.5  # share of it that another mounting angle explains at least, if it is that and no jolts
 TELLING: Final = 2.0  # ratio of the two variances from which on an innovation tells between the classes
-POWER: Final = 0.3  # of each likelihood: the errors of consecutive nodes are alike
 LEAST: Final = -10.0  # log likelihood ratio of one node: a skid is no loose mount
 LOG_ODDS_LIMIT: Final = 10.0  # so that a mount that comes loose is noticed
-RIGID_ABOVE: Final = 5.0  # log odds at which a mount becomes rigid
+RIGID_ABOVE: Final = 3.0  # log odds at which a mount becomes rigid
 LOOSE_BELOW: Final = 0.0  # and at which it is loose again
 
 
@@ -64,6 +70,12 @@ def slip_std_of(row: Row) -> float:
 
 
 @njit(nogil=True)
+def weight_power(row: Row, rigid: bool, t: Tuning) -> float:
+    """Return the power with which the sideways axis weighs the hypotheses: 0 unless it tells mounting angles apart."""
+    return POWER if rigid and is_mount_untold(row, t) else 0.0
+
+
+@njit(nogil=True)
 def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None:
     """Weigh what a node tells of the mount. one: the best hypothesis, before the node.
 
@@ -87,7 +99,7 @@ def judge_mount(one: Hypothesis, scratch: Scratch, node: Node, row: Row) -> None
 
 
 @njit(nogil=True)
-def decide_mount(work: Hypotheses, count: int, row: Row, scratch: Scratch) -> None:
+def decide_mount(work: Hypotheses, count: int, row: Row, t: Tuning, scratch: Scratch) -> None:
     """Put the mount of a row in the class that its log odds tell, with hysteresis.
 
     None becomes rigid whose sideways axis tells of jolts: a device in a hand looked rigid between them.
@@ -97,25 +109,30 @@ def decide_mount(work: Hypotheses, count: int, row: Row, scratch: Scratch) -> No
         mount.rigid = 1
         if row.settings.slip_given == 0:
             for h in range(count):
-                _rule_out_slip(work[h], scratch)
+                _rule_out_slip(work[h], is_mount_untold(row, t), scratch)
     elif mount.rigid == 1 and mount.rigid_log_odds < LOOSE_BELOW:
         mount.rigid = 0
 
 
 @njit(nogil=True)
-def follow_mount(work: Hypotheses, count: int, row: Row, node: Node, scratch: Scratch) -> bool:
+def follow_mount(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, scratch: Scratch) -> bool:
     """Judge the mount by a node. Return whether its sideways increment may correct the hypotheses."""
     if not is_lateral_known(node):
         return False
     judge_mount(work[best_of(work, count)], scratch, node, row)
-    decide_mount(work, count, row, scratch)
+    decide_mount(work, count, row, t, scratch)
     return tells_course(row)
 
 
 @njit(nogil=True)
-def _rule_out_slip(one: Hypothesis, scratch: Scratch) -> None:
-    """Update a hypothesis with a slip of zero: what it has taken for slip is the mounting angle."""
+def _rule_out_slip(one: Hypothesis, weigh: bool, scratch: Scratch) -> None:
+    """Update a hypothesis with a slip of zero: what it has taken for slip is the mounting angle.
+
+    weigh: it then also loses the weight that it owes to a slip.
+    """
     scratch.H[:] = 0.0
     scratch.H[SLIP] = 1.0
     S = project(one.cov, scratch.H, scratch.PH) + RIGID_SLIP**2
+    if weigh:
+        one.log_weight -= 0.5 * (math.log(S) + one.mean[SLIP] ** 2 / S)
     update_pda(one.mean, one.cov, scratch.PH, S, -one.mean[SLIP], 1.0)

@@ -66,7 +66,7 @@ from dropanchor_service.estimation.fleet.belief.predict import (
     predict_state,
 )
 from dropanchor_service.estimation.fleet.belief.publish import publish
-from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of
+from dropanchor_service.estimation.fleet.belief.rigidity import RIGID_SLIP, follow_mount, slip_std_of, weight_power
 from dropanchor_service.estimation.fleet.belief.standing import judge_standstill, offer_refused, offer_turnabout
 from dropanchor_service.estimation.fleet.belief.start import (
     collect_start,
@@ -100,8 +100,9 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
     if _is_empty(node):
         return
     decay, growth, F, FP = scratch.decay, scratch.growth, scratch.F, scratch.FP
-    lateral, slip_std = follow_mount(work, count, row, node, scratch), slip_std_of(row)
+    lateral, slip_std = follow_mount(work, count, row, node, t, scratch), slip_std_of(row)
     rigid = slip_std <= RIGID_SLIP
+    power = weight_power(row, rigid, t)
     bends = bends_tilt(node) and (rigid or is_lateral_known(node))
     fill_noise(decay, growth, node, row, t)
     for heading_class in range(CLASSES):
@@ -117,7 +118,7 @@ def _predict_all(work: Hypotheses, count: int, row: Row, node: Node, t: Tuning, 
                 if bends:
                     follow_tilt(work[h].mean, work[h].cov, node, rigid, t)
                 if lateral:
-                    update_lateral(work[h], scratch, node, row, slip_std)
+                    update_lateral(work[h], scratch, node, row, slip_std, power)
 
 
 @njit(nogil=True)

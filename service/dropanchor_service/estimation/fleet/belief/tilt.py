@@ -23,6 +23,7 @@ noise of the accelerations already holds what the tilt does in that time.
 import math
 from typing import Final
 
+from dropanchor_service.estimation.fleet.belief.lateral import increments
 from dropanchor_service.estimation.fleet.belief.layout import (
     ACC_BIAS,
     GYRO_BIAS,
@@ -72,9 +73,8 @@ def follow_tilt(s: Floats, P: Floats, node: Node, rigid: bool, t: Tuning) -> Non
 def predict_tilt(s: Floats, P: Floats, node: Node) -> None:
     """Predict the biases of a rigid mount, and their covariance, in a state that was predicted over the node."""
     w = node.dyaw - s[GYRO_BIAS] * node.dt_s
-    share, course = node.tilt_gain / node.dt_s, s[MOUNT] + s[SLIP] + w / 2
-    cc, sc = math.cos(course), math.sin(course)
-    along, across = node.dv_forward * cc + node.dv_left * sc, node.dv_left * cc - node.dv_forward * sc
+    share = node.tilt_gain / node.dt_s
+    along, across = increments(node, s[MOUNT] + s[SLIP] + w / 2)
     by_bias, by_course = 1.0 + min(node.tilt_gain, node.dt_s / TAU), -share * across
     by_speed, by_gyro = -share * w, node.tilt_gain * s[V]
     c, n = math.cos(w), math.sin(w)

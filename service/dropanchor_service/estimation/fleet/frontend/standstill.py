@@ -10,7 +10,7 @@ sooner, in shorter blocks. Many tags rest for no more than a second.
 Bias: scalar Kalman filter per axis, P += Q dt, block mean of rate with variance R, from the noise that it shows.
 
 Hard braking leaves a hundred times the limit in a variance and keeps a stop from being seen for a second. So the
-detector has a mean of its own, which a jump starts anew, and a variance that counts no sample for more than `MOST`.
+detector has a mean of its own, which a jump starts anew, and a variance that counts no sample for more than `CLIP`.
 """
 
 import math
@@ -42,7 +42,7 @@ Standstill: TypeAlias = Any  # a record of STANDSTILL
 TAU = 0.12  # s
 ACC_SD = 0.08  # m/s^2, root of the sum over three axes: 0.045 per axis
 JUMP = 0.5  # m/s^2, deviation of an axis that no tag at rest shows
-MOST = 4.0  # times the limit's variance
+CLIP = 4.0  # times the limit's variance
 CLEAR, DOUBT = 0.8, 3.0  # share of the limit's variance above which quiet counts only a third
 GYRO_SD = 0.05  # rad/s, likewise
 RATE = 0.08  # rad/s, of the mean rotation before the bias is known
@@ -94,7 +94,7 @@ def update_still(s: Standstill, k: float, acc: Array) -> None:
         d = acc[i] - s.still[i]
         s.still[i] += d if abs(d) > JUMP else k * d
         square += (1.0 - k) * d * d
-    s.still_var += k * (min(square, MOST * ACC_SD * ACC_SD) - s.still_var)
+    s.still_var += k * (min(square, CLIP * ACC_SD * ACC_SD) - s.still_var)
 
 
 @njit(cache=True, nogil=True)

@@ -68,7 +68,7 @@ def test_one_ramp_of_the_speed_teaches_the_mounting_angle() -> None:
     row, (one, scratch) = row_of(), unmounted()
     for k in range(10):
         one["mean"][V] = 0.3 * (k + 1)
-        update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row, 0.1)
+        update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row, 0.1, 0.0)
     assert one["mean"][MOUNT] == pytest.approx(0.4, abs=0.1)
     assert one["cov"][MOUNT, MOUNT] < 0.02
 
@@ -94,6 +94,22 @@ def test_a_tag_that_speeds_up_and_brakes_all_the_time_learns_its_mounting_angle(
         node = driven(before, after, 0.0, 0.4)
         node["dv_var"], node["motion_var"] = 0.1 * 0.5, 0.1 * 0.4995
         one["mean"][V] = after
-        update_lateral(one, scratch, node, row, 0.02)
+        update_lateral(one, scratch, node, row, 0.02, 0.0)
     assert one["mean"][MOUNT] == pytest.approx(0.4, abs=0.05)
     assert one["cov"][MOUNT, MOUNT] < 0.02
+
+
+def lost_weight(angle: float, power: float) -> float:
+    """Return the log weight that a hypothesis with a mount of `angle` rad loses, where 0.4 rad is true, by one ramp."""
+    row, (one, scratch) = row_of(), unmounted()
+    one["mean"][MOUNT], one["cov"][MOUNT, MOUNT] = angle, 0.02
+    for k in range(10):
+        one["mean"][V] = 0.3 * (k + 1)
+        update_lateral(one, scratch, driven(0.3 * k, 0.3 * (k + 1), 0.0, 0.4), row, 0.02, power)
+    return -float(one["log_weight"])
+
+
+def test_a_ramp_weighs_hypotheses_with_other_mounting_angles() -> None:
+    right, wrong = lost_weight(0.4, 0.3), lost_weight(-0.6, 0.3)
+    assert wrong > right + 3.0
+    assert lost_weight(-0.6, 0.0) == 0.0

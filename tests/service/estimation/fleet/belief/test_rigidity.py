@@ -15,16 +15,19 @@ from dropanchor_service.estimation.fleet.belief.rigidity import (
     judge_mount,
     slip_std_of,
     tells_course,
+    weight_power,
 )
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.tuning import Tuning
 from support.belief import STATE, hypothesis_of, node_of
 
 DT = 0.1  # s
+TUNING = Tuning().record()[0]
 
 
-def row_of(resolved: bool = True, slip_std: float = math.nan) -> Any:
+def row_of(resolved: bool = True, slip_std: float = math.nan, mount_angle: float = math.nan) -> Any:
     settings = default_settings()
+    settings["mount_angle"] = mount_angle
     settings["slip_std"] = slip_std
     configured = configure_row(settings, Tuning())
     rows = np.zeros(1, configured.dtype)
@@ -36,6 +39,12 @@ def row_of(resolved: bool = True, slip_std: float = math.nan) -> Any:
 def course_keeping(speed: float) -> Any:
     s = STATE.copy()
     s[V], s[MOUNT], s[SLIP], s[GYRO_BIAS], s[ACC_BIAS], s[LEFT_BIAS] = speed, 0.0, 0.0, 0.0, 0.0, 0.0
+    return s
+
+
+def slipping(slip: float) -> Any:
+    s = course_keeping(2.0)
+    s[SLIP] = slip
     return s
 
 
@@ -56,7 +65,7 @@ def drive(row: Any, slip_std: float, speed: float = 2.0, seconds: float = 20.0, 
         )
         one, scratch = hypothesis_of(course_keeping(speed), np.diag(np.full(N, 1e-6)))
         judge_mount(one, scratch, node, row)
-        decide_mount(np.array([one]), 1, row, scratch)
+        decide_mount(np.array([one]), 1, row, TUNING, scratch)
 
 
 def test_a_mount_that_does_not_wander_is_found_rigid_and_its_slip_small() -> None:
@@ -124,10 +133,32 @@ def test_what_a_hypothesis_took_for_slip_is_its_mounting_angle_when_the_mount_is
     P[MOUNT, SLIP] = P[SLIP, MOUNT] = -0.0099  # their sum is known, and each of them is not
     one, scratch = hypothesis_of(s, P)
     work = np.array([one])
-    decide_mount(work, 1, row, scratch)
+    decide_mount(work, 1, row, TUNING, scratch)
     assert work[0]["mean"][MOUNT] == pytest.approx(0.3, abs=0.02)
     assert abs(work[0]["mean"][SLIP]) < 0.01
     assert work[0]["cov"][SLIP, SLIP] < RIGID_SLIP**2
+
+
+@pytest.mark.parametrize(("told", "weighed"), [(math.nan, True), (0.2, False)])
+def test_a_hypothesis_loses_the_weight_that_it_owes_to_a_slip_where_nobody_told_the_angle(
+    told: float, weighed: bool
+) -> None:
+    row = row_of(mount_angle=told)
+    row["mount"]["rigid_log_odds"] = 10.0
+    P = np.diag(np.full(N, 1e-4))
+    work = np.concatenate([np.atleast_1d(hypothesis_of(slipping(slip), P)[0]) for slip in (0.0, -0.4)])
+    decide_mount(work, 2, row, TUNING, hypothesis_of(STATE, P)[1])
+    assert row["mount"]["rigid"] == 1
+    assert bool(work[0]["log_weight"] > work[1]["log_weight"] + 10.0) is weighed
+
+
+@pytest.mark.parametrize(
+    ("told", "rigid", "weighs"), [(math.nan, True, True), (math.nan, False, False), (0.2, True, False)]
+)
+def test_the_sideways_axis_weighs_only_on_a_rigid_mount_that_nobody_told(
+    told: float, rigid: bool, weighs: bool
+) -> None:
+    assert (weight_power(row_of(mount_angle=told), rigid, TUNING) > 0.0) is weighs
 
 
 def speed_up_and_brake(row: Any, askew: float, jolts: float = 0.0, seconds: float = 10.0) -> None:
