@@ -31,6 +31,7 @@ class StateReason(StrEnum):
     UNCERTAIN = "uncertain"
     FAULT = "fault"
     HEADING_UNSURE = "heading_unsure"
+    SENSOR_FAULT = "sensor_fault"
 
 
 class Frame(StrEnum):

@@ -40,6 +40,10 @@ class Reason(StrEnum):
     TAGS_FULL = "tags_full"
     SHED = "shed"
     ESTIMATOR_FAULT = "estimator_fault"
+    TIME_NOT_UTC = "time_not_utc"
+    TIME_REPEATED = "time_repeated"
+    IMU_STUCK = "imu_stuck"
+    SENSOR_FAULT = "sensor_fault"
 
 
 class Explanation(NamedTuple):
@@ -94,4 +98,12 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.TAGS_FULL: Explanation("message", "the service has reached its maximum number of tags"),
     Reason.SHED: Explanation("message", "the service was overloaded and dropped it"),
     Reason.ESTIMATOR_FAULT: Explanation("sample", "the estimator of this tag failed on it"),
+    Reason.TIME_NOT_UTC: Explanation(
+        "message, sample", "UTC before 2015, as seconds, milliseconds or microseconds look where nanoseconds belong"
+    ),
+    Reason.TIME_REPEATED: Explanation("sample", "an IMU sample that is not newer than the one before it"),
+    Reason.IMU_STUCK: Explanation("sample", "the IMU repeats its last sample to the last bit"),
+    Reason.SENSOR_FAULT: Explanation(
+        "sample", "the sensor failed its check (units, axes, silence), as the tag's hint says"
+    ),
 }

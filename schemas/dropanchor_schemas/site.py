@@ -164,6 +164,17 @@ class TagSettings(_Settings):
         description="What moves the tag: a vehicle, which follows its course, or a person on foot, who may hold the "
         "tag in any way; auto: a person while the accelerations show steps, otherwise a vehicle.",
     )
+    acc_unit: Literal["m/s2", "g", "mg"] = Field(
+        default="m/s2", description="Unit in which the tag sends accelerations; they are converted before their check."
+    )
+    acc_reversed: StrictBool = Field(
+        default=False,
+        description="Whether the accelerations have the opposite sign, as on iOS: down instead of up at rest.",
+    )
+    gyro_unit: Literal["rad/s", "deg/s"] = Field(default="rad/s", description="Unit in which the tag sends rates.")
+    range_unit: Literal["m", "cm", "mm", "ft"] = Field(
+        default="m", description="Unit in which the tag sends ranges and their standard deviation."
+    )
     start: StartPose | None = Field(default=None, description="Where the tag starts, if known.")
 
     def over(self, defaults: "TagSettings") -> "TagSettings":

@@ -27,6 +27,7 @@ _HINTS = {
     StateReason.FAULT: "The estimate had to start again. If this repeats, check what the tag sends.",
     StateReason.HEADING_UNSURE: "There is no heading reference, so north is not known: set where the tag starts and "
     "looks, or add a second anchor.",
+    StateReason.SENSOR_FAULT: "A sensor of this tag failed its check: look at what this tag needs.",
 }
 HINTS = [_HINTS[reason] for reason in StateReason]
 RELATIVE_HINT = (

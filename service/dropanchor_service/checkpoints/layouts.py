@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-VERSION = 5
+VERSION = 6
 """Number of the layout that this version writes. Raise it when a column of the state changes, in its name, its type or
 its meaning: `migrations.py` says what else to do."""
 READ_BEFORE = 2

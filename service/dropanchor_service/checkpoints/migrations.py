@@ -17,13 +17,28 @@ import numpy as np
 from dropanchor_service.checkpoints.format import CheckpointError, Snapshot
 from dropanchor_service.checkpoints.layouts import VERSION, DTypes
 from dropanchor_service.estimation.columns import Array, default_settings
+from dropanchor_service.store.rows import COUNTS
 
 Fresh = Callable[[Array], Mapping[str, Array]]
 """Takes TAG_SETTINGS of all rows, and returns the arrays of the engine as they are before the first sample."""
 Steps = Mapping[int, Callable[[Snapshot], Snapshot]]
 
-STEPS: Steps = {}
 SETTINGS = "engine.settings"
+
+
+def with_more_reasons(found: Snapshot) -> Snapshot:
+    """Return a snapshot whose counters have room for the reasons of rejections that layout 6 appended."""
+    before = found.arrays.get("counts")
+    if before is None or "rejected" not in (before.dtype.names or ()):
+        return found
+    after = np.zeros(len(before), COUNTS)
+    for name in set(before.dtype.names or ()) - {"rejected"}:
+        after[name] = before[name]
+    after["rejected"][:, : before["rejected"].shape[1]] = before["rejected"]
+    return Snapshot({**found.arrays, "counts": after}, found.document)
+
+
+STEPS: Steps = {5: with_more_reasons}
 
 
 def migrated(found: Snapshot, version: int, dtypes: DTypes, fresh: Fresh, steps: Steps = STEPS) -> Snapshot:

@@ -167,6 +167,7 @@ class StateReason(IntEnum):
     UNCERTAIN = 9  # the ellipse has grown too large
     FAULT = 10  # the row's numbers were not finite; it starts again
     HEADING_UNSURE = 11  # the heading may be wrong by a constant, and with it the direction from the anchor
+    SENSOR_FAULT = 12  # a sensor failed its check; engines do not give it
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ FEW = 128  # entries up to which a dictionary counts faster than NumPy
 KINDS = tuple(kind.name for kind in kinds.KINDS)
 REASONS = tuple(Reason)
 
-_COUNTS = np.dtype(
+COUNTS = np.dtype(
     [
         ("first_heard_ns", "i8"),  # 0: never
         ("last_heard_ns", "i8"),
@@ -76,7 +76,7 @@ class Rows:
         self._lock = Lock()
         self._tags: list[Tag] = []
         self._sites = np.zeros(16, np.int32)
-        self._counts = np.zeros(16, _COUNTS)
+        self._counts = np.zeros(16, COUNTS)
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
