@@ -167,9 +167,10 @@ class TagSettings(_Settings):
     acc_unit: Literal["m/s2", "g", "mg"] = Field(
         default="m/s2", description="Unit in which the tag sends accelerations; they are converted before their check."
     )
-    acc_reversed: StrictBool = Field(
-        default=False,
-        description="Whether the accelerations have the opposite sign, as on iOS: down instead of up at rest.",
+    acc_reversed: StrictBool | None = Field(
+        default=None,
+        description="Whether the accelerations have the opposite sign, as on iOS: down instead of up at rest. If "
+        "false, the tag may hang upside down; null: unknown, the check of the sensors looks for it.",
     )
     gyro_unit: Literal["rad/s", "deg/s"] = Field(default="rad/s", description="Unit in which the tag sends rates.")
     range_unit: Literal["m", "cm", "mm", "ft"] = Field(

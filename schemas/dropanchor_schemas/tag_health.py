@@ -74,8 +74,11 @@ class Care(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    reason: Literal["battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact"]
+    reason: Literal["sensor_fault", "battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact"]
     hint: str
+    setting: dict[str, str | bool] | None = Field(
+        default=None, description="Setting of the tag that mends it, for a person to accept; null: none does."
+    )
 
 
 class HealthReport(NamedTuple):

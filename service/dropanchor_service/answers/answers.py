@@ -72,6 +72,9 @@ class Answers:
 
     def hint_of(self, tag: Tag) -> str:
         """Return what a person can do so that more of the tag's samples are used; empty if there is nothing to do."""
+        found = self.tags.rows.findings.of(tag.row)
+        if found:
+            return found[0].sentence
         unknown = self.unknown_anchor_of(tag)
         if unknown is None:
             return ""

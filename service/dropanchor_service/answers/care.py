@@ -1,5 +1,6 @@
 """Find the tags that need a person, and say what to do for them."""
 
+from collections.abc import Iterator
 from typing import Any
 
 from dropanchor_service.store import HealthTable, Tag
@@ -9,7 +10,7 @@ from dropanchor_service.store.health import HealthRecord
 BATTERY_LOW = 0.2
 SPOOL_RISES = 3  # reports in a row
 NO_CONTACT_S = 300.0
-REASONS = ("battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact")
+REASONS = ("sensor_fault", "battery_low", "firmware_differs", "spool_growing", "clock_offset", "no_contact")
 
 
 def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | None:
@@ -22,7 +23,7 @@ def health_answer(record: HealthRecord | None, now_ns: int) -> dict[str, Any] | 
 
 def care_of(
     tag: Tag, health: HealthTable, now_ns: int, clock_offset: ClockOffset | None = None
-) -> list[dict[str, str]]:
+) -> list[dict[str, Any]]:
     """Return a `Care` for everything that a person should do for the tag."""
     record = health.of(tag.row)
     hints = {} if record is None else _of_values(record, health.majority_firmware)
@@ -31,7 +32,14 @@ def care_of(
     last_ns = max(tag.last_heard_ns or 0, 0 if record is None or tag.last_heard_ns else record.received_ns)
     if last_ns and _age_s(last_ns, now_ns) > NO_CONTACT_S:
         hints["no_contact"] = _no_contact(tag.online, _age_s(last_ns, now_ns))
-    return [{"reason": reason, "hint": hint} for reason, hint in hints.items()]
+    return [*_of_sensors(tag), *({"reason": reason, "hint": hint, "setting": None} for reason, hint in hints.items())]
+
+
+def _of_sensors(tag: Tag) -> Iterator[dict[str, Any]]:
+    """Yield a `Care` for each fault of the tag's sensors."""
+    for found in tag.rows.findings.of(tag.row):
+        setting = None if found.setting is None else dict([found.setting])
+        yield {"reason": "sensor_fault", "hint": found.sentence, "setting": setting}
 
 
 def _of_values(record: HealthRecord, majority: str | None) -> dict[str, str]:

@@ -72,7 +72,17 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     for text, place in _unknown_anchors(poses, site, tags, now_ns):
         hint[place] = len(texts)
         texts.append(text)
+    for text, one in _about_sensors(poses, tags):
+        hint[one] = len(texts)
+        texts.append(text)
     return texts, hint
+
+
+def _about_sensors(poses: Array, tags: TagTable) -> Iterator[tuple[str, int]]:
+    """Yield what is wrong with the sensors of a tag, and the place of its pose."""
+    for place in np.flatnonzero(poses["reason"] == StateReason.SENSOR_FAULT).tolist():
+        for found in tags.rows.findings.of(int(poses["row"][place]))[:1]:
+            yield found.sentence, place
 
 
 def _about_arrivals(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, Array]]:

@@ -34,6 +34,7 @@ from dropanchor_service.estimation.columns import (
     State,
     default_settings,
 )
+from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_service.ingest.decode import read_forms, read_samples
 from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.publishers import Publishers
@@ -132,6 +133,9 @@ def warm_up(engine: Engine, progress: CompilationProgress | None = None) -> None
     """Compile the kernels of `engine` with two seconds of a tag that moves off. Discard `engine` afterwards."""
     with _compiling("the estimator, which takes about a minute", progress or CompilationProgress()):
         _run(engine)
+        check = SensorCheck()
+        check.check(_moving_off(2))
+        check.note_absurd(np.zeros(1, np.int32), np.zeros(1), np.zeros(1, np.int32))
 
 
 def _run(engine: Engine) -> None:

@@ -45,6 +45,10 @@ TAG_SETTINGS = np.dtype(
         ("start_std", "f8"),
         ("declination", "f8"),  # true minus magnetic north, positive east
         ("motion", "u1"),
+        ("acc_factor", "f8"),  # by which the tag's accelerations become m/s²; engines get m/s², rad/s and m
+        ("gyro_factor", "f8"),
+        ("range_factor", "f8"),
+        ("acc_sign_told", "?"),  # whether the operator says which way accelerations point
     ]
 )
 
@@ -240,7 +244,8 @@ class Restorable(Protocol):
 def default_settings() -> Array:
     """Return TAG_SETTINGS (0-d) of a tag about which nothing is known."""
     settings = np.zeros((), TAG_SETTINGS)
-    settings["range_scale"] = 1.0
+    for name in ("range_scale", "acc_factor", "gyro_factor", "range_factor"):
+        settings[name] = 1.0
     for name in UNKNOWN:
         settings[name] = np.nan
     return settings

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dropanchor_schemas.site import TagSettings
+from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import (
     POSE,
     TAG_SETTINGS,
@@ -18,7 +19,11 @@ from dropanchor_service.estimation.columns import (
     State,
     StateReason,
 )
+from dropanchor_service.estimation.plausibility.check import Checked, SensorCheck
+from dropanchor_service.estimation.plausibility.layout import make_checks
 from dropanchor_service.ingest.anchors import AnchorTable
+from dropanchor_service.ingest.decode import Decoded
+from dropanchor_service.ingest.units import convert, has_units
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.runtime.logs import RareLog
 from dropanchor_service.settings.engine_columns import tag_columns
@@ -54,7 +59,9 @@ class GuardedEngine:
         self._configured: dict[int, _Configured] = {}
         self._settings = np.zeros(0, TAG_SETTINGS)  # by row
         self._has_configured = np.zeros(0, bool)  # by row
+        self._has_units = False  # whether any tag has other units than ours
         self._faults: dict[int, _Faults] = {}
+        self._sensors = SensorCheck()
 
     @property
     def keeps_state(self) -> bool:
@@ -66,7 +73,9 @@ class GuardedEngine:
         if not isinstance(self._engine, Restorable):
             return {}
         settings = self._settings[: len(self._sites.rows)]
-        return {"anchors": self.anchors.places, "settings": settings} | self._engine.state()
+        self._sensors.reserve(len(settings))
+        checks = self._sensors.columns[: len(settings)]
+        return {"anchors": self.anchors.places, "settings": settings, "checks": checks} | self._engine.state()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Restore what `state` returned.
@@ -77,9 +86,11 @@ class GuardedEngine:
         assert isinstance(self._engine, Restorable)
         self.follow_sites()
         anchors, settings = state.pop("anchors"), state.pop("settings")
+        self._sensors.columns = state.pop("checks")
         moved = set(self.anchors.sites[: len(anchors)][self.anchors.places[: len(anchors)] != anchors].tolist())
         self._engine.restore(state)
         self._settings = settings
+        self._has_units = has_units(settings)
         for row, known in enumerate(settings):
             current = self._current(row)
             unchanged = tag_columns(current.tag, current.declination_rad).tobytes() == known.tobytes()
@@ -95,7 +106,7 @@ class GuardedEngine:
         engine = type(self._engine)()
         for row, of_tag in enumerate(settings):
             engine.configure(row, of_tag)
-        return engine.state()
+        return engine.state() | {"checks": make_checks(len(settings))}
 
     def follow_sites(self) -> list[ServedSite]:
         """Apply the changes of the sites since the last call. Return the sites that have changed.
@@ -144,10 +155,31 @@ class GuardedEngine:
         """Yield the poses of all rows. A row that makes the engine fail starts afresh."""
         for row in self._new_rows(samples):
             self._configure(row)
-        for batch in self._bisected(samples, now_ns):
+        checked = self._sensors.check(samples)
+        for batch in self._bisected(checked.samples, now_ns) if any(map(len, checked.samples.columns())) else ():
+            self._sensors.mark(batch.poses)
             for column in (batch.poses, batch.innovations):
                 column["anchor"] = self.anchors.own_indices(column["anchor"])
             yield batch
+        if len(checked.found):
+            self._note_findings(checked)
+            yield PoseBatch(poses=checked.poses, rejected={Reason.SENSOR_FAULT: checked.left_out})
+
+    def _note_findings(self, checked: Checked) -> None:
+        """Tell what is wrong with sensors, and forget what was estimated with them."""
+        for row in checked.found.tolist():
+            self._sites.rows.findings.set(row, self._sensors.findings(row))
+        for row in checked.failed.tolist():
+            self._configure(row, start_known=False)
+
+    def note_absurd(self, imu_rows: Array, imu_sizes: Array, range_rows: Array) -> None:
+        """Note samples that no sensor can have measured. imu_sizes: the greatest value of each."""
+        self._sensors.note_absurd(imu_rows, imu_sizes, range_rows)
+
+    def convert(self, decoded: Decoded, of_row: Array) -> None:
+        """Convert samples of tags whose units the operator has told, in place. of_row: of each message."""
+        if self._has_units:
+            convert(decoded, of_row, self._settings)
 
     def _new_rows(self, samples: SampleBatch) -> Sequence[int]:
         rows = [column["row"] for column in samples.columns() if len(column)]
@@ -192,12 +224,15 @@ class GuardedEngine:
         # After a fault the tag is no longer where it started.
         tag = current.tag if start_known else current.tag.model_copy(update={"start": None})
         self._engine.configure(row, tag_columns(tag, current.declination_rad))
+        if start_known:
+            self._sensors.start(row, current.tag.acc_reversed is not None)
         self._keep_settings(row, tag_columns(current.tag, current.declination_rad))
 
     def _keep_settings(self, row: int, settings: Array) -> None:
         if row >= len(self._settings):
             self._settings = enlarged(self._settings, max(row + 1, 2 * len(self._settings)))
         self._settings[row] = settings
+        self._has_units = has_units(self._settings)
 
     def _current(self, row: int) -> _Configured:
         """Return the settings that its site has now for this row."""

@@ -15,7 +15,7 @@ from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
-from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
+from dropanchor_service.ingest.screening import Rejected, absurd_imu, keep, screen, within_time
 from dropanchor_service.store import Sites
 from dropanchor_service.store.rings import rank_in_row
 
@@ -110,7 +110,10 @@ class SampleReader:
         """
         read, sequenced, of_row, arrived = ordered.forms, ordered.sequenced, ordered.of_row, ordered.arrived
         for due in _one_per_row(sequenced.due, of_row):
-            decoded, rejected = screen(read_samples(read, due))
+            sent = read_samples(read, due)
+            self._engine.convert(sent, of_row)
+            decoded, rejected = screen(sent)
+            self._note_absurd(sent, rejected, of_row)
             of_batch = replace(sequenced, due=due)
             offsets, jumps = self._publishers.time_offsets(read.forms, of_batch, arrived, _times(decoded))
             self._rejections.count_clock_jumps(jumps)
@@ -118,6 +121,15 @@ class SampleReader:
             spans = _spans(in_time)
             self._note_replays(in_time, due, of_row, arrived, spans[1])
             yield self._batch(in_time, rejected, due, of_row, arrived, spans)
+
+    def _note_absurd(self, sent: Decoded, rejected: list[Rejected], of_row: Array) -> None:
+        """Tell the check of the sensors about values that no sensor measures: they look like another unit."""
+        if {entry.reason for entry in rejected}.isdisjoint((Reason.IMU_ABSURD, Reason.RANGE_ABSURD)):
+            return
+        imu, sizes = absurd_imu(sent.imu)
+        ranges = [entry.messages for entry in rejected if entry.reason == Reason.RANGE_ABSURD]
+        far = np.concatenate([np.empty(0, np.int64), *ranges])
+        self._engine.note_absurd(of_row[imu["message"]], sizes, of_row[far])
 
     def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
         """Return the arrival until which pending messages have waited long enough.

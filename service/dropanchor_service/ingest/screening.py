@@ -34,6 +34,13 @@ def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
     return decoded.with_columns(columns), rejected
 
 
+def absurd_imu(imu: Array) -> tuple[Array, Array]:
+    """Return the IMU samples beyond what sensors measure, and the greatest value of each."""
+    sizes = np.abs(np.concatenate([imu["acc"], imu["gyro"]], axis=1))
+    beyond = (sizes[:, :3] > values.ACC_LIMIT).any(axis=1) | (sizes[:, 3:] > values.GYRO_LIMIT).any(axis=1)
+    return imu[beyond], sizes[beyond].max(axis=1, initial=0.0)
+
+
 def keep(samples: Array, bad: Array, reason: Reason, rejected: list[Rejected]) -> Array:
     """Return the samples that are not `bad`, and add the others to `rejected`."""
     if not bad.any():

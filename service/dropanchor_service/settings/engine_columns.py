@@ -8,6 +8,10 @@ import numpy as np
 from dropanchor_schemas.site import Anchor, TagSettings
 from dropanchor_service.estimation.columns import ANCHOR, Array, HeadingSource, Motion, default_settings
 
+ACC_UNITS = {"m/s2": 1.0, "g": 9.80665, "mg": 0.00980665}
+GYRO_UNITS = {"rad/s": 1.0, "deg/s": math.pi / 180.0}
+RANGE_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+
 
 def anchor_columns(anchors: Sequence[Anchor]) -> Array:
     """Return one ANCHOR per anchor, in order."""
@@ -33,6 +37,9 @@ def tag_columns(tag: TagSettings, declination_rad: float) -> Array:
     columns["magnetometer_calibrated"] = tag.magnetometer_calibrated
     columns["declination"] = declination_rad
     columns["motion"] = Motion[tag.motion.upper()]
+    columns["acc_factor"] = ACC_UNITS[tag.acc_unit] * (-1.0 if tag.acc_reversed else 1.0)
+    columns["gyro_factor"], columns["range_factor"] = GYRO_UNITS[tag.gyro_unit], RANGE_UNITS[tag.range_unit]
+    columns["acc_sign_told"] = tag.acc_reversed is not None
     if tag.start is not None:
         columns["start_known"] = True
         columns["start_x"], columns["start_y"] = tag.start.x, tag.start.y

@@ -11,6 +11,7 @@ from dropanchor_schemas import kinds
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.arrivals import Arrivals
+from dropanchor_service.store.findings import SensorFindings
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.records import enlarged, take
 
@@ -80,6 +81,7 @@ class Rows:
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
+        self.findings = SensorFindings()
         self.online_until = OnlineUntil()
 
     def __len__(self) -> int:
