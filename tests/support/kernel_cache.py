@@ -22,7 +22,7 @@ def use_cache_of_these_sources() -> None:
     package = ROOT / "service" / "dropanchor_service"
     sources = [
         source
-        for name in ("estimation/fleet", "ingest/kernels", "answers/kernels", "zones")
+        for name in ("estimation", "ingest/kernels", "answers/kernels", "zones")
         for source in sorted((package / name).rglob("*.py"))
     ]
     digest = hashlib.sha256(

@@ -7,6 +7,7 @@ const REQUEST_MS = 3000;
 const REQUEST_MS_PER_TAG = 5;
 
 /** @typedef {{offset_s: number, uncertainty_s: number}} Offset */
+/** @typedef {{reason: string, hint: string, setting: Record<string, string | boolean> | null}} Care */
 
 /**
  * @typedef {object} TagStatus as in the contract, as far as the page needs it
@@ -18,7 +19,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {string | null} unknown_anchor an anchor that the tag ranges to although the site does not have it
  * @property {Health | null} health what the tag reports about itself
  * @property {(Offset & {from_motion: Offset | null}) | null} clock_offset of motion, ahead of the ranges
- * @property {{reason: string, hint: string}[]} needs_care what a person should do for the tag
+ * @property {Care[]} needs_care what a person should do for the tag
  * @property {{height_m: number, name: string, group: string, colour: string | null}} settings
  */
 

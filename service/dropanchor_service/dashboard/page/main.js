@@ -50,6 +50,7 @@ const chips = new StateChips(byId("chips"), fleet, choice);
 const care = new CareChip(/** @type {HTMLButtonElement} */ (byId("care")), byId("care-count"), roster, choice);
 const detail = new Detail(byId("detail"), fleet, roster, choice, evidence);
 const setup = new Setup(map, fleet, roster, choice, connection);
+detail.changes = setup.changes;
 const plans = new Plans(map, roster, choice, connection, setup);
 const basemap = new Basemap(map, connection, byId("basemap"), byId("attribution"));
 const notices = new Notices(connection, fleet);

@@ -15,6 +15,8 @@ import { symbol } from "../map/symbols.js";
 export class Detail {
   /** Direction of the x axis, counter-clockwise from east. */
   #rotation_rad = 0;
+  /** How settings are changed; null until the page knows. @type {import("../data/changes.js").Changes | null} */
+  changes = null;
 
   /** @param {HTMLElement} panel @param {Fleet} fleet @param {import("../data/roster.js").Roster} roster
    * @param {import("../page/choice.js").Choice} choice @param {import("../data/evidence.js").Evidence} evidence */
@@ -117,7 +119,7 @@ export class Detail {
   /** @param {string} tag */
   #health(tag) {
     const status = this.roster.of(tag);
-    fillList(this.#part("care"), (status?.needs_care ?? []).map(({ hint }) => said(hint)));
+    this.#care(tag, status?.needs_care ?? []);
     const box = this.#part("health");
     const texts = status?.health ? healthTexts(status.health) : [];
     if (status?.clock_offset) texts.push([t("health.motion_clock"), clockText(status.clock_offset)]);
@@ -132,6 +134,35 @@ export class Detail {
       pair.append(Object.assign(document.createElement("dd"), { textContent: text }));
       return pair;
     }));
+  }
+
+  /** List what a person should do, with a button where a setting of the tag does it.
+   * @param {string} tag @param {import("../data/roster.js").Care[]} cares */
+  #care(tag, cares) {
+    const list = this.#part("care");
+    list.hidden = cares.length === 0;
+    const mayWrite = this.changes?.mayWrite ?? false;
+    const shown = JSON.stringify([tag, cares, mayWrite]);
+    if (list.dataset.shown === shown) return;
+    list.dataset.shown = shown;
+    list.replaceChildren(...cares.map(({ hint, setting }) => {
+      const item = Object.assign(document.createElement("li"), { textContent: said(hint) });
+      if (setting && mayWrite) item.append(" ", this.#acceptButton(tag, setting));
+      return item;
+    }));
+  }
+
+  /** @param {string} tag @param {Record<string, string | boolean>} setting */
+  #acceptButton(tag, setting) {
+    const what = t("care.accepted", { tag, setting: settingText(setting) });
+    const button = Object.assign(document.createElement("button"), { type: "button", className: "accept", textContent: t("care.accept", { setting: settingText(setting) }) });
+    button.addEventListener("click", () => this.#accept(what, `tags/${encodeURIComponent(tag)}/settings`, setting));
+    return button;
+  }
+
+  /** @param {string} what @param {string} path @param {Record<string, string | boolean>} setting */
+  async #accept(what, path, setting) {
+    await this.changes?.edit(what, path, setting, await this.changes.read(path), () => this.update());
   }
 
   /** @param {number} row */
@@ -167,6 +198,9 @@ function countsInto(list, title, byName) {
   const counts = Object.entries(byName ?? {}).sort((a, b) => b[1] - a[1]);
   fillList(list, counts.length === 0 ? [] : [title, ...counts.map(([name, number]) => `${words(name)} ${count(number)}`)]);
 }
+
+/** @param {Record<string, string | boolean>} setting */
+const settingText = (setting) => Object.entries(setting).map(([name, value]) => `${name} = ${value}`).join(", ");
 
 /** @param {HTMLElement} list @param {string[]} texts */
 function fillList(list, texts) {

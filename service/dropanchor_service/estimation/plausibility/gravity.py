@@ -48,7 +48,7 @@ def judge_gravity(c: Check, acc: Vector, seconds: float, acc_same_s: float, gyro
     """
     length = norm(acc)
     stuck = acc_same_s > STUCK_S and gyro_same_s < ALIVE_S and length > 0.0
-    first = c.known_s == 0.0
+    first, was_right = c.known_s == 0.0, c.right_s > 0.0
     wrong = length < LEAST or length > MOST
     c.known_s += seconds
     c.norm += (length - c.norm) * seconds / min(c.known_s, SLOW_S)
@@ -59,20 +59,27 @@ def judge_gravity(c: Check, acc: Vector, seconds: float, acc_same_s: float, gyro
     c.right_s = 0.0 if wrong or stuck else c.right_s + seconds
     if stuck:
         return ACC_STUCK
-    of_unit = ACC_IN_G <= c.imu_verdict <= ACC_SILENT
-    if may_be_used(c.imu_verdict) and (c.wrong_s >= WRONG_S or (wrong and first)):
-        c.known_s, c.norm = seconds, length
-        for i in range(3):
-            c.level[i] = acc[i]
-        return _unit(c)
     within = SLOW_LEAST < c.norm < SLOW_MOST
-    if may_be_used(c.imu_verdict) and c.known_s > SLOW_S and not within:
-        return _unit(c)
-    if of_unit or c.imu_verdict == ACC_STUCK:
-        if c.right_s >= RIGHT_S and within:
-            return GOOD
-        return _unit(c) if of_unit else ACC_STUCK
-    return int(c.imu_verdict)
+    if may_be_used(c.imu_verdict):
+        if c.wrong_s >= WRONG_S or (wrong and first):
+            _restart_means(c, acc, seconds)
+            return _unit(c)
+        return int(c.imu_verdict) if within or c.known_s <= SLOW_S else _unit(c)
+    if not ACC_IN_G <= c.imu_verdict <= ACC_STUCK:
+        return int(c.imu_verdict)
+    if c.right_s > 0.0:
+        if not was_right:  # what was wrong before says no more
+            _restart_means(c, acc, seconds)
+        return GOOD if c.right_s >= RIGHT_S and within else int(c.imu_verdict)
+    return ACC_STUCK if c.imu_verdict == ACC_STUCK else _unit(c)
+
+
+@njit(nogil=True)
+def _restart_means(c: Check, acc: Vector, seconds: float) -> None:
+    """Begin the slow means with this block."""
+    c.known_s, c.norm = seconds, norm(acc)
+    for i in range(3):
+        c.level[i] = acc[i]
 
 
 @njit(nogil=True)

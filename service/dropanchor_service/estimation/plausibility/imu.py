@@ -46,7 +46,9 @@ def _fill_block(c: Check, imu: Array, first: int, end: int) -> int:
     t_ns, i = c.t_ns, first
     acc_ns, gyro_ns = c.acc_ns, c.gyro_ns
     ax, ay, az, gx, gy, gz = c.last[0], c.last[1], c.last[2], c.last[3], c.last[4], c.last[5]
-    sum_ax = sum_ay = sum_az = sum_gx = sum_gy = sum_gz = sum_mx = sum_my = sum_mz = 0.0
+    sum_ax, sum_ay, sum_az = c.acc[0], c.acc[1], c.acc[2]
+    sum_gx, sum_gy, sum_gz = c.gyro[0], c.gyro[1], c.gyro[2]
+    sum_mx, sum_my, sum_mz = c.mag[0], c.mag[1], c.mag[2]
     last_ns = c.begin_ns + BLOCK_NS
     while i < end:
         sample = imu[i]
@@ -73,17 +75,10 @@ def _fill_block(c: Check, imu: Array, first: int, end: int) -> int:
     c.t_ns, c.acc_ns, c.gyro_ns = t_ns, acc_ns, gyro_ns
     c.n += i - first
     c.last[0], c.last[1], c.last[2], c.last[3], c.last[4], c.last[5] = ax, ay, az, gx, gy, gz
-    _add(c.acc, sum_ax, sum_ay, sum_az)
-    _add(c.gyro, sum_gx, sum_gy, sum_gz)
-    _add(c.mag, sum_mx, sum_my, sum_mz)
+    c.acc[0], c.acc[1], c.acc[2] = sum_ax, sum_ay, sum_az
+    c.gyro[0], c.gyro[1], c.gyro[2] = sum_gx, sum_gy, sum_gz
+    c.mag[0], c.mag[1], c.mag[2] = sum_mx, sum_my, sum_mz
     return i
-
-
-@njit(nogil=True)
-def _add(sums: Array, x: float, y: float, z: float) -> None:
-    sums[0] += x
-    sums[1] += y
-    sums[2] += z
 
 
 @njit(nogil=True)
@@ -168,7 +163,7 @@ def _settle(c: Check, verdict: int) -> None:
     if verdict == c.imu_verdict:
         return
     if may_be_used(verdict) != may_be_used(c.imu_verdict):
-        c.tilted = c.contradicted = c.turned = c.peak = 0.0
+        c.tilted = c.contradicted = c.turned = c.peak = c.doubted_s = 0.0
         c.upside_s = c.upside_s if verdict != GOOD else 0.0
         c.dip_s = c.left = c.left_rate = 0.0
         c.moved = c.field_blocks = 0

@@ -54,6 +54,7 @@ CHECK = np.dtype(
         ("told_turn", "f8"),  # rad, since then
         ("tilted", "f4"),  # rad², sum of what the gyroscope told
         ("contradicted", "f4"),  # rad², sum of what gravity contradicted
+        ("doubted_s", "f4"),  # for which a contradiction still lets the axes be doubted
         ("turned", "f4"),  # rad, without a contradiction since the last one
         ("peak", "f4"),  # rad/s
         ("rates", "f4", 3),  # rad², by axis, of what was contradicted

@@ -19,10 +19,11 @@ CALM = (9.0, 10.6)  # m/s², norms at which an acceleration is hardly more than 
 LONGEST_S, LONGEST_TURN = 5.0, 3.0  # s, rad, between two calm blocks that are compared
 TILT: Final = 0.2  # rad, between two calm blocks
 MOSTLY: Final = 0.7  # of the turn is tilting
-STILL: Final = 0.4  # of what the gyroscope tells, if gravity hardly moves at all
+STILL: Final = 0.25  # of what the gyroscope tells, if gravity hardly moves at all
 AT_MOST: Final = 0.5  # rad², that one comparison counts for
 ENOUGH: Final = 0.2  # rad²
 CONTRADICTED, AGREED = 0.6, 0.4  # share of the tilting
+DOUBTED_S: Final = 10.0  # after gravity has stayed where it was although the gyroscope told a tilt
 TURNED_WELL: Final = 2.0  # rad, without a contradiction
 FORGET_S: Final = 60.0
 PEAK_S: Final = 30.0
@@ -32,10 +33,11 @@ FIELD_TURN = (0.1, 1.5)  # rad, of a block that tells how the field turns
 FIELD_BLOCKS: Final = 4
 FIELD_KEPT: Final = 0.98
 FIELD_EXPLAINED: Final = 0.7  # share of the changes of the field
-FIELD_SURE, FIELD_DOUBTED = 8.0, 4.0  # standard deviations
+FIELD_SURE, FIELD_DOUBTED = 8.0, 5.0  # standard deviations
 OPPOSITE, SAME = -0.4, 0.5
 
-AXES_DIFFER, GYRO_IN_DEG = int(ImuVerdict.AXES_DIFFER), int(ImuVerdict.GYRO_IN_DEG)
+AXES_DIFFER, AXES_DOUBTED = int(ImuVerdict.AXES_DIFFER), int(ImuVerdict.AXES_DOUBTED)
+GYRO_IN_DEG = int(ImuVerdict.GYRO_IN_DEG)
 TURNS_DIFFER, TURNS_DOUBTED = int(ImuVerdict.TURNS_DIFFER), int(ImuVerdict.TURNS_DOUBTED)
 
 
@@ -66,6 +68,9 @@ def judge_turning(c: Check, acc: Vector, gyro: Vector, n: int, seconds: float, a
     if c.tilted > ENOUGH and c.contradicted > CONTRADICTED * c.tilted:
         c.imu_detail = _greatest(c.rates)
         return GYRO_IN_DEG if c.peak > FAST else AXES_DIFFER
+    c.doubted_s = max(0.0, c.doubted_s - seconds)
+    if c.imu_verdict in (GOOD, AXES_DOUBTED):
+        return AXES_DOUBTED if c.doubted_s > 0.0 else GOOD
     return int(c.imu_verdict)
 
 
@@ -110,12 +115,14 @@ def _add_tilt(c: Check, turn: Vector, tilt: float, shown: float, error: float) -
         if c.told_turn > 0.5 * TILT:
             c.turned += c.told_turn
         return
-    counted = (2.0 if shown < STILL * tilt else 1.0) * min(tilt * tilt, AT_MOST)
+    still = shown < STILL * tilt
+    counted = (2.0 if still else 0.5) * min(tilt * tilt, AT_MOST)
     share = (error / tilt) ** 2
     c.tilted += counted
     c.contradicted += counted * min(share, 2.0)
     if share > CONTRADICTED:
         c.turned = 0.0
+        c.doubted_s = DOUBTED_S if still else c.doubted_s
         for i in range(3):
             c.rates[i] += turn[i] * turn[i]
 

@@ -26,6 +26,7 @@ class ImuVerdict(IntEnum):
     # from here on doubts: the samples are used, but the track is not believed
     UPSIDE_DOWN = 13
     TURNS_DOUBTED = 14
+    AXES_DOUBTED = 15
 
 
 class RangeVerdict(IntEnum):
@@ -78,6 +79,7 @@ IMU_SENTENCES = {
     ImuVerdict.AXES_DIFFER: f"The gyroscope turns about its {{0}} axis, but gravity does not follow: {_IN_ONE_ORDER}",
     ImuVerdict.TURNS_DIFFER: f"The gyroscope and the magnetometer turn in different ways: {_IN_ONE_ORDER}",
     ImuVerdict.TURNS_DOUBTED: f"The gyroscope and the magnetometer seem to turn in different ways: {_IN_ONE_ORDER}",
+    ImuVerdict.AXES_DOUBTED: f"The gyroscope turns about an axis that gravity does not follow: {_IN_ONE_ORDER}",
     ImuVerdict.RAW_COUNTS: "The IMU's values are beyond what such sensors measure ({0} along one axis): they look "
     "like raw counts, so multiply them by the scale of the data sheet (m/s², rad/s, µT).",
 }

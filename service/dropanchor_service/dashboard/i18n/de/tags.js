@@ -28,6 +28,8 @@ export default {
   "care.needs": "Zu prüfen",
   "care.what": "Tags, um die sich jemand kümmern sollte. Klicken zeigt nur diese.",
   "care.list": "Was dieses Tag braucht",
+  "care.accept": "{setting} setzen",
+  "care.accepted": "{tag}: {setting} gesetzt.",
   "table.elsewhere": "{tag}, auf einem anderen Stockwerk",
   "table.how": "Tags. Pfeiltasten bewegen, Enter wählt aus.",
   "table.tag": "Tag",

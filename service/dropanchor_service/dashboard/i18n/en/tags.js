@@ -28,6 +28,8 @@ export default {
   "care.needs": "Needs care",
   "care.what": "Tags that a person should look after. Click to show only these.",
   "care.list": "What this tag needs",
+  "care.accept": "Set {setting}",
+  "care.accepted": "{tag}: {setting} set.",
   "table.elsewhere": "{tag}, on another floor",
   "table.how": "Tags. Arrow keys move, Enter selects.",
   "table.tag": "Tag",

@@ -1,0 +1,217 @@
+"""The check of the sensors names what is wrong with them, and finds nothing where nothing is."""
+
+import csv
+import gzip
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dropanchor_service.estimation.columns import IMU, RANGE, Array, SampleBatch, State, StateReason
+from dropanchor_service.estimation.plausibility.check import SensorCheck
+from support.recordings import recording_or_skip
+from support.sensor_faults import (
+    FAULTS,
+    GRAVITY,
+    T0_NS,
+    beyond,
+    cut,
+    of_imu,
+    run_of,
+    samples_of,
+    tracked,
+    verdicts_of,
+)
+
+SCENARIOS = ("S5", "M5", "C5", "OU", "L1", "SG", "RV", "rolling", "forklift", "hand", "pocket", "turned")
+RECORDINGS = (
+    *("cf_circle_xy", "cf_sine_xyz", "hanyang_losB4", "hanyang_nlosA2", "iasl_s1", "iasl_s3", "inrol_1", "inrol_2"),
+    *("mower", "plaza2", "rtt_canteen_2_213", "rtt_laboratory_1_113", "rtt_library_2_213"),
+    *("starloc_fast_s1_tag1", "starloc_fast_s1_tag2", "tiers_B", "tiers_D"),
+    *(f"phones/ms0{walk}_{how}" for walk in range(8) for how in ("front", "rot", "turn")),
+)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("scenario", ["M5", "OU", "forklift"])
+def test_each_fault_is_named(fault: str, scenario: str) -> None:
+    imu, ranges = samples_of(run_of(scenario, 47_000))
+    change, names = FAULTS[fault]
+    change(imu, ranges)
+    assert verdicts_of(imu, ranges).found[-1][1] == names
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("noise", ["calibrated", "real", "released", "paper"])
+def test_good_sensors_get_no_verdict(scenario: str, noise: str) -> None:
+    for seed in range(47_100, 47_103):
+        assert verdicts_of(*samples_of(run_of(scenario, seed, noise))).found == []
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_no_recording_gets_a_verdict(name: str) -> None:
+    folder = recording_or_skip(name)
+    imu, of_anchors = _imu(folder), _ranges(folder)
+    for ranges in of_anchors:
+        assert verdicts_of(imu if len(imu) else _still(ranges), ranges).found == []
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_tag_whose_sensors_are_wrong_is_never_far_off_while_tracking(fault: str) -> None:
+    run = run_of("OU", 47_200)
+    imu, ranges = samples_of(run)
+    FAULTS[fault][0](imu, ranges)
+    checked = tracked(imu, ranges, run, start_known=False)
+    assert beyond(checked.poses, run)[1] == 0
+    assert checked.poses[-1]["reason"] == StateReason.SENSOR_FAULT
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_told_start_is_believed_for_seconds_at_most(fault: str) -> None:
+    """Axes and signs show in the first turn, and until then the told start and the ranges hold the track."""
+    run = run_of("forklift", 47_200)
+    imu, ranges = samples_of(run)
+    FAULTS[fault][0](imu, ranges)
+    checked = tracked(imu, ranges, run, start_known=True)
+    assert beyond(checked.poses, run)[1] <= 50  # 5 s
+    assert checked.poses[-1]["reason"] == StateReason.SENSOR_FAULT
+
+
+def test_the_check_does_not_touch_a_tag_with_good_sensors() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_201))
+    check = SensorCheck()
+    assert all(check.check(batch).samples is batch for batch in cut(imu, ranges, 0.2))
+
+
+@pytest.mark.parametrize("fault", ["accelerations in g", "reversed accelerations", "rates about z, y, x"])
+def test_a_fault_may_begin_and_end_within_a_run(fault: str) -> None:
+    imu, ranges = samples_of(run_of("M5", 47_202))
+    good = imu.copy()
+    FAULTS[fault][0](imu, ranges)
+    during = (imu["t_ns"] > T0_NS + 20 * 10**9) & (imu["t_ns"] < T0_NS + 45 * 10**9)
+    imu[~during] = good[~during]
+    found = verdicts_of(imu, ranges, step_s=0.5).found
+    assert any(FAULTS[fault][1] <= names for _, names in found)
+    assert 20.0 < found[0][0] < 45.0
+    assert found[-1][1] == set()
+
+
+def test_verdicts_do_not_depend_on_how_samples_are_cut_into_batches() -> None:
+    imu, ranges = samples_of(run_of("forklift", 47_203))
+    FAULTS["rates about z, y, x"][0](imu, ranges)
+    checks = [SensorCheck() for _ in range(3)]
+    for check, step_s in zip(checks, (0.05, 0.7, 1000.0), strict=True):
+        verdicts_of(imu, ranges, step_s, check)
+    assert len({check.columns[:1].tobytes() for check in checks}) == 1
+
+
+def test_a_neighbour_with_wrong_sensors_changes_nothing() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_204))
+    wrong_imu, wrong_ranges = imu.copy(), ranges.copy()
+    FAULTS["accelerations in g"][0](wrong_imu, wrong_ranges)
+    wrong_imu["row"] = wrong_ranges["row"] = 1
+    check = SensorCheck()
+    kept = []
+    for own, other in zip(cut(imu, ranges, 0.5), cut(wrong_imu, wrong_ranges, 0.5), strict=True):
+        both = SampleBatch(np.concatenate([own.imu, other.imu]), np.concatenate([own.ranges, other.ranges]))
+        kept.append(check.check(both).samples)
+    assert np.concatenate([batch.imu[batch.imu["row"] == 0] for batch in kept]).tobytes() == imu.tobytes()
+    assert not any((batch.imu["row"] == 1).any() for batch in kept[2:])
+
+
+def test_a_tag_that_really_hangs_upside_down_is_no_fault() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_205))
+    turned = of_imu(
+        "acc", lambda v: v * (1, -1, -1), ("gyro", lambda v: v * (1, -1, -1)), ("mag", lambda v: v * (1, -1, -1))
+    )
+    turned(imu, ranges)
+    assert verdicts_of(imu, ranges).found == []
+
+
+def test_upside_down_without_a_field_is_doubted_until_turns_show_which_it_is() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_206))
+    of_imu("acc", lambda v: v * (1, -1, -1), ("gyro", lambda v: v * (1, -1, -1)))(imu, ranges)
+    imu["mag"] = np.nan
+    assert [names for _, names in verdicts_of(imu, ranges).found] == [{"upside_down"}, set()]
+
+
+def test_doubted_sensors_leave_the_pose_but_not_the_state() -> None:
+    run = run_of("OU", 47_207)
+    imu, ranges = samples_of(run)
+    FAULTS["ranges that a module averages"][0](imu, ranges)
+    poses = tracked(imu, ranges, run, start_known=True).poses
+    last = poses[-100:]
+    assert set(last["state"].tolist()) <= {State.DEGRADED, State.AMBIGUOUS, State.COASTING}
+    assert np.isfinite(last["x"]).all()
+
+
+def test_values_beyond_all_sensors_look_like_raw_counts() -> None:
+    check = SensorCheck()
+    rows = np.zeros(30, np.int32)
+    check.note_absurd(rows, np.full(30, 16384.0), rows[:0])
+    (found,) = check.findings(0)
+    assert found.name == "raw_counts"
+    assert "16384" in found.sentence
+
+
+def test_ranges_beyond_all_radios_look_like_millimetres() -> None:
+    check = SensorCheck()
+    check.note_absurd(np.empty(0, np.int32), np.empty(0), np.zeros(20, np.int32))
+    assert [found.setting for found in check.findings(0)] == [("range_unit", "mm")]
+
+
+def test_a_verdict_that_was_restored_still_holds() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_208))
+    FAULTS["accelerations in g"][0](imu, ranges)
+    first, second = SensorCheck(), SensorCheck()
+    batches = list(cut(imu, ranges, 1.0))
+    for batch in batches[:5]:
+        first.check(batch)
+    second.columns = first.columns.copy()
+    assert not any(len(column) for column in second.check(batches[5]).samples.columns())
+    assert second.findings(0) == first.findings(0)
+
+
+def test_a_sentence_says_what_to_multiply_by() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_209))
+    FAULTS["accelerations in g"][0](imu, ranges)
+    check = SensorCheck()
+    verdicts_of(imu, ranges, check=check)
+    (found,) = check.findings(0)
+    assert str(GRAVITY) in found.sentence
+    assert found.setting == ("acc_unit", "g")
+
+
+def _table(path: Path) -> Iterator[dict[str, str]]:
+    with gzip.open(path, "rt") as file:
+        yield from csv.DictReader(file)
+
+
+def _imu(folder: Path) -> Array:
+    path = folder / "imu.csv.gz"
+    rows = list(_table(path)) if path.exists() else []
+    imu = np.zeros(len(rows), IMU)
+    if not rows:
+        return imu
+    imu["t_ns"] = [round(float(row["t_s"]) * 1e9) + T0_NS for row in rows]
+    for name, columns in (("acc", "ax ay az"), ("gyro", "gx gy gz"), ("mag", "mx my mz")):
+        imu[name] = [[float(row.get(column) or "nan") for column in columns.split()] for row in rows]
+    return imu
+
+
+def _ranges(folder: Path) -> Iterator[Array]:
+    rows = list(_table(folder / "range.csv.gz"))
+    for anchor in {row["anchor_id"] for row in rows}:
+        of_anchor = [row for row in rows if row["anchor_id"] == anchor]
+        ranges = np.zeros(len(of_anchor), RANGE)
+        ranges["t_ns"] = [round(float(row["t_s"]) * 1e9) + T0_NS for row in of_anchor]
+        ranges["range"] = [float(row["range_m"]) for row in of_anchor]
+        yield ranges
+
+
+def _still(ranges: Array) -> Array:
+    """Return one IMU sample for a recording that has none."""
+    imu = np.zeros(1, IMU)
+    imu["t_ns"], imu["acc"] = ranges["t_ns"][0], (0.0, 0.0, GRAVITY)
+    return imu
