@@ -1,5 +1,6 @@
 """What the modules print that are patterns, as their makers and users document it, and how each behaves at a port."""
 
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -15,16 +16,16 @@ class PatternExample(NamedTuple):
     options: tuple[str, ...] = ()
 
 
-def asked(command: str, text: str) -> Answer:
-    """Return a module that measures once for each of these commands."""
-    received = ""
+def asked(command: str, *texts: str) -> Answer:
+    """Return a module that prints one of these texts after the other, one for each of these commands."""
+    received, turn = "", itertools.cycle(texts)
 
     def answer(sent: bytes) -> bytes:
         nonlocal received
         received += sent.decode("latin-1")
         count = received.count(f"{command}\r\n")
         received = received.rpartition("\r\n")[2]
-        return f"OK\r\n{text}\r\n".encode() * count
+        return "".join(f"OK\r\n{next(turn)}\r\n" for _ in range(count)).encode()
 
     return answer
 
@@ -51,7 +52,9 @@ PATTERN_EXAMPLES = {
         [("an0:0.55m", [("0", 0.55)]), ("an1:12.40m", [("1", 12.40)])], lambda: talkative("an0:0.55m")
     ),
     "bu03": PatternExample(
-        [(BU03, [(0, 1.234)]), ("distance:2 0.530000", [("2", 0.53)])], lambda: asked("AT+DISTANCE", BU03)
+        [(BU03, [(0, 1.234)]), ("distance:2 0.530000", [("2", 0.53)])],
+        lambda: asked("AT+DISTANCE", BU03, BU03, "distance: 1.234400"),
+        ("--module", "bu03"),
     ),
     "reyax": PatternExample(
         [(REYAX, [("TAG1", 0.53)]), ("+ANCHOR_RCV=DAVID123,5,HELLO,40 cm,-72", [("DAVID123", 0.40)])],

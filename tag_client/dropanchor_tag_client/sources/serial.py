@@ -38,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tag", help="id of the tag (default: the one of --credentials)")
     parser.add_argument(
         "--module",
+        type=_module_name,
         default=_AUTO,
         metavar="NAME|FILE",
         help=f"{', '.join(MODULES)}, a file NAME.toml with patterns, or auto: listen and find out (default: auto)",
@@ -132,12 +133,14 @@ def _module(arguments: argparse.Namespace) -> Module | None:
         return module_of_patterns(arguments.pattern)
     if name == _AUTO:
         return None
-    if name.endswith(SUFFIX):
-        return module_of_file(Path(name))
-    if name not in MODULES:
-        hint = did_you_mean(name, MODULES) or f"; there are {', '.join(MODULES)}"
-        raise ValueError(f"--module {name}: no module is called so, and no file ends so{hint}")
-    return MODULES[name]
+    return module_of_file(Path(name)) if name.endswith(SUFFIX) else MODULES[name]
+
+
+def _module_name(text: str) -> str:
+    if text != _AUTO and text not in MODULES and not text.endswith(SUFFIX):
+        hint = did_you_mean(text, MODULES) or f"; there are {', '.join(MODULES)}, and files NAME{SUFFIX}"
+        raise argparse.ArgumentTypeError(f"no module is called {text}{hint}")
+    return text
 
 
 def _check(arguments: argparse.Namespace) -> None:

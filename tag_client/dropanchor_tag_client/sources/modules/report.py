@@ -28,6 +28,7 @@ class Drop(StrEnum):
     ANCHOR_TO_ANCHOR = "anchor_to_anchor"
     OTHER_FRAME = "other_frame"
     WITHOUT_RANGE = "without_range"
+    REPEATED = "repeated"
 
 
 class Dropped(Counter[Drop]):

@@ -12,8 +12,8 @@ _INTERVAL_S, _MAX_INTERVAL_S = 1.0, 60.0
 _NO_ANCHOR_AFTER_S = 2.0
 _MAX_PENDING = 32
 
-_EXPECTED = {Drop.UNCORRECTED, Drop.ANCHOR_TO_ANCHOR, Drop.WITHOUT_RANGE}
-_HEARD = (Drop.NEGATIVE, Drop.ABSURD, Drop.NO_ANSWER, Drop.DAMAGED, Drop.ANCHOR_TO_ANCHOR)
+_EXPECTED = {Drop.UNCORRECTED, Drop.ANCHOR_TO_ANCHOR, Drop.WITHOUT_RANGE, Drop.REPEATED}
+_HEARD = (Drop.NEGATIVE, Drop.ABSURD, Drop.NO_ANSWER, Drop.DAMAGED, Drop.REPEATED)
 _HINTS = {
     Drop.NEGATIVE: "distances below zero: calibrate the module's antenna delay",
     Drop.ABSURD: "not a distance: an overflow, or the mark of a measurement that failed",

@@ -59,9 +59,10 @@ def test_a_parser_finds_its_way_again_after_garbage(
 ) -> None:
     tried = parser()
     tried.feed(garbage + b"\r\n")
-    for _ in range(25):  # a false length may hold back 1,024 bytes of what follows
-        found = parsed(tried, text)
-    assert found[-1:] == [expected]
+    found = [parsed(tried, text) for _ in range(25)]  # a false length may hold back 1,024 bytes of what follows
+    again: Pairs = [] if tried.dropped[Drop.REPEATED] else expected
+    assert found[-1][-1:] == [again]
+    assert [expected] in found
 
 
 def test_a_tag_that_a_line_names_goes_with_each_range() -> None:

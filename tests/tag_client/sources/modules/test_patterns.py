@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from dropanchor_tag_client.sources.modules.patterns.fields import PatternError
 from dropanchor_tag_client.sources.modules.patterns.files import module_of_file
 from dropanchor_tag_client.sources.modules.patterns.parser import Patterns, pattern
@@ -97,6 +98,13 @@ def test_a_number_that_is_no_distance_is_counted_under_its_reason(line: str, rea
     assert [one for report in reports for one in report.ranges] == []
 
 
+def test_a_measurement_that_a_module_prints_again_counts_once() -> None:
+    parser = MODULES["bu03"].parser()
+    reports = parser.feed(b"distance: 1.25\r\nOK\r\ndistance: 1.25\r\nOK\r\ndistance: 1.26\r\n")
+    assert [one.range_m for report in reports for one in report.ranges] == [1.25, 1.26]
+    assert parser.dropped[Drop.REPEATED] == 1
+
+
 @pytest.mark.parametrize(
     ("text", "problem", "place"),
     [
@@ -137,6 +145,7 @@ def test_a_mistake_in_a_pattern_is_named_and_its_place_shown(text: str, problem:
         ('patterns = ["d {range:m}"]\nbaud_rate = 1', 'there is no key "baud_rate"; known are patterns'),
         ('patterns = ["d {range:m}"]\nbaud = "fast"', "baud is 'fast', a whole number such as 115200 was expected"),
         ('patterns = ["d {range:m}"]\npoll = "AT"', "poll is 'AT', a list of texts was expected"),
+        ('patterns = ["d {range:m}"]\nrepeats = 1', "repeats is 1, true or false was expected"),
         ('patterns = ["d {range}"]', '"range" needs its unit'),
     ],
 )

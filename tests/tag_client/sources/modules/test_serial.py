@@ -205,12 +205,22 @@ def test_wrong_arguments_are_refused_with_what_to_do(tmp_path: Path, capsys: pyt
         (["serial", "x", "--tag", "a", "--as-anchor", "7"], "--as-anchor needs --tag-from-id"),
         (["serial", "x", "--tag", "a", "--up", "x"], "must be different axes"),
         (["serial", str(tmp_path), "--tag", "a"], "cannot be used at 115200 baud"),
-        (["serial", "x", "--tag", "a", "--module", "dwm100"], "did you mean dwm1001?"),
         (["serial", "x", "--tag", "a", "--module", "none.toml"], "none.toml cannot be read: No such file"),
         (["serial", "x", "--tag", "a", "--module", "bu01", "--pattern", "{range:m}"], "leave out --module"),
         (["serial", "x", "--tag", "a", "--pattern", "d={range:mile}"], 'no unit "mile"'),
     ]:
         assert main(arguments) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_the_nearest_module_is_suggested_for_a_name_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, message in [
+        ("dwm101", "no module is called dwm101; did you mean dwm1001?"),
+        ("?", "and files NAME.toml"),
+    ]:
+        with pytest.raises(SystemExit) as ended:
+            main(["serial", "x", "--tag", "a", "--module", name])
+        assert ended.value.code == 2
         assert message in capsys.readouterr().err
 
 

@@ -14,7 +14,7 @@ _SHIPPED = Path(__file__).parents[1] / "shipped"
 _BAUD = 115_200
 _HINT = "Is an anchor on, and is --baud right?"
 _TEXTS = ("patterns", "ignore", "start", "poll")
-_KEYS = (*_TEXTS, "baud", "hint")
+_KEYS = (*_TEXTS, "repeats", "baud", "hint")
 
 
 def shipped_modules() -> list[Module]:
@@ -40,7 +40,7 @@ def module_of_file(path: Path) -> Module:
 
 def module_of_patterns(texts: list[str]) -> Module:
     """Return a module without a name of its own. Raises ValueError."""
-    return Module("the module of --pattern", _BAUD, _parser(_checked(texts, "--pattern"), ()), (), _HINT)
+    return Module("the module of --pattern", _BAUD, _parser(_checked(texts, "--pattern")), (), _HINT)
 
 
 def _module(path: Path, given: dict[str, Any]) -> Module:
@@ -53,7 +53,9 @@ def _module(path: Path, given: dict[str, Any]) -> Module:
         raise ValueError(f"{path}: baud is {baud!r}, a whole number such as 115200 was expected")
     if not isinstance(hint, str):
         raise ValueError(f"{path}: hint is {hint!r}, a text was expected")
-    parser = _parser(_checked(given["patterns"], str(path)), tuple(ignore))
+    if not isinstance(repeats := given.get("repeats", False), bool):
+        raise ValueError(f"{path}: repeats is {repeats!r}, true or false was expected")
+    parser = _parser(_checked(given["patterns"], str(path)), tuple(ignore), repeats)
     return Module(path.stem, baud, parser, commands(start), hint, commands(poll))
 
 
@@ -62,8 +64,10 @@ def commands(texts: list[str]) -> tuple[bytes, ...]:
     return tuple(text.encode() + b"\r\n" for text in texts)
 
 
-def _parser(patterns: list[Pattern], ignored: tuple[str, ...]) -> Callable[[], Patterns]:
-    return lambda: Patterns(patterns, ignored)
+def _parser(
+    patterns: list[Pattern], ignored: tuple[str, ...] = (), is_repeating: bool = False
+) -> Callable[[], Patterns]:
+    return lambda: Patterns(patterns, ignored, is_repeating=is_repeating)
 
 
 def _checked(texts: list[str], source: str) -> list[Pattern]:

@@ -30,13 +30,18 @@ def pattern(text: str) -> Pattern:
 
 
 class Patterns:
-    """Parse lines by the first pattern that fits. ignored: how lines begin that are known to hold no measurement."""
+    """Parse lines by the first pattern that fits.
 
-    def __init__(self, patterns: Iterable[Pattern], ignored: Iterable[str] = ()) -> None:
+    ignored: how lines begin that are known to hold no measurement. is_repeating: whether the module prints its last
+    measurement again until there is another one; a line that is equal to the one before then measures nothing.
+    """
+
+    def __init__(self, patterns: Iterable[Pattern], ignored: Iterable[str] = (), *, is_repeating: bool = False) -> None:
         self.dropped = Dropped()
         self._lines = Lines(self.dropped)
         self._patterns = tuple(patterns)
         self._ignored = tuple(ignored)
+        self._is_repeating, self._last = is_repeating, ""
 
     def feed(self, data: bytes) -> list[Report]:
         return [one for line in self._lines.feed(data) if (one := self._report(_COLOURS.sub("", line))) is not None]
@@ -44,7 +49,12 @@ class Patterns:
     def _report(self, line: str) -> Report | None:
         for candidate in self._patterns:
             if (found := candidate.found(line)) is not None:
-                return report(candidate.fields, found, self.dropped)
+                repeated = self._is_repeating and line == self._last
+                self._last = line
+                if not repeated:
+                    return report(candidate.fields, found, self.dropped)
+                self.dropped[Drop.REPEATED] += 1
+                return Report(())
         if line.startswith(self._ignored):
             self.dropped[Drop.WITHOUT_RANGE] += 1
         else:
