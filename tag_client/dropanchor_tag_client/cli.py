@@ -80,6 +80,8 @@ _SERIAL_EXAMPLES = """examples:
                                                                         anchor 022E is the site's anchor "yard"
   dropanchor-tag serial /dev/ttyACM0 --tag cart-1 --module dwm3001 --start "INITF -ADDR=0 -PADDR=1"
   dropanchor-tag serial /dev/ttyUSB0 --tag arm-1 --module linktrack --forward=-x --up=y
+  dropanchor-tag serial /dev/ttyUSB0 --tag arm-1 --pattern 'from: {anchor} Range: {range:m} m'
+                                                                        any module that prints lines
   dropanchor-tag serial /dev/ttyUSB0 --tag-from-id --tag cart-          the module is the anchor: tags cart-0, cart-1, …
 
 The command prints the ids of the anchors; configure them in the site under these names. It continues when the module is

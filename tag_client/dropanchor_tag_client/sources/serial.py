@@ -5,7 +5,9 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 
+from dropanchor_tag_client.command_line import did_you_mean
 from dropanchor_tag_client.options import (
     add_anchor_name_option,
     add_calibration_option,
@@ -20,22 +22,43 @@ from dropanchor_tag_client.sources.axes import AXES, mounting
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from dropanchor_tag_client.sources.modules.detect import Arrived
 from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
+from dropanchor_tag_client.sources.modules.module import Module
 from dropanchor_tag_client.sources.modules.outlet import ManyTags, OneTag, Outlet
+from dropanchor_tag_client.sources.modules.patterns.files import SUFFIX, commands, module_of_file, module_of_patterns
 from dropanchor_tag_client.sources.modules.reader import Reader
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
 from dropanchor_tag_client.upkeep import Upkeep
 
 _FLUSH_S = 0.1
+_AUTO = "auto"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("port", metavar="PORT", help="such as /dev/ttyACM0 or /dev/serial/by-id/…; COM3 on Windows")
     parser.add_argument("--tag", help="id of the tag (default: the one of --credentials)")
     parser.add_argument(
-        "--module", choices=["auto", *MODULES], default="auto", help="auto: listen and find out (default: %(default)s)"
+        "--module",
+        type=_module_name,
+        default=_AUTO,
+        metavar="NAME|FILE",
+        help=f"{', '.join(MODULES)}, a file NAME.toml with patterns, or auto: listen and find out (default: auto)",
+    )
+    parser.add_argument(
+        "--pattern",
+        action="append",
+        default=[],
+        metavar="TEXT",
+        help="how a line of the module looks: 'from: {anchor} Range: {range:m}'; may be given several times",
     )
     parser.add_argument("--baud", type=int, help="baud rate (default: as the module is delivered)")
     parser.add_argument("--start", metavar="COMMAND", help="what to send to a module that reports nothing")
+    parser.add_argument(
+        "--poll",
+        action="append",
+        default=[],
+        metavar="COMMAND",
+        help="what to send ten times per second to a module that measures only when asked; may be given several times",
+    )
     add_anchor_name_option(parser, "the module calls")
     gateway = parser.add_argument_group("when the module is an anchor")
     gateway.add_argument(
@@ -55,15 +78,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Publish until interrupted. Raises PortError, ConnectError, ValueError."""
     _check(arguments)
-    log = StatusLog()
-    module = MODULES.get(arguments.module)
-    reader = Reader(arguments.port, module, arguments.baud, arguments.start, log.add)
+    module, log = _module(arguments), StatusLog()
+    reader = Reader(arguments.port, module, arguments.baud, arguments.start, commands(arguments.poll), log.add)
     reports = reader.reports()
     next(reports)  # report a port that cannot be opened before waiting for the router
     try:
         with _outlet(arguments, log) as outlet:
             publish(reader, reports, outlet, log)
     finally:
+        log.write(is_last=True)
         sys.stderr.write(f"{log.summary(reader.dropped)}\n")
     return 0
 
@@ -73,12 +96,14 @@ def publish(reader: Reader, reports: Iterator[Arrived], outlet: Outlet, log: Sta
     clock, flushed_s = DeviceClock(), time.monotonic()
     for arrival_ns, found in reports:
         for report in found:
-            t_ns = arrival_ns if report.device_ms is None else clock.utc_ns(arrival_ns, report.device_ms)
+            t_ns = arrival_ns if report.device_ns is None else clock.utc_ns(arrival_ns, report.device_ns)
             outlet.publish(report, t_ns)
+            log.add_report(report, reader.dropped)
         if time.monotonic() - flushed_s > _FLUSH_S:
             flushed_s = time.monotonic()
             outlet.flush()
             log.add_dropped(reader.dropped)
+            log.write()
 
 
 @contextmanager
@@ -97,6 +122,25 @@ def _outlet(arguments: argparse.Namespace, log: StatusLog) -> Iterator[Outlet]:
         stack.callback(many.close)
         stack.enter_context(Upkeep(many.clients))
         yield many
+
+
+def _module(arguments: argparse.Namespace) -> Module | None:
+    """Return the module that the options name or describe, None to find out. Raises ValueError."""
+    name = arguments.module
+    if arguments.pattern:
+        if name != _AUTO:
+            raise ValueError("--pattern describes the module: leave out --module")
+        return module_of_patterns(arguments.pattern)
+    if name == _AUTO:
+        return None
+    return module_of_file(Path(name)) if name.endswith(SUFFIX) else MODULES[name]
+
+
+def _module_name(text: str) -> str:
+    if text != _AUTO and text not in MODULES and not text.endswith(SUFFIX):
+        hint = did_you_mean(text, MODULES) or f"; there are {', '.join(MODULES)}, and files NAME{SUFFIX}"
+        raise argparse.ArgumentTypeError(f"no module is called {text}{hint}")
+    return text
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -84,4 +84,4 @@ def test_a_command_that_is_wrong_is_not_installed(capsys: pytest.CaptureFixture[
     with pytest.raises(SystemExit) as end:
         main(["install", "serial", "/dev/ttyACM0", "--module", "nonsense"])
     assert end.value.code == 2
-    assert "invalid choice" in capsys.readouterr().err
+    assert "no module is called nonsense" in capsys.readouterr().err

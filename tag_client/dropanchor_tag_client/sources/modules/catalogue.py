@@ -1,29 +1,12 @@
-"""The supported modules: how to reach each of them, and how to start its reports."""
-
-from collections.abc import Callable
-from typing import NamedTuple
+"""The supported modules: those that need a parser of their own, and those that are a pattern."""
 
 from dropanchor_tag_client.sources.modules.dwm1001 import Dwm1001
 from dropanchor_tag_client.sources.modules.dwm3001 import Dwm3001
 from dropanchor_tag_client.sources.modules.linktrack import LinkTrack
 from dropanchor_tag_client.sources.modules.makerfabs import Makerfabs
-from dropanchor_tag_client.sources.modules.report import Parser
+from dropanchor_tag_client.sources.modules.module import Module
+from dropanchor_tag_client.sources.modules.patterns.files import shipped_modules
 from dropanchor_tag_client.sources.modules.trek1000 import Trek1000
-
-
-class Module(NamedTuple):
-    """A supported module.
-
-    baud: as delivered. start_commands: written to a silent module, one per second. hint: what its owner can do if it
-    stays silent.
-    """
-
-    name: str
-    baud: int
-    parser: Callable[[], Parser]
-    start_commands: tuple[bytes, ...]
-    hint: str
-
 
 MODULES = {
     module.name: module
@@ -41,5 +24,6 @@ MODULES = {
             "makerfabs", 115_200, Makerfabs, (b"AT+SETRPT=1\r\n",), "Is it set up (AT+SETCFG), and is an anchor on?"
         ),
         Module("linktrack", 921_600, LinkTrack, (), "Choose NodeFrame 2 or 3 as its protocol in the vendor's program."),
+        *shipped_modules(),
     )
 }

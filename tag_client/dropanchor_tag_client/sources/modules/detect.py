@@ -5,7 +5,9 @@ from collections.abc import Callable, Generator
 
 import serial
 
-from dropanchor_tag_client.sources.modules.catalogue import MODULES, Module
+from dropanchor_tag_client.sources.modules.catalogue import MODULES
+from dropanchor_tag_client.sources.modules.heard import Heard
+from dropanchor_tag_client.sources.modules.module import Module
 from dropanchor_tag_client.sources.modules.report import Report
 
 Arrived = tuple[int, list[Report]]
@@ -21,18 +23,23 @@ def detect(port: serial.Serial, baud: int | None, log: Callable[[str], None]) ->
     """
     rates = [baud] if baud else sorted({module.baud for module in MODULES.values()})
     while True:
-        counts = dict.fromkeys(rates, 0)
+        heard = {rate: Heard() for rate in rates}
         for rate in rates:
             port.baudrate = rate
-            found, counts[rate] = yield from _listen(port)
-            silent = () if counts[rate] else (module for module in MODULES.values() if module.baud == rate)
+            found = yield from _listen(port, heard[rate])
+            silent = () if heard[rate].count else (module for module in MODULES.values() if module.baud == rate)
             for candidate in silent:  # a module that sends something else is left alone
                 if found is None and candidate.start_commands:
                     yield from write(port, candidate.start_commands)
-                    found, _ = yield from _listen(port)
+                    found = yield from _listen(port, heard[rate])
             if found is not None:
                 return found
-        log(f"{port.port}: no module recognised yet ({_counts_text(counts)}). --module says which it is.")
+        log(f"{port.port}: no module recognised yet {_what_arrived(heard)}")
+
+
+def recognised(data: bytes) -> Module | None:
+    """Return the module that understands some of what arrived, if there is one."""
+    return next((module for module in MODULES.values() if module.parser().feed(data)), None)
 
 
 def read(port: serial.Serial) -> bytes:
@@ -50,19 +57,23 @@ def write(port: serial.Serial, commands: tuple[bytes, ...]) -> Generator[Arrived
         port.write(command)
 
 
-def _listen(port: serial.Serial) -> Generator[Arrived, None, tuple[Module | None, int]]:
-    """Return the module whose report is understood within a while, and how many bytes were received."""
+def _listen(port: serial.Serial, heard: Heard) -> Generator[Arrived, None, Module | None]:
+    """Return the module whose report is understood within a while."""
     parsers = [(module, module.parser()) for module in MODULES.values()]
-    end_s, received = time.monotonic() + _LISTEN_S, 0
+    end_s = time.monotonic() + _LISTEN_S
     while time.monotonic() < end_s:
         data = read(port)
-        received += len(data)
+        heard.add(data)
         for module, parser in parsers:
             if parser.feed(data):
-                return module, received
+                return module
         yield time.time_ns(), []
-    return None, received
+    return None
 
 
-def _counts_text(counts: dict[int, int]) -> str:
-    return ", ".join(f"{count} bytes at {rate} baud" for rate, count in counts.items())
+def _what_arrived(heard: dict[int, Heard]) -> str:
+    counts = ", ".join(f"{one.count} bytes at {rate} baud" for rate, one in heard.items())
+    rate, most = max(heard.items(), key=lambda item: (item[1].is_text, item[1].count))
+    if not most.count:
+        return f"({counts}). Is it on? --module says which it is."
+    return f"({counts}). The last that arrived: {most.sentence(rate)}"

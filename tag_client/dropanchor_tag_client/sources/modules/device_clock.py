@@ -2,7 +2,6 @@
 
 _DRIFT = 200e-6  # more than any crystal drifts
 _JUMP_NS = 1_000_000_000
-_NS_PER_MS = 1_000_000
 
 
 class DeviceClock:
@@ -12,13 +11,12 @@ class DeviceClock:
         self._offset_ns: int | None = None
         self._last_ns = 0
 
-    def utc_ns(self, arrival_ns: int, device_ms: int) -> int:
+    def utc_ns(self, arrival_ns: int, device_ns: int) -> int:
         """Return the time of a measurement, ns UTC.
 
-        arrival_ns: UTC, when it arrived. device_ms: its time on the module's clock. A jump of either clock, as after a
+        arrival_ns: UTC, when it arrived. device_ns: its time on the module's clock. A jump of either clock, as after a
         restart of the module, starts a new offset.
         """
-        device_ns = device_ms * _NS_PER_MS
         offset_ns = arrival_ns - device_ns
         if self._offset_ns is None or abs(offset_ns - self._offset_ns) > _JUMP_NS:
             self._offset_ns = offset_ns

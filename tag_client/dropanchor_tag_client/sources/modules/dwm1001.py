@@ -5,12 +5,11 @@ number of anchors that it announces, each with its index, a hexadecimal id and n
 """
 
 import re
-from collections import Counter
 
 from dropanchor_tag_client.sources.modules.lines import Lines
-from dropanchor_tag_client.sources.modules.report import Drop, Range, Report, plausible
+from dropanchor_tag_client.sources.modules.report import Drop, Dropped, Range, Report, plausible
 
-_NUMBER = r"-?\d{1,4}\.\d{2}"
+_NUMBER = r"-?\d{1,7}\.\d{2}"
 _ID = r"[0-9A-F]{4}"
 _DIST = re.compile(r"DIST,(\d{1,2})(?:,(.*))?")
 _LEC_ANCHOR = re.compile(rf"AN(\d{{1,2}}),({_ID}),{_NUMBER},{_NUMBER},{_NUMBER},({_NUMBER})(?:,|$)")
@@ -27,7 +26,7 @@ class Dwm1001:
     """Parse the ranges of a tag to its anchors, which are named as the module prints them (`022E`)."""
 
     def __init__(self) -> None:
-        self.dropped: Counter[Drop] = Counter()
+        self.dropped = Dropped()
         self._lines = Lines(self.dropped)
 
     def feed(self, data: bytes) -> list[Report]:
@@ -43,7 +42,7 @@ class Dwm1001:
             if text.startswith("POS,"):
                 self.dropped[Drop.POSITION_ONLY] += 1
             elif text:
-                self.dropped[Drop.NOT_UNDERSTOOD] += 1
+                self.dropped.not_understood(line)
             return None
         if anchors is None or len({name for name, _ in anchors}) != len(anchors):
             self.dropped[Drop.DAMAGED] += 1

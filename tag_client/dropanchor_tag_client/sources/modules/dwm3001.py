@@ -4,9 +4,8 @@ A notification takes one line or several: it ends with its closing brace, not wi
 """
 
 import re
-from collections import Counter
 
-from dropanchor_tag_client.sources.modules.report import Drop, Range, Report, plausible
+from dropanchor_tag_client.sources.modules.report import Drop, Dropped, Range, Report, plausible
 
 _MAX_NOTIFICATION = 4096
 _START = "SESSION_INFO_NTF:"
@@ -27,7 +26,7 @@ class Dwm3001:
     """Parse ranges to the other side, which is named by the number of its address (0x0001 is 1)."""
 
     def __init__(self) -> None:
-        self.dropped: Counter[Drop] = Counter()
+        self.dropped = Dropped()
         self._text = ""
 
     def feed(self, data: bytes) -> list[Report]:

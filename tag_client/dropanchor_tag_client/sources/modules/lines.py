@@ -1,9 +1,8 @@
 """Split bytes into lines of text of limited length."""
 
 import re
-from collections import Counter
 
-from dropanchor_tag_client.sources.modules.report import Drop
+from dropanchor_tag_client.sources.modules.report import Drop, Dropped
 
 MAX_LINE_BYTES = 1024
 _END = re.compile(rb"[\r\n]+")
@@ -12,7 +11,7 @@ _END = re.compile(rb"[\r\n]+")
 class Lines:
     """Collect bytes and return whole lines. A line of more than `MAX_LINE_BYTES` is dropped."""
 
-    def __init__(self, dropped: Counter[Drop]) -> None:
+    def __init__(self, dropped: Dropped) -> None:
         self._dropped = dropped
         self._rest = b""
         self._skipping = False

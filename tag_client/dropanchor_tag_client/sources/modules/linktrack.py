@@ -4,16 +4,14 @@ Little-endian: 0x55, a mark, u16 length of the frame, …, and as last byte the 
 in m/s² and the gyro in rad/s as the module sends them; the vendor's own unpacking does not scale them.
 """
 
-import math
 import struct
-from collections import Counter
 
-from dropanchor_tag_client.sources.modules.report import Drop, Imu, Range, Report, plausible
+from dropanchor_tag_client.sources.modules.report import Drop, Dropped, Imu, Range, Report, plausible, plausible_imu
 
 _HEADER = 0x55
 _MIN_LENGTH, _MAX_LENGTH = 8, 1024  # the longest frame has some 650 bytes
 _ANCHOR, _TAG = 1, 2
-_G_MAX, _GYRO_MAX = 400.0, 100.0  # m/s², rad/s: more than the sensor can measure
+_NS_PER_MS = 1_000_000
 
 # role, id | gyro and acc | local time, ms | number of nodes
 _FRAME2 = struct.Struct("<4xBB 4x3x9x9x9x 6f 12x6x16x4x I 10x2x B")
@@ -28,7 +26,7 @@ class LinkTrack:
     """Parse the ranges and the IMU of a tag, or the ranges of several tags from an anchor. Nodes are named by id."""
 
     def __init__(self) -> None:
-        self.dropped: Counter[Drop] = Counter()
+        self.dropped = Dropped()
         self._rest = b""
 
     def feed(self, data: bytes) -> list[Report]:
@@ -63,9 +61,10 @@ class LinkTrack:
         ranges = list(node.iter_unpack(frame[layout.size : -1]))
         if frame[1] == _MARK3:
             role, own, local_ms, _ = _FRAME3.unpack_from(frame)
-            return Report(self._ranges(role, own, ranges), None, local_ms)
+            return Report(self._ranges(role, own, ranges), None, local_ms * _NS_PER_MS)
         role, own, *imu, local_ms, _ = _FRAME2.unpack_from(frame)
-        return Report(self._ranges(role, own, ranges), self._imu(imu, str(own)) if role != _ANCHOR else None, local_ms)
+        own_imu = self._imu(imu, str(own)) if role != _ANCHOR else None
+        return Report(self._ranges(role, own, ranges), own_imu, local_ms * _NS_PER_MS)
 
     def _ranges(self, role: int, own: int, nodes: list[tuple[int, int, bytes]]) -> tuple[Range, ...]:
         found = []
@@ -81,7 +80,5 @@ class LinkTrack:
         gyro, acc = (values[0], values[1], values[2]), (values[3], values[4], values[5])
         if not any(values):  # a module without an IMU
             return None
-        if not all(map(math.isfinite, values)) or max(map(abs, acc)) > _G_MAX or max(map(abs, gyro)) > _GYRO_MAX:
-            self.dropped[Drop.ABSURD] += 1
-            return None
-        return Imu(acc, gyro, tag)
+        imu = Imu(acc, gyro, tag)
+        return imu if plausible_imu(imu, self.dropped) else None

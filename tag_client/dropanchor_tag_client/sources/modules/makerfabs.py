@@ -6,10 +6,9 @@ Ranges are in cm, 0 where there is none. Later firmware names the anchor of each
 """
 
 import re
-from collections import Counter
 
 from dropanchor_tag_client.sources.modules.lines import Lines
-from dropanchor_tag_client.sources.modules.report import Drop, Range, Report, plausible
+from dropanchor_tag_client.sources.modules.report import Drop, Dropped, Range, Report, plausible
 
 _START = "AT+RANGE="
 _REPORT = re.compile(
@@ -24,7 +23,7 @@ class Makerfabs:
     """Parse the ranges of the tag that each line names. An anchor is named by its number."""
 
     def __init__(self) -> None:
-        self.dropped: Counter[Drop] = Counter()
+        self.dropped = Dropped()
         self._lines = Lines(self.dropped)
 
     def feed(self, data: bytes) -> list[Report]:
@@ -33,7 +32,7 @@ class Makerfabs:
     def _report(self, line: str) -> Report | None:
         before, start, text = line.rpartition(_START)
         if not start:
-            self.dropped[Drop.NOT_UNDERSTOOD] += 1
+            self.dropped.not_understood(line)
             return None
         self.dropped[Drop.DAMAGED] += _START in before
         found = _REPORT.fullmatch(text)

@@ -28,16 +28,17 @@ class Samples:
         self._anchors: set[str] = set()
         self._up_axis: UpAxis | None = UpAxis()
 
-    def range(self, client: TagClient, anchor: int | str, range_m: float, t_ns: int) -> None:
+    def range(self, client: TagClient, anchor: int | str, one: Range, t_ns: int) -> None:
         name = self._names.get(str(anchor), anchor)
-        client.publish_range(name, range_m, t_ns=t_ns)
+        client.publish_range(name, one.range_m, t_ns=t_ns, std_m=one.std_m)
         self._log.ranges += 1
         if str(name) not in self._anchors and len(self._anchors) < MAX_TAGS:
             self._anchors.add(str(name))
-            self._log.add(f'tag "{client.tag}": anchor "{name}"{_number(str(name))} at {range_m:.2f} m')
+            self._log.add(f'tag "{client.tag}": anchor "{name}"{_number(str(name))} at {one.range_m:.2f} m')
 
     def imu(self, client: TagClient, imu: Imu, t_ns: int) -> None:
-        client.publish_imu(self._mounted.to_body(imu.acc), self._mounted.to_body(imu.gyro), t_ns=t_ns)
+        mag = None if imu.mag is None else self._mounted.to_body(imu.mag)
+        client.publish_imu(self._mounted.to_body(imu.acc), self._mounted.to_body(imu.gyro), mag, t_ns=t_ns)
         self._log.imu += 1
         if self._up_axis is not None and (up := self._up_axis.add(imu.acc)) is not None:
             self._up_axis = None
@@ -63,7 +64,7 @@ class OneTag:
     def publish(self, report: Report, t_ns: int) -> None:
         for one in report.ranges:
             if self._is_ours(one.tag):
-                self._samples.range(self._client, one.anchor, one.range_m, t_ns)
+                self._samples.range(self._client, one.anchor, one, t_ns)
         if report.imu is not None and self._is_ours(report.imu.tag):
             self._samples.imu(self._client, report.imu, t_ns)
 
@@ -103,7 +104,7 @@ class ManyTags:
         for one in report.ranges:
             tag, anchor = self._tag_and_anchor(one)
             if (client := self._client(tag)) is not None:
-                self._samples.range(client, anchor, one.range_m, t_ns)
+                self._samples.range(client, anchor, one, t_ns)
         if report.imu is not None and self._as_anchor is None and (client := self._client(report.imu.tag)) is not None:
             self._samples.imu(client, report.imu, t_ns)
 

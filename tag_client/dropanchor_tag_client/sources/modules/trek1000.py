@@ -9,10 +9,9 @@ the line with a diagnosis, write a mask that means nothing, and mark a missing r
 """
 
 import re
-from collections import Counter
 
 from dropanchor_tag_client.sources.modules.lines import Lines
-from dropanchor_tag_client.sources.modules.report import Drop, Range, Report, plausible
+from dropanchor_tag_client.sources.modules.report import Drop, Dropped, Range, Report, plausible
 
 _REPORT = re.compile(
     r"m([acr])\s+([0-9a-f]{2})\s+((?:[0-9a-f]{8}\s+){4}(?:(?:[0-9a-f]{8}\s+){4})?)"
@@ -29,7 +28,7 @@ class Trek1000:
     """
 
     def __init__(self) -> None:
-        self.dropped: Counter[Drop] = Counter()
+        self.dropped = Dropped()
         self._lines = Lines(self.dropped)
         self._uncorrected = 0
 
@@ -39,7 +38,10 @@ class Trek1000:
     def _report(self, line: str) -> Report | None:
         found = _REPORT.fullmatch(line)
         if found is None:
-            self.dropped[Drop.DAMAGED if line[:3] in ("mc ", "mr ", "ma ") else Drop.NOT_UNDERSTOOD] += 1
+            if line.startswith(("mc ", "mr ", "ma ")):
+                self.dropped[Drop.DAMAGED] += 1
+            else:
+                self.dropped.not_understood(line)
             return None
         kind, mask, ranges, tag, diagnosis = found.groups()
         if reason := self._reason_to_drop(kind):

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 from dropanchor_tag_client.sources.modules.catalogue import MODULES
 from dropanchor_tag_client.sources.modules.report import MAX_RANGE_M, Parser, Report
 from support import module_strings as said
+from support.pattern_strings import PATTERN_EXAMPLES
 
 TEXTS = [text for name, text in vars(said).items() if name.isupper() and isinstance(text, str)]
+TEXTS += [text for example in PATTERN_EXAMPLES.values() for text, _ in example.documented]
 FRAMES = [said.NODEFRAME2, said.NODEFRAME3]
 WHOLE = [*(f"{text}\r\n".encode() for text in TEXTS), *FRAMES]
 PARSERS = [module.parser for module in MODULES.values()]
@@ -42,7 +44,7 @@ def test_whatever_comes_a_parser_reports_only_what_can_be(parser: Callable[[], P
     tried = parser()
     for report in all_reports(tried, pieces):
         assert all(0 <= one.range_m <= MAX_RANGE_M for one in report.ranges)
-        assert all(len(str(one.anchor)) <= 16 and len(one.tag or "") <= 5 for one in report.ranges)
+        assert all(len(str(one.anchor)) <= 64 and len(one.tag or "") <= 64 for one in report.ranges)
     assert size(tried) < 10_000
 
 

@@ -16,6 +16,7 @@ from support import module_strings as said
 from support.commands import start_python
 from support.listening import ReceivedFrames, listening
 from support.module_strings import EXAMPLES, Pairs
+from support.pattern_strings import PATTERN_EXAMPLES
 from support.serial_module import Answer, SerialModule, dwm1001_shell, plugged_in, talkative
 from support.zenoh_router import wait_until
 
@@ -67,6 +68,21 @@ def test_what_a_module_prints_is_published(
         wait_until(lambda: len(received.ranges()) >= 5 * len(expected))
         found = ranges(received)
     assert found[: 2 * len(expected)] == 2 * numbered(expected)
+
+
+@pytest.mark.parametrize("name", PATTERN_EXAMPLES)
+def test_a_module_that_is_a_pattern_is_found_and_what_it_prints_is_published(
+    router_endpoint: str, tmp_path: Path, name: str
+) -> None:
+    example = PATTERN_EXAMPLES[name]
+    expected = numbered(example.documented[0][1])
+    with (
+        listening(router_endpoint) as received,
+        plugged_in(tmp_path / "port", example.answer(), MODULES[name].baud) as module,
+        serial(router_endpoint, module, "--tag", "a", *example.options),
+    ):
+        wait_until(lambda: len(received.ranges()) >= 5)
+        assert set(ranges(received)) == set(expected)
 
 
 def test_a_dwm1001_that_reports_already_is_not_written_to(router_endpoint: str, tmp_path: Path) -> None:
@@ -189,8 +205,22 @@ def test_wrong_arguments_are_refused_with_what_to_do(tmp_path: Path, capsys: pyt
         (["serial", "x", "--tag", "a", "--as-anchor", "7"], "--as-anchor needs --tag-from-id"),
         (["serial", "x", "--tag", "a", "--up", "x"], "must be different axes"),
         (["serial", str(tmp_path), "--tag", "a"], "cannot be used at 115200 baud"),
+        (["serial", "x", "--tag", "a", "--module", "none.toml"], "none.toml cannot be read: No such file"),
+        (["serial", "x", "--tag", "a", "--module", "bu01", "--pattern", "{range:m}"], "leave out --module"),
+        (["serial", "x", "--tag", "a", "--pattern", "d={range:mile}"], 'no unit "mile"'),
     ]:
         assert main(arguments) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_the_nearest_module_is_suggested_for_a_name_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, message in [
+        ("dwm101", "no module is called dwm101; did you mean dwm1001?"),
+        ("?", "and files NAME.toml"),
+    ]:
+        with pytest.raises(SystemExit) as ended:
+            main(["serial", "x", "--tag", "a", "--module", name])
+        assert ended.value.code == 2
         assert message in capsys.readouterr().err
 
 

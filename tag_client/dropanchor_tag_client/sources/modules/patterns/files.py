@@ -1,0 +1,81 @@
+"""Read modules that are patterns from TOML files: those of the package, and those of its users."""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from dropanchor_tag_client.sources.modules.module import Module
+from dropanchor_tag_client.sources.modules.patterns.fields import PatternError
+from dropanchor_tag_client.sources.modules.patterns.parser import Pattern, Patterns, pattern
+
+SUFFIX = ".toml"
+_SHIPPED = Path(__file__).parents[1] / "shipped"
+_BAUD = 115_200
+_HINT = "Is an anchor on, and is --baud right?"
+_TEXTS = ("patterns", "ignore", "start", "poll")
+_KEYS = (*_TEXTS, "repeats", "baud", "hint")
+
+
+def shipped_modules() -> list[Module]:
+    """Return the modules of the files in the package."""
+    return [module_of_file(path) for path in sorted(_SHIPPED.glob(f"*{SUFFIX}"))]
+
+
+def module_of_file(path: Path) -> Module:
+    """Return the module that a file describes, which is called after the file. Raises ValueError."""
+    try:
+        given = tomllib.loads(path.read_text())
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ValueError(f"{path} is not TOML: {error}") from error
+    for key in given:
+        if key not in _KEYS:
+            raise ValueError(f'{path}: there is no key "{key}"; known are {", ".join(_KEYS)}')
+    if not _are_texts(given.get("patterns")) or not given["patterns"]:
+        raise ValueError(f'{path}: patterns is missing or no list of texts: patterns = ["an{{anchor}}:{{range:m}}m"]')
+    return _module(path, given)
+
+
+def module_of_patterns(texts: list[str]) -> Module:
+    """Return a module without a name of its own. Raises ValueError."""
+    return Module("the module of --pattern", _BAUD, _parser(_checked(texts, "--pattern")), (), _HINT)
+
+
+def _module(path: Path, given: dict[str, Any]) -> Module:
+    ignore, start, poll = (given.get(key, []) for key in _TEXTS[1:])
+    baud, hint = given.get("baud", _BAUD), given.get("hint", _HINT)
+    for key, value in (("ignore", ignore), ("start", start), ("poll", poll)):
+        if not _are_texts(value):
+            raise ValueError(f"{path}: {key} is {value!r}, a list of texts was expected")
+    if not isinstance(baud, int) or isinstance(baud, bool) or baud <= 0:
+        raise ValueError(f"{path}: baud is {baud!r}, a whole number such as 115200 was expected")
+    if not isinstance(hint, str):
+        raise ValueError(f"{path}: hint is {hint!r}, a text was expected")
+    if not isinstance(repeats := given.get("repeats", False), bool):
+        raise ValueError(f"{path}: repeats is {repeats!r}, true or false was expected")
+    parser = _parser(_checked(given["patterns"], str(path)), tuple(ignore), repeats)
+    return Module(path.stem, baud, parser, commands(start), hint, commands(poll))
+
+
+def commands(texts: list[str]) -> tuple[bytes, ...]:
+    """Return what is written to a module for each of the commands."""
+    return tuple(text.encode() + b"\r\n" for text in texts)
+
+
+def _parser(
+    patterns: list[Pattern], ignored: tuple[str, ...] = (), is_repeating: bool = False
+) -> Callable[[], Patterns]:
+    return lambda: Patterns(patterns, ignored, is_repeating=is_repeating)
+
+
+def _checked(texts: list[str], source: str) -> list[Pattern]:
+    try:
+        return [pattern(text) for text in texts]
+    except PatternError as error:
+        raise ValueError(f"{source}: {error}") from error
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, str) for one in value)
