@@ -2,6 +2,7 @@
 
 import base64
 import json
+import os
 import struct
 import subprocess
 import time
@@ -58,6 +59,15 @@ def publish(client: Client, topic: str, payload: object) -> None:
     client.publish(topic, body, qos=1).wait_for_publish(10)
 
 
+def field_or_skip(name: str) -> Path:
+    """Return a file of what devices publish: in `../shared` beside the checkout, or in the folder DROPANCHOR_SHARED."""
+    shared = Path(os.environ.get("DROPANCHOR_SHARED", Path(__file__).parents[5] / "shared"))
+    file = shared / "field" / "devices" / "mqtt" / name
+    if not file.is_file():
+        pytest.skip(f"{file} does not exist: DROPANCHOR_SHARED names the folder that has field/devices")
+    return file
+
+
 def ranges(heard: ReceivedFrames) -> list[tuple[str, int, float]]:
     found = zip(heard.keys, heard.frames, strict=True)
     return [(key.split("/")[4], one.anchor, round(one.range_m, 3)) for key, frame in found for one in frame.ranges]
@@ -96,6 +106,109 @@ def test_a_phone_publishes_over_websocket_and_its_tag_is_in_the_topic(router_end
         wait_until(lambda: sum(len(frame.imu) for frame in heard.frames) >= 290)
     assert {key.split("/")[4] for key in heard.keys} == {"cart-1"}
     assert heard.frames[0].imu[0].acc == pytest.approx((0.0, 0.0, G))
+
+
+@pytest.mark.parametrize(
+    ("name", "topic", "expected"),
+    [
+        ("espresense", "espresense/devices/badge1/kitchen", [("badge1", anchor_number("kitchen"), 3.21)]),
+        ("makerfabs", "uwb/mf1", [("mf1", 1, 3.42), ("mf1", 7, 5.1)]),
+        ("tasmota_uwb", "tele/tasu/SENSOR", [("tasu", 1, 2.345), ("tasu", 7, 1.872)]),
+    ],
+)
+def test_rules_read_what_devices_publish(
+    router_endpoint: str, tmp_path: Path, name: str, topic: str, expected: list[tuple[str, int, float]]
+) -> None:
+    rules, payload = field_or_skip(f"{name}.toml"), field_or_skip(f"{name}__{topic.replace('/', '_')}.json")
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--template", str(rules)) as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        publish(client, topic, payload.read_bytes())
+        wait_until(lambda: ranges(heard) == expected)
+
+
+def test_an_object_with_texts_units_and_a_time_of_its_own_becomes_ranges(router_endpoint: str, tmp_path: Path) -> None:
+    (tmp_path / "rules.toml").write_text(
+        '[[rule]]\ntopic = "uwb/+"\ntag = "{1}"\nkind = "range"\neach = "anchors"\nunit = {range_m = "cm"}\n'
+        'fields = {anchor = "{key}", range_m = "{value}", t_ns = "at"}\n'
+    )
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--template", str(tmp_path / "rules.toml")) as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        publish(client, "uwb/cart", {"at": "2026-11-26T08:00:00.250Z", "anchors": {"1": "320", "2": 410, "3": "1e999"}})
+        wait_until(lambda: ranges(heard) == [("cart", 1, 3.2), ("cart", 2, 4.1)])
+        process.terminate()
+        summary = wait_for_line(process, "samples of")
+    assert {one.t_ns for frame in heard.frames for one in frame.ranges} == {1_795_680_000_250_000_000}
+    assert summary.strip() == "2 samples of 1 tags published; left out: refused 1"
+
+
+def test_what_the_broker_kept_from_earlier_is_told_and_used_only_if_the_rule_allows_it(
+    router_endpoint: str, tmp_path: Path
+) -> None:
+    (tmp_path / "rules.toml").write_text(RULES + RULES.replace("plant/", "kept/") + "retained = true\n")
+    with mosquitto(tmp_path) as broker, broker.publisher() as client, listening(router_endpoint) as heard:
+        for topic in ("plant/hall/uwb", "kept/hall/uwb"):
+            client.publish(topic, json.dumps({"id": 3, "m": 2.5}), qos=1, retain=True).wait_for_publish(10)
+        with bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--template", str(tmp_path / "rules.toml")) as process:
+            said = wait_for_line(process, "left out: retained 1")
+            client.publish("plant/hall/uwb", json.dumps({"id": 3, "m": 4.5}), qos=1, retain=True).wait_for_publish(10)
+            wait_until(lambda: ranges(heard) == [("hall", 3, 2.5), ("hall", 3, 4.5)])
+            process.terminate()
+            summary = wait_for_line(process, "samples of")
+    assert "plant/hall/uwb: the broker kept it, and nobody knows how old it is. retained = true in the rule" in said
+    assert summary.strip() == "2 samples of 1 tags published; left out: retained 1"
+
+
+def test_an_iphone_is_published_the_right_way_up(router_endpoint: str, tmp_path: Path) -> None:
+    messages = field_or_skip("sensor_logger_iphone.jsonl").read_bytes().splitlines()
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--sensor-logger", "sensor-logger/+") as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        for body in messages:
+            publish(client, "sensor-logger/phone", body)
+        wait_until(lambda: sum(len(frame.imu) for frame in heard.frames) >= 100)
+    assert {round(one.acc[2], 3) for frame in heard.frames for one in frame.imu} == {round(G, 3)}
+
+
+def test_a_phone_whose_sign_cannot_be_known_is_told_and_not_published(router_endpoint: str, tmp_path: Path) -> None:
+    upright = {
+        "gyroscope": lambda _: (0.0, 0.0, 0.5),
+        "accelerometer": lambda _: (0.0, 0.0, 0.0),
+        "gravity": lambda _: (0.0, -G, 0.0),
+    }
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        broker.publisher() as client,
+    ):
+        where = (router_endpoint, f"127.0.0.1:{broker.port}", "--sensor-logger", "sensor-logger")
+        with bridge(*where) as process:
+            wait_for_line(process, "connected")
+            for body in recording(3, upright):
+                publish(client, "sensor-logger", body)
+            assert "Lay the phone flat with its screen up" in wait_for_line(process, "sign_unknown")
+            process.terminate()
+            assert wait_for_line(process, "samples of").startswith("0 samples of 0 tags published; left out: sign_unk")
+        assert heard.frames == []
+        with bridge(*where, "--signs", "ios") as process:
+            wait_for_line(process, "connected")
+            for body in recording(3, upright):
+                publish(client, "sensor-logger", body)
+            wait_until(lambda: heard.frames)
+    assert heard.frames[0].imu[0].acc == pytest.approx((G, 0.0, 0.0))
 
 
 def test_bad_payloads_are_named_and_counted_and_harm_no_other_tag(router_endpoint: str, tmp_path: Path) -> None:
@@ -188,6 +301,7 @@ def test_tls_and_a_password_are_used_and_a_foreign_certificate_is_refused(
         (["localhost", "--decawave", "--mqtt-user", "x"], "DROPANCHOR_MQTT_PASSWORD"),
         (["localhost", "--decawave", "--name", "x"], "ID=NAME was expected"),
         (["localhost", "--template", "nowhere.toml"], "nowhere.toml"),
+        (["localhost", "--sensor-logger", "phones/+x"], "--sensor-logger is 'phones/+x'"),
     ],
 )
 def test_an_error_prints_a_message_and_exits_with_code_2(
