@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta, tzinfo
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from typing import Any, NamedTuple
 
 from dropanchor_schemas.wire import MAX_T_NS
@@ -75,7 +75,7 @@ class Reader(NamedTuple):
             raise UnusableError(f"{source} is {shown(value)}, a time was expected")
         try:
             t_ns = Decimal(str(value).strip()) * NS_PER[self.time_unit]
-        except (InvalidOperation, ValueError):
+        except (ArithmeticError, ValueError):
             return self._iso_ns(str(value).strip(), source)
         if not (t_ns.is_finite() and 0 <= t_ns < MAX_T_NS):
             raise UnusableError(f"{source} is {shown(value)}, which is no time in {self.time_unit} since 1970")
@@ -97,7 +97,10 @@ class Reader(NamedTuple):
                     "in the rule says which"
                 )
             time = time.replace(tzinfo=self.zone)
-        t_ns = (time - _EPOCH) // timedelta(microseconds=1) * 1_000
-        if t_ns < 0:
-            raise UnusableError(f"{source} is {shown(text)}, which is before 1970")
+        try:
+            t_ns = (time - _EPOCH) // timedelta(microseconds=1) * 1_000
+        except OverflowError:
+            t_ns = -1
+        if not 0 <= t_ns < MAX_T_NS:
+            raise UnusableError(f"{source} is {shown(text)}, which is before 1970 or after 2262")
         return t_ns

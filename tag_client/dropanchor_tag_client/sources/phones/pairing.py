@@ -74,7 +74,9 @@ class Pairing:
         if paired.samples:
             self._fruitless = -1
             return paired
-        return paired._replace(problem=damaged_in(batch, damaged) or self._problem(parts, paired.unpaired))
+        needed = parts if self._streams.keys() >= {*parts} else (TOTAL, LINEAR, GRAVITY)
+        wrong = damaged_in((GYROSCOPE, *needed), batch, damaged)
+        return paired._replace(problem=wrong or self._problem(parts, paired.unpaired))
 
     def _problem(self, parts: tuple[str, ...], unpaired: int) -> str:
         """Return why there was no sample yet. Once it works, what lacks is a gap."""

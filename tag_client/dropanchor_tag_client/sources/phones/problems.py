@@ -1,6 +1,6 @@
 """Why the readings of a phone give no motion: a sentence for the person who holds the phone."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from dropanchor_tag_client.sources.phones.readings import GRAVITY, GYROSCOPE, LINEAR, TITLES, TOTAL
 
@@ -14,7 +14,6 @@ APART = (
     "switched on to 100 Hz."
 )
 _ANY_ACCELERATION = f"{TITLES[TOTAL]} (Android) or {TITLES[LINEAR]} and {TITLES[GRAVITY]} (iPhone)"
-_NEEDED = (GYROSCOPE, TOTAL, LINEAR, GRAVITY)
 
 
 def lacking(seen: Collection[str]) -> str:
@@ -26,12 +25,12 @@ def lacking(seen: Collection[str]) -> str:
     return f"No motion can be used yet: switch on {', and '.join(missing)}." if missing else ""
 
 
-def damaged_in(streams: Collection[str], damaged: Mapping[str, str]) -> str:
+def damaged_in(needed: Iterable[str], streams: Collection[str], damaged: Mapping[str, str]) -> str:
     """Return what is wrong with a needed sensor of which a batch has damaged readings and no others.
 
-    streams: sensors that have good readings. damaged: by sensor, what is wrong.
+    streams: sensors that have good readings in the batch. damaged: by sensor, what is wrong.
     """
-    for name in _NEEDED:
+    for name in needed:
         if name in damaged and name not in streams:
             return (
                 f"The readings of {TITLES[name]} {damaged[name]}: start the recording again. If that does not help, "

@@ -123,6 +123,14 @@ def test_a_sensor_that_is_on_and_gives_no_numbers_is_named_at_once_and_only_whil
     assert pairing.add(force, {"magnetometer": "are not numbers"}).problem == ""
 
 
+def test_a_damaged_sensor_that_is_not_needed_is_not_blamed() -> None:
+    upright = linear_and_gravity(-1) | {"gravity": stream([7, 27], (0, -G, 0))}
+    damage = {"totalacceleration": "are not numbers"}
+    assert Pairing(Signs.AUTO).add(upright, damage).problem == TILTED
+    assert len(Pairing(Signs.IOS).add(upright, damage).samples) == 2
+    assert "Total Acceleration are" in Pairing(Signs.AUTO).add({"gyroscope": stream([0], (0, 0, 0))}, damage).problem
+
+
 def test_readings_that_are_never_near_each_other_are_told() -> None:
     pairing = Pairing(Signs.AUTO)
     problems = []
