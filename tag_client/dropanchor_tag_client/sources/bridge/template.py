@@ -42,9 +42,7 @@ class Template(Format):
 
     def parse(self, message: Received) -> Iterator[Found]:
         rules = [rule for rule in self._rules if matches(rule.topic, message.topic)]
-        if message.retained:
-            rules = [rule for rule in rules if rule.retained]
-        if not rules:
+        if message.retained and not any(rule.retained for rule in rules):
             yield refused_retained(message, ". retained = true in the rule takes it all the same")
             return
         value = json_of(message.payload)
@@ -52,4 +50,6 @@ class Template(Format):
             yield value._replace(detail=f"{message.topic}: {value.detail}")
             return
         for rule in rules:
+            if message.retained and not rule.retained:
+                continue
             yield from rule.parse(message.topic, value, message.t_ns)
