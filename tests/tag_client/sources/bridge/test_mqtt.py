@@ -2,25 +2,20 @@
 
 import base64
 import json
-import os
 import struct
 import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from paho.mqtt.client import Client
 
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.cli import main
 from support.certificate import self_signed
-from support.commands import start_python
 from support.listening import ReceivedFrames, listening
 from support.mosquitto import mosquitto, needs_mosquitto
-from support.sensor_logger import G, recording
-from support.zenoh_router import free_port, wait_until
+from support.mqtt_bridge import bridge, field_or_skip, publish, wait_for_line
+from support.zenoh_router import wait_until
 
 pytestmark = needs_mosquitto
 
@@ -32,40 +27,6 @@ tag = "{1}"
 kind = "range"
 fields = { anchor = "id", range_m = "m" }
 """
-
-
-@contextmanager
-def bridge(endpoint: str, broker: str, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
-    """Run `dropanchor-tag mqtt` until the block ends."""
-    process = start_python("-m", "dropanchor_tag_client", "mqtt", broker, "--connect", endpoint, *arguments)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.communicate(timeout=30)
-
-
-def wait_for_line(process: "subprocess.Popen[str]", text: str) -> str:
-    """Read what the bridge says until this text comes, and return the line."""
-    assert process.stderr is not None
-    for line in process.stderr:
-        if text in line:
-            return line
-    raise AssertionError(f"the bridge ended without saying {text!r}")
-
-
-def publish(client: Client, topic: str, payload: object) -> None:
-    body = payload if isinstance(payload, bytes) else json.dumps(payload)
-    client.publish(topic, body, qos=1).wait_for_publish(10)
-
-
-def field_or_skip(name: str) -> Path:
-    """Return a file of what devices publish: in `../shared` beside the checkout, or in the folder DROPANCHOR_SHARED."""
-    shared = Path(os.environ.get("DROPANCHOR_SHARED", Path(__file__).parents[5] / "shared"))
-    file = shared / "field" / "devices" / "mqtt" / name
-    if not file.is_file():
-        pytest.skip(f"{file} does not exist: DROPANCHOR_SHARED names the folder that has field/devices")
-    return file
 
 
 def ranges(heard: ReceivedFrames) -> list[tuple[str, int, float]]:
@@ -89,23 +50,6 @@ def test_ranges_of_a_decawave_gateway_and_of_a_template_are_published(router_end
         publish(client, "plant/hall/uwb", {"id": 3, "m": 2.5})
         expected = {("t-hall", 3, 2.5), ("t-9A28", anchor_number("yard"), 7.94)}
         wait_until(lambda: expected <= set(ranges(heard)))
-
-
-def test_a_phone_publishes_over_websocket_and_its_tag_is_in_the_topic(router_endpoint: str, tmp_path: Path) -> None:
-    sensors = {"gyroscope": lambda _: (0.0, 0.0, 0.5), "totalacceleration": lambda _: (0.0, 0.0, G)}
-    socket = free_port()
-    with (
-        mosquitto(tmp_path, "allow_anonymous true", f"listener {socket} 127.0.0.1", "protocol websockets") as broker,
-        listening(router_endpoint) as heard,
-        bridge(router_endpoint, f"ws://127.0.0.1:{socket}", "--sensor-logger", "sensor-logger/+") as process,
-        broker.publisher() as client,
-    ):
-        wait_for_line(process, "connected")
-        for body in recording(3, sensors):
-            publish(client, "sensor-logger/cart-1", body)
-        wait_until(lambda: sum(len(frame.imu) for frame in heard.frames) >= 290)
-    assert {key.split("/")[4] for key in heard.keys} == {"cart-1"}
-    assert heard.frames[0].imu[0].acc == pytest.approx((0.0, 0.0, G))
 
 
 @pytest.mark.parametrize(
@@ -166,49 +110,6 @@ def test_what_the_broker_kept_from_earlier_is_told_and_used_only_if_the_rule_all
             summary = wait_for_line(process, "samples of")
     assert "plant/hall/uwb: the broker kept it, and nobody knows how old it is. retained = true in the rule" in said
     assert summary.strip() == "2 samples of 1 tags published; left out: retained 1"
-
-
-def test_an_iphone_is_published_the_right_way_up(router_endpoint: str, tmp_path: Path) -> None:
-    messages = field_or_skip("sensor_logger_iphone.jsonl").read_bytes().splitlines()
-    with (
-        mosquitto(tmp_path) as broker,
-        listening(router_endpoint) as heard,
-        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--sensor-logger", "sensor-logger/+") as process,
-        broker.publisher() as client,
-    ):
-        wait_for_line(process, "connected")
-        for body in messages:
-            publish(client, "sensor-logger/phone", body)
-        wait_until(lambda: sum(len(frame.imu) for frame in heard.frames) >= 100)
-    assert {round(one.acc[2], 3) for frame in heard.frames for one in frame.imu} == {round(G, 3)}
-
-
-def test_a_phone_whose_sign_cannot_be_known_is_told_and_not_published(router_endpoint: str, tmp_path: Path) -> None:
-    upright = {
-        "gyroscope": lambda _: (0.0, 0.0, 0.5),
-        "accelerometer": lambda _: (0.0, 0.0, 0.0),
-        "gravity": lambda _: (0.0, -G, 0.0),
-    }
-    with (
-        mosquitto(tmp_path) as broker,
-        listening(router_endpoint) as heard,
-        broker.publisher() as client,
-    ):
-        where = (router_endpoint, f"127.0.0.1:{broker.port}", "--sensor-logger", "sensor-logger")
-        with bridge(*where) as process:
-            wait_for_line(process, "connected")
-            for body in recording(3, upright):
-                publish(client, "sensor-logger", body)
-            assert "Lay the phone flat with its screen up" in wait_for_line(process, "sign_unknown")
-            process.terminate()
-            assert wait_for_line(process, "samples of").startswith("0 samples of 0 tags published; left out: sign_unk")
-        assert heard.frames == []
-        with bridge(*where, "--signs", "ios") as process:
-            wait_for_line(process, "connected")
-            for body in recording(3, upright):
-                publish(client, "sensor-logger", body)
-            wait_until(lambda: heard.frames)
-    assert heard.frames[0].imu[0].acc == pytest.approx((G, 0.0, 0.0))
 
 
 def test_bad_payloads_are_named_and_counted_and_harm_no_other_tag(router_endpoint: str, tmp_path: Path) -> None:
@@ -309,3 +210,14 @@ def test_an_error_prints_a_message_and_exits_with_code_2(
 ) -> None:
     assert main(["mqtt", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_rule_with_an_unknown_place_ends_the_program_and_lists_what_is_known(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "rules.toml").write_text(RULES.replace('"id"', '"{2}"'))
+    assert main(["mqtt", "localhost", "--template", str(tmp_path / "rules.toml")]) == 2
+    assert (
+        "rule 1: fields.anchor: there is no {2}; known are {1} (what each + stands for), {topic[0]} to {topic[2]}, "
+        "{value} (the payload), and a path in the payload, such as {device.id}"
+    ) in capsys.readouterr().err
