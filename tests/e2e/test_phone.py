@@ -90,6 +90,17 @@ def test_a_phone_over_http_is_online_and_its_empty_battery_is_told(tmp_path: Pat
         assert [care["reason"] for care in status["needs_care"]] == ["battery_low"]
 
 
+def test_a_phone_whose_gyroscope_gives_no_numbers_is_told_so_over_http(tmp_path: Path) -> None:
+    sensors = SENSORS | {"gyroscope": lambda _: (float("nan"), 0.0, 0.0)}
+    with running_service("--config", str(settings_file(tmp_path, ["anna"]))) as service:
+        for batch in recording(2, sensors, start_ns=time.time_ns() - 2_000_000_000):
+            answer = service.ask("POST", f"{PHONE}?tag=anna", content=batch)
+            assert (answer.status_code, answer.text.partition(":")[0]) == (
+                499,
+                "The readings of Gyroscope are not numbers",
+            )
+
+
 def test_a_phone_whose_clock_is_ahead_of_the_ranges_is_told(tmp_path: Path) -> None:
     config, ahead_ns = settings_file(tmp_path, ["anna"]), 800_000_000
     with running_service("--config", str(config)) as service:

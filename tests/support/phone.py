@@ -5,7 +5,7 @@ from typing import Generic
 
 from dropanchor_schemas.wire import ENCODING_JSON, Frame, ImuSample, decode_packed
 from dropanchor_service.phones.intake import M, PhoneIntake, Session
-from dropanchor_service.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.pairing import Signs
 
 
 class Phone(Generic[M]):

@@ -1,6 +1,7 @@
 """How ROS 2 nodes with rmw_zenoh name topics, announce themselves and number messages.
 
-Source: docs/design.md, liveliness_utils.cpp and attachment_helpers.cpp of ros2/rmw_zenoh, from Jazzy on.
+Source: docs/design.md, liveliness_utils.cpp and attachment_helpers.cpp of ros2/rmw_zenoh, from Jazzy on. ROS 2 Humble
+has no type hashes; its keys have a fixed text in their place.
 """
 
 import struct
@@ -11,6 +12,10 @@ from xxhash import xxh3_128_digest
 _ATTACHMENT = struct.Struct("<qqB16s")  # sequence number, source timestamp in ns UTC, length of the gid, gid
 _GID_BYTES = 16
 _DEPTH = 10
+NO_TYPE_HASH = "TypeHashNotSupported"
+"""What the keys of ROS 2 Humble have in the place of the type hash."""
+_PUBLISHER = "MP"
+_TOKEN_PARTS = 13
 _QOS = f"::,{_DEPTH}:,:,:,,"  # reliable, volatile, keep last; no deadline, lifespan or lease
 
 
@@ -24,6 +29,16 @@ class RosType(NamedTuple):
     def dds_name(self) -> str:
         package, kind, name = self.name.split("/")
         return f"{package}::{kind}::dds_::{name}_"
+
+
+class Announced(NamedTuple):
+    """A publisher of a node. session: the Zenoh id. topic: with a slash at its begin. type_name: as in `RosType`."""
+
+    domain: str
+    session: str
+    node: str
+    topic: str
+    type_name: str
 
 
 class Attachment(NamedTuple):
@@ -65,6 +80,21 @@ def topic_token(domain: int, session: str, node: str, entity: int, role: str, to
     name = "%" + topic.strip("/").replace("/", "%")
     place = f"@ros2_lv/{domain}/{session}/0/{entity}/{role}/%/%/{node}"
     return f"{place}/{name}/{of.dds_name}/{of.type_hash}/{_QOS}"
+
+
+def any_publisher() -> str:
+    """Return the key expression of the liveliness keys of all publishers of all domains."""
+    return f"@ros2_lv/*/*/*/*/{_PUBLISHER}/**"
+
+
+def announced_by(token: str) -> Announced | None:
+    """Return the publisher of a liveliness key, None if it is one of something else."""
+    parts = token.split("/")
+    if len(parts) != _TOKEN_PARTS or parts[5] != _PUBLISHER:
+        return None
+    _, domain, session, _, _, _, _, _, node, topic, dds_name, _, _ = parts
+    name = dds_name.replace("::dds_::", "::").removesuffix("_").replace("::", "/")
+    return Announced(domain, session, node, topic.replace("%", "/"), name)
 
 
 def gid_of(token: str) -> bytes:

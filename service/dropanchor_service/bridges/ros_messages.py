@@ -1,4 +1,7 @@
-"""Read and write the ROS 2 messages that matter here, as CDR. The types are those of ROS 2 Jazzy."""
+"""Read and write the ROS 2 messages that matter here, as CDR. The types are those of ROS 2 Jazzy.
+
+Messages of ROS 2 Humble are read too: its Imu has the same fields, its Range has no variance.
+"""
 
 import math
 from collections.abc import Mapping
@@ -10,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from dropanchor_schemas.wire import ImuSample, RangeSample, anchor_number
 from dropanchor_service.bridges.frames import frame_id
-from dropanchor_service.bridges.rmw_zenoh import RosType
+from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH, RosType
 
 Json = Mapping[str, Any]
 
@@ -28,32 +31,36 @@ class RosMessages:
 
     def __init__(self) -> None:
         self._store = get_typestore(Stores.ROS2_JAZZY)
+        self._humble = get_typestore(Stores.ROS2_HUMBLE)
         self.imu = self._type("sensor_msgs/msg/Imu")
         self.range = self._type("sensor_msgs/msg/Range")
         self.pose = self._type("geometry_msgs/msg/PoseWithCovarianceStamped")
         self.odometry = self._type("nav_msgs/msg/Odometry")
         self.tf = self._type("tf2_msgs/msg/TFMessage")
 
-    def imu_sample(self, cdr: bytes, t_ns: int) -> ImuSample:
+    def imu_sample(self, cdr: bytes, t_ns: int, type_hash: str) -> ImuSample:
         """Return the sample of a sensor_msgs/Imu. t_ns: its time if it has no stamp. Raises UnusableError."""
-        message = self._read(cdr, self.imu)
-        for covariance in (message.angular_velocity_covariance, message.linear_acceleration_covariance):
-            if covariance[0] == -1.0:  # by definition of the message
-                raise UnusableError("an IMU message without gyroscope or accelerometer")
+        message = self._read(cdr, self.imu, type_hash)
+        for name in ("angular_velocity", "linear_acceleration"):
+            if getattr(message, f"{name}_covariance")[0] == -1.0:  # by definition of the message
+                raise UnusableError(f"an IMU message without {name}, as {name}_covariance[0] = -1 says")
         acc, gyro = message.linear_acceleration, message.angular_velocity
         if not all(map(math.isfinite, (acc.x, acc.y, acc.z, gyro.x, gyro.y, gyro.z))):
             raise UnusableError("an IMU message that is not finite")
+        if not (acc.x or acc.y or acc.z):
+            raise UnusableError("an IMU message whose linear_acceleration is 0 along all axes: it was not measured")
         return ImuSample(_time_ns(message, t_ns), (acc.x, acc.y, acc.z), (gyro.x, gyro.y, gyro.z), None)
 
-    def range_sample(self, cdr: bytes, t_ns: int, anchor: str) -> RangeSample:
+    def range_sample(self, cdr: bytes, t_ns: int, anchor: str, type_hash: str) -> RangeSample:
         """Return the sample of a sensor_msgs/Range. t_ns: its time if it has no stamp. Raises UnusableError."""
-        message = self._read(cdr, self.range)
+        message = self._read(cdr, self.range, type_hash)
         if not math.isfinite(message.range):  # infinite means: too close, or nothing there
             raise UnusableError("a range that is not finite")
         has_limits = message.max_range > message.min_range
         if has_limits and not message.min_range <= message.range <= message.max_range:
             raise UnusableError("a range outside min_range and max_range")
-        std_m = math.sqrt(message.variance) if message.variance > 0 else math.nan
+        variance = getattr(message, "variance", 0.0)  # Humble has none
+        std_m = math.sqrt(variance) if variance > 0 else math.nan
         return RangeSample(_time_ns(message, t_ns), anchor_number(anchor), message.range, std_m)
 
     def pose_cdr(self, pose: Json, height_m: float) -> bytes:
@@ -112,9 +119,12 @@ class RosMessages:
     def _write(self, of: RosType, **fields: Any) -> bytes:
         return bytes(self._store.serialize_cdr(self._make(of.name, **fields), of.name))
 
-    def _read(self, cdr: bytes, of: RosType) -> Any:
+    def _read(self, cdr: bytes, of: RosType, type_hash: str) -> Any:
+        if type_hash not in (of.type_hash, NO_TYPE_HASH):
+            raise UnusableError(f"a {of.name} with other fields than in ROS 2 Humble and Jazzy")
+        store = self._humble if type_hash == NO_TYPE_HASH else self._store
         try:
-            return self._store.deserialize_cdr(cdr, of.name)
+            return store.deserialize_cdr(cdr, of.name)
         except SerdeError as error:
             raise UnusableError(f"a damaged {of.name}") from error
 

@@ -5,10 +5,8 @@ import os
 import re
 import sys
 import time
-from collections import Counter
 from collections.abc import Mapping
 from contextlib import ExitStack
-from functools import partial
 from threading import Event, Thread
 from typing import Any
 from urllib.parse import quote
@@ -16,10 +14,11 @@ from urllib.parse import quote
 from dropanchor_schemas.epochs import EpochFence
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_service.bridges.frames import tag_frame_id
-from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
+from dropanchor_service.bridges.ros_messages import RosMessages, is_usable
 from dropanchor_service.commands.options import positive
 from dropanchor_service.commands.rest import KEY_VARIABLE, RefusedError, asked
 from dropanchor_service.commands.ros_node import RosNode
+from dropanchor_service.commands.ros_samples import SampleInput
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_tag_client import TagClient
 from dropanchor_tag_client.options import add_connection_options, apply_defaults, opened_client, opened_session
@@ -27,7 +26,8 @@ from dropanchor_tag_client.session import ConnectError
 from dropanchor_tag_client.sources.axes import AXES, Mounting, mounting
 
 DESCRIPTION = f"""\
-Makes a robot with ROS 2 a tag. Its nodes must use rmw_zenoh (RMW_IMPLEMENTATION=rmw_zenoh_cpp, ROS 2 Jazzy or newer).
+Makes a robot with ROS 2 a tag. Its nodes must use rmw_zenoh (RMW_IMPLEMENTATION=rmw_zenoh_cpp, ROS 2 Jazzy or newer;
+of ROS 2 Humble samples are read, and its nodes do not see the poses).
 Reads sensor_msgs/Imu and sensor_msgs/Range, and publishes the tag's pose as geometry_msgs/PoseWithCovarianceStamped,
 nav_msgs/Odometry and TF. If the service requires an API key for poses, set the environment variable {KEY_VARIABLE}.
 """
@@ -119,7 +119,7 @@ def _bridge(arguments: argparse.Namespace, node: RosNode, client: TagClient | No
     messages, stop = RosMessages(), Event()
     poses = Thread(target=PoseOutput(arguments, node, messages).run, args=(stop,), name="poses")
     with interrupts() as interrupt:
-        samples = None if client is None else SampleInput(arguments, node, messages, client, mounted)
+        samples = None if client is None else SampleInput(arguments, node, messages, client, mounted, _say)
         poses.start()
         try:
             _say(f"ready: domain {arguments.domain} at {arguments.ros_connect}, tag {arguments.tag}")
@@ -131,62 +131,6 @@ def _bridge(arguments: argparse.Namespace, node: RosNode, client: TagClient | No
             poses.join()
             if samples:
                 _say(samples.summary())
-
-
-class SampleInput:
-    """Turns messages of the configured topics into samples of the tag."""
-
-    def __init__(
-        self,
-        arguments: argparse.Namespace,
-        node: RosNode,
-        messages: RosMessages,
-        client: TagClient,
-        mounted: Mounting,
-    ) -> None:
-        self._node = node
-        self._messages = messages
-        self._client = client
-        self._mounted = mounted
-        self._rejected: Counter[str] = Counter()
-        self._told: Counter[str] = Counter()
-        self._tell_s = 0.0
-        if arguments.imu:
-            node.subscribe(arguments.imu, messages.imu, self._imu)
-        for topic, anchor in arguments.range:
-            node.subscribe(topic, messages.range, partial(self._range, anchor))
-
-    def take(self) -> None:
-        """Publish the sample of the next message, if one comes soon. Say now and then what was left out."""
-        received = self._node.take(_TAKE_S)
-        if received is not None:
-            try:
-                if not received.has_known_fields:
-                    raise UnusableError("a message whose type has other fields than in ROS 2 Jazzy")
-                received.handle(received.cdr, received.t_ns)
-            except UnusableError as error:
-                self._rejected[str(error)] += 1
-        if time.monotonic() >= self._tell_s and self._rejected != self._told:
-            self._tell_s = time.monotonic() + _REPORT_S
-            for reason, count in (self._rejected - self._told).items():
-                _say(f"left out {count} × {reason}")
-            self._told = self._rejected.copy()
-
-    def summary(self) -> str:
-        """Return what became of all messages."""
-        left_out = [f"{count} × {reason}" for reason, count in sorted(self._rejected.items())]
-        left_out += [f"{count} × {reason}" for reason, count in sorted(self._client.refused.items())]
-        left_out += [f"{self._node.lost} that came too fast"] if self._node.lost else []
-        return f"{self._client.sent.samples} samples sent; left out: {', '.join(left_out) or 'none'}"
-
-    def _imu(self, cdr: bytes, t_ns: int) -> None:
-        sample = self._messages.imu_sample(cdr, t_ns)
-        acc, gyro = self._mounted.to_body(sample.acc), self._mounted.to_body(sample.gyro)
-        self._client.publish_imu(acc, gyro, t_ns=sample.t_ns)
-
-    def _range(self, anchor: str, cdr: bytes, t_ns: int) -> None:
-        sample = self._messages.range_sample(cdr, t_ns, anchor)
-        self._client.publish_range(anchor, sample.range_m, t_ns=sample.t_ns, std_m=sample.std_m)
 
 
 class PoseOutput:

@@ -8,8 +8,11 @@ from typing import NamedTuple
 import zenoh
 
 from dropanchor_service.bridges.rmw_zenoh import (
+    Announced,
     Attachment,
     RosType,
+    announced_by,
+    any_publisher,
     attachment_from,
     gid_of,
     node_token,
@@ -19,15 +22,17 @@ from dropanchor_service.bridges.rmw_zenoh import (
 )
 
 _QUEUED_MESSAGES = 10_000
+_MAX_PUBLISHERS = 10_000
 
 
 class Received(NamedTuple):
     """A message of a subscription. t_ns: when it was sent, or received if it does not say."""
 
+    topic: str
     cdr: bytes
     t_ns: int
-    has_known_fields: bool
-    handle: Callable[[bytes, int], None]
+    type_hash: str
+    handle: "Callable[[Received], None]"
 
 
 class RosNode:
@@ -44,6 +49,8 @@ class RosNode:
         self._entities = 0
         self._queue: Queue[Received] = Queue(_QUEUED_MESSAGES)
         self._kept: list[object] = [self._declare(node_token(domain, self._id, name))]
+        self._announced: dict[str, Announced] = {}
+        self._kept.append(session.liveliness().declare_subscriber(any_publisher(), self._note_publisher, history=True))
 
     def publisher(self, topic: str, of: RosType) -> Callable[[bytes], None]:
         """Announce a publisher, and return the function that publishes a CDR message."""
@@ -60,16 +67,16 @@ class RosNode:
 
         return publish
 
-    def subscribe(self, topic: str, of: RosType, handle: Callable[[bytes, int], None]) -> None:
-        """Announce a subscription. `take` calls `handle` with the CDR and the time of each message."""
+    def subscribe(self, topic: str, of: RosType, handle: Callable[[Received], None]) -> None:
+        """Announce a subscription. `take` returns its messages with `handle`."""
         self._announce("MS", topic, of)
 
         def receive(sample: zenoh.Sample) -> None:  # on a thread of Zenoh: it must not block
             attached = None if sample.attachment is None else attachment_from(sample.attachment.to_bytes())
             t_ns = time.time_ns() if attached is None else attached.t_ns
-            known = str(sample.key_expr).endswith(f"/{of.type_hash}")
+            type_hash = str(sample.key_expr).rpartition("/")[2]
             try:
-                self._queue.put_nowait(Received(sample.payload.to_bytes(), t_ns, known, handle))
+                self._queue.put_nowait(Received(topic, sample.payload.to_bytes(), t_ns, type_hash, handle))
             except Full:
                 self.lost += 1
 
@@ -81,6 +88,18 @@ class RosNode:
             return self._queue.get(timeout=timeout_s)
         except Empty:
             return None
+
+    def publishers_of_others(self) -> list[Announced]:
+        """Return the publishers that other nodes announce, of all domains."""
+        return [one for one in list(self._announced.values()) if one.session != self._id]
+
+    def _note_publisher(self, sample: zenoh.Sample) -> None:  # on a thread of Zenoh
+        token = str(sample.key_expr)
+        announced = announced_by(token)
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._announced.pop(token, None)
+        elif announced is not None and len(self._announced) < _MAX_PUBLISHERS:
+            self._announced[token] = announced
 
     @property
     def _id(self) -> str:

@@ -226,6 +226,7 @@ class GuardedEngine:
         self._engine.configure(row, tag_columns(tag, current.declination_rad))
         if start_known:
             self._sensors.start(row, current.tag.acc_reversed is not None)
+            self._sites.rows.findings.set(row, ())
         self._keep_settings(row, tag_columns(current.tag, current.declination_rad))
 
     def _keep_settings(self, row: int, settings: Array) -> None:

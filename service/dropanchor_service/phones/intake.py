@@ -11,9 +11,9 @@ from threading import Lock
 from typing import Generic, Protocol, TypeVar
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, ImuSample, encode_packed
-from dropanchor_service.phones.pairing import Signs
-from dropanchor_service.phones.readings import PhoneError
-from dropanchor_service.phones.session import WAIT_S, Taken
+from dropanchor_tag_client.sources.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.session import WAIT_S, Taken
 
 SESSIONS_PER_TAG = 2
 MAX_SESSIONS = 2000

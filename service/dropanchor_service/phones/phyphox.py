@@ -17,12 +17,10 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from dropanchor_schemas.wire import MAX_T_NS
 from dropanchor_service.phones.phyphox_experiment import AXES, COLUMNS
-from dropanchor_service.phones.readings import PhoneError, is_measurement
-from dropanchor_service.phones.streams import Stream, make_stream
+from dropanchor_tag_client.sources.phones.readings import PhoneError, is_measurement
+from dropanchor_tag_client.sources.phones.streams import Reading, Stream, make_stream
 
 MAX_S = MAX_T_NS // 1_000_000_000
 NO_EXPERIMENT = "The message is not one of the experiment that this service makes for phyphox: load it again."
@@ -90,11 +88,11 @@ def _starts(time: dict[str, Any]) -> list[_Start]:
 
 def _stream(columns: list[list[Any]], starts: list[_Start]) -> tuple[Stream, int]:
     """Return the readings of four columns, and how many make no sense. What lacks a value makes none."""
-    readings = [tuple(map(_number, reading)) for reading in zip(*columns, strict=False)]
-    used = [reading for reading in readings if is_measurement(*reading[1:]) and 0.0 <= reading[0] < MAX_S]
-    times = [_utc_ns(reading[0], starts) for reading in used]
-    damaged = max(map(len, columns)) - len(used)
-    return make_stream(np.array(times, np.int64), np.array([reading[1:] for reading in used], np.float64)), damaged
+    readings: list[Reading] = []
+    for t_s, x, y, z in zip(*(map(_number, column) for column in columns), strict=False):
+        if is_measurement(x, y, z) and 0.0 <= t_s < MAX_S:
+            readings.append((_utc_ns(t_s, starts), (x, y, z)))
+    return make_stream(readings), max(map(len, columns)) - len(readings)
 
 
 def _utc_ns(experiment_s: float, starts: list[_Start]) -> int:

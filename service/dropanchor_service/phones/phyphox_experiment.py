@@ -7,7 +7,7 @@ sensors take the attribute `rateStrategy`. Older apps ask the person to update t
 from urllib.parse import quote, urlsplit
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from dropanchor_service.phones.readings import GYROSCOPE, MAGNETOMETER, TOTAL
+from dropanchor_tag_client.sources.phones.readings import GYROSCOPE, MAGNETOMETER, TOTAL
 
 MEDIA_TYPE = "application/phyphox"
 VERSION = "1.14"

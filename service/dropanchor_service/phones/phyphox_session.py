@@ -6,13 +6,11 @@ tells that one is missing between them. A pause of the experiment looks the same
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from dropanchor_service.phones.pairing import Paired, Pairing, Signs
 from dropanchor_service.phones.phyphox import Message
-from dropanchor_service.phones.readings import GYROSCOPE
-from dropanchor_service.phones.session import MAX_WAITING, WAIT_S, Taken, taken_of
-from dropanchor_service.phones.streams import Stream
+from dropanchor_tag_client.sources.phones.pairing import Paired, Pairing, Signs
+from dropanchor_tag_client.sources.phones.readings import GYROSCOPE
+from dropanchor_tag_client.sources.phones.session import MAX_WAITING, WAIT_S, Taken, taken_of
+from dropanchor_tag_client.sources.phones.streams import Stream, make_stream
 
 STEP_NS = 100_000_000  # between two readings of the gyroscope where none is missing; messages are 200 ms long
 BEGUN_NS = 1_000_000_000  # after the start of the experiment; a first message that is later is not the first
@@ -27,7 +25,7 @@ class PhyphoxSession:
     def __init__(self) -> None:
         self._pairing = Pairing(Signs.ANDROID)
         self._end_ns: int | None = None  # of the gyroscope's last reading that was not held back
-        self._known = np.empty(0, np.int64)  # times of the gyroscope's readings
+        self._known: set[int] = set()  # times of the gyroscope's readings
         self._waiting: dict[int, tuple[Streams, float]] = {}  # by the time of the gyroscope's first reading
 
     def take(self, message: Message, now_s: float) -> Taken:
@@ -36,9 +34,9 @@ class PhyphoxSession:
         if gyroscope is None:
             return self._taken([self._pairing.add(message.streams)])
         fresh = self._without_known(gyroscope)
-        if not len(fresh):
+        if not fresh:
             return self._taken([], duplicate=True)
-        first_ns, streams = int(fresh.t_ns[0]), {**message.streams, GYROSCOPE: fresh}
+        first_ns, streams = fresh.t_ns[0], {**message.streams, GYROSCOPE: fresh}
         if self._end_ns is None:
             start_ns = message.start_ns
             self._end_ns = start_ns if first_ns - start_ns < BEGUN_NS else first_ns
@@ -63,11 +61,10 @@ class PhyphoxSession:
 
     def _without_known(self, gyroscope: Stream) -> Stream:
         """Return the readings that have not come before, and remember them."""
-        newest_ns = max(gyroscope.newest_ns, int(self._known[-1]) if len(self._known) else 0)
-        fresh = ~np.isin(gyroscope.t_ns, self._known) & (gyroscope.t_ns > newest_ns - REMEMBERED_NS)
-        known = np.union1d(self._known, gyroscope.t_ns)
-        self._known = known[known > newest_ns - REMEMBERED_NS]
-        return Stream(gyroscope.t_ns[fresh], gyroscope.values[fresh])
+        oldest_ns = max(gyroscope.newest_ns, max(self._known, default=0)) - REMEMBERED_NS
+        fresh = make_stream(one for one in gyroscope.readings() if one[0] > oldest_ns and one[0] not in self._known)
+        self._known = {t_ns for t_ns in self._known.union(gyroscope.t_ns) if t_ns > oldest_ns}
+        return fresh
 
     def _following(self, arrived_s: float) -> int | None:
         """Return the key of the message that comes next; None when it is to be waited for."""

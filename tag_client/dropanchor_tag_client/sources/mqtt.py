@@ -20,6 +20,8 @@ from dropanchor_tag_client.sources.bridge.measurement import Format
 from dropanchor_tag_client.sources.bridge.pipe import Bridge
 from dropanchor_tag_client.sources.bridge.sensor_logger import SensorLogger
 from dropanchor_tag_client.sources.bridge.template import Template
+from dropanchor_tag_client.sources.bridge.topics import is_filter
+from dropanchor_tag_client.sources.phones.pairing import Signs
 from dropanchor_tag_client.sources.throttled_log import throttled_log
 from dropanchor_tag_client.upkeep import Upkeep
 
@@ -35,6 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensor-logger",
         metavar="TOPIC",
         help="the topic that is set in the app Sensor Logger; a + in it is the tag: sensor-logger/+",
+    )
+    what.add_argument(
+        "--signs",
+        choices=list(Signs),
+        default=Signs.AUTO,
+        type=Signs,
+        help="which way accelerations of Sensor Logger point (default: gravity tells while the screen is up)",
     )
     what.add_argument("--template", type=Path, action="append", default=[], metavar="FILE", help="rules in TOML")
     parser.add_argument("--tag-prefix", default="", help="what to put before the ids of the tags, such as cart-")
@@ -86,7 +95,9 @@ def _formats(arguments: argparse.Namespace) -> list[Format]:
     if arguments.decawave:
         formats.append(Decawave())
     if arguments.sensor_logger is not None:
-        formats.append(SensorLogger(arguments.sensor_logger))
+        if not is_filter(arguments.sensor_logger):
+            raise ValueError(f"--sensor-logger is {arguments.sensor_logger!r}; a topic such as phones/+ was expected")
+        formats.append(SensorLogger(arguments.sensor_logger, arguments.signs))
     if not formats:
         raise ValueError("no format was given: add --decawave, --sensor-logger TOPIC or --template FILE")
     return formats

@@ -1,8 +1,10 @@
 """Keys, liveliness tokens and attachments as rmw_zenoh documents them."""
 
 from dropanchor_service.bridges.rmw_zenoh import (
+    Announced,
     Attachment,
     RosType,
+    announced_by,
     attachment_from,
     gid_of,
     node_token,
@@ -24,6 +26,13 @@ def test_keys_and_tokens_have_the_form_of_the_examples_in_the_design_document() 
         "@ros2_lv/0/8b20917502ee955ac4476e0266340d5c/0/10/MP/%/%/talker/%chatter/"
         f"std_msgs::msg::dds_::String_/{HASH}/::,10:,:,:,,"
     )
+
+
+def test_the_publisher_of_a_token_is_read_back() -> None:
+    token = topic_token(7, "8b20", "driver", 10, "MP", "/imu/data", STRING)
+    assert announced_by(token) == Announced("7", "8b20", "driver", "/imu/data", "std_msgs/msg/String")
+    for other in (topic_token(7, "8b20", "driver", 10, "MS", "/imu", STRING), node_token(7, "8b20", "driver"), ""):
+        assert announced_by(other) is None
 
 
 def test_an_attachment_has_33_bytes() -> None:

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH
 from dropanchor_service.bridges.ros_messages import RosMessages, UnusableError, is_usable
-from support.ros2 import HEADER, IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, imu_cdr, range_cdr, read_pose
+from support.ros2 import HEADER, IMU, ODOMETRY, POSE, RANGE, TF, CdrReader, CdrWriter, imu_cdr, range_cdr, read_pose
 
 T_NS = 1_800_000_000_123_456_789
 COVARIANCE = [[0.1, 0.02, 0.03], [0.02, 0.4, 0.05], [0.03, 0.05, 0.6]]
@@ -67,25 +68,49 @@ def test_a_robot_gets_no_pose_that_it_must_not_act_on(fields: dict[str, Any]) ->
 
 
 def test_samples_have_the_values_and_the_stamp_of_their_message() -> None:
-    imu = MESSAGES.imu_sample(imu_cdr(T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), 5)
+    imu = MESSAGES.imu_sample(imu_cdr(T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), 5, MESSAGES.imu.type_hash)
     assert imu == (T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), None)
-    distance = MESSAGES.range_sample(range_cdr(T_NS, 3.5, variance=0.0625), 5, "7")
+    distance = MESSAGES.range_sample(range_cdr(T_NS, 3.5, variance=0.0625), 5, "7", MESSAGES.range.type_hash)
     assert distance == (T_NS, 7, 3.5, 0.25)
 
 
 def test_a_message_without_stamp_or_variance_has_the_time_of_its_sending_and_an_unknown_deviation() -> None:
-    sample = MESSAGES.range_sample(range_cdr(0, 3.5, variance=0.0), T_NS, "yard")
+    sample = MESSAGES.range_sample(range_cdr(0, 3.5, variance=0.0), T_NS, "yard", MESSAGES.range.type_hash)
     assert sample.t_ns == T_NS
     assert isnan(sample.std_m)
 
 
 def test_a_sensor_without_limits_may_report_any_range() -> None:
-    assert MESSAGES.range_sample(range_cdr(T_NS, 3.5, max_range=0.0), 0, "7").range_m == 3.5
+    assert MESSAGES.range_sample(range_cdr(T_NS, 3.5, max_range=0.0), 0, "7", MESSAGES.range.type_hash).range_m == 3.5
 
 
 @given(st.binary(max_size=400) | st.binary(max_size=400).map(lambda body: HEADER + body))
 def test_any_bytes_are_a_sample_or_unusable(cdr: bytes) -> None:
-    with suppress(UnusableError):
-        assert len(MESSAGES.imu_sample(cdr, T_NS).acc) == 3
-    with suppress(UnusableError):
-        assert MESSAGES.range_sample(cdr, T_NS, "7").anchor == 7
+    for imu_hash, range_hash in ((MESSAGES.imu.type_hash, MESSAGES.range.type_hash), (NO_TYPE_HASH, NO_TYPE_HASH)):
+        with suppress(UnusableError):
+            assert len(MESSAGES.imu_sample(cdr, T_NS, imu_hash).acc) == 3
+        with suppress(UnusableError):
+            assert MESSAGES.range_sample(cdr, T_NS, "7", range_hash).anchor == 7
+
+
+def test_messages_of_humble_are_read_without_the_variance_that_it_does_not_have() -> None:
+    cdr = CdrWriter().header(T_NS, "uwb").add("B", 0).add("f", 0.1, 0.0, 100.0, 3.5).cdr
+    assert MESSAGES.range_sample(cdr, 5, "7", NO_TYPE_HASH)[:3] == (T_NS, 7, 3.5)
+    imu = MESSAGES.imu_sample(imu_cdr(T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3)), 5, NO_TYPE_HASH)
+    assert imu == (T_NS, (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), None)
+    with pytest.raises(UnusableError, match="a damaged sensor_msgs/msg/Range"):
+        MESSAGES.range_sample(cdr, 5, "7", MESSAGES.range.type_hash)
+
+
+@pytest.mark.parametrize(
+    ("cdr", "type_hash", "why"),
+    [
+        (imu_cdr(T_NS, (0, 0, 9.8), (0, 0, 0), covariance=-1.0), MESSAGES.imu.type_hash, "without angular_velocity"),
+        (imu_cdr(T_NS, (0, 0, 0), (0, 0, 0.1)), MESSAGES.imu.type_hash, "0 along all axes: it was not measured"),
+        (imu_cdr(T_NS, (0, -0.0, 0), (0, 0, 0)), NO_TYPE_HASH, "0 along all axes: it was not measured"),
+        (imu_cdr(T_NS, (0, 0, 9.8), (0, 0, 0)), "RIHS01_00", "other fields than in ROS 2 Humble and Jazzy"),
+    ],
+)
+def test_an_imu_message_without_a_measurement_is_named(cdr: bytes, type_hash: str, why: str) -> None:
+    with pytest.raises(UnusableError, match=why):
+        MESSAGES.imu_sample(cdr, T_NS, type_hash)

@@ -65,7 +65,7 @@ def test_accelerations_in_g_are_named_and_never_reach_the_engine() -> None:
 
 def test_the_accepted_unit_converts_what_comes_from_then_on() -> None:
     bench = sent(*frames(20, acc=1.0))
-    bench.site.set_tag_settings("a", bench.site.tag_settings("a").model_copy(update={"acc_unit": "g"}))
+    bench.site.set_tag("a", bench.site.tag_settings("a").model_copy(update={"acc_unit": "g"}))
     send(bench, *frames(20, begin=20, acc=1.0))
     assert state_of(bench)[0] == State.TRACKING
     assert bench.engine.batches[-1].imu["acc"][0, 2] == pytest.approx(GRAVITY)

@@ -8,8 +8,8 @@ import pytest
 
 from dropanchor_service.phones.phyphox import Message, parse
 from dropanchor_service.phones.phyphox_session import PhyphoxSession
-from dropanchor_service.phones.readings import PhoneError
-from dropanchor_service.phones.session import MAX_WAITING, WAIT_S
+from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.session import MAX_WAITING, WAIT_S
 from support.phone import Phone
 from support.phyphox import Value, event, message, recording
 from support.sensor_logger import G, Vector

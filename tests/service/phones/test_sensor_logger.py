@@ -8,9 +8,9 @@ import pytest
 
 from dropanchor_schemas.wire import ENCODING_JSON
 from dropanchor_service.phones.intake import BATTERY_S, SESSIONS_PER_TAG
-from dropanchor_service.phones.readings import PhoneError
-from dropanchor_service.phones.sensor_logger import Message, parse
-from dropanchor_service.phones.session import MAX_WAITING, WAIT_S, Session
+from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.sensor_logger import Message, parse
+from dropanchor_tag_client.sources.phones.session import MAX_WAITING, WAIT_S, Session
 from support.phone import Phone
 from support.sensor_logger import T_NS, G, Value, Vector, message, reading, recording
 

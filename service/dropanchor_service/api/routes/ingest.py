@@ -19,10 +19,10 @@ from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
 from dropanchor_service.phones.intake import PhoneIntake
-from dropanchor_service.phones.pairing import Signs
-from dropanchor_service.phones.readings import PhoneError
-from dropanchor_service.phones.sensor_logger import Message, parse
-from dropanchor_service.phones.session import WAIT_S, Session
+from dropanchor_tag_client.sources.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.sensor_logger import Message, parse
+from dropanchor_tag_client.sources.phones.session import WAIT_S, Session
 
 PHONE_ERROR = 499
 """The one status of which Sensor Logger shows the text."""

@@ -24,8 +24,8 @@ from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_service.phones.phyphox import Message, parse
 from dropanchor_service.phones.phyphox_experiment import AXES, COLUMNS, MEDIA_TYPE, experiment, link_of
 from dropanchor_service.phones.phyphox_session import PhyphoxSession
-from dropanchor_service.phones.readings import PhoneError
-from dropanchor_service.phones.session import WAIT_S
+from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.session import WAIT_S
 
 SVG = "image/svg+xml"
 _NEVER_STORE = {"cache-control": "no-store"}  # both hold the key

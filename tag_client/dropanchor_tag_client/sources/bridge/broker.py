@@ -12,6 +12,8 @@ from urllib.parse import urlsplit
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion
 
+from dropanchor_tag_client.sources.bridge.measurement import Received
+
 _PORTS = {"mqtt": 1883, "mqtts": 8883, "ws": 80, "wss": 443}
 _QUEUE_MESSAGES = 10_000
 _KEEP_ALIVE_S, _RETRY_S, _MAX_RETRY_S = 30, 1, 10
@@ -46,14 +48,6 @@ class BrokerSettings(NamedTuple):
         if parts.scheme in ("mqtt", "ws") and (self.ca or self.cert):
             raise BrokerError(f"certificates are given, but {self.url} is not an mqtts:// or wss:// address")
         return parts.scheme, parts.hostname, port or _PORTS[parts.scheme], parts.path
-
-
-class Received(NamedTuple):
-    """A message and when it arrived, ns UTC."""
-
-    topic: str
-    payload: bytes
-    t_ns: int
 
 
 class Broker:
@@ -120,7 +114,7 @@ class Broker:
 
     def _on_message(self, _client: Client, _data: Any, message: MQTTMessage) -> None:
         if self._queue.qsize() < _QUEUE_MESSAGES:  # only this thread puts
-            self._queue.put(Received(message.topic, bytes(message.payload), time.time_ns()))
+            self._queue.put(Received(message.topic, bytes(message.payload), time.time_ns(), bool(message.retain)))
         else:
             self.lost += 1
 

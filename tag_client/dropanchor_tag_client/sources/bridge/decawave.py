@@ -12,7 +12,16 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
-from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Measurement, json_of
+from dropanchor_tag_client.sources.bridge.measurement import (
+    Drop,
+    Dropped,
+    Format,
+    Found,
+    Measurement,
+    Received,
+    json_of,
+    refused_retained,
+)
 
 _TYPE_AND_COUNT = struct.Struct("<BB")
 _DISTANCE = struct.Struct("<HIB")
@@ -22,22 +31,24 @@ _NO_MEASUREMENTS = ("status", "config", "service")
 _US = 1_000
 
 
-class Decawave:
+class Decawave(Format):
     """topics: `dwm/node/<id>/uplink/<what>`, and LEAPS' `<prefix>/<network>/node/uplink/<what>/<id>`."""
 
     topics: tuple[str, ...] = ("dwm/node/+/uplink/#", "+/+/node/uplink/#")
 
-    def parse(self, topic: str, payload: bytes, t_ns: int) -> Iterator[Measurement | Dropped]:
-        node, what = _node_and_what(topic)
+    def parse(self, message: Received) -> Iterator[Found]:
+        node, what = _node_and_what(message.topic)
         if what in _NO_MEASUREMENTS:
             return
-        value = json_of(payload)
-        if isinstance(value, Dropped):
+        value = json_of(message.payload)
+        if message.retained:
+            yield refused_retained(message)
+        elif isinstance(value, Dropped):
             yield value
         elif what == "location":
             yield Dropped(Drop.POSITION_ONLY, "the gateway's positions hold no ranges; see the user data of the tag")
         elif what == "data" and isinstance(value, dict) and isinstance(value.get("data"), str):
-            yield from _ranges(node, value["data"], _time(value.get("timestamp"), t_ns))
+            yield from _ranges(node, value["data"], _time(value.get("timestamp"), message.t_ns))
         else:
             yield Dropped(Drop.NOT_UNDERSTOOD, "user data, as in dwm/node/…/uplink/data, was expected")
 
@@ -49,7 +60,7 @@ def _node_and_what(topic: str) -> tuple[str, str]:
     return levels[-1].upper(), levels[4] if len(levels) > 5 else ""
 
 
-def _ranges(node: str, text: str, t_ns: int) -> Iterator[Measurement | Dropped]:
+def _ranges(node: str, text: str, t_ns: int) -> Iterator[Found]:
     try:
         data = base64.b64decode(text, validate=True)
         kind, count = _TYPE_AND_COUNT.unpack_from(data)

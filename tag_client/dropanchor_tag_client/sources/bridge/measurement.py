@@ -1,7 +1,7 @@
 """What a format makes of a message, and why it left out something."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from typing import Any, NamedTuple, Protocol
 
@@ -14,12 +14,26 @@ class Drop(StrEnum):
     TOO_LONG = "too_long"
     NOT_JSON = "not_json"
     NOT_UNDERSTOOD = "not_understood"
+    RETAINED = "retained"
     TAG_INVALID = "tag_invalid"
     TOO_MANY_TAGS = "too_many_tags"
     POSITION_ONLY = "position_only"
     DUPLICATE = "duplicate"
+    DAMAGED = "damaged"
+    SIGN_UNKNOWN = "sign_unknown"
+    NO_MOTION = "no_motion"
     UNPAIRED = "unpaired"
+    REFUSED = "refused"
     BACKLOG = "backlog"
+
+
+class Received(NamedTuple):
+    """A message and when it arrived, ns UTC. retained: the broker kept it from earlier."""
+
+    topic: str
+    payload: bytes
+    t_ns: int
+    retained: bool = False
 
 
 class Dropped(NamedTuple):
@@ -37,19 +51,35 @@ class Measurement(NamedTuple):
     fields: dict[str, Any]
 
 
+Found = Measurement | Dropped
+
+
 class Format(Protocol):
     """topics: the filters to subscribe to."""
 
     topics: tuple[str, ...]
 
-    def parse(self, topic: str, payload: bytes, t_ns: int) -> Iterator[Measurement | Dropped]:
-        """Yield what a message holds. t_ns: when it arrived. Never raises, whatever the payload is."""
+    def parse(self, message: Received) -> Iterator[Found]:
+        """Yield what a message holds. Never raises, whatever the payload is."""
+
+    def overdue(self, t_ns: int) -> Iterable[Found]:  # noqa: ARG002
+        """Return what need not wait any longer for messages that are missing at this time."""
+        return ()
+
+
+def refused_retained(message: Received, way_out: str = "") -> Dropped:
+    """Return why a retained message is left out."""
+    return Dropped(Drop.RETAINED, f"{message.topic}: the broker kept it, and nobody knows how old it is{way_out}")
+
+
+def too_long(payload: bytes) -> Dropped:
+    return Dropped(Drop.TOO_LONG, f"{len(payload)} bytes")
 
 
 def json_of(payload: bytes) -> Any:
     """Return the JSON value of a payload, or why there is none."""
     if len(payload) > MAX_PAYLOAD_BYTES:
-        return Dropped(Drop.TOO_LONG, f"{len(payload)} bytes")
+        return too_long(payload)
     try:
         return json.loads(payload, parse_constant=_no_constant)
     except (ValueError, RecursionError) as error:

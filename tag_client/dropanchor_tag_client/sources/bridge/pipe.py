@@ -8,9 +8,8 @@ from typing import Any
 
 from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_tag_client.client import TagClient
-from dropanchor_tag_client.sources.bridge.broker import Received
-from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Format, Measurement
-from dropanchor_tag_client.sources.bridge.template import matches
+from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Format, Found, Measurement, Received
+from dropanchor_tag_client.sources.bridge.topics import matches
 from dropanchor_tag_client.sources.publish import BadLineError, publisher_of
 
 MAX_TAGS = 256
@@ -49,10 +48,11 @@ class Bridge:
         """Publish what a message holds."""
         for one in self._formats:
             if any(matches(topic, message.topic) for topic in one.topics):
-                for found in one.parse(message.topic, message.payload, message.t_ns):
-                    self._drop(found) if isinstance(found, Dropped) else self._publish(found)
+                self._take_all(one.parse(message))
 
     def flush(self) -> None:
+        for one in self._formats:
+            self._take_all(one.overdue(time.time_ns()))
         for client in self._clients.values():
             client.flush()
 
@@ -85,6 +85,10 @@ class Bridge:
         for client in self._clients.values():
             client.close()
 
+    def _take_all(self, parts: Iterable[Found]) -> None:
+        for found in parts:
+            self._drop(found) if isinstance(found, Dropped) else self._publish(found)
+
     def _publish(self, found: Measurement) -> None:
         fields = dict(found.fields)
         if "anchor" in fields:
@@ -98,10 +102,13 @@ class Bridge:
             return self._drop(Dropped(Drop.TAG_INVALID, f"{found.tag!r}: {error}"))
         if client is None:
             return self._drop(Dropped(Drop.TOO_MANY_TAGS, f"tag {found.tag} is number {MAX_TAGS + 1}"))
+        refused = Counter(client.refused)
         try:
             publish(client)
         except ValueError as error:  # such as an anchor id that is too long
             return self._drop(Dropped(Drop.NOT_UNDERSTOOD, f"tag {found.tag}: {error}"))
+        for reason in client.refused - refused:
+            return self._drop(Dropped(Drop.REFUSED, f"tag {found.tag}: {reason.value}"))
         self.samples += found.kind != "health"
         return None
 

@@ -1,167 +1,94 @@
-"""Messages of the app Sensor Logger, which publishes the readings of a phone's sensors.
+"""Messages of the app Sensor Logger, which publishes the readings of a phone's sensors."""
 
-{"messageId": 0, "sessionId": "…", "deviceId": "…", "payload": [{"name": "gyroscope", "time": 1698501144401773000,
-"values": {"x": 0.1, "y": 0.0, "z": 0.0}}, …]}: the readings of one batch period, with UTC in ns. "Standardise Units &
-Frames" must be on, or the phone an Android: then accelerations are specific force. An IMU sample has the time of a
-gyroscope reading; the other sensors are interpolated there.
-"""
-
-import math
-from bisect import bisect_left
 from collections import OrderedDict
 from collections.abc import Iterator
-from typing import Any, NamedTuple
 
-from dropanchor_schemas.wire import Vector
-from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Measurement, json_of
+from dropanchor_schemas.wire import ImuSample
+from dropanchor_tag_client.sources.bridge.measurement import (
+    MAX_PAYLOAD_BYTES,
+    Drop,
+    Dropped,
+    Format,
+    Found,
+    Measurement,
+    Received,
+    refused_retained,
+    too_long,
+)
+from dropanchor_tag_client.sources.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.problems import TILTED
+from dropanchor_tag_client.sources.phones.readings import TITLES, PhoneError
+from dropanchor_tag_client.sources.phones.sensor_logger import Message, parse
+from dropanchor_tag_client.sources.phones.session import WAIT_S, Session, Taken
 
-TOTAL, LINEAR, GRAVITY = "totalacceleration", "accelerometer", "gravity"
-GYROSCOPE, MAGNETOMETER = "gyroscope", "magnetometer"
-_SENSORS = (TOTAL, LINEAR, GRAVITY, GYROSCOPE, MAGNETOMETER)
-_MAX_GAP_NS = 250_000_000  # between two readings that are interpolated
-_HOLD_NS = 2_000_000_000  # for which a reading waits for those of the other sensors
-_MAX_READINGS = 5_000
 _MAX_RECORDINGS = 256
 
 
-class _Reading(NamedTuple):
-    t_ns: int
-    value: Vector
-
-
-class SensorLogger:
+class SensorLogger(Format):
     """topic: the one that is set in the app. A `+` in it stands for the tag; without one, the phone's device id does.
+    signs: which way the accelerations of the phones point."""
 
-    The top edge of the phone points forward.
-    """
-
-    def __init__(self, topic: str) -> None:
+    def __init__(self, topic: str, signs: Signs = Signs.AUTO) -> None:
         self.topics: tuple[str, ...] = (topic,)
+        self._signs = signs
         self._tag_level = topic.split("/").index("+") if "+" in topic.split("/") else None
-        self._recordings: OrderedDict[tuple[str, str], _Recording] = OrderedDict()
+        self._recordings: OrderedDict[tuple[str, str], Session] = OrderedDict()
 
-    def parse(self, topic: str, payload: bytes, t_ns: int) -> Iterator[Measurement | Dropped]:  # noqa: ARG002
-        message = json_of(payload)
-        if isinstance(message, Dropped):
-            yield message
+    def parse(self, message: Received) -> Iterator[Found]:
+        if message.retained:
+            yield refused_retained(message)
             return
-        if not isinstance(message, dict) or not isinstance(message.get("payload", []), list):
-            yield Dropped(Drop.NOT_UNDERSTOOD, "a message of Sensor Logger was expected: an object with a payload")
+        if len(message.payload) > MAX_PAYLOAD_BYTES:
+            yield too_long(message.payload)
             return
-        tag = message.get("deviceId") if self._tag_level is None else topic.split("/")[self._tag_level]
-        if not isinstance(tag, str) or not tag:
+        try:
+            readings = parse(message.payload)
+        except PhoneError as error:
+            yield Dropped(Drop.NOT_UNDERSTOOD, f"{message.topic}: {error}")
+            return
+        if readings is None:
+            return
+        tag = readings.device_id if self._tag_level is None else message.topic.split("/")[self._tag_level]
+        if not tag:
             yield Dropped(Drop.TAG_INVALID, "the message has no deviceId")
             return
-        recording = self._recording(tag, str(message.get("sessionId")))
-        for found in recording.add(message.get("messageId"), message.get("payload", [])):
-            yield Measurement(tag, "imu", found) if isinstance(found, dict) else found
-        if (level := _battery_level(message.get("payload", []))) is not None:
-            yield Measurement(tag, "health", {"battery_fraction": level})
+        yield from self._found(tag, readings, message.t_ns * 1e-9)
 
-    def _recording(self, tag: str, session_id: str) -> "_Recording":
-        recording = self._recordings.pop((tag, session_id), None) or _Recording()
+    def overdue(self, t_ns: int) -> Iterator[Found]:
+        for (tag, _), session in self._recordings.items():
+            if session.waiting_since_s is not None:
+                yield from _of(tag, session.release(t_ns * 1e-9 - WAIT_S))
+
+    def _found(self, tag: str, readings: Message, now_s: float) -> Iterator[Found]:
+        taken = self._recording(tag, readings.session_id).take(readings, now_s)
+        yield from _of(tag, taken)
+        if taken.duplicate:
+            yield Dropped(Drop.DUPLICATE, f"tag {tag}: message {readings.message_id}")
+            return
+        for sensor, what in readings.damage.items():
+            yield Dropped(Drop.DAMAGED, f"tag {tag}: readings of {TITLES[sensor]} {what}")
+        if readings.battery_fraction is not None:
+            yield Measurement(tag, "health", {"battery_fraction": readings.battery_fraction})
+
+    def _recording(self, tag: str, session_id: str) -> Session:
+        recording = self._recordings.pop((tag, session_id), None) or Session(self._signs)
         self._recordings[tag, session_id] = recording
         if len(self._recordings) > _MAX_RECORDINGS:
             self._recordings.popitem(last=False)
         return recording
 
 
-class _Recording:
-    """The readings of one recording that may still be needed, by sensor."""
-
-    def __init__(self) -> None:
-        self._readings: dict[str, list[_Reading]] = {}
-        self._last_id = -1
-
-    def add(self, message_id: Any, payload: list[Any]) -> Iterator[dict[str, Any] | Dropped]:
-        """Yield the fields of the samples that are complete with this message."""
-        if isinstance(message_id, int):
-            if message_id == self._last_id:
-                yield Dropped(Drop.DUPLICATE, f"message {message_id}")
-                return
-            self._last_id = message_id
-        bad = sum(not self._take(reading) for reading in payload)
-        if bad:
-            yield Dropped(Drop.NOT_UNDERSTOOD, f"{bad} readings make no sense")
-        yield from self._samples()
-
-    def _take(self, reading: Any) -> bool:
-        """Keep a reading of a sensor that is used. Return False if it makes no sense."""
-        if not isinstance(reading, dict):
-            return False
-        name = str(reading.get("name")).lower()
-        if name not in _SENSORS:
-            return True
-        try:
-            values = reading.get("values", reading)
-            x, y, z = (float(values[axis]) for axis in "xyz")
-            found = _Reading(int(reading["time"]), (y, -x, z))  # from the phone's axes to those of the tag
-        except (KeyError, TypeError, ValueError, OverflowError):
-            return False
-        if not all(map(math.isfinite, found.value)):
-            return False
-        kept = self._readings.setdefault(name, [])
-        kept.append(found)
-        if len(kept) > 1 and found.t_ns < kept[-2].t_ns:
-            kept.sort()
-        del kept[:-_MAX_READINGS]
-        return True
-
-    def _samples(self) -> Iterator[dict[str, Any] | Dropped]:
-        parts = (TOTAL,) if TOTAL in self._readings else (LINEAR, GRAVITY)
-        gyro = self._readings.get(GYROSCOPE, [])
-        newest_ns = max((readings[-1].t_ns for readings in self._readings.values() if readings), default=0)
-        unpaired = 0
-        while gyro:
-            t_ns = gyro[0].t_ns
-            is_late = t_ns < newest_ns - _HOLD_NS
-            if not is_late and any(t_ns > self._newest_ns(name) for name in (*parts, *self._optional())):
-                break
-            turn = gyro.pop(0)
-            values = [self._at(name, t_ns) for name in parts]
-            if None in values:
-                unpaired += 1
-                continue
-            force = [sum(components) for components in zip(*(v for v in values if v), strict=True)]
-            yield {"acc": force, "gyro": list(turn.value), "mag": self._at(MAGNETOMETER, t_ns), "t_ns": t_ns}
-        if unpaired:
-            yield Dropped(Drop.UNPAIRED, "switch on Gyroscope and Total Acceleration, or Accelerometer and Gravity")
-        self._forget(newest_ns - 2 * _HOLD_NS)
-
-    def _optional(self) -> tuple[str, ...]:
-        return (MAGNETOMETER,) if MAGNETOMETER in self._readings else ()
-
-    def _newest_ns(self, name: str) -> int:
-        readings = self._readings.get(name)
-        return readings[-1].t_ns if readings else -1
-
-    def _at(self, name: str, t_ns: int) -> list[float] | None:
-        """Interpolate a sensor at a time. Return None without readings on both sides that are near enough."""
-        readings = self._readings.get(name, [])
-        after = bisect_left(readings, t_ns, key=lambda reading: reading.t_ns)
-        if after == len(readings) or (after == 0 and readings[0].t_ns != t_ns):
-            return None
-        right = readings[after]
-        if right.t_ns == t_ns:
-            return list(right.value)
-        left = readings[after - 1]
-        gap_ns = right.t_ns - left.t_ns
-        share = (t_ns - left.t_ns) / gap_ns
-        if gap_ns > _MAX_GAP_NS:
-            return None
-        return [a + share * (b - a) for a, b in zip(left.value, right.value, strict=True)]
-
-    def _forget(self, before_ns: int) -> None:
-        for name, readings in self._readings.items():
-            if name != GYROSCOPE and readings and readings[0].t_ns < before_ns:
-                del readings[: bisect_left(readings, before_ns, key=lambda reading: reading.t_ns)]
+def _of(tag: str, taken: Taken) -> Iterator[Found]:
+    """Yield the samples that are complete, and why there are none."""
+    for sample in taken.samples:
+        yield Measurement(tag, "imu", _fields(sample))
+    if taken.problem:
+        yield Dropped(Drop.SIGN_UNKNOWN if taken.problem == TILTED else Drop.NO_MOTION, f"tag {tag}: {taken.problem}")
+    elif taken.unpaired:
+        text = f"tag {tag}: {taken.unpaired} readings of Gyroscope without an acceleration at their time"
+        yield Dropped(Drop.UNPAIRED, text)
 
 
-def _battery_level(payload: list[Any]) -> float | None:
-    """Return the last charge of the phone's battery in a message, None if there is none."""
-    for reading in reversed(payload):
-        values = reading.get("values") if isinstance(reading, dict) and reading.get("name") == "battery" else None
-        level = values.get("batteryLevel") if isinstance(values, dict) else None
-        if isinstance(level, int | float) and not isinstance(level, bool):
-            return float(level)
-    return None
+def _fields(sample: ImuSample) -> dict[str, object]:
+    mag = None if sample.mag is None else list(sample.mag)
+    return {"acc": list(sample.acc), "gyro": list(sample.gyro), "mag": mag, "t_ns": sample.t_ns}

@@ -1,7 +1,9 @@
 """Samples over HTTP: who may send them for which tag, what is answered, what is passed on."""
 
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -20,9 +22,9 @@ from dropanchor_schemas.wire import (
 )
 from dropanchor_service.api.app import MAX_BODY_BYTES
 from dropanchor_service.api.http.rates import RateLimiter
-from dropanchor_service.phones.pairing import TILTED
 from dropanchor_service.security.api_keys import SOURCE, ApiKeyError, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
+from dropanchor_tag_client.sources.phones.problems import TILTED
 from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.sensor_logger import T_NS, G, message, reading
 
@@ -128,6 +130,14 @@ def test_what_a_phone_cannot_be_used_for_is_told_with_the_status_that_its_app_sh
         assert sentence in response.text
     ios = post(bench, f"{PHONE}?tag=anna&signs=ios", message(0, upright, session="another"))
     assert PhoneReadingsReceived.model_validate(ios.json()).samples == 1
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, None, "NaN"])
+def test_a_phone_whose_sensor_gives_no_numbers_is_told_so_and_not_to_switch_it_on(value: Any) -> None:
+    readings = [reading("totalacceleration", T_NS, (0, 0, G)), reading("gyroscope", T_NS, (value, 0, 0))]
+    response = post(make_api_bench(), f"{PHONE}?tag=anna", message(0, readings))
+    assert response.status_code == 499
+    assert response.text.startswith("The readings of Gyroscope are not numbers: start the recording again.")
 
 
 def test_a_tags_key_speaks_for_its_own_tag_and_for_nobody_else(guarded: Guarded) -> None:

@@ -2,8 +2,8 @@
 
 import base64
 import json
+import math
 import struct
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,48 +11,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dropanchor_tag_client.sources.bridge.decawave import Decawave
-from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Format, Measurement
+from dropanchor_tag_client.sources.bridge.measurement import Drop, Dropped, Format, Measurement, Received
 from dropanchor_tag_client.sources.bridge.sensor_logger import SensorLogger
-from dropanchor_tag_client.sources.bridge.template import Template, TemplateError, matches
-from support.sensor_logger import G, message, reading, recording
+from dropanchor_tag_client.sources.phones.pairing import Signs
+from support.sensor_logger import G, Value, message, reading, recording
 
 NOW_NS = 1_800_000_000_000_000_000
 MS = 1_000_000
-RULES = """
-[[rule]]
-topic = "plant/+/uwb"
-tag = "{1}-{device.id}"
-kind = "range"
-each = "anchors"
-time_unit = "ms"
-fields = { anchor = "id", range_m = "cm", t_ns = "at" }
-scale = { range_m = 0.01 }
-
-[[rule]]
-topic = "imu/#"
-tag = "cart"
-kind = "imu"
-fields = { acc = ["ax", "ay", "az"], gyro = "g" }
-scale = { acc = 9.80665, gyro = 0.5 }
-
-[[rule]]
-topic = "radar"
-tag = "{who}"
-kind = "range"
-time_unit = "s"
-fields = { anchor = "=yard", range_m = "list.1.d", t_ns = "t" }
-"""
 
 
-@pytest.fixture
-def template(tmp_path: Path) -> Template:
-    (tmp_path / "rules.toml").write_text(RULES)
-    return Template(tmp_path / "rules.toml")
+ANDROID: dict[str, Value] = {"gyroscope": lambda _: (0.0, 0.0, 0.1), "totalacceleration": lambda _: (0.0, 0.0, G)}
 
 
 def parsed(one: Format, topic: str, value: Any) -> list[Measurement | Dropped]:
     payload = value if isinstance(value, bytes) else json.dumps(value).encode()
-    return list(one.parse(topic, payload, NOW_NS))
+    return list(one.parse(Received(topic, payload, NOW_NS)))
 
 
 def reasons(found: list[Measurement | Dropped]) -> list[Drop]:
@@ -127,17 +100,21 @@ def test_every_gyroscope_reading_of_a_phone_becomes_a_sample_once() -> None:
 
 def test_the_battery_of_a_phone_is_reported_as_its_health() -> None:
     phone = SensorLogger("sensor-logger")
-
-    def found_in(values: object) -> list[Measurement | Dropped]:
-        reading = {"name": "battery", "time": 1, "values": values}
-        message = {"messageId": 1, "sessionId": "s", "deviceId": "p", "payload": [reading]}
-        return [found for found in phone.parse("sensor-logger", json.dumps(message).encode(), 0) if found[0] == "p"]
-
-    assert found_in({"batteryLevel": 0.53, "batteryState": "unplugged"}) == [
-        Measurement("p", "health", {"battery_fraction": 0.53})
+    levels: tuple[Any, ...] = (
+        {"batteryLevel": 0.53, "batteryState": "unplugged"},
+        {"batteryLevel": True},
+        {"batteryLevel": -1},
+        {},
+        [0.5],
+    )
+    found = [
+        one
+        for number, values in enumerate(levels)
+        for one in parsed(phone, "sensor-logger", message(number, [{"name": "battery", "time": 1, "values": values}]))
     ]
-    for values in ({"batteryLevel": True}, {"batteryLevel": "full"}, {}, [0.5]):
-        assert found_in(values) == []
+    assert [one for one in found if isinstance(one, Measurement)] == [
+        Measurement("phone", "health", {"battery_fraction": 0.53})
+    ]
 
 
 def test_the_readings_of_a_phone_are_interpolated() -> None:
@@ -158,102 +135,60 @@ def test_a_phone_without_an_acceleration_is_told_which_sensors_to_switch_on() ->
         for body in recording(4, {"gyroscope": lambda _: (0.0, 0.0, 0.0)})
         for one in parsed(phone, "sensor-logger", body)
     ]
-    assert set(reasons(found)) == {Drop.UNPAIRED}
+    assert reasons(found) == [Drop.NO_MOTION] * 2
+    assert isinstance(found[-1], Dropped)
+    assert "switch on Total Acceleration (Android) or Accelerometer and Gravity (iPhone)" in found[-1].detail
 
 
 def test_a_message_of_a_phone_that_comes_twice_counts_once() -> None:
     phone = SensorLogger("sensor-logger")
-    assert parsed(phone, "sensor-logger", message(3, [])) == []
-    assert reasons(parsed(phone, "sensor-logger", message(3, []))) == [Drop.DUPLICATE]
+    [body] = recording(1, ANDROID)
+    assert len(parsed(phone, "sensor-logger", body)) == 99
+    assert reasons(parsed(phone, "sensor-logger", body)) == [Drop.DUPLICATE]
 
 
-def test_a_template_finds_tag_anchor_range_and_time(template: Template) -> None:
-    value = {"device": {"id": 7}, "anchors": [{"id": "A", "cm": 321, "at": 1_700_000_000_000}, {"id": 2, "cm": 5}]}
-    found = parsed(template, "plant/hall/uwb", value)
-    assert found[0] == Measurement(
-        "hall-7", "range", {"anchor": "A", "range_m": pytest.approx(3.21), "t_ns": 1_700_000_000_000 * MS}
-    )
-    assert reasons(found) == [Drop.NOT_UNDERSTOOD]
+def test_a_message_of_a_phone_that_never_comes_is_waited_for_two_seconds() -> None:
+    phone = SensorLogger("sensor-logger")
+    first, _, third = recording(3, ANDROID)
+    assert len(parsed(phone, "sensor-logger", first)) == 99
+    assert parsed(phone, "sensor-logger", third) == []
+    assert list(phone.overdue(NOW_NS + 1_000 * MS)) == []
+    assert len(fields(list(phone.overdue(NOW_NS + 2_001 * MS)))) > 90
 
 
-def test_the_time_may_stand_beside_a_list_but_an_anchor_may_not(template: Template) -> None:
-    value = {
-        "device": {"id": 7},
-        "id": "not the anchor",
-        "at": 1_700_000_000_000,
-        "anchors": [{"id": 2, "cm": 5}, {"cm": 6}],
+def test_an_iphone_has_the_same_samples_as_over_http_with_or_without_standardised_frames() -> None:
+    def samples(sign: float, signs: Signs = Signs.AUTO) -> list[dict[str, Any]]:
+        sensors: dict[str, Value] = {
+            "gyroscope": lambda _: (0.0, 0.0, 0.1),
+            "accelerometer": lambda _: (sign, 0.0, 0.0),
+            "gravity": lambda _: (0.0, 0.0, sign * G),
+        }
+        [body] = recording(1, sensors)
+        return fields(parsed(SensorLogger("sensor-logger", signs), "sensor-logger", body))
+
+    assert samples(-1.0) == samples(1.0) == samples(-1.0, Signs.IOS)
+    assert samples(-1.0)[0]["acc"] == pytest.approx([0.0, -1.0, G])
+    assert samples(-1.0, Signs.ANDROID)[0]["acc"] == pytest.approx([0.0, 1.0, -G])
+
+
+def test_a_phone_that_stands_upright_is_not_published_before_its_sign_is_known() -> None:
+    phone = SensorLogger("sensor-logger")
+    sensors: dict[str, Value] = {
+        "gyroscope": lambda _: (0.0, 0.0, 0.0),
+        "accelerometer": lambda _: (0.0, 0.0, 0.0),
+        "gravity": lambda _: (0.0, -G, 0.0),
     }
-    found = parsed(template, "plant/hall/uwb", value)
-    assert fields(found) == [{"anchor": 2, "range_m": pytest.approx(0.05), "t_ns": 1_700_000_000_000 * MS}]
-    assert reasons(found) == [Drop.NOT_UNDERSTOOD]
+    found = [one for body in recording(4, sensors) for one in parsed(phone, "sensor-logger", body)]
+    assert reasons(found) == [Drop.SIGN_UNKNOWN] * 4
+    assert fields(found) == []
 
 
-def test_a_template_reads_vectors_constants_and_indices(template: Template) -> None:
-    (imu,) = fields(parsed(template, "imu/left/front", {"ax": 0, "ay": 0, "az": 1, "g": [1, 2, 3]}))
-    assert imu == {"t_ns": NOW_NS, "acc": [0, 0, 9.80665], "gyro": [0.5, 1.0, 1.5]}
-    (one,) = fields(parsed(template, "radar", {"who": "x", "t": 1.5, "list": [{}, {"d": 4.5}]}))
-    assert one == {"anchor": "yard", "range_m": 4.5, "t_ns": 1_500_000_000}
-
-
-def test_the_rules_in_the_documentation_work(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[4] / "tag_client" / "docs" / "devices.md").read_text()
-    (tmp_path / "rules.toml").write_text(text.split("```toml\n")[1].split("```")[0])
-    documented = Template(tmp_path / "rules.toml")
-    value = {"device": {"id": 7}, "anchors": [{"id": "A", "cm": 321, "at": 5}]}
-    assert fields(parsed(documented, "plant/hall/uwb", value)) == [
-        {"anchor": "A", "range_m": pytest.approx(3.21), "t_ns": 5 * MS}
-    ]
-    assert fields(parsed(documented, "imu/a", {"ax": 0, "ay": 0, "az": 1, "g": [0, 0, 1]}))
-
-
-@pytest.mark.parametrize(
-    ("topic", "value"),
-    [
-        ("plant/hall/uwb", {"device": {"id": 7}, "anchors": 5}),
-        ("plant/hall/uwb", {"anchors": [{"id": 1, "cm": 3, "at": 5}]}),
-        ("plant/hall/uwb", {"device": {"id": 7}, "anchors": [{"id": 1, "cm": "far", "at": 5}]}),
-        ("imu/x", {"ax": 0}),
-        ("radar", {"who": "x", "t": "soon", "list": [1, {"d": 2}]}),
-        ("radar", 5),
-    ],
-)
-def test_what_a_template_cannot_find_is_named(template: Template, topic: str, value: object) -> None:
-    assert reasons(parsed(template, topic, value)) == [Drop.NOT_UNDERSTOOD]
-
-
-@pytest.mark.parametrize(
-    ("text", "why"),
-    [
-        ("", "has no table"),
-        ("[[rule]]\ntopic = 1\n", "tag is missing"),
-        (RULES.replace('"range"', '"rang"'), "kind is 'rang'"),
-        (RULES.replace("anchor = ", "anker = "), "fields are anchor, range_m"),
-        (RULES.replace("{1}", "{2}"), "names a + that the topic does not have"),
-        (RULES.replace('"ms"', '"h"'), "time_unit is one of"),
-        (RULES.replace("each", "every"), "there is no key 'every'"),
-        (RULES + "]", "rules.toml"),
-    ],
-)
-def test_a_wrong_file_of_rules_is_named_with_the_rule(tmp_path: Path, text: str, why: str) -> None:
-    (tmp_path / "rules.toml").write_text(text)
-    with pytest.raises(TemplateError, match=why.replace("+", r"\+")):
-        Template(tmp_path / "rules.toml")
-
-
-@pytest.mark.parametrize(
-    ("pattern", "topic", "expected"),
-    [
-        ("a/b", "a/b", True),
-        ("a/+", "a/b", True),
-        ("a/+", "a/b/c", False),
-        ("a/#", "a/b/c", True),
-        ("a/#", "a", True),
-        ("a/#", "b/a", False),
-        ("+/b", "a/c", False),
-    ],
-)
-def test_a_filter_matches_topics_as_in_mqtt(pattern: str, topic: str, expected: bool) -> None:
-    assert matches(pattern, topic) is expected
+def test_readings_that_are_not_numbers_are_named_with_their_sensor() -> None:
+    phone = SensorLogger("sensor-logger")
+    readings = [reading("totalacceleration", NOW_NS, (0.0, 0.0, G)), reading("gyroscope", NOW_NS, (math.inf, 0.0, 0.0))]
+    found = parsed(phone, "sensor-logger", message(0, readings))
+    assert reasons(found) == [Drop.NO_MOTION, Drop.DAMAGED]
+    assert all(isinstance(one, Dropped) and "readings of Gyroscope are not numbers" in one.detail for one in found)
 
 
 _JSON = st.recursive(
@@ -274,14 +209,10 @@ _JSON = st.recursive(
 
 
 @given(payload=st.binary(max_size=60) | _JSON.map(lambda value: json.dumps(value).encode()))
-def test_no_payload_ends_a_format(payload: bytes, tmp_path_factory: pytest.TempPathFactory) -> None:
-    rules = tmp_path_factory.getbasetemp() / "rules.toml"
-    rules.write_text(RULES)
+def test_no_payload_ends_a_format(payload: bytes) -> None:
     for one, topic in (
         (Decawave(), "dwm/node/9a28/uplink/data"),
         (Decawave(), "a/b/node/uplink"),
         (SensorLogger("sensor-logger"), "sensor-logger"),
-        (Template(rules), "plant/hall/uwb"),
-        (Template(rules), "radar"),
     ):
-        list(one.parse(topic, payload, NOW_NS))
+        list(one.parse(Received(topic, payload, NOW_NS)))

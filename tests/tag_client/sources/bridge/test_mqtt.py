@@ -5,21 +5,17 @@ import json
 import struct
 import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from paho.mqtt.client import Client
 
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_tag_client.cli import main
 from support.certificate import self_signed
-from support.commands import start_python
 from support.listening import ReceivedFrames, listening
 from support.mosquitto import mosquitto, needs_mosquitto
-from support.sensor_logger import G, recording
-from support.zenoh_router import free_port, wait_until
+from support.mqtt_bridge import bridge, field_or_skip, publish, wait_for_line
+from support.zenoh_router import wait_until
 
 pytestmark = needs_mosquitto
 
@@ -31,31 +27,6 @@ tag = "{1}"
 kind = "range"
 fields = { anchor = "id", range_m = "m" }
 """
-
-
-@contextmanager
-def bridge(endpoint: str, broker: str, *arguments: str) -> Iterator["subprocess.Popen[str]"]:
-    """Run `dropanchor-tag mqtt` until the block ends."""
-    process = start_python("-m", "dropanchor_tag_client", "mqtt", broker, "--connect", endpoint, *arguments)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.communicate(timeout=30)
-
-
-def wait_for_line(process: "subprocess.Popen[str]", text: str) -> str:
-    """Read what the bridge says until this text comes, and return the line."""
-    assert process.stderr is not None
-    for line in process.stderr:
-        if text in line:
-            return line
-    raise AssertionError(f"the bridge ended without saying {text!r}")
-
-
-def publish(client: Client, topic: str, payload: object) -> None:
-    body = payload if isinstance(payload, bytes) else json.dumps(payload)
-    client.publish(topic, body, qos=1).wait_for_publish(10)
 
 
 def ranges(heard: ReceivedFrames) -> list[tuple[str, int, float]]:
@@ -81,21 +52,64 @@ def test_ranges_of_a_decawave_gateway_and_of_a_template_are_published(router_end
         wait_until(lambda: expected <= set(ranges(heard)))
 
 
-def test_a_phone_publishes_over_websocket_and_its_tag_is_in_the_topic(router_endpoint: str, tmp_path: Path) -> None:
-    sensors = {"gyroscope": lambda _: (0.0, 0.0, 0.5), "totalacceleration": lambda _: (0.0, 0.0, G)}
-    socket = free_port()
+@pytest.mark.parametrize(
+    ("name", "topic", "expected"),
+    [
+        ("espresense", "espresense/devices/badge1/kitchen", [("badge1", anchor_number("kitchen"), 3.21)]),
+        ("makerfabs", "uwb/mf1", [("mf1", 1, 3.42), ("mf1", 7, 5.1)]),
+        ("tasmota_uwb", "tele/tasu/SENSOR", [("tasu", 1, 2.345), ("tasu", 7, 1.872)]),
+    ],
+)
+def test_rules_read_what_devices_publish(
+    router_endpoint: str, tmp_path: Path, name: str, topic: str, expected: list[tuple[str, int, float]]
+) -> None:
+    rules, payload = field_or_skip(f"{name}.toml"), field_or_skip(f"{name}__{topic.replace('/', '_')}.json")
     with (
-        mosquitto(tmp_path, "allow_anonymous true", f"listener {socket} 127.0.0.1", "protocol websockets") as broker,
+        mosquitto(tmp_path) as broker,
         listening(router_endpoint) as heard,
-        bridge(router_endpoint, f"ws://127.0.0.1:{socket}", "--sensor-logger", "sensor-logger/+") as process,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--template", str(rules)) as process,
         broker.publisher() as client,
     ):
         wait_for_line(process, "connected")
-        for body in recording(3, sensors):
-            publish(client, "sensor-logger/cart-1", body)
-        wait_until(lambda: sum(len(frame.imu) for frame in heard.frames) >= 290)
-    assert {key.split("/")[4] for key in heard.keys} == {"cart-1"}
-    assert heard.frames[0].imu[0].acc == pytest.approx((0.0, 0.0, G))
+        publish(client, topic, payload.read_bytes())
+        wait_until(lambda: ranges(heard) == expected)
+
+
+def test_an_object_with_texts_units_and_a_time_of_its_own_becomes_ranges(router_endpoint: str, tmp_path: Path) -> None:
+    (tmp_path / "rules.toml").write_text(
+        '[[rule]]\ntopic = "uwb/+"\ntag = "{1}"\nkind = "range"\neach = "anchors"\nunit = {range_m = "cm"}\n'
+        'fields = {anchor = "{key}", range_m = "{value}", t_ns = "at"}\n'
+    )
+    with (
+        mosquitto(tmp_path) as broker,
+        listening(router_endpoint) as heard,
+        bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--template", str(tmp_path / "rules.toml")) as process,
+        broker.publisher() as client,
+    ):
+        wait_for_line(process, "connected")
+        publish(client, "uwb/cart", {"at": "2026-11-26T08:00:00.250Z", "anchors": {"1": "320", "2": 410, "3": "1e999"}})
+        wait_until(lambda: ranges(heard) == [("cart", 1, 3.2), ("cart", 2, 4.1)])
+        process.terminate()
+        summary = wait_for_line(process, "samples of")
+    assert {one.t_ns for frame in heard.frames for one in frame.ranges} == {1_795_680_000_250_000_000}
+    assert summary.strip() == "2 samples of 1 tags published; left out: refused 1"
+
+
+def test_what_the_broker_kept_from_earlier_is_told_and_used_only_if_the_rule_allows_it(
+    router_endpoint: str, tmp_path: Path
+) -> None:
+    (tmp_path / "rules.toml").write_text(RULES + RULES.replace("plant/", "kept/") + "retained = true\n")
+    with mosquitto(tmp_path) as broker, broker.publisher() as client, listening(router_endpoint) as heard:
+        for topic in ("plant/hall/uwb", "kept/hall/uwb"):
+            client.publish(topic, json.dumps({"id": 3, "m": 2.5}), qos=1, retain=True).wait_for_publish(10)
+        with bridge(router_endpoint, f"127.0.0.1:{broker.port}", "--template", str(tmp_path / "rules.toml")) as process:
+            said = wait_for_line(process, "left out: retained 1")
+            client.publish("plant/hall/uwb", json.dumps({"id": 3, "m": 4.5}), qos=1, retain=True).wait_for_publish(10)
+            wait_until(lambda: ranges(heard) == [("hall", 3, 2.5), ("hall", 3, 4.5)])
+            process.terminate()
+            summary = wait_for_line(process, "samples of")
+    assert "plant/hall/uwb: the broker kept it, and nobody knows how old it is. retained = true in the rule" in said
+    assert summary.strip() == "2 samples of 1 tags published; left out: retained 1"
 
 
 def test_bad_payloads_are_named_and_counted_and_harm_no_other_tag(router_endpoint: str, tmp_path: Path) -> None:
@@ -188,6 +202,7 @@ def test_tls_and_a_password_are_used_and_a_foreign_certificate_is_refused(
         (["localhost", "--decawave", "--mqtt-user", "x"], "DROPANCHOR_MQTT_PASSWORD"),
         (["localhost", "--decawave", "--name", "x"], "ID=NAME was expected"),
         (["localhost", "--template", "nowhere.toml"], "nowhere.toml"),
+        (["localhost", "--sensor-logger", "phones/+x"], "--sensor-logger is 'phones/+x'"),
     ],
 )
 def test_an_error_prints_a_message_and_exits_with_code_2(
@@ -195,3 +210,14 @@ def test_an_error_prints_a_message_and_exits_with_code_2(
 ) -> None:
     assert main(["mqtt", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_rule_with_an_unknown_place_ends_the_program_and_lists_what_is_known(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "rules.toml").write_text(RULES.replace('"id"', '"{2}"'))
+    assert main(["mqtt", "localhost", "--template", str(tmp_path / "rules.toml")]) == 2
+    assert (
+        "rule 1: fields.anchor: there is no {2}; known are {1} (what each + stands for), {topic[0]} to {topic[2]}, "
+        "{value} (the payload), and a path in the payload, such as {device.id}"
+    ) in capsys.readouterr().err

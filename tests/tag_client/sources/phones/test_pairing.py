@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping
 
-import numpy as np
 import pytest
 
 from dropanchor_schemas.wire import ImuSample
-from dropanchor_service.phones.pairing import LACKING, TILTED, Pairing, Signs
-from dropanchor_service.phones.streams import Stream, make_stream
+from dropanchor_tag_client.sources.phones.pairing import Pairing, Signs
+from dropanchor_tag_client.sources.phones.problems import APART, TILTED
+from dropanchor_tag_client.sources.phones.streams import Stream, make_stream
 from support.sensor_logger import T_NS, G
 
 MS = 1_000_000
@@ -15,7 +15,7 @@ MS = 1_000_000
 
 def stream(times_ms: list[float], *values: tuple[float, float, float]) -> Stream:
     rows = values if len(values) == len(times_ms) else [values[0]] * len(times_ms)
-    return make_stream(np.array([T_NS + round(t * MS) for t in times_ms]), np.array(rows))
+    return make_stream((T_NS + round(t * MS), row) for t, row in zip(times_ms, rows, strict=True))
 
 
 def paired(pairing: Pairing, batch: Mapping[str, Stream]) -> list[tuple[float, ImuSample]]:
@@ -89,16 +89,56 @@ def test_a_phone_whose_signs_cannot_be_told_is_asked_to_lie_flat_and_then_works(
     upright = linear_and_gravity(-1) | {"gravity": stream([7, 27], (0, -G, 0))}
     result = pairing.add(upright)
     assert (result.samples, result.problem) == ([], TILTED)
-    flat = {name: Stream(s.t_ns + 100 * MS, s.values) for name, s in linear_and_gravity(-1).items()}
+    flat = {name: Stream([t_ns + 100 * MS for t_ns in s.t_ns], s.values) for name, s in linear_and_gravity(-1).items()}
     result = pairing.add(flat)
     assert [sample.acc for sample in result.samples] == [pytest.approx((2, -1, G))] * 2
     assert result.problem == ""
 
 
-def test_a_phone_without_a_gyroscope_is_told_what_to_switch_on_once_it_is_sure() -> None:
+@pytest.mark.parametrize(
+    ("sensors", "sentence"),
+    [
+        (["totalacceleration"], "switch on Gyroscope."),
+        (["gravity", "gyroscope"], "switch on Accelerometer."),
+        (["accelerometer", "gyroscope"], "switch on Gravity."),
+        (["gyroscope"], "switch on Total Acceleration (Android) or Accelerometer and Gravity (iPhone)."),
+        ([], "switch on Gyroscope, and Total Acceleration (Android) or Accelerometer and Gravity (iPhone)."),
+    ],
+)
+def test_a_phone_is_told_which_sensors_to_switch_on_once_it_is_sure(sensors: list[str], sentence: str) -> None:
+    pairing = Pairing(Signs.IOS)
+    problems = [pairing.add({name: stream([t], (0, 0, G)) for name in sensors}).problem for t in (0, 10, 20, 30)]
+    assert problems == ["", "", *[f"No motion can be used yet: {sentence}"] * 2]
+
+
+def test_a_sensor_that_is_on_and_gives_no_numbers_is_named_at_once_and_only_while_it_does() -> None:
     pairing = Pairing(Signs.AUTO)
-    problems = [pairing.add({"totalacceleration": stream([t], (0, 0, G))}).problem for t in (0, 10, 20, 30)]
-    assert problems == ["", "", LACKING, LACKING]
+    force = {"totalacceleration": stream([0], (0, 0, G))}
+    for _ in range(4):
+        assert (
+            "The readings of Gyroscope are not numbers:" in pairing.add(force, {"gyroscope": "are not numbers"}).problem
+        )
+    whole = pairing.add({name: stream([10], (0, 0, G)) for name in ("totalacceleration", "gyroscope")})
+    assert (len(whole.samples), whole.problem) == (1, "")
+    assert pairing.add(force, {"magnetometer": "are not numbers"}).problem == ""
+
+
+def test_a_damaged_sensor_that_is_not_needed_is_not_blamed() -> None:
+    upright = linear_and_gravity(-1) | {"gravity": stream([7, 27], (0, -G, 0))}
+    damage = {"totalacceleration": "are not numbers"}
+    assert Pairing(Signs.AUTO).add(upright, damage).problem == TILTED
+    assert len(Pairing(Signs.IOS).add(upright, damage).samples) == 2
+    assert "Total Acceleration are" in Pairing(Signs.AUTO).add({"gyroscope": stream([0], (0, 0, 0))}, damage).problem
+
+
+def test_readings_that_are_never_near_each_other_are_told() -> None:
+    pairing = Pairing(Signs.AUTO)
+    problems = []
+    for second in range(5):
+        at_ms = 1000.0 * second
+        batch = {"gyroscope": stream([at_ms + 500], (0, 0, 0)), "totalacceleration": stream([at_ms], (0, 0, G))}
+        problems.append(pairing.add(batch).problem)
+    assert problems == ["", "", APART, APART, APART]
 
 
 def test_a_gap_in_the_accelerometer_is_not_interpolated_and_its_readings_are_counted() -> None:

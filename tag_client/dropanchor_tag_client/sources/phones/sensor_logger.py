@@ -1,4 +1,4 @@
-"""Messages that the app Sensor Logger pushes.
+"""Messages that the app Sensor Logger pushes, over HTTP or MQTT.
 
 {"messageId": 0, "sessionId": "…", "deviceId": "…", "payload": [{"name": "gyroscope", "time": 1698501144401773000,
 "values": {"x": 0.1, "y": 0.0, "z": 0.0}}, …]}: the readings of one batch period of all sensors that are switched on,
@@ -6,29 +6,37 @@ with UTC in ns. https://github.com/tszheichoi/awesome-sensor-logger/blob/main/PU
 """
 
 import json
+import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from dropanchor_schemas.wire import MAX_T_NS
-from dropanchor_service.phones.readings import SENSORS, PhoneError, is_measurement
-from dropanchor_service.phones.streams import Stream, make_stream
+from dropanchor_schemas.wire import MAX_T_NS, Vector
+from dropanchor_tag_client.sources.phones.readings import SENSORS, PhoneError, is_measurement
+from dropanchor_tag_client.sources.phones.streams import Reading, Stream, make_stream
 
 BATTERY = "battery"
 MAX_SESSION_ID = 128
 MAX_MESSAGE_ID = 2**53
+_NOT_NUMBERS, _TOO_LARGE = "are not numbers", "are larger than a sensor can measure"
 
 
 class Message(NamedTuple):
-    """One batch. streams: by sensor, those of SENSORS that it has. damaged: readings of them that make no sense.
-    battery_fraction: the last charge of the battery in the batch; 1 is full."""
+    """One batch. streams: by sensor, those of SENSORS that it has. damage: by sensor, what is wrong with readings of it
+    that make no sense. damaged: how many these are. battery_fraction: the last charge of the battery in the batch; 1 is
+    full. device_id: empty without one."""
 
     session_id: str
     message_id: int
     streams: Mapping[str, Stream]
     damaged: int
     battery_fraction: float | None = None
+    damage: Mapping[str, str] = MappingProxyType({})
+    device_id: str = ""
+
+
+class _DamagedError(ValueError):
+    """The reading makes no sense. The text goes on after "the readings of a sensor"."""
 
 
 def parse(body: bytes) -> Message | None:
@@ -36,16 +44,25 @@ def parse(body: bytes) -> Message | None:
     try:
         message = json.loads(body)
     except (ValueError, RecursionError) as error:
-        raise PhoneError("The message is not JSON: is the app Sensor Logger, with HTTP Push?") from error
+        raise PhoneError("The message is not JSON: is the app Sensor Logger?") from error
     if not isinstance(message, dict):
-        raise PhoneError("The message is not a JSON object: is the app Sensor Logger, with HTTP Push?")
+        raise PhoneError("The message is not a JSON object: is the app Sensor Logger?")
     payload = message.get("payload", [])
     if not isinstance(payload, list):
         raise PhoneError("The field payload is not a list of readings.")
     if not payload:
         return None
-    streams, damaged = _streams(payload)
-    return Message(_session_id(message), _message_id(message), streams, damaged, _battery_fraction(payload))
+    device_id = message.get("deviceId")
+    streams, damage, damaged = _streams(payload)
+    return Message(
+        _session_id(message),
+        _message_id(message),
+        streams,
+        damaged,
+        _battery_fraction(payload),
+        damage,
+        device_id if isinstance(device_id, str) else "",
+    )
 
 
 def _session_id(message: dict[str, Any]) -> str:
@@ -62,39 +79,42 @@ def _message_id(message: dict[str, Any]) -> int:
     return found
 
 
-def _streams(payload: list[Any]) -> tuple[dict[str, Stream], int]:
-    """Return the readings by sensor, and how many make no sense. Other sensors are left out."""
-    found: dict[str, list[tuple[int, tuple[float, float, float]]]] = {}
+def _streams(payload: list[Any]) -> tuple[dict[str, Stream], dict[str, str], int]:
+    """Return the readings by sensor, what is wrong with others, and how many these are. Other sensors are left out."""
+    found: dict[str, list[Reading]] = {}
+    damage: dict[str, str] = {}
     damaged = 0
     for reading in payload:
         name = str(reading.get("name", "")).lower() if isinstance(reading, dict) else ""
         if name not in SENSORS:
             continue
         try:
-            found.setdefault(name, []).append((_time(reading["time"]), _vector(reading.get("values", reading))))
-        except (KeyError, TypeError, ValueError, OverflowError):
+            found.setdefault(name, []).append((_time(reading.get("time")), _vector(reading.get("values", reading))))
+        except _DamagedError as error:
+            damage[name] = str(error)
             damaged += 1
-    return {name: _stream(readings) for name, readings in found.items() if readings}, damaged
-
-
-def _stream(readings: list[tuple[int, tuple[float, float, float]]]) -> Stream:
-    times, values = zip(*readings, strict=True)
-    return make_stream(np.array(times, np.int64), np.array(values, np.float64))
+    return {name: make_stream(readings) for name, readings in found.items() if readings}, damage, damaged
 
 
 def _time(value: Any) -> int:
-    """Return ns. The app has sent numbers and text. Raises ValueError or TypeError."""
-    t_ns = int(value)
+    """Return ns. The app has sent numbers and text. Raises _DamagedError."""
+    try:
+        t_ns = int(value)
+    except (TypeError, ValueError, OverflowError):
+        t_ns = -1
     if isinstance(value, bool) or not 0 <= t_ns < MAX_T_NS:
-        raise ValueError("no time")
+        raise _DamagedError("have no time")
     return t_ns
 
 
-def _vector(values: Any) -> tuple[float, float, float]:
-    """Raises KeyError, ValueError or TypeError."""
-    x, y, z = float(values["x"]), float(values["y"]), float(values["z"])
+def _vector(values: Any) -> Vector:
+    """Raises _DamagedError."""
+    try:
+        x, y, z = float(values["x"]), float(values["y"]), float(values["z"])
+    except (KeyError, TypeError, ValueError, OverflowError):
+        raise _DamagedError(_NOT_NUMBERS) from None
     if not is_measurement(x, y, z):
-        raise ValueError("no measurement")
+        raise _DamagedError(_TOO_LARGE if all(map(math.isfinite, (x, y, z))) else _NOT_NUMBERS)
     return x, y, z
 
 

@@ -4,7 +4,15 @@ import math
 
 TOTAL, LINEAR, GRAVITY = "totalacceleration", "accelerometer", "gravity"
 GYROSCOPE, MAGNETOMETER = "gyroscope", "magnetometer"
-SENSORS = (TOTAL, LINEAR, GRAVITY, GYROSCOPE, MAGNETOMETER)
+TITLES = {
+    TOTAL: "Total Acceleration",
+    LINEAR: "Accelerometer",
+    GRAVITY: "Gravity",
+    GYROSCOPE: "Gyroscope",
+    MAGNETOMETER: "Magnetometer",
+}
+"""What the app Sensor Logger calls them on its screen."""
+SENSORS = tuple(TITLES)
 MAX_VALUE = 1e6
 
 

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from dropanchor_schemas.wire import ImuSample
-from dropanchor_service.phones.pairing import Paired, Pairing, Signs
-from dropanchor_service.phones.sensor_logger import Message
+from dropanchor_tag_client.sources.phones.pairing import Paired, Pairing, Signs
+from dropanchor_tag_client.sources.phones.sensor_logger import Message
 
 WAIT_S = 2.0  # for a message that is missing before others
 MAX_WAITING = 16
@@ -39,7 +39,7 @@ class Session:
         if self._next is None:
             self._next = 0 if message.message_id < FIRST else message.message_id
         if message.message_id < self._next:  # it was given up; the readings around it are gone
-            return self._taken([self._pairing.beginning_anew().add(message.streams)])
+            return self._taken([self._pairing.beginning_anew().add(message.streams, message.damage)])
         self._waiting[message.message_id] = message, now_s
         return self.release(now_s - WAIT_S)
 
@@ -48,7 +48,7 @@ class Session:
         paired = []
         while (following := self._following(arrived_s)) is not None:
             message, _ = self._waiting.pop(following)
-            paired.append(self._pairing.add(message.streams))
+            paired.append(self._pairing.add(message.streams, message.damage))
             self._next = following + 1
         oldest = self._newest - REMEMBERED
         self._known = {known for known in self._known if known > oldest}
