@@ -6,11 +6,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from dropanchor_service.importing.choice import Choice, Found
 from dropanchor_service.importing.join import Joined, joined, merged
 from dropanchor_service.importing.output import require_free, write_recording
 from dropanchor_service.importing.readings import ImportingError, Position
 from dropanchor_service.importing.report import report
-from dropanchor_service.importing.sources import Choice, Found, check_used, read_source
+from dropanchor_service.importing.sources import check_used, read_source
 from dropanchor_service.importing.tables.mapping import ColumnMap, Fields, loaded, parsed, saved, words_of
 from dropanchor_service.importing.verdicts import verdicts
 from dropanchor_service.phones.pairing import Signs
@@ -82,8 +83,12 @@ def _add_tables(parser: argparse.ArgumentParser) -> None:
     tables.add_argument(
         "--map", nargs="+", action="extend", default=[], metavar="FIELD=COLUMN:UNIT", help="what the columns hold"
     )
-    tables.add_argument("--map-file", type=Path, metavar="FILE", help="read the mapping from this file; --map overrides")
-    tables.add_argument("--save-map", type=Path, metavar="FILE", help="write the mapping that was used to this file (TOML)")
+    tables.add_argument(
+        "--map-file", type=Path, metavar="FILE", help="read the mapping from this file; --map overrides"
+    )
+    tables.add_argument(
+        "--save-map", type=Path, metavar="FILE", help="write the mapping that was used to this file (TOML)"
+    )
 
 
 def _add_topics(parser: argparse.ArgumentParser) -> None:
@@ -118,9 +123,7 @@ def _import(arguments: argparse.Namespace) -> None:
     require_free(arguments.out, arguments.force)
     mounted = mounting(arguments.forward or "x", arguments.up or "z")
     columns = _columns(arguments)
-    choice = Choice(
-        columns, arguments.signs, arguments.imu, arguments.mag, tuple(arguments.range), arguments.tag
-    )
+    choice = Choice(columns, arguments.signs, arguments.imu, arguments.mag, tuple(arguments.range), arguments.tag)
     founds = [read_source(source, choice) for source in arguments.sources]
     check_used(columns, founds)
     readings = merged([(str(s), found.readings) for s, found in zip(arguments.sources, founds, strict=True)])
@@ -150,8 +153,8 @@ def _guessed(founds: Sequence[Found]) -> list[str]:
     tables = {name: fields for found in founds for name, fields in found.guessed.items()}
     if not tables:
         return []
-    words = [words_of(fields, name if _clashes(name, tables) else None) for name, fields in tables.items()]
-    return ["guessed from the names of the columns:", "  --map " + " ".join(words)]
+    words = [word for name in tables for word in words_of(tables[name], name if _clashes(name, tables) else None)]
+    return ["guessed from the names of the columns:", "  --map " + " ".join(dict.fromkeys(words))]
 
 
 def _clashes(name: str, tables: dict[str, Fields]) -> bool:

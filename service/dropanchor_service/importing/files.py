@@ -55,7 +55,9 @@ class File:
 def files_of(path: Path) -> list[File]:
     """Return the files of a source. Raises ImportingError where there is none or the archive is damaged."""
     if path.is_dir():
-        found = sorted(inner for inner in path.rglob("*") if inner.is_file() and not _is_hidden(inner.relative_to(path)))
+        found = sorted(
+            inner for inner in path.rglob("*") if inner.is_file() and not _is_hidden(inner.relative_to(path))
+        )
         files = [File(inner.relative_to(path).as_posix(), inner) for inner in found[:MAX_FILES]]
     elif not path.exists():
         raise ImportingError(f"{path} does not exist")

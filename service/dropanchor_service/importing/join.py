@@ -14,8 +14,8 @@ from dropanchor_service.importing.readings import (
     headings_of,
     ranges_of,
 )
-from dropanchor_service.phones.streams import Array, Stream
 from dropanchor_service.phones.pairing import MAX_GAP_NS
+from dropanchor_service.phones.streams import Array, Stream
 from dropanchor_tag_client.sources.axes import Mounting
 
 NS_PER_S = 1_000_000_000
@@ -59,7 +59,9 @@ def merged(parts: Sequence[tuple[str, Readings]]) -> Readings:
             if len(stream):
                 setattr(whole, sensor, stream)
         whole.ranges = ranges_of(*_both(whole.ranges, part.ranges))
-        whole.headings = headings_of(*(np.concatenate(pair) for pair in zip(*map(_columns, (whole.headings, part.headings)), strict=True)))
+        whole.headings = headings_of(
+            *(np.concatenate(pair) for pair in zip(*map(_columns, (whole.headings, part.headings)), strict=True))
+        )
         whole.anchors |= part.anchors
         whole.notes += part.notes
         whole.left_out.add_all(part.left_out)
@@ -102,7 +104,10 @@ def _imu(readings: Readings) -> Imu:
 
 
 def _say_what_lacks(readings: Readings) -> None:
-    for name, has, lacks in (("gyroscope", readings.acc, readings.gyro), ("accelerometer", readings.gyro, readings.acc)):
+    for name, has, lacks in (
+        ("gyroscope", readings.acc, readings.gyro),
+        ("accelerometer", readings.gyro, readings.acc),
+    ):
         if len(has) and not len(lacks):
             readings.notes.append(f"there is no {name}: without it the IMU is of no use, and is left out")
 

@@ -24,7 +24,9 @@ def require_free(folder: Path, force: bool) -> None:
     if folder.exists() and not folder.is_dir():
         raise ImportingError(f"{folder} is a file: --out names a folder")
     if folder.is_dir() and any(folder.iterdir()) and not force:
-        raise ImportingError(f"{folder} is not empty: choose another folder, or replace the recording in it with --force")
+        raise ImportingError(
+            f"{folder} is not empty: choose another folder, or replace the recording in it with --force"
+        )
 
 
 def write_recording(folder: Path, joined: Joined, anchors: dict[str, Position]) -> None:

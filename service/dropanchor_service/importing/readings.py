@@ -116,7 +116,9 @@ class Readings:
 
     @property
     def is_empty(self) -> bool:
-        return not any(map(len, (self.acc, self.gyro, self.mag, self.ranges, self.headings, self.anchors)))
+        return not (
+            len(self.acc) or len(self.gyro) or len(self.mag) or len(self.ranges) or len(self.headings) or self.anchors
+        )
 
 
 def stream_of(t_ns: Array, values: Array, source: str, what: str, left_out: LeftOut) -> Stream:

@@ -16,7 +16,7 @@ _HEAD = ("sensor", "samples", "rate", "from", "to", "gaps", "values")
 def report(joined: Joined) -> list[str]:
     """Return the lines of the table, and the clocks."""
     imu, ranges, headings = joined.imu, joined.ranges, joined.headings
-    rows = [_HEAD]
+    rows: list[Sequence[str]] = [_HEAD]
     if len(imu):
         has_field = np.isfinite(imu.mag[:, 0])
         rows.append(_row("acc", imu.t_ns, f"median {_median_norm(imu.acc):.3g} m/s²"))
@@ -70,8 +70,8 @@ def _clocks(joined: Joined) -> Iterator[str]:
         yield f"clocks: the IMU and the ranges overlap for {together_s:.1f} s"
     else:
         yield (
-            f"clocks: the IMU and the ranges do not overlap: they are {-together_s:.1f} s apart, and a replay has never "
-            "both. Do their times come from one clock, in one unit?"
+            f"clocks: the IMU and the ranges do not overlap: they are {-together_s:.1f} s apart, and a replay "
+            "never has both. Do their times come from one clock, in one unit?"
         )
 
 

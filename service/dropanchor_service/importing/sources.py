@@ -1,45 +1,21 @@
 """Find out what a source is, and read it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
+from dropanchor_service.importing.choice import Choice, Found
 from dropanchor_service.importing.files import File, files_of, first_bytes
 from dropanchor_service.importing.join import merged
 from dropanchor_service.importing.phones import phyphox, sensor_logger
 from dropanchor_service.importing.readings import ImportingError, Readings
 from dropanchor_service.importing.tables.json_table import JsonTable, read_json
-from dropanchor_service.importing.tables.mapping import ColumnMap, Fields, column_text
+from dropanchor_service.importing.tables.mapping import ColumnMap, column_text
 from dropanchor_service.importing.tables.reading import fields_of, is_useful, positions, readings_of
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
-from dropanchor_service.phones.pairing import Signs
 
 TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
 JSON = (".json", ".jsonl", ".ndjson")
 _MCAP, _ROS1, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0", b"SQLite format 3\0"
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What the person chose. columns: of tables. signs: of a phone's accelerations. imu, mag: topics. ranges: topics,
-    each with its anchor, None where the messages name it. tag: of a recording of this service."""
-
-    columns: ColumnMap = field(default_factory=ColumnMap)
-    signs: Signs = Signs.AUTO
-    imu: str | None = None
-    mag: str | None = None
-    ranges: tuple[tuple[str, str | None], ...] = ()
-    tag: str | None = None
-
-
-@dataclass
-class Found:
-    """What a source holds. fields: the columns that were used of its tables; guessed: those of tables without a
-    mapping."""
-
-    readings: Readings
-    fields: dict[str, Fields] = field(default_factory=dict)
-    guessed: dict[str, Fields] = field(default_factory=dict)
 
 
 def read_source(path: Path, choice: Choice) -> Found:
@@ -110,7 +86,9 @@ def _of_tables(path: Path, tables: Sequence[TextTable | JsonTable], columns: Col
 
 
 def _unused(table: TextTable | JsonTable) -> Readings:
-    return Readings(notes=[f"{table.name}: not used: its columns {', '.join(table.columns[:12])} hold no known reading"])
+    return Readings(
+        notes=[f"{table.name}: not used: its columns {', '.join(table.columns[:12])} hold no known reading"]
+    )
 
 
 def _no_column(path: Path, tables: Sequence[TextTable | JsonTable], columns: ColumnMap) -> str:

@@ -25,7 +25,9 @@ def _of_acceleration(median: float, unit: Unit) -> list[str]:
         return []
     for (low, high), name in ((_G, "g"), (_MILLI_G, "mg")):
         if low <= median <= high:
-            return [f"the accelerations look like {name}: their median is {median:.3g} where {_WANTED}{_advice(unit, name)}"]
+            return [
+                f"the accelerations look like {name}: their median is {median:.3g} where {_WANTED}{_advice(unit, name)}"
+            ]
     if median < _NOTHING:
         return [
             f"gravity is missing from the accelerations: their median is {median:.3g} m/s² where {_WANTED}. Record the "

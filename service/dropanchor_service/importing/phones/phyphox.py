@@ -52,8 +52,8 @@ def read_export(files: Sequence[File], source: str) -> Readings:
         for sensor, places in _sensors(table.columns).items():
             if sensor in streams:
                 raise ImportingError(
-                    f"{source}: {table.name} holds {sensor} as another file does; its columns are "
-                    f"{', '.join(table.columns)}. Make the export again, or leave one of the files out"
+                    f"{source}: the columns of {table.name} are {', '.join(table.columns)}, and another file has them, "
+                    "too: make the export again, or leave one of the files out"
                 )
             streams[sensor] = _stream(table, places, starts, left_out, sensor)
     readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, Signs.ANDROID, source)
@@ -95,7 +95,8 @@ def _stream(table: TextTable, places: list[int], starts: Starts | None, left_out
 def _t_ns(experiment_s: Array, starts: Starts | None) -> Array:
     """Return UTC by the last start before each time, or the times of the experiment."""
     if starts is None:
-        return np.rint(experiment_s * _NS_PER_S).astype(np.int64)
+        since_start: Array = np.rint(experiment_s * _NS_PER_S).astype(np.int64)
+        return since_start
     began_s, utc_s = starts
     last = np.maximum(np.searchsorted(began_s, experiment_s, side="right") - 1, 0)
     utc_ns = np.rint(utc_s * 1e6).astype(np.int64) * 1000
@@ -108,7 +109,9 @@ def _starts(files: Sequence[File]) -> Starts | None:
     if file is None:
         return None
     table = read_table(file)
-    rows: list[Mapping[str, str]] = [dict(zip(table.columns, cells, strict=False)) for _, cells in table.rows(LeftOut())]
+    rows: list[Mapping[str, str]] = [
+        dict(zip(table.columns, cells, strict=False)) for _, cells in table.rows(LeftOut())
+    ]
     try:
         starts = sorted(
             (float(row["experiment time"]), float(row["system time"])) for row in rows if row["event"] == "START"

@@ -65,9 +65,7 @@ def _stream(table: TextTable, left_out: LeftOut) -> Stream:
         else:
             t_ns.append(int(t))
             values.extend((x, y, z))
-    return stream_of(
-        np.asarray(t_ns, np.int64), np.asarray(values).reshape(-1, 3), table.name, "readings", left_out
-    )
+    return stream_of(np.asarray(t_ns, np.int64), np.asarray(values).reshape(-1, 3), table.name, "readings", left_out)
 
 
 def _metadata(file: File) -> Mapping[str, str]:

@@ -148,5 +148,3 @@ def _scale(fields: Fields, name: str) -> Callable[[float], float]:
     if name.endswith("std"):
         return lambda value: abs(factor) * value
     return lambda value: factor * value + offset
-
-

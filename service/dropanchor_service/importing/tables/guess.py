@@ -15,11 +15,30 @@ _SENSORS = {
 }
 _WITHOUT_GRAVITY = {"linear", "lin", "user", "free", "world", "filtered", "raw"}  # used where there is nothing else
 _NOT_A_READING = {"cov", "covariance", "std", "stddev", "sigma", "bias", "offset", "var", "variance", "gravity", "quat"}
-_NOT_A_READING |= {"orientation", "quaternion", "position", "pos", "truth", "gt", "temp", "temperature", "error", "jerk"}
+_NOT_A_READING |= {
+    "orientation",
+    "quaternion",
+    "position",
+    "pos",
+    "truth",
+    "gt",
+    "temp",
+    "temperature",
+    "error",
+    "jerk",
+}
 _AXES = {"x": 0, "y": 1, "z": 2, "0": 0, "1": 1, "2": 2}
 _STUCK = re.compile(r"(?:(?P<sensor>[a-z]+?)(?P<axis>[xyz])|(?P<axis2>[xyz])(?P<sensor2>[a-z]{3,}))")
 _TIMES = {"t", "time", "times", "timestamp", "timestamps", "ts", "stamp", "date", "datetime", "tick", "ticks", "epoch"}
-_TIMES_WITH_UNIT = {"millis": "ms", "micros": "us", "nanos": "ns", "seconds": "s", "secs": "s", "sec": "s", "elapsed": ""}
+_TIMES_WITH_UNIT = {
+    "millis": "ms",
+    "micros": "us",
+    "nanos": "ns",
+    "seconds": "s",
+    "secs": "s",
+    "sec": "s",
+    "elapsed": "",
+}
 _OF_TIMES = {"header", "field", "unix", "utc", "sensor", "system", "sys", "device", "host", "since", "start", "boot"}
 _OF_TIMES |= {"log", "elapsed", "local", "gps", "imu", "uwb", "recv", "received", "sample", "of", "iso", "monotonic"}
 _NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"}
@@ -31,6 +50,7 @@ _ANCHORS = {"anchor", "anchors", "anchorid", "beacon", "beaconid", "anc", "respo
 _OF_ANCHORS = {"id", "addr", "address", "mac", "name", "short", "device", "range", "ranges", "uwb", "to", "from"}
 _STDS = {"std", "stddev", "sigma", "stdev", "uncertainty"}
 _HEADINGS = {"heading", "yaw"}
+_BARE = {"vector", "value", "values", "data", "xyz"}
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
 
@@ -50,7 +70,7 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
     """
     best: dict[str, tuple[int, Column]] = {}
     for name in columns:
-        found = _found(name) or _vector([*_words(table), *_words(_BRACKETS.sub(r"\1", name))])
+        found = _found(name) or _of_table(table, name)
         if found and (found.field not in best or found.rank < best[found.field][0]):
             best[found.field] = found.rank, Column(name, found.unit)
     fields = {field: column for field, (_, column) in best.items()}
@@ -104,6 +124,13 @@ def _found(name: str) -> _Found | None:
         if found and quantity and not found.unit and known(unit, quantity):
             return found._replace(unit=unit)
     return _identified(words)
+
+
+def _of_table(table: str, name: str) -> _Found | None:
+    """Return what a column holds that names only an axis, by the name of its table."""
+    words = _words(_BRACKETS.sub(r"\1", name))
+    bare = bool(words) and words[-1] in _AXES and set(words[:-1]) <= _BARE
+    return _vector([*(word for word in _words(table) if len(word) > 2), words[-1]]) if bare else None
 
 
 def _with_unit(found: _Found, unit: str, name: str) -> _Found:
@@ -181,4 +208,3 @@ def unused(columns: Iterable[str], fields: dict[str, Column]) -> list[str]:
     """Return the columns that no field uses."""
     used = {column.name for column in fields.values()}
     return [column for column in columns if column not in used]
-

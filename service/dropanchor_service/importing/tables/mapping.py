@@ -105,10 +105,10 @@ def saved(fields: Mapping[str, Fields]) -> str:
     return "\n\n".join(sections) + "\n"
 
 
-def words_of(fields: Fields, source: str | None = None) -> str:
+def words_of(fields: Fields, source: str | None = None) -> list[str]:
     """Return the words of `--map` as a shell takes them. source: the only one they are for."""
     prefix = "" if source is None else f"{source}/"
-    return " ".join(shlex.quote(f"{prefix}{name}={column}") for name, column in fields.items())
+    return [shlex.quote(f"{prefix}{name}={column}") for name, column in fields.items()]
 
 
 def resolved(text: str, columns: Iterable[str], name: str) -> Column | None:

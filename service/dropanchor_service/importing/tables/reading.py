@@ -133,7 +133,9 @@ def _conversions(fields: Fields, found: Collected) -> list[str]:
         sentences.setdefault(said, []).append(f"-{column.name}" if column.sign < 0 else column.name)
     lines = [f"{', '.join(columns)}: {said}" for said, columns in sentences.items()]
     if RANGE in fields and ANCHOR not in fields:
-        lines.append(f"no column names the anchor: the ranges are to anchor {ONLY_ANCHOR} (--map range.ID={fields[RANGE]})")
+        lines.append(
+            f"no column names the anchor: the ranges are to anchor {ONLY_ANCHOR} (--map range.ID={fields[RANGE]})"
+        )
     if found.held:
         lines.append(f"{found.held} rows repeat the range before: they are no new ranges, and are left out")
     return lines
@@ -148,5 +150,3 @@ def _units(fields: Fields) -> dict[str, Unit]:
             known = units.get(quantity)
             units[quantity] = Unit(column.unit, (*(known.given if known else ()), word))
     return units
-
-

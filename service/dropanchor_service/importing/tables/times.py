@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_service.importing.tables.units import ISO, conversion
 from dropanchor_service.importing.readings import TIME
+from dropanchor_service.importing.tables.units import ISO, conversion
 from dropanchor_service.phones.streams import Array
 
 NS_PER_S = 1_000_000_000
@@ -78,6 +78,8 @@ def _unwrapped(raw: list[int | float]) -> tuple[list[int | float], list[int]]:
 
 def _unit_of(numbers: Array) -> str:
     """Return the unit in which the numbers are dates of this century at a plausible rate, or else the rate is usual."""
+    if len(numbers) < 2 and np.all(numbers < UTC_S[0]):
+        return "s"
     steps = np.diff(numbers)
     rising = steps[steps > 0]
     step = float(rising.sum() / len(steps)) if len(rising) else 1.0

@@ -40,7 +40,9 @@ _ALIASES: dict[str, dict[str, str]] = {
     | dict.fromkeys(("nsec", "nsecs", "nanos", "nanosec", "nanosecond", "nanoseconds"), "ns"),
 }
 _SCALED = re.compile(r"(.+)([*/])\s*([-+0-9.eE]+)")
-_SUPERSCRIPT = str.maketrans({"²": "2", "⁻": "-", "¹": "1", "µ": "u", "μ": "u", "^": None, " ": None, "·": None, "*": None})
+_SUPERSCRIPT = str.maketrans(
+    {"²": "2", "⁻": "-", "¹": "1", "µ": "u", "μ": "u", "^": None, " ": None, "·": None, "*": None}
+)
 
 
 class Conversion(NamedTuple):
@@ -56,7 +58,7 @@ class Conversion(NamedTuple):
 
 
 def conversion(text: str, quantity: str) -> Conversion:
-    """Return the conversion of a unit, as `g`, `deg/s` or `g/16384` (counts). Raises ImportingError, which lists units."""
+    """Return the conversion of a unit, as `g`, `deg/s` or `g/16384` (counts). Raises ImportingError."""
     found = known(text, quantity)
     if found is None:
         raise ImportingError(
