@@ -48,7 +48,7 @@ def tables_of(bag: Bag, names: Collection[str], path: object) -> dict[str, Topic
             raise ImportingError(f"{path}: the topic {name} cannot be read: {topics[name].problem}")
     samples = _samples(bag, names)
     return {
-        name: TopicTable(name, topics[name].type, topics[name].count, columns_of(messages), bag)
+        name: TopicTable(name, topics[name].type, topics[name].count, columns_of(messages, topics[name].type), bag)
         for name, messages in samples.items()
     }
 
@@ -92,7 +92,7 @@ def _roles(bag: Bag) -> dict[str, str]:
         t.name for t in bag.topics if t.type not in _KNOWN and not t.problem and not t.type.startswith(_NO_SENSORS)
     ]
     for name, messages in _samples(bag, others).items():
-        if role := _role(columns_of(messages), name):
+        if role := _role(columns_of(messages, ""), name):
             roles[name] = role
     return roles
 

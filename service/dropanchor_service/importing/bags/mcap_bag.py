@@ -10,7 +10,7 @@ import orjson
 import zstandard
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
-from mcap.records import Channel, Schema
+from mcap.records import Channel, Header, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
@@ -29,13 +29,18 @@ class McapBag:
     def __init__(self, path: Path) -> None:
         self._path = path
         self.notes: list[str] = []
+        self.profile = ""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         counts, seconds = self._summary() or self._counted()
         if not self._channels:
             raise ImportingError(f"{path} holds no topic")
-        self.profile = self._header
-        self.topics = [self._topic(channel, counts[channel.id], seconds) for channel in self._channels.values()]
+        by_topic: dict[str, Topic] = {}
+        for channel in self._channels.values():
+            known = by_topic.get(channel.topic)
+            count = counts[channel.id] + (known.count if known else 0)
+            by_topic[channel.topic] = self._topic(channel, count, seconds)
+        self.topics = list(by_topic.values())
 
     def messages(self, topics: Collection[str]) -> Iterator[Message]:
         """Yield the messages of these topics in the order of the file."""
@@ -50,7 +55,7 @@ class McapBag:
         try:
             with self._path.open("rb") as file:
                 reader = make_reader(file)
-                self._header = reader.get_header().profile
+                self.profile = reader.get_header().profile
                 summary = reader.get_summary()
         except _READ_ERRORS:
             return None
@@ -65,9 +70,10 @@ class McapBag:
         """Read the whole file, and return its counts."""
         counts: Counter[int] = Counter()
         times: list[int] = []
-        self._header = ""
         for record in self._records():
-            if isinstance(record, Schema):
+            if isinstance(record, Header):
+                self.profile = record.profile
+            elif isinstance(record, Schema):
                 self._schemas[record.id] = record
             elif isinstance(record, Channel):
                 self._channels[record.id] = record

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dropanchor_service.importing.bags.bag import IMU, NS_PER_S, RANGE, Bag, Message
+from dropanchor_service.importing.bags.bag import IMU, MAG, NS_PER_S, RANGE, Bag, Message
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import LeftOut
 from dropanchor_service.importing.tables.flat import Flat, flat_rows
@@ -18,6 +18,12 @@ _STAMPS = (
     ("stamp.sec", "stamp.nanosec"),
 )
 _HIDDEN = ("covariance", "header.", "timestamp.sec", "timestamp.nsec", "stamp.sec", "stamp.nanosec", "__msgtype__")
+
+_READINGS = {
+    IMU: (STAMP, "linear_acceleration.", "angular_velocity."),
+    MAG: (STAMP, "magnetic_field."),
+    RANGE: (STAMP, STD, "range"),
+}
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,10 @@ class TopicTable:
     bag: Bag
     notes: tuple[str, ...] = ()
 
+    @property
+    def anchor_advice(self) -> str:
+        return f"--range {self.name}=ANCHOR names another one"
+
     def rows(self, left_out: LeftOut) -> Iterator[Row]:
         messages = shown(self.bag.messages([self.name]), self.name, self.count)
         for number, message in enumerate(messages, 1):
@@ -45,10 +55,11 @@ class TopicTable:
                     yield number, [row.get(column) for column in self.columns]
 
 
-def columns_of(messages: Sequence[Message]) -> tuple[str, ...]:
-    """Return the columns of the messages of one topic."""
+def columns_of(messages: Sequence[Message], kind: str) -> tuple[str, ...]:
+    """Return the columns of the messages of one topic. kind: of messages; of some, most fields are no readings."""
     names = dict.fromkeys(name for message in messages for row in rows_of(message) for name in row)
-    return tuple(name for name in names if not any(hidden in name for hidden in _HIDDEN))
+    used = _READINGS.get(kind, ("",))
+    return tuple(name for name in names if name.startswith(used) and not any(hidden in name for hidden in _HIDDEN))
 
 
 def rows_of(message: Message) -> Iterator[Flat]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from dropanchor_service.importing.readings import RANGE, LeftOut
 from dropanchor_service.importing.tables.mapping import ANCHOR, T_NSEC, VECTORS, WIDE, Fields, T, quantity_of
-from dropanchor_service.importing.tables.table import Table, exact_number, number, text_of
+from dropanchor_service.importing.tables.table import Exact, Table, exact_number, number, text_of
 from dropanchor_service.importing.tables.times import iso_ns
 from dropanchor_service.importing.tables.units import conversion
 
@@ -38,7 +38,7 @@ class Collected:
     the rows. iso: the times are ISO 8601; zoneless: some of them without a zone."""
 
     def __init__(self, fields: Fields) -> None:
-        self.times: list[int | float] = []
+        self.times: list[Exact] = []
         self.seconds: list[int] = []
         self.lines: list[int] = []
         self.iso = self.zoneless = False

@@ -27,6 +27,10 @@ class JsonTable:
     is_list: bool
     notes: tuple[str, ...] = ()
 
+    @property
+    def anchor_advice(self) -> str:
+        return "--map range.ID=COLUMN names another one"
+
     def rows(self, left_out: LeftOut) -> Iterator[Row]:
         """Yield the rows of each object. Raises ImportingError."""
         for line, value in shown(_objects(self.file, self.is_list), self.name):

@@ -80,7 +80,9 @@ def readings_of(table: Table, fields: Fields) -> Readings:
         raise ImportingError(f"{table.name}: no row has a time in the column {fields[T].name!r}")
     times = _times(found, fields)
     readings.is_utc = times.is_utc
-    readings.notes += [f"{table.name}: {note}" for note in (*table.notes, *times.notes, *_conversions(fields, found))]
+    readings.notes += [
+        f"{table.name}: {note}" for note in (*table.notes, *times.notes, *_conversions(table, fields, found))
+    ]
     for quantity, kind in found.vectors.items():
         values = np.column_stack([np.asarray(column) for column in kind.values.values()])
         stream = stream_of(times.t_ns[np.asarray(kind.rows)], values, table.name, quantity, readings.left_out)
@@ -115,7 +117,7 @@ def _arrays(kind: Kind) -> list[Array]:
     return [np.asarray(column) for column in kind.values.values()]
 
 
-def _conversions(fields: Fields, found: Collected) -> list[str]:
+def _conversions(table: Table, fields: Fields, found: Collected) -> list[str]:
     """Return a sentence for each conversion, and for each unit that was assumed."""
     sentences: dict[str, list[str]] = {}
     for name, column in fields.items():
@@ -133,9 +135,7 @@ def _conversions(fields: Fields, found: Collected) -> list[str]:
         sentences.setdefault(said, []).append(f"-{column.name}" if column.sign < 0 else column.name)
     lines = [f"{', '.join(columns)}: {said}" for said, columns in sentences.items()]
     if RANGE in fields and ANCHOR not in fields:
-        lines.append(
-            f"no column names the anchor: the ranges are to anchor {ONLY_ANCHOR} (--map range.ID={fields[RANGE]})"
-        )
+        lines.append(f"nothing names the anchor: the ranges are to anchor {ONLY_ANCHOR} ({table.anchor_advice})")
     if found.held:
         lines.append(f"{found.held} rows repeat the range before: they are no new ranges, and are left out")
     return lines

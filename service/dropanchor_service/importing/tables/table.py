@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 from typing import Any, Protocol
 
 from dropanchor_service.importing.readings import LeftOut
@@ -9,11 +10,14 @@ from dropanchor_service.importing.readings import LeftOut
 Row = tuple[int, Sequence[Any]]
 """Number of the line or message, and one value for each column; None or an empty text where there is none."""
 
+Exact = int | float | Decimal
+
 _EMPTY = {"", "nan", "null", "none", "na", "n/a", "-", "--", "inf", "-inf", "+inf"}
 
 
 class Table(Protocol):
-    """name: of its file or topic. columns: their names. notes: what was decided to read it."""
+    """name: of its file or topic. columns: their names. notes: what was decided to read it. anchor_advice:
+    what to do where nothing names the anchor."""
 
     @property
     def name(self) -> str: ...
@@ -23,6 +27,9 @@ class Table(Protocol):
 
     @property
     def notes(self) -> Sequence[str]: ...
+
+    @property
+    def anchor_advice(self) -> str: ...
 
     def rows(self, left_out: LeftOut) -> Iterator[Row]: ...
 
@@ -44,13 +51,14 @@ def number(value: Any) -> float | None:
     return found if math.isfinite(found) else None
 
 
-def exact_number(value: Any) -> int | float | None:
-    """Return a cell as a number, a whole one as int: times in ns do not fit into a float. Raises ValueError."""
+def exact_number(value: Any) -> Exact | None:
+    """Return a cell as a number with all its digits: a float has too few for UTC in ns. Raises ValueError."""
     if isinstance(value, int) and not isinstance(value, bool):
         return value
     if isinstance(value, str) and value.strip().isdigit():
         return int(value)
-    return number(value)
+    found = number(value)
+    return Decimal(value.strip().replace(",", ".")) if isinstance(value, str) and found is not None else found
 
 
 def text_of(value: Any) -> str:

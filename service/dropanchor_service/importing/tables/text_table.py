@@ -35,6 +35,10 @@ class TextTable:
     separator: str
     first: int
 
+    @property
+    def anchor_advice(self) -> str:
+        return "--map range.ID=COLUMN names another one"
+
     def rows(self, left_out: LeftOut) -> Iterator[Row]:
         """Yield the rows that have a value for each column. Raises ImportingError."""
         width = len(self.columns)

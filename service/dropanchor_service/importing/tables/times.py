@@ -1,11 +1,13 @@
 """Times of a column as ns: their unit, wrapped counters, ISO 8601."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
 import numpy as np
 
 from dropanchor_service.importing.readings import TIME
+from dropanchor_service.importing.tables.table import Exact
 from dropanchor_service.importing.tables.units import ISO, conversion
 from dropanchor_service.phones.streams import Array
 
@@ -26,7 +28,7 @@ class Times(NamedTuple):
     notes: list[str]
 
 
-def times_of(raw: list[int | float], unit: str | None, column: str, lines: list[int]) -> Times:
+def times_of(raw: Sequence[Exact], unit: str | None, column: str, lines: list[int]) -> Times:
     """Return the times of a column. unit: None if nobody told. lines: of the rows."""
     notes = []
     numbers, wraps = _unwrapped(raw)
@@ -63,7 +65,7 @@ def iso_ns(text: str) -> tuple[int, bool] | None:
     return seconds * NS_PER_S + int((digits + "0" * 9)[:9]), has_zone
 
 
-def _unwrapped(raw: list[int | float]) -> tuple[list[int | float], list[int]]:
+def _unwrapped(raw: Sequence[Exact]) -> tuple[Sequence[Exact], list[int]]:
     """Return the numbers without the wraps of a 32-bit counter, and the rows at which it wrapped."""
     if not raw or max(raw) >= _WRAP or max(raw) < _WRAP // 2 or not all(isinstance(number, int) for number in raw):
         return raw, []
@@ -92,11 +94,12 @@ def _unit_of(numbers: Array) -> str:
     return min(_UNITS, key=lambda unit: abs(float(np.log(rates[unit] / _USUAL_HZ))))
 
 
-def _ns(numbers: list[int | float], factor: float) -> Array:
-    """Return ns, exactly for whole numbers."""
-    if all(isinstance(number, int) for number in numbers) and factor == int(factor):
-        return np.array([number * int(factor) for number in numbers], np.int64)
-    return np.rint(np.asarray(numbers, np.float64) * factor).astype(np.int64)
+def _ns(numbers: Sequence[Exact], factor: float) -> Array:
+    """Return ns, exactly for numbers that are exact."""
+    if factor == int(factor) and not any(isinstance(number, float) for number in numbers):
+        return np.array([round(number * int(factor)) for number in numbers], np.int64)
+    ns: Array = np.rint(np.asarray(numbers, np.float64) * factor).astype(np.int64)
+    return ns
 
 
 def _back(t_ns: Array, column: str, lines: list[int]) -> list[str]:
