@@ -36,6 +36,7 @@ Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service provides their poses over Zenoh and REST.
 """
 _EXTRAS = {
+    "apsw": "ros2",
     "matplotlib": "evaluation",
     "scipy": "evaluation",
     "sympy": "evaluation",

@@ -74,6 +74,8 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
         if found and (found.field not in best or found.rank < best[found.field][0]):
             best[found.field] = found.rank, Column(name, found.unit)
     fields = {field: column for field, (_, column) in best.items()}
+    if T_NSEC in fields and T not in fields:
+        fields[T] = Column(fields.pop(T_NSEC).name, "ns")
     if RANGE in fields or ANCHOR in fields:
         fields = {field: column for field, column in fields.items() if not field.startswith(WIDE)}
     return {field: fields[field] for field in sorted(fields, key=_order) if _is_whole(field, fields)}
@@ -117,7 +119,9 @@ def _found(name: str) -> _Found | None:
         found = _identified(_words(bracketed[1]))
         return found and _with_unit(found, bracketed[2], name)
     words = _words(name)
-    for count in (2, 1):  # words of a unit at the end, as in gyro_x_rad_s
+    if _NANOSECONDS & set(words):
+        return _time(words)
+    for count in (3, 2, 1):  # words of a unit at the end, as in gyro_x_rad_s
         unit = "".join(words[-count:])
         found = _identified(words[:-count]) if len(words) > count else None
         quantity = quantity_of(found.field) if found else None

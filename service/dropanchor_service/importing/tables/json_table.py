@@ -58,9 +58,10 @@ def read_json(file: File) -> JsonTable:
 
 
 def _is_one_a_line(file: File) -> bool:
+    """Return whether the first of several lines is an object."""
     with file.opened() as raw:
-        first = next((line for line in raw if line.strip()), b"")
-    return _parsed(first) is not None
+        lines = (line for line in raw if line.strip())
+        return _parsed(next(lines, b"")) is not None and next(lines, None) is not None
 
 
 def _objects(file: File, is_list: bool) -> Iterator[tuple[int, Any]]:
@@ -77,8 +78,13 @@ def _objects(file: File, is_list: bool) -> Iterator[tuple[int, Any]]:
         value = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise ImportingError(f"{file.name} is not JSON: {error}") from error
-    rows = value if isinstance(value, list) else next((v for v in value.values() if isinstance(v, list)), [value])
-    yield from enumerate(rows, 1)
+    yield from enumerate(value if isinstance(value, list) else _rows_in(value), 1)
+
+
+def _rows_in(value: Any) -> list[Any]:
+    """Return the first list of objects in an object, or else the object."""
+    inner = value.values() if isinstance(value, dict) else ()
+    return next((v for v in inner if isinstance(v, list) and v and isinstance(v[0], dict)), [value])
 
 
 def _parsed(line: bytes) -> Any:

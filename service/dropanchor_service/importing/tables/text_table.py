@@ -19,7 +19,6 @@ _HEAD_LINES = 60
 _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
 _COMMENTS = ("#", "%", "//")
-_TABLE_BYTES = 8
 
 
 @dataclass(frozen=True)
@@ -63,10 +62,10 @@ def read_table(file: File) -> TextTable:
     text = getincrementaldecoder(encoding)(errors="replace").decode(head)
     lines = text.splitlines(keepends=True)[: _HEAD_LINES + 1]
     lines = lines[:-1] if len(lines) > 1 and len(head) == _HEAD_BYTES else lines[:_HEAD_LINES]
+    if not any(map(str.strip, lines)):
+        raise ImportingError(f"{file.name} is empty")
     separator = _separator(lines, file.name)
     rows = [(line, cells) for line, cells in _split(lines, separator, file.name) if cells]
-    if not rows or len(head) < _TABLE_BYTES // 2:
-        raise ImportingError(f"{file.name} is empty")
     width = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     first, header = next((line, cells) for line, cells in rows if len(cells) == width)
     if first > 1 and any(line < first for line, _ in rows):

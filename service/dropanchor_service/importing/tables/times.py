@@ -14,7 +14,7 @@ from dropanchor_service.phones.streams import Array
 NS_PER_S = 1_000_000_000
 UTC_S = (1e9, 4.1e9)  # from 2001 to 2099: numbers within are taken for UTC
 _USUAL_HZ = 50.0
-_PLAUSIBLE_HZ = (0.05, 20_000.0)
+_PLAUSIBLE_HZ = (0.2, 20_000.0)
 _UNITS = ("s", "ms", "us", "ns")
 _WRAP = 2**32
 BACK_S = 1.0
