@@ -1,7 +1,8 @@
 """Join what the sources hold: accelerations and fields at the times of the gyroscope, and all on one clock."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from dropanchor_service.phones.streams import Array, Stream
 from dropanchor_tag_client.sources.axes import Mounting
 
 NS_PER_S = 1_000_000_000
+_DAY_NS = 86_400 * NS_PER_S
 _KEPT_NS = 1000 * NS_PER_S  # times below are from a start, and stay as they are
 
 
@@ -80,6 +82,7 @@ def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
         imu = Imu(imu.t_ns, imu.acc @ rotation, imu.gyro @ rotation, imu.mag @ rotation)
     times = [kind.t_ns for kind in (imu, readings.ranges, readings.headings) if len(kind)]
     first_ns = min((int(t_ns[0]) for t_ns in times), default=0)
+    _require_one_clock({"IMU": imu.t_ns, "ranges": readings.ranges.t_ns, "headings": readings.headings.t_ns})
     t0_ns = first_ns // NS_PER_S * NS_PER_S if not 0 <= first_ns < _KEPT_NS else 0
     ranges, headings = readings.ranges, readings.headings
     return Joined(
@@ -89,6 +92,18 @@ def joined(readings: Readings, mounted: Mounting | None = None) -> Joined:
         readings.anchors,
         t0_ns,
     )
+
+
+def _require_one_clock(sensors: Mapping[str, Array]) -> None:
+    """Raise ImportingError for sensors that are days apart: a replay would run through all of them."""
+    spans = [(int(t_ns[0]), int(t_ns[-1]), name) for name, t_ns in sensors.items() if len(t_ns)]
+    for (_, end, before), (start, _, after) in pairwise(sorted(spans)):
+        if start - end > _DAY_NS:
+            raise ImportingError(
+                f"the times of the {before} end {(start - end) / _DAY_NS:.0f} days before those of the {after} begin: they "
+                "are not of one clock, or not in the unit that was taken. Say the unit with --map t=COLUMN:UNIT (s, ms, us, ns), "
+                "or record both with one clock"
+            )
 
 
 def _imu(readings: Readings) -> Imu:

@@ -97,11 +97,7 @@ def no_headings() -> Headings:
 
 @dataclass
 class Readings:
-    """What one source or several hold.
-
-    notes: what was decided and converted, for the person. units: by quantity. is_utc: whether the times are UTC, None
-    without times. Otherwise they count from a start that nobody knows.
-    """
+    """What one source or several hold. notes: what was decided and converted, for the person. units: by quantity."""
 
     acc: Stream = field(default_factory=no_readings)
     gyro: Stream = field(default_factory=no_readings)
@@ -112,7 +108,6 @@ class Readings:
     notes: list[str] = field(default_factory=list)
     left_out: LeftOut = field(default_factory=LeftOut)
     units: dict[str, Unit] = field(default_factory=dict)
-    is_utc: bool | None = None
 
     @property
     def is_empty(self) -> bool:

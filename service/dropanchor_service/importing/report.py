@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from dropanchor_service.importing.join import NS_PER_S, Joined
+from dropanchor_service.importing.tables.times import UTC_S
 from dropanchor_service.phones.streams import Array
 
 GAP_PERIODS, GAP_S = 5.0, 0.2  # a step is a gap when it is longer than so many usual ones, and than this
@@ -60,9 +61,11 @@ def _median_norm(vectors: Array) -> float:
 
 
 def _clocks(joined: Joined) -> Iterator[str]:
-    if joined.t0_ns:
+    if UTC_S[0] * NS_PER_S <= joined.t0_ns < UTC_S[1] * NS_PER_S:
         moment = datetime.fromtimestamp(joined.t0_ns / NS_PER_S, UTC)
         yield f"t_s = 0 is {moment:%Y-%m-%d %H:%M:%S} UTC (dropanchor-tag replay --t0-ns {joined.t0_ns})"
+    elif joined.t0_ns:
+        yield f"t_s = 0 is {joined.t0_ns / NS_PER_S:.0f} s on the clock of the source"
     if not len(joined.imu) or not len(joined.ranges):
         return
     together_s = overlap_s(joined.imu.t_ns, joined.ranges.t_ns)

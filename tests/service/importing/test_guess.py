@@ -80,6 +80,7 @@ def test_turn_rates_in_degrees_are_known(name: str) -> None:
         (("ts", "uwb_range", "uwb_rssi"), ["t=ts", "range=uwb_range"]),
         (("micros", "d0", "d1"), ["t=micros:us", "range.0=d0", "range.1=d1"]),
         (("time", "dist_A1 [m]", "dist_A2 [m]"), ["t=time", "range.A1=dist_A1 [m]:m", "range.A2=dist_A2 [m]:m"]),
+        (("timestamp", "id", "range"), ["t=timestamp", "anchor=id", "range=range"]),
         (("time", "yaw_deg", "range"), ["t=time", "range=range", "heading=yaw_deg:deg"]),
         (
             ("header.stamp.sec", "header.stamp.nanosec", "range"),

@@ -200,6 +200,23 @@ def test_clocks_that_do_not_overlap_are_named(run: Import) -> None:
     assert "the IMU and the ranges do not overlap: they are 499.6 s apart" in run(run.folder / "s").printed
 
 
+def test_clocks_that_are_days_apart_are_refused(run: Import) -> None:
+    run.file("s/imu.csv", IMU + imu_rows())
+    run.file("s/uwb.csv", "time_ms,range\n1760000000000,5\n1760000000100,5\n")
+    ended = run(run.folder / "s")
+    assert ended.status == 2
+    assert (
+        "the times of the IMU end 20370 days before those of the ranges begin: they are not of one clock" in ended.error
+    )
+
+
+def test_rows_from_before_the_clock_was_set_are_left_out(run: Import) -> None:
+    rows = "".join(f"{t},A,5\n" for t in (0, 100, *range(1760000000000, 1760000001000, 100)))
+    ended = run(run.file("uwb.csv", "time_ms,anchor,range\n" + rows))
+    assert len(ended.rows("range")) == 10
+    assert "uwb.csv: 2 left out: the time is more than 30 days from most others (lines 2, 3)" in ended.printed
+
+
 def test_the_axes_of_the_imu_can_be_turned(run: Import) -> None:
     run.file("s/imu.csv", IMU + "".join(f"{i / 100},1,2,9.81,0,0,0\n" for i in range(5)))
     run.file("s/uwb.csv", PLAIN)

@@ -33,7 +33,7 @@ def read_own(path: Path, tag: str | None) -> Readings:
 
     tag: None for the only one.
     """
-    reader, readings = RecordingReader(path), Readings(is_utc=True)
+    reader, readings = RecordingReader(path), Readings()
     by_tag: dict[str, list[Arrived]] = {}
     site: Site | None = None
     for turn in reader.turns():

@@ -17,7 +17,7 @@ def imu_readings(streams: Mapping[str, Stream], signs: Signs, source: str) -> Re
     """Return the IMU of a phone. streams: by sensor, in the phone's axes. Raises ImportingError."""
     _require_sensors(streams, source)
     parts = (TOTAL,) if TOTAL in streams else (LINEAR, GRAVITY)
-    readings = Readings(is_utc=True)
+    readings = Readings()
     readings.gyro = _in_body(streams[GYROSCOPE])
     readings.mag = _in_body(streams.get(MAGNETOMETER, no_readings()))
     force = _force([streams[name] for name in parts], streams[GYROSCOPE].t_ns)

@@ -59,7 +59,6 @@ def read_export(files: Sequence[File], source: str) -> Readings:
     readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, Signs.ANDROID, source)
     readings.left_out.add_all(left_out)
     readings.notes.insert(0, f"{source}: an export of phyphox")
-    readings.is_utc = starts is not None
     if starts is None:
         readings.notes.append(f"{source}: without meta/time.csv its times count from the start of the experiment")
     return readings

@@ -47,6 +47,7 @@ _RANGES |= {"rng", "slant", "ranging", "value"}
 _RANGE_NAMES = _RANGES - {"uwb", "tof", "twr", "measured", "measurement", "slant", "value"}
 _NOT_A_RANGE = _NOT_A_READING | {"rssi", "quality", "max", "min", "fov", "view", "snr", "count", "seq", "status", "id"}
 _ANCHORS = {"anchor", "anchors", "anchorid", "beacon", "beaconid", "anc", "responder", "node", "nodeid"}
+_IDS = {"id", "mac", "addr", "address"}  # of the anchor, beside a range
 _OF_ANCHORS = {"id", "addr", "address", "mac", "name", "short", "device", "range", "ranges", "uwb", "to", "from"}
 _STDS = {"std", "stddev", "sigma", "stdev", "uncertainty"}
 _HEADINGS = {"heading", "yaw"}
@@ -76,6 +77,8 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
     fields = {field: column for field, (_, column) in best.items()}
     if T_NSEC in fields and T not in fields:
         fields[T] = Column(fields.pop(T_NSEC).name, "ns")
+    if RANGE in fields and ANCHOR not in fields and (names := [name for name in columns if name.lower() in _IDS]):
+        fields[ANCHOR] = Column(names[0])
     if RANGE in fields or ANCHOR in fields:
         fields = {field: column for field, column in fields.items() if not field.startswith(WIDE)}
     return {field: fields[field] for field in sorted(fields, key=_order) if _is_whole(field, fields)}

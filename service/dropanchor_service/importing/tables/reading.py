@@ -34,6 +34,7 @@ from dropanchor_service.importing.tables.times import Times, times_of
 from dropanchor_service.importing.tables.units import SI, conversion
 from dropanchor_service.phones.streams import Array
 
+_FAR_NS = 30 * 86_400 * 1_000_000_000
 _NEEDED = {RANGE, *(names[0] for names in VECTORS.values()), "heading"}
 
 
@@ -79,17 +80,17 @@ def readings_of(table: Table, fields: Fields) -> Readings:
     if not found.times:
         raise ImportingError(f"{table.name}: no row has a time in the column {fields[T].name!r}")
     times = _times(found, fields)
-    readings.is_utc = times.is_utc
+    near = _near(times, found, table.name, readings.left_out)
     readings.notes += [
         f"{table.name}: {note}" for note in (*table.notes, *times.notes, *_conversions(table, fields, found))
     ]
     for quantity, kind in found.vectors.items():
-        values = np.column_stack([np.asarray(column) for column in kind.values.values()])
-        stream = stream_of(times.t_ns[np.asarray(kind.rows)], values, table.name, quantity, readings.left_out)
+        rows, columns = _kept(kind, near)
+        stream = stream_of(times.t_ns[rows], np.column_stack(columns), table.name, quantity, readings.left_out)
         setattr(readings, quantity, stream)
-    readings.ranges = _ranges(found, times.t_ns)
-    heading = found.headings
-    readings.headings = headings_of(times.t_ns[np.asarray(heading.rows, np.int64)], *_arrays(heading))
+    readings.ranges = _ranges(found.ranges, times.t_ns, near)
+    rows, columns = _kept(found.headings, near)
+    readings.headings = headings_of(times.t_ns[rows], *columns)
     readings.units = _units(fields)
     if left := unused(table.columns, dict(fields)):
         readings.notes.append(f"{table.name}: not used: {', '.join(left[:12])}{', …' if len(left) > 12 else ''}")
@@ -108,13 +109,25 @@ def _times(found: Collected, fields: Fields) -> Times:
     return times._replace(t_ns=times.t_ns + np.asarray(found.seconds, np.int64)) if found.seconds else times
 
 
-def _ranges(found: Collected, t_ns: Array) -> Ranges:
-    kind = found.ranges
-    return ranges_of(t_ns[np.asarray(kind.rows, np.int64)], kind.anchors, *_arrays(kind))
+def _near(times: Times, found: Collected, source: str, left_out: LeftOut) -> Array:
+    """Return which rows have a time that is near most others: a device without a set clock sends 1970 at first."""
+    near: Array = np.abs(times.t_ns - np.int64(np.median(times.t_ns))) < _FAR_NS
+    for row in np.flatnonzero(~near).tolist():
+        left_out.add(source, "the time is more than 30 days from most others", found.lines[row])
+    return near
 
 
-def _arrays(kind: Kind) -> list[Array]:
-    return [np.asarray(column) for column in kind.values.values()]
+def _ranges(kind: Kind, t_ns: Array, near: Array) -> Ranges:
+    rows, columns = _kept(kind, near)
+    anchors = [anchor for anchor, row in zip(kind.anchors, kind.rows, strict=True) if near[row]]
+    return ranges_of(t_ns[rows], anchors, *columns)
+
+
+def _kept(kind: Kind, near: Array) -> tuple[Array, list[Array]]:
+    """Return the rows of readings whose time is near most others, and their columns."""
+    rows = np.asarray(kind.rows, np.int64)
+    kept = near[rows]
+    return rows[kept], [np.asarray(column)[kept] for column in kind.values.values()]
 
 
 def _conversions(table: Table, fields: Fields, found: Collected) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from dropanchor_service.importing.readings import TIME
 from dropanchor_service.importing.tables.table import Exact
-from dropanchor_service.importing.tables.units import ISO, conversion
+from dropanchor_service.importing.tables.units import conversion
 from dropanchor_service.phones.streams import Array
 
 NS_PER_S = 1_000_000_000
@@ -21,10 +21,9 @@ BACK_S = 1.0
 
 
 class Times(NamedTuple):
-    """t_ns: (n,) int64. is_utc: whether they count from 1970. notes: what was decided."""
+    """t_ns: (n,) int64. notes: what was decided."""
 
     t_ns: Array
-    is_utc: bool
     notes: list[str]
 
 
@@ -38,8 +37,7 @@ def times_of(raw: Sequence[Exact], unit: str | None, column: str, lines: list[in
         unit = _unit_of(np.asarray(numbers, np.float64))
         notes.append(f"{column}: no unit is told; the values look like {_NAMES[unit]}: --map t={column}:{unit}")
     t_ns = _ns(numbers, conversion(unit, TIME).factor)
-    is_utc = bool(len(t_ns)) and UTC_S[0] * NS_PER_S <= int(np.median(t_ns)) < UTC_S[1] * NS_PER_S
-    return Times(t_ns, is_utc, notes + _back(t_ns, column, lines))
+    return Times(t_ns, notes + _back(t_ns, column, lines))
 
 
 _NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
@@ -113,6 +111,3 @@ def _back(t_ns: Array, column: str, lines: list[int]) -> list[str]:
         f"{f' and {len(back) - 1} times more' if len(back) > 1 else ''}: the rows are put in order of time. If a clock "
         "was set or a device started anew there, cut the file and import the parts one by one"
     ]
-
-
-__all__ = ["BACK_S", "ISO", "NS_PER_S", "UTC_S", "Times", "iso_ns", "times_of"]
