@@ -100,9 +100,9 @@ def _require_one_clock(sensors: Mapping[str, Array]) -> None:
     for (_, end, before), (start, _, after) in pairwise(sorted(spans)):
         if start - end > _DAY_NS:
             raise ImportingError(
-                f"the times of the {before} end {(start - end) / _DAY_NS:.0f} days before those of the {after} begin: they "
-                "are not of one clock, or not in the unit that was taken. Say the unit with --map t=COLUMN:UNIT (s, ms, us, ns), "
-                "or record both with one clock"
+                f"the times of the {before} end {(start - end) / _DAY_NS:.0f} days before those of the {after} begin: "
+                "they are not of one clock, or not in the unit that was taken. Say the unit with --map t=COLUMN:UNIT "
+                "(s, ms, us, ns), or record both with one clock"
             )
 
 

@@ -121,6 +121,10 @@ def test_other_columns_are_no_readings(column: str) -> None:
     assert words(column, column.replace("_x", "_y"), column.replace("_x", "_z")) == []
 
 
+def test_the_heading_of_a_truth_is_no_reading_of_the_tag() -> None:
+    assert words("t_s", "x", "y", "z", "yaw_rad") == ["t=t_s:s"]
+
+
 def test_a_vector_without_one_of_its_axes_is_none() -> None:
     assert words("t", "ax", "ay", "range") == ["t=t", "range=range"]
 

@@ -77,6 +77,8 @@ def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
     fields = {field: column for field, (_, column) in best.items()}
     if T_NSEC in fields and T not in fields:
         fields[T] = Column(fields.pop(T_NSEC).name, "ns")
+    if {"x", "y"} <= {name.lower() for name in columns}:  # of a truth: its heading was not measured by the tag
+        fields = {field: column for field, column in fields.items() if field not in (HEADING, "heading_std")}
     if RANGE in fields and ANCHOR not in fields and (names := [name for name in columns if name.lower() in _IDS]):
         fields[ANCHOR] = Column(names[0])
     if RANGE in fields or ANCHOR in fields:
