@@ -136,7 +136,8 @@ def _import(arguments: argparse.Namespace) -> None:
     _save_map(arguments.save_map, founds)
     _say(["", *report(samples), *readings.left_out.sentences(), *_lacking(samples)])
     _say(verdicts(samples.imu, samples.ranges, readings.units))
-    _say(["", f"{arguments.out}: next, dropanchor replay {shlex.quote(str(arguments.out))}"])
+    which = " --anchor ID" if len(anchors) > 1 else ""  # a replay asks for one
+    _say(["", f"{arguments.out}: next, dropanchor replay {shlex.quote(str(arguments.out))}{which}"])
 
 
 def _columns(arguments: argparse.Namespace) -> ColumnMap:
