@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Container, Sequence
 from importlib import import_module
+from keyword import iskeyword
 from types import ModuleType
 from typing import Any
 
@@ -24,6 +25,7 @@ _COMMANDS = {
     "key": "manage API keys of the REST interface",
     "history": "move the history of a site from its file into a database",
     "record": "record the samples and poses of a service, and download the files",
+    "import": "turn bags of ROS, exports of phones and tables into a recording",
     "replay": "run an engine on a recording, offline",
     "foxglove": "show the poses of a running service live in Foxglove or Lichtblick",
     "ros2": "make a robot with ROS 2 a tag, and publish its pose to ROS",
@@ -34,6 +36,7 @@ Live positions of a fleet of tags around one dropped UWB anchor.
 Tags publish raw ranges and IMU samples over Zenoh; the service provides their poses over Zenoh and REST.
 """
 _EXTRAS = {
+    "apsw": "ros2",
     "matplotlib": "evaluation",
     "scipy": "evaluation",
     "sympy": "evaluation",
@@ -49,6 +52,7 @@ _EPILOG = """\
 examples:
   dropanchor demo                          run the service with simulated tags and watch them in a browser
   dropanchor serve                         run the service with a built-in Zenoh router and default settings
+  dropanchor import drive.bag --out DRIVE  turn a bag, an export of a phone or a table into a recording
   dropanchor replay RECORDING --anchor 1   run the same estimator on a recording and report its error
   dropanchor evaluate paper --out report   run the paper's experiments and compare the figures
   dropanchor COMMAND --help                show all options of a command
@@ -84,7 +88,7 @@ def _parser(chosen: Container[str]) -> Parser:
         one = commands.add_parser(name, help=brief)
         if name in chosen:
             use_kernel_cache()  # before a command imports compiled kernels
-            command = _imported(f"dropanchor_service.commands.{name}")
+            command = _imported(_module(name))
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)
             one.set_defaults(run=command.run)
@@ -108,12 +112,17 @@ class _Version(argparse.Action):
 def _is_installed(command: str) -> bool:
     """Return whether the packages of a command are there: some commands need an extra."""
     try:
-        _imported(f"dropanchor_service.commands.{command}")
+        _imported(_module(command))
     except ModuleNotFoundError as error:
         if error.name not in _EXTRAS:
             raise
         return False
     return True
+
+
+def _module(command: str) -> str:
+    """Return the module of a command. One that is a keyword of Python has an underscore."""
+    return f"dropanchor_service.commands.{command}{'_' if iskeyword(command) else ''}"
 
 
 def _imported(name: str) -> ModuleType:

@@ -58,6 +58,7 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
         ("foxglove", "foxglove", ["foxglove"]),
         ("rosbags", "ros2", ["ros2", "--tag=cart"]),
         ("xxhash", "ros2", ["ros2", "--tag=cart"]),
+        ("rosbags", "ros2", ["import", "--out=drive", str(Path(__file__).with_name("importing") / "empty.bag")]),
         ("psycopg", "postgresql", ["cluster", "status"]),
         ("ray", "cluster", ["cluster", "start", "--join", "--config=yards.toml"]),
     ],

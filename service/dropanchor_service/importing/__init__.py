@@ -1,0 +1,1 @@
+"""Turn recordings of others into a folder that `dropanchor replay` reads."""

@@ -1,0 +1,1 @@
+"""Bags of ROS and MCAP files: topics with messages."""

@@ -1,0 +1,1 @@
+"""Exports of apps that record the sensors of a phone."""

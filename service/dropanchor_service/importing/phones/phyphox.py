@@ -1,0 +1,120 @@
+"""Exports of the app phyphox: a folder or zip with one CSV for each sensor, or one CSV with all of them.
+
+The first column is "Time (s)", the others are "Acceleration x (m/s^2)", "Gyroscope x (rad/s)", "Magnetic field x (µT)".
+meta/time.csv has the times at which the experiment began and paused. https://phyphox.org/wiki/index.php/Data_export
+Both platforms give the specific force in the same axes; see `dropanchor_service.phones.phyphox`.
+"""
+
+import re
+from array import array
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from dropanchor_service.importing.files import File
+from dropanchor_service.importing.phones.phone import imu_readings
+from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
+from dropanchor_service.importing.tables.table import number
+from dropanchor_service.importing.tables.text_table import TextTable, read_table
+from dropanchor_service.phones.pairing import Signs
+from dropanchor_service.phones.readings import GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
+from dropanchor_service.phones.streams import Array, Stream
+
+_TIME = "Time (s)"
+_AXIS = re.compile(r"(.+?) ([xyz]) \((.+)\)")
+_SENSORS = {
+    ("acceleration", "m/s^2"): TOTAL,
+    ("linear acceleration", "m/s^2"): LINEAR,
+    ("gyroscope", "rad/s"): GYROSCOPE,
+    ("magnetic field", "µt"): MAGNETOMETER,
+    ("magnetic field", "μt"): MAGNETOMETER,
+}
+_META = re.compile(r"(?:^|/)meta/")
+_NS_PER_S = 1_000_000_000
+
+Starts = tuple[Array, Array]
+"""Experiment time and UTC at which the experiment began or went on, s."""
+
+
+def is_export(columns: Sequence[str]) -> bool:
+    """Return whether a table with these columns comes from the app."""
+    return columns[:1] == (_TIME,) and bool(_sensors(columns))
+
+
+def read_export(files: Sequence[File], source: str) -> Readings:
+    """Return the IMU of an export. Raises ImportingError."""
+    left_out, starts = LeftOut(), _starts(files)
+    streams: dict[str, Stream] = {}
+    for file in files:
+        if _META.search(file.name) or not file.name.lower().endswith((".csv", ".txt", ".tsv")):
+            continue
+        table = read_table(file)
+        for sensor, places in _sensors(table.columns).items():
+            if sensor in streams:
+                raise ImportingError(
+                    f"{source}: the columns of {table.name} are {', '.join(table.columns)}, and another file has them, "
+                    "too: make the export again, or leave one of the files out"
+                )
+            streams[sensor] = _stream(table, places, starts, left_out, sensor)
+    readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, Signs.ANDROID, source)
+    readings.left_out.add_all(left_out)
+    readings.notes.insert(0, f"{source}: an export of phyphox")
+    if starts is None:
+        readings.notes.append(f"{source}: without meta/time.csv its times count from the start of the experiment")
+    return readings
+
+
+def _sensors(columns: Sequence[str]) -> dict[str, list[int]]:
+    """Return the places of x, y and z by sensor."""
+    found: dict[str, dict[str, int]] = {}
+    for place, name in enumerate(columns):
+        match = _AXIS.fullmatch(name)
+        sensor = match and _SENSORS.get((match[1].lower(), match[3].lower()))
+        if match and sensor:
+            found.setdefault(sensor, {})[match[2]] = place
+    return {sensor: [axes[axis] for axis in "xyz"] for sensor, axes in found.items() if len(axes) == 3}
+
+
+def _stream(table: TextTable, places: list[int], starts: Starts | None, left_out: LeftOut, what: str) -> Stream:
+    times, values = array("d"), array("d")
+    for line, cells in table.rows(left_out):
+        try:
+            t, x, y, z = (number(cells[place]) for place in (0, *places))
+        except ValueError:
+            t = x = y = z = None
+        if t is None or x is None or y is None or z is None:
+            left_out.add(table.name, "a value is not a number", line)
+        else:
+            times.append(t)
+            values.extend((x, y, z))
+    t_ns = _t_ns(np.asarray(times), starts)
+    return stream_of(t_ns, np.asarray(values).reshape(-1, 3), table.name, what, left_out)
+
+
+def _t_ns(experiment_s: Array, starts: Starts | None) -> Array:
+    """Return UTC by the last start before each time, or the times of the experiment."""
+    if starts is None:
+        since_start: Array = np.rint(experiment_s * _NS_PER_S).astype(np.int64)
+        return since_start
+    began_s, utc_s = starts
+    last = np.maximum(np.searchsorted(began_s, experiment_s, side="right") - 1, 0)
+    utc_ns = np.rint(utc_s * 1e6).astype(np.int64) * 1000
+    ns: Array = utc_ns[last] + np.rint((experiment_s - began_s[last]) * _NS_PER_S).astype(np.int64)
+    return ns
+
+
+def _starts(files: Sequence[File]) -> Starts | None:
+    file = next((file for file in files if _META.search(file.name) and file.stem == "time"), None)
+    if file is None:
+        return None
+    table = read_table(file)
+    rows: list[Mapping[str, str]] = [
+        dict(zip(table.columns, cells, strict=False)) for _, cells in table.rows(LeftOut())
+    ]
+    try:
+        starts = sorted(
+            (float(row["experiment time"]), float(row["system time"])) for row in rows if row["event"] == "START"
+        )
+    except (KeyError, ValueError) as error:
+        raise ImportingError(f"{file.name} holds no times of the experiment: leave it out, or export again") from error
+    return (np.array([start[0] for start in starts]), np.array([start[1] for start in starts])) if starts else None

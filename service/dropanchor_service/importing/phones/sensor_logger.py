@@ -1,0 +1,88 @@
+"""Exports of the app Sensor Logger: a folder or zip with one CSV for each sensor.
+
+Each has the columns time (UTC in ns), seconds_elapsed, z, y, x. Metadata.csv tells the platform, and whether
+"Standardise Units & Frames" was on. https://github.com/tszheichoi/awesome-sensor-logger
+"""
+
+from array import array
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from dropanchor_service.importing.files import File
+from dropanchor_service.importing.phones.phone import imu_readings
+from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
+from dropanchor_service.importing.tables.table import exact_number, number
+from dropanchor_service.importing.tables.text_table import TextTable, read_table
+from dropanchor_service.phones.pairing import Signs
+from dropanchor_service.phones.readings import SENSORS
+from dropanchor_service.phones.streams import Stream
+
+_COLUMNS = ("time", "x", "y", "z")
+_MARK = "seconds_elapsed"
+_METADATA = "metadata"
+
+
+def is_export(columns: Sequence[str]) -> bool:
+    """Return whether a table with these columns comes from the app."""
+    return _MARK in columns and set(_COLUMNS) <= set(columns)
+
+
+def read_export(files: Sequence[File], source: str, signs: Signs) -> Readings:
+    """Return the IMU of an export. Raises ImportingError."""
+    left_out = LeftOut()
+    streams = {file.stem: _stream(read_table(file), left_out) for file in files if file.stem in SENSORS}
+    metadata = next((_metadata(file) for file in files if file.stem == _METADATA), {})
+    told = signs if signs is not Signs.AUTO else _signs(metadata)
+    readings = imu_readings({name: stream for name, stream in streams.items() if len(stream)}, told, source)
+    readings.left_out.add_all(left_out)
+    readings.notes.insert(0, f"{source}: an export of Sensor Logger{_platform(metadata)}")
+    if told is Signs.AUTO:
+        readings.notes.append(
+            f"{source}: nothing tells whether the phone is an iPhone; gravity tells the sign, while the screen is up "
+            "(--signs ios or --signs android says it)"
+        )
+    elif told is Signs.IOS:
+        readings.notes.append(f"{source}: accelerations of an iPhone: their sign is turned round")
+    unused = sorted(file.name for file in files if file.stem not in (*SENSORS, _METADATA))
+    if unused:
+        readings.notes.append(f"{source}: not used: {', '.join(unused[:8])}{', …' if len(unused) > 8 else ''}")
+    return readings
+
+
+def _stream(table: TextTable, left_out: LeftOut) -> Stream:
+    if missing := set(_COLUMNS) - set(table.columns):
+        raise ImportingError(f"{table.name} lacks the columns {', '.join(sorted(missing))} of Sensor Logger")
+    places = [table.columns.index(name) for name in _COLUMNS]
+    t_ns, values = array("q"), array("d")
+    for line, cells in table.rows(left_out):
+        try:
+            t, (x, y, z) = exact_number(cells[places[0]]), [number(cells[place]) for place in places[1:]]
+        except ValueError:
+            t = x = y = z = None
+        if t is None or x is None or y is None or z is None:
+            left_out.add(table.name, "a value is not a number", line)
+        else:
+            t_ns.append(int(t))
+            values.extend((x, y, z))
+    return stream_of(np.asarray(t_ns, np.int64), np.asarray(values).reshape(-1, 3), table.name, "readings", left_out)
+
+
+def _metadata(file: File) -> Mapping[str, str]:
+    """Return the only row of the metadata, by column."""
+    table = read_table(file)
+    row = next((cells for _, cells in table.rows(LeftOut())), ())
+    return dict(zip(table.columns, map(str, row), strict=False))
+
+
+def _signs(metadata: Mapping[str, str]) -> Signs:
+    """Return what the metadata tells of the sign of accelerations."""
+    platform = metadata.get("platform", "").lower()
+    if metadata.get("standardisation", "").lower() == "true" or platform == "android":
+        return Signs.ANDROID
+    return Signs.IOS if platform == "ios" else Signs.AUTO
+
+
+def _platform(metadata: Mapping[str, str]) -> str:
+    found = [metadata.get(name, "") for name in ("device name", "platform", "appVersion")]
+    return f" ({', '.join(filter(None, found))})" if any(found) else ""

@@ -1,0 +1,1 @@
+"""Tables of readings: text with columns, JSON, and the messages of a topic."""

@@ -1,0 +1,219 @@
+"""Guess from the names of columns what they hold: `acc_x [g]`, `gyro_x_dps`, `distance_mm`, `linear_acceleration.x`."""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from dropanchor_service.importing.readings import ACC, GYRO, HEADING, MAG, RANGE, ImportingError
+from dropanchor_service.importing.tables.mapping import ANCHOR, POSITION, T_NSEC, VECTORS, WIDE, Column, T, quantity_of
+from dropanchor_service.importing.tables.units import SI, known
+
+_SENSORS = {
+    ACC: {"a", "acc", "accel", "accelerometer", "acceleration", "accelerations", "accelero", "lsm6acc"},
+    GYRO: {"g", "w", "gyr", "gyro", "gyros", "gyroscope", "omega", "angular", "rotation", "rot"},
+    MAG: {"m", "mag", "magn", "magnet", "magnetometer", "magnetic", "b", "compass"},
+}
+_WITHOUT_GRAVITY = {"linear", "lin", "user", "free", "world", "filtered", "raw"}  # used where there is nothing else
+_NOT_A_READING = {"cov", "covariance", "std", "stddev", "sigma", "bias", "offset", "var", "variance", "gravity", "quat"}
+_NOT_A_READING |= {
+    "orientation",
+    "quaternion",
+    "position",
+    "pos",
+    "truth",
+    "gt",
+    "temp",
+    "temperature",
+    "error",
+    "jerk",
+}
+_AXES = {"x": 0, "y": 1, "z": 2, "0": 0, "1": 1, "2": 2}
+_STUCK = re.compile(r"(?:(?P<sensor>[a-z]+?)(?P<axis>[xyz])|(?P<axis2>[xyz])(?P<sensor2>[a-z]{3,}))")
+_TIMES = {"t", "time", "times", "timestamp", "timestamps", "ts", "stamp", "date", "datetime", "tick", "ticks", "epoch"}
+_TIMES_WITH_UNIT = {
+    "millis": "ms",
+    "micros": "us",
+    "nanos": "ns",
+    "seconds": "s",
+    "secs": "s",
+    "sec": "s",
+    "elapsed": "",
+}
+_OF_TIMES = {"header", "field", "unix", "utc", "sensor", "system", "sys", "device", "host", "since", "start", "boot"}
+_OF_TIMES |= {"log", "elapsed", "local", "gps", "imu", "uwb", "recv", "received", "sample", "of", "iso", "monotonic"}
+_NANOSECONDS = {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"}
+_RANGES = {"range", "ranges", "dist", "distance", "distances", "d", "r", "uwb", "tof", "twr", "measured", "measurement"}
+_RANGES |= {"rng", "slant", "ranging", "value"}
+_RANGE_NAMES = _RANGES - {"uwb", "tof", "twr", "measured", "measurement", "slant", "value"}
+_NOT_A_RANGE = _NOT_A_READING | {"rssi", "quality", "max", "min", "fov", "view", "snr", "count", "seq", "status", "id"}
+_ANCHORS = {"anchor", "anchors", "anchorid", "beacon", "beaconid", "anc", "responder", "node", "nodeid"}
+_IDS = {"id", "mac", "addr", "address"}  # of the anchor, beside a range
+_OF_ANCHORS = {"id", "addr", "address", "mac", "name", "short", "device", "range", "ranges", "uwb", "to", "from"}
+_STDS = {"std", "stddev", "sigma", "stdev", "uncertainty"}
+_HEADINGS = {"heading", "yaw"}
+_BARE = {"vector", "value", "values", "data", "xyz"}
+_BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+_WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+|°/?s?")
+
+
+class _Found(NamedTuple):
+    """field: of the mapping. unit: as the name tells it. rank: the smaller, the better."""
+
+    field: str
+    unit: str | None
+    rank: int
+
+
+def guessed(columns: Sequence[str], table: str = "") -> dict[str, Column]:
+    """Return the columns by field. Raises ImportingError for a name with a unit that is not known.
+
+    table: its name, which tells what columns are that are only named x, y and z.
+    """
+    best: dict[str, tuple[int, Column]] = {}
+    for name in columns:
+        found = _found(name) or _of_table(table, name)
+        if found and (found.field not in best or found.rank < best[found.field][0]):
+            best[found.field] = found.rank, Column(name, found.unit)
+    fields = {field: column for field, (_, column) in best.items()}
+    if T_NSEC in fields and T not in fields:
+        fields[T] = Column(fields.pop(T_NSEC).name, "ns")
+    if {"x", "y"} <= {name.lower() for name in columns}:  # of a truth: its heading was not measured by the tag
+        fields = {field: column for field, column in fields.items() if field not in (HEADING, "heading_std")}
+    if RANGE in fields and ANCHOR not in fields and (names := [name for name in columns if name.lower() in _IDS]):
+        fields[ANCHOR] = Column(names[0])
+    if RANGE in fields or ANCHOR in fields:
+        fields = {field: column for field, column in fields.items() if not field.startswith(WIDE)}
+    return {field: fields[field] for field in sorted(fields, key=_order) if _is_whole(field, fields)}
+
+
+def guessed_time(columns: Sequence[str]) -> dict[str, Column]:
+    """Return only the columns with the time."""
+    return {field: column for field, column in guessed(columns).items() if field in (T, T_NSEC)}
+
+
+def is_anchors(columns: Sequence[str]) -> bool:
+    """Return whether a table holds the positions of anchors."""
+    names = {name.strip().lower() for name in columns}
+    return {"x", "y"} <= names and bool(names & {"id", "anchor", "anchor_id", "name"}) and not guessed_time(columns)
+
+
+def position_columns(columns: Sequence[str]) -> dict[str, Column]:
+    """Return the columns of a table of anchors by `POSITION`. z may lack."""
+    names = {name.strip().lower(): name for name in columns}
+    identifier = next(names[name] for name in ("id", "anchor_id", "anchor", "name") if name in names)
+    return {"id": Column(identifier)} | {axis: Column(names[axis]) for axis in POSITION[1:] if axis in names}
+
+
+def _is_whole(field: str, fields: dict[str, Column]) -> bool:
+    """Return whether the field is of use: a vector needs its three axes, a deviation its value."""
+    vector = next((names for names in VECTORS.values() if field in names), ())
+    if field == "heading_std":
+        return HEADING in fields
+    return all(name in fields for name in vector)
+
+
+def _order(field: str) -> int:
+    order = (T, T_NSEC, *(name for names in VECTORS.values() for name in names), ANCHOR, RANGE)
+    return order.index(field) if field in order else len(order)
+
+
+def _found(name: str) -> _Found | None:
+    """Return what a column holds, with the unit in brackets or at the end of its name."""
+    bracketed = _BRACKETS.match(name)
+    if bracketed and bracketed[1] and not bracketed[2].isdigit():
+        found = _identified(_words(bracketed[1]))
+        return found and _with_unit(found, bracketed[2], name)
+    words = _words(name)
+    if _NANOSECONDS & set(words):
+        return _time(words)
+    for count in (3, 2, 1):  # words of a unit at the end, as in gyro_x_rad_s
+        unit = "".join(words[-count:])
+        found = _identified(words[:-count]) if len(words) > count else None
+        quantity = quantity_of(found.field) if found else None
+        if found and quantity and not found.unit and known(unit, quantity):
+            return found._replace(unit=unit)
+    return _identified(words)
+
+
+def _of_table(table: str, name: str) -> _Found | None:
+    """Return what a column holds that names only an axis, by the name of its table."""
+    words = _words(_BRACKETS.sub(r"\1", name))
+    bare = bool(words) and words[-1] in _AXES and set(words[:-1]) <= _BARE
+    return _vector([*(word for word in _words(table) if len(word) > 2), words[-1]]) if bare else None
+
+
+def _with_unit(found: _Found, unit: str, name: str) -> _Found:
+    quantity = quantity_of(found.field)
+    if quantity is None or not unit:
+        return found
+    if known(unit, quantity) is None:
+        raise ImportingError(
+            f"the column {name!r} has the unit {unit!r}, which is not known: say with --map what it is, as "
+            f"'{found.field}={name}:{SI[quantity]}', or '…:{SI[quantity]}/1000' for counts"
+        )
+    return found._replace(unit=unit)
+
+
+def _words(name: str) -> list[str]:
+    return [word.lower() for word in _WORDS.findall(name.replace("°/s", " dps ").replace("µ", "u"))]
+
+
+def _identified(words: list[str]) -> _Found | None:
+    return _vector(words) or _time(words) or _scalar(words) or _wide(words)
+
+
+def _vector(words: list[str]) -> _Found | None:
+    if not words or _NOT_A_READING & set(words):
+        return None
+    sensors, axis = set(words[:-1]), words[-1]
+    if len(words) > 1 and words[0] in "xyz" and axis not in _AXES:
+        sensors, axis = set(words[1:]), words[0]
+    stuck = _STUCK.fullmatch(words[-1])
+    if axis not in _AXES and stuck:
+        sensors, axis = {stuck["sensor"] or stuck["sensor2"]}, stuck["axis"] or stuck["axis2"]
+    for quantity, known_words in _SENSORS.items():
+        certain = sensors & known_words if axis in "xyz" else sensors & known_words - set("agwmb")
+        if axis in _AXES and certain:
+            rank = len(words) + 10 * len(_WITHOUT_GRAVITY & set(words))
+            return _Found(VECTORS[quantity][_AXES[axis]], None, rank)
+    return None
+
+
+def _time(words: list[str]) -> _Found | None:
+    found = set(words)
+    if found & _NANOSECONDS and found <= _NANOSECONDS | _OF_TIMES | _TIMES:
+        return _Found(T_NSEC, None, len(words))
+    unit = next((_TIMES_WITH_UNIT[word] for word in words if word in _TIMES_WITH_UNIT), None)
+    if (unit is None and not found & _TIMES) or not found <= _TIMES | set(_TIMES_WITH_UNIT) | _OF_TIMES:
+        return None
+    return _Found(T, unit or None, len(words) + 10 * ("elapsed" in found))
+
+
+def _scalar(words: list[str]) -> _Found | None:
+    found = set(words)
+    if not found:
+        return None
+    if found & _STDS and found <= _STDS | _RANGES | _HEADINGS:
+        return _Found("heading_std" if found & _HEADINGS else "std", None, len(words))
+    if found & _ANCHORS and found <= _ANCHORS | _OF_ANCHORS:
+        return _Found(ANCHOR, None, len(words))
+    if found & _HEADINGS and len(found) == 1:
+        return _Found(HEADING, None, len(words))
+    if found & _RANGE_NAMES and found <= _RANGES:
+        return _Found(RANGE, None, len(words))
+    return None
+
+
+def _wide(words: list[str]) -> _Found | None:
+    """Return the ranges to one anchor, whose id the name holds: `dist_A1`, `range to anchor 3`."""
+    found = set(words)
+    rest = [word for word in words if word not in _RANGES | _ANCHORS | {"to", "from"}]
+    if not found & _RANGE_NAMES or found & _NOT_A_RANGE or not 1 <= len(rest) <= 2:
+        return None
+    return _Found(WIDE + "".join(rest).upper(), None, len(words))
+
+
+def unused(columns: Iterable[str], fields: dict[str, Column]) -> list[str]:
+    """Return the columns that no field uses."""
+    used = {column.name for column in fields.values()}
+    return [column for column in columns if column not in used]

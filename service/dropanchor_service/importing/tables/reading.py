@@ -1,0 +1,165 @@
+"""Readings of a table by a mapping, told or guessed."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from dropanchor_service.importing.readings import (
+    RANGE,
+    ImportingError,
+    LeftOut,
+    Ranges,
+    Readings,
+    Unit,
+    headings_of,
+    ranges_of,
+    stream_of,
+)
+from dropanchor_service.importing.tables.collect import ONLY_ANCHOR, Collected, Kind, collected
+from dropanchor_service.importing.tables.guess import guessed, guessed_time, is_anchors, position_columns, unused
+from dropanchor_service.importing.tables.mapping import (
+    ANCHOR,
+    POSITION,
+    T_NSEC,
+    VECTORS,
+    WIDE,
+    Column,
+    Fields,
+    T,
+    quantity_of,
+    resolved,
+)
+from dropanchor_service.importing.tables.table import Table, number, text_of
+from dropanchor_service.importing.tables.times import Times, times_of
+from dropanchor_service.importing.tables.units import SI, conversion
+from dropanchor_service.phones.streams import Array
+
+_FAR_NS = 30 * 86_400 * 1_000_000_000
+_NEEDED = {RANGE, *(names[0] for names in VECTORS.values()), "heading"}
+
+
+def fields_of(table: Table, told: Mapping[str, str]) -> dict[str, Column]:
+    """Return the columns of a table by field: those that were told, or else guessed. Raises ImportingError.
+
+    told: for each field the text that names its column. Those that the table does not have are left out.
+    """
+    if not told:
+        return guessed(table.columns, table.name)
+    fields = {name: column for name, text in told.items() if (column := resolved(text, table.columns, name))}
+    return (guessed_time(table.columns) | fields) if fields and T not in fields else fields
+
+
+def is_useful(fields: Fields) -> bool:
+    """Return whether the fields hold any reading with its time."""
+    return T in fields and any(name in _NEEDED or name.startswith(WIDE) for name in fields)
+
+
+def positions(table: Table, left_out: LeftOut) -> Readings | None:
+    """Return the anchors of a table that holds their positions, None if it is no such table."""
+    if not is_anchors(table.columns):
+        return None
+    index = {name: table.columns.index(column.name) for name, column in position_columns(table.columns).items()}
+    readings = Readings(left_out=left_out)
+    for line, cells in table.rows(left_out):
+        try:
+            x, y, z = (number(cells[index[axis]]) if axis in index else 0.0 for axis in POSITION[1:])
+        except ValueError:
+            x = y = z = None
+        if x is None or y is None or z is None:
+            left_out.add(table.name, "the position is not a number", line)
+        else:
+            readings.anchors[text_of(cells[index["id"]])] = x, y, z
+    readings.notes.append(f"{table.name}: positions of anchors, taken as metres")
+    return readings
+
+
+def readings_of(table: Table, fields: Fields) -> Readings:
+    """Return the readings of a table. Raises ImportingError where it has none."""
+    readings = Readings()
+    found = collected(table, fields, readings.left_out)
+    if not found.times:
+        raise ImportingError(f"{table.name}: no row has a time in the column {fields[T].name!r}")
+    times = _times(found, fields)
+    near = _near(times, found, table.name, readings.left_out)
+    readings.notes += [
+        f"{table.name}: {note}" for note in (*table.notes, *times.notes, *_conversions(table, fields, found))
+    ]
+    for quantity, kind in found.vectors.items():
+        rows, columns = _kept(kind, near)
+        stream = stream_of(times.t_ns[rows], np.column_stack(columns), table.name, quantity, readings.left_out)
+        setattr(readings, quantity, stream)
+    readings.ranges = _ranges(found.ranges, times.t_ns, near)
+    rows, columns = _kept(found.headings, near)
+    readings.headings = headings_of(times.t_ns[rows], *columns)
+    readings.units = _units(fields)
+    if left := unused(table.columns, dict(fields)):
+        readings.notes.append(f"{table.name}: not used: {', '.join(left[:12])}{', …' if len(left) > 12 else ''}")
+    return readings
+
+
+def _times(found: Collected, fields: Fields) -> Times:
+    column = fields[T]
+    if not found.iso:
+        unit = column.unit or ("s" if T_NSEC in fields else None)
+        times = times_of(found.times, unit, column.name, found.lines)
+    else:
+        notes = [f"{column.name} is ISO 8601" + (" without a time zone: taken for UTC" if found.zoneless else "")]
+        times = times_of(found.times, "ns", column.name, found.lines)
+        times = times._replace(notes=notes + times.notes)
+    return times._replace(t_ns=times.t_ns + np.asarray(found.seconds, np.int64)) if found.seconds else times
+
+
+def _near(times: Times, found: Collected, source: str, left_out: LeftOut) -> Array:
+    """Return which rows have a time that is near most others: a device without a set clock sends 1970 at first."""
+    near: Array = np.abs(times.t_ns - np.int64(np.median(times.t_ns))) < _FAR_NS
+    for row in np.flatnonzero(~near).tolist():
+        left_out.add(source, "the time is more than 30 days from most others", found.lines[row])
+    return near
+
+
+def _ranges(kind: Kind, t_ns: Array, near: Array) -> Ranges:
+    rows, columns = _kept(kind, near)
+    anchors = [anchor for anchor, row in zip(kind.anchors, kind.rows, strict=True) if near[row]]
+    return ranges_of(t_ns[rows], anchors, *columns)
+
+
+def _kept(kind: Kind, near: Array) -> tuple[Array, list[Array]]:
+    """Return the rows of readings whose time is near most others, and their columns."""
+    rows = np.asarray(kind.rows, np.int64)
+    kept = near[rows]
+    return rows[kept], [np.asarray(column)[kept] for column in kind.values.values()]
+
+
+def _conversions(table: Table, fields: Fields, found: Collected) -> list[str]:
+    """Return a sentence for each conversion, and for each unit that was assumed."""
+    sentences: dict[str, list[str]] = {}
+    for name, column in fields.items():
+        quantity = quantity_of(name)
+        if quantity is None or name in (T, T_NSEC):
+            continue
+        unit = None if column.unit is None else conversion(column.unit, quantity)
+        if unit is None:
+            said = f"no unit is told: taken as {SI[quantity]}"
+        elif unit.is_si:
+            said = f"in {unit.name}"
+        else:
+            offset = " + 90°" if unit.offset else ""
+            said = f"converted from {unit.name} to {SI[quantity]} (times {unit.factor:.10g}{offset})"
+        sentences.setdefault(said, []).append(f"-{column.name}" if column.sign < 0 else column.name)
+    lines = [f"{', '.join(columns)}: {said}" for said, columns in sentences.items()]
+    if RANGE in fields and ANCHOR not in fields:
+        lines.append(f"nothing names the anchor: the ranges are to anchor {ONLY_ANCHOR} ({table.anchor_advice})")
+    if found.held:
+        lines.append(f"{found.held} rows repeat the range before: they are no new ranges, and are left out")
+    return lines
+
+
+def _units(fields: Fields) -> dict[str, Unit]:
+    units: dict[str, Unit] = {}
+    for name, column in fields.items():
+        quantity = quantity_of(name)
+        if quantity is not None and name not in ("std", "heading_std", T):
+            word = f"{name}={'-' if column.sign < 0 else ''}{column.name}"
+            known = units.get(quantity)
+            units[quantity] = Unit(column.unit, (*(known.given if known else ()), word))
+    return units

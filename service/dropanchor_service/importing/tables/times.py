@@ -1,0 +1,113 @@
+"""Times of a column as ns: their unit, wrapped counters, ISO 8601."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+import numpy as np
+
+from dropanchor_service.importing.readings import TIME
+from dropanchor_service.importing.tables.table import Exact
+from dropanchor_service.importing.tables.units import conversion
+from dropanchor_service.phones.streams import Array
+
+NS_PER_S = 1_000_000_000
+UTC_S = (1e9, 4.1e9)  # from 2001 to 2099: numbers within are taken for UTC
+_USUAL_HZ = 50.0
+_PLAUSIBLE_HZ = (0.2, 20_000.0)
+_UNITS = ("s", "ms", "us", "ns")
+_WRAP = 2**32
+BACK_S = 1.0
+
+
+class Times(NamedTuple):
+    """t_ns: (n,) int64. notes: what was decided."""
+
+    t_ns: Array
+    notes: list[str]
+
+
+def times_of(raw: Sequence[Exact], unit: str | None, column: str, lines: list[int]) -> Times:
+    """Return the times of a column. unit: None if nobody told. lines: of the rows."""
+    notes = []
+    numbers, wraps = _unwrapped(raw)
+    if wraps:
+        notes.append(f"{column}: the counter wraps at 2^32 (line {lines[wraps[0]]}): unwrapped {len(wraps)} times")
+    if unit is None:
+        unit = _unit_of(np.asarray(numbers, np.float64))
+        notes.append(f"{column}: no unit is told; the values look like {_NAMES[unit]}: --map t={column}:{unit}")
+    t_ns = _ns(numbers, conversion(unit, TIME).factor)
+    return Times(t_ns, notes + _back(t_ns, column, lines))
+
+
+_NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+
+
+def iso_ns(text: str) -> tuple[int, bool] | None:
+    """Return the time of a text in ISO 8601 and whether it names its time zone; None if it is none.
+
+    A time without a zone is taken for UTC.
+    """
+    if len(text) < 10 or text[4:5] not in "-0123456789" or not ("-" in text[1:] or "T" in text):
+        return None
+    whole, point, rest = text.strip().replace(",", ".").partition(".")
+    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))] if point else ""
+    try:
+        moment = datetime.fromisoformat((whole + rest[len(digits) :]).replace(" ", "T", 1))
+    except ValueError:
+        return None
+    has_zone = moment.tzinfo is not None
+    if not has_zone:
+        moment = moment.replace(tzinfo=UTC)
+    seconds = round((moment.replace(microsecond=0)).timestamp())
+    return seconds * NS_PER_S + int((digits + "0" * 9)[:9]), has_zone
+
+
+def _unwrapped(raw: Sequence[Exact]) -> tuple[Sequence[Exact], list[int]]:
+    """Return the numbers without the wraps of a 32-bit counter, and the rows at which it wrapped."""
+    if not raw or max(raw) >= _WRAP or max(raw) < _WRAP // 2 or not all(isinstance(number, int) for number in raw):
+        return raw, []
+    steps = np.diff(np.asarray(raw, np.int64))
+    wraps = (np.flatnonzero(steps < -_WRAP // 2) + 1).tolist()
+    if not wraps:
+        return raw, []
+    added = np.zeros(len(raw), np.int64)
+    added[wraps] = _WRAP
+    return (np.asarray(raw, np.int64) + np.cumsum(added)).tolist(), wraps
+
+
+def _unit_of(numbers: Array) -> str:
+    """Return the unit in which the numbers are dates of this century at a plausible rate, or else the rate is usual."""
+    if len(numbers) < 2 and np.all(numbers < UTC_S[0]):
+        return "s"
+    steps = np.diff(numbers)
+    rising = steps[steps > 0]
+    step = float(rising.sum() / len(steps)) if len(rising) else 1.0
+    middle = float(np.median(numbers))
+    rates = {unit: NS_PER_S / (step * conversion(unit, TIME).factor) for unit in _UNITS}
+    for unit, rate in rates.items():
+        seconds = middle * conversion(unit, TIME).factor / NS_PER_S
+        if UTC_S[0] <= seconds < UTC_S[1] and (_PLAUSIBLE_HZ[0] <= rate <= _PLAUSIBLE_HZ[1] or len(numbers) < 3):
+            return unit
+    return min(_UNITS, key=lambda unit: abs(float(np.log(rates[unit] / _USUAL_HZ))))
+
+
+def _ns(numbers: Sequence[Exact], factor: float) -> Array:
+    """Return ns, exactly for numbers that are exact."""
+    if factor == int(factor) and not any(isinstance(number, float) for number in numbers):
+        return np.array([round(number * int(factor)) for number in numbers], np.int64)
+    ns: Array = np.rint(np.asarray(numbers, np.float64) * factor).astype(np.int64)
+    return ns
+
+
+def _back(t_ns: Array, column: str, lines: list[int]) -> list[str]:
+    steps_s = np.diff(t_ns) / NS_PER_S
+    back = np.flatnonzero(steps_s < -BACK_S)
+    if not len(back):
+        return []
+    first = int(back[0])
+    return [
+        f"{column}: time goes back by {-steps_s[first]:.1f} s in line {lines[first + 1]}"
+        f"{f' and {len(back) - 1} times more' if len(back) > 1 else ''}: the rows are put in order of time. If a clock "
+        "was set or a device started anew there, cut the file and import the parts one by one"
+    ]
