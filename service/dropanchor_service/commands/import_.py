@@ -14,8 +14,8 @@ from dropanchor_service.importing.report import report
 from dropanchor_service.importing.sources import check_used, read_source
 from dropanchor_service.importing.tables.mapping import ColumnMap, Fields, loaded, parsed, saved, words_of
 from dropanchor_service.importing.verdicts import verdicts
-from dropanchor_service.phones.pairing import Signs
 from dropanchor_tag_client.sources.axes import AXES, mounting
+from dropanchor_tag_client.sources.phones.pairing import Signs
 
 DESCRIPTION = """\
 Turns what you have into a recording: a folder with range.csv, imu.csv, heading.csv and anchors.csv, which

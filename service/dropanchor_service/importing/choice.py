@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from dropanchor_service.importing.readings import Readings
 from dropanchor_service.importing.tables.mapping import ColumnMap, Fields
-from dropanchor_service.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.pairing import Signs
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.readings import (
     Headings,
     ImportingError,
@@ -15,9 +16,9 @@ from dropanchor_service.importing.readings import (
     headings_of,
     ranges_of,
 )
-from dropanchor_service.phones.pairing import MAX_GAP_NS
-from dropanchor_service.phones.streams import Array, Stream
+from dropanchor_service.importing.streams import Stream
 from dropanchor_tag_client.sources.axes import Mounting
+from dropanchor_tag_client.sources.phones.pairing import MAX_GAP_NS
 
 NS_PER_S = 1_000_000_000
 _DAY_NS = 86_400 * NS_PER_S

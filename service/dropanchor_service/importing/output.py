@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.join import Joined
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, Position
-from dropanchor_service.phones.streams import Array
 from dropanchor_tag_client.recording import HEADING_COLUMNS, IMU_COLUMNS
 
 _FILES = tuple(f"{name}.csv{end}" for name in ("anchors", "range", "imu", "heading", "truth") for end in ("", ".gz"))

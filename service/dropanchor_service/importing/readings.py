@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dropanchor_service.phones.streams import Array, Stream, make_stream, no_readings
+from dropanchor_service.estimation.columns import Array
+from dropanchor_service.importing.streams import Stream, make_stream, no_readings
 
 ACC, GYRO, MAG, RANGE, HEADING, TIME = "acc", "gyro", "mag", "range", "heading", "time"
 MAX_EXAMPLES = 3

@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.join import NS_PER_S, Joined
 from dropanchor_service.importing.tables.times import UTC_S
-from dropanchor_service.phones.streams import Array
 
 GAP_PERIODS, GAP_S = 5.0, 0.2  # a step is a gap when it is longer than so many usual ones, and than this
 _HEAD = ("sensor", "samples", "rate", "from", "to", "gaps", "values")

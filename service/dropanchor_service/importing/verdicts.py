@@ -1,46 +1,42 @@
-"""What the values themselves say about their units and axes, as sentences for the person."""
+"""What the samples themselves say about their units and axes, as sentences for the person."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import IMU, RANGE, SampleBatch
+from dropanchor_service.estimation.plausibility.recorded import findings_of
+from dropanchor_service.estimation.plausibility.verdicts import Finding
 from dropanchor_service.importing.join import Imu
-from dropanchor_service.importing.readings import ACC, Ranges, Unit
+from dropanchor_service.importing.readings import ACC, GYRO, Ranges, Unit
+from dropanchor_service.importing.readings import RANGE as OF_RANGE
 
-MIN_SAMPLES = 20
-_G, _MILLI_G, _NOTHING = (0.85, 1.2), (850.0, 1200.0), 3.0
-_GRAVITY_MPS2 = (8.0, 12.0)
-
-
-def verdicts(imu: Imu, ranges: Ranges, units: Mapping[str, Unit]) -> list[str]:  # noqa: ARG001
-    """Return what is wrong with the samples by their values. units: as the source has them, by quantity."""
-    if len(imu) < MIN_SAMPLES:
-        return []
-    return _of_acceleration(float(np.median(np.linalg.norm(imu.acc, axis=1))), units.get(ACC, Unit(None)))
+_QUANTITY = {"acc_unit": ACC, "gyro_unit": GYRO, "range_unit": OF_RANGE}
 
 
-def _of_acceleration(median: float, unit: Unit) -> list[str]:
-    """At rest or at a steady speed, an acceleration with gravity is 9.8 m/s²."""
-    if _GRAVITY_MPS2[0] <= median <= _GRAVITY_MPS2[1]:
-        return []
-    for (low, high), name in ((_G, "g"), (_MILLI_G, "mg")):
-        if low <= median <= high:
-            return [
-                f"the accelerations look like {name}: their median is {median:.3g} where {_WANTED}{_advice(unit, name)}"
-            ]
-    if median < _NOTHING:
-        return [
-            f"gravity is missing from the accelerations: their median is {median:.3g} m/s² where {_WANTED}. Record the "
-            "acceleration with gravity (Android: TYPE_ACCELEROMETER, not TYPE_LINEAR_ACCELERATION)"
-        ]
-    return [f"the median acceleration is {median:.3g} m/s² where {_WANTED}: is the unit right?"]
+def verdicts(imu: Imu, ranges: Ranges, units: Mapping[str, Unit]) -> list[str]:
+    """Return what is wrong with the samples, as the check of a live tag says it. units: as the source has them."""
+    found: dict[str, Finding] = {}
+    for anchor in sorted(set(ranges.anchors)) or [""]:
+        found |= {finding.name: finding for finding in findings_of(_samples(imu, ranges, anchor))}
+    return [finding.sentence + _advice(finding, units) for finding in found.values()]
 
 
-_WANTED = "9.8 m/s² is usual"
+def _samples(imu: Imu, ranges: Ranges, anchor: str) -> SampleBatch:
+    """Return the IMU samples and the ranges to one anchor."""
+    here = np.array([name == anchor for name in ranges.anchors], bool)
+    samples = SampleBatch(np.zeros(len(imu), IMU), np.zeros(int(here.sum()), RANGE))
+    samples.imu["t_ns"], samples.imu["acc"] = imu.t_ns, imu.acc
+    samples.imu["gyro"], samples.imu["mag"] = imu.gyro, imu.mag
+    if here.any():
+        samples.ranges["t_ns"], samples.ranges["range"] = ranges.t_ns[here], ranges.range_m[here]
+    return samples
 
 
-def _advice(unit: Unit, name: str) -> str:
+def _advice(finding: Finding, units: Mapping[str, Unit]) -> str:
     """Return which words of `--map` to give, where nobody told a unit."""
+    name, value = finding.setting or ("", "")
+    unit = units.get(_QUANTITY.get(name, ""), Unit(None))
     if unit.name is not None or not unit.given:
-        return f" (the source says {unit.name})" if unit.name else ""
-    return f": --map {' '.join(f'{word}:{name}' for word in unit.given)}"
+        return f" (The source says {unit.name}.)" if unit.name else ""
+    return f" Here: --map {' '.join(f'{word}:{value}' for word in unit.given)}"

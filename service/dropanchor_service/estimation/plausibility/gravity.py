@@ -27,8 +27,9 @@ LEAST_TURNING: Final = 0.6  # rad²/s
 LEAST_SPEED: Final = 0.3  # m/s
 FORGET_S: Final = 60.0
 
-ACC_IN_G, ACC_SCALE, ACC_NO_GRAVITY = (
+ACC_IN_G, ACC_IN_MG, ACC_SCALE, ACC_NO_GRAVITY = (
     int(ImuVerdict.ACC_IN_G),
+    int(ImuVerdict.ACC_IN_MG),
     int(ImuVerdict.ACC_SCALE),
     int(ImuVerdict.ACC_NO_GRAVITY),
 )
@@ -93,6 +94,8 @@ def _unit(c: Check) -> int:
         return ACC_SCALE
     if ONE_G[0] < c.norm < ONE_G[1] and one_way:
         return ACC_IN_G
+    if 1e3 * ONE_G[0] < c.norm < 1e3 * ONE_G[1] and one_way:
+        return ACC_IN_MG
     if c.norm < LEAST and (not one_way or c.norm < ONE_G[0]):
         return ACC_NO_GRAVITY
     return ACC_SCALE

@@ -9,6 +9,7 @@ import numpy as np
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.site import Site
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, Rejection, anchor_number, decode_packed
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.readings import (
     ACC,
     GYRO,
@@ -21,7 +22,6 @@ from dropanchor_service.importing.readings import (
     ranges_of,
     stream_of,
 )
-from dropanchor_service.phones.streams import Array
 from dropanchor_service.recording.reading import RecordingReader
 
 Arrived = tuple[Frame, int]

@@ -1,13 +1,14 @@
-"""The sensors of a phone as an IMU in the axes of a tag, by the rules of `dropanchor_service.phones.pairing`."""
+"""The sensors of a phone as an IMU in the axes of a tag, by the rules of the tag client."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.readings import ACC, GYRO, MAG, ImportingError, Readings, Unit
-from dropanchor_service.phones.pairing import FLAT_MPS2, MAX_GAP_NS, Signs
-from dropanchor_service.phones.readings import GRAVITY, GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
-from dropanchor_service.phones.streams import Array, Stream, no_readings
+from dropanchor_service.importing.streams import Stream, no_readings
+from dropanchor_tag_client.sources.phones.pairing import FLAT_MPS2, MAX_GAP_NS, Signs
+from dropanchor_tag_client.sources.phones.readings import GRAVITY, GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
 
 AXES_NOTE = "the axes of the phone are those of the tag: the top edge points forward, the screen up"
 _BODY_FROM_PHONE = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -11,14 +11,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.files import File
 from dropanchor_service.importing.phones.phone import imu_readings
 from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
+from dropanchor_service.importing.streams import Stream
 from dropanchor_service.importing.tables.table import number
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
-from dropanchor_service.phones.pairing import Signs
-from dropanchor_service.phones.readings import GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
-from dropanchor_service.phones.streams import Array, Stream
+from dropanchor_tag_client.sources.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.readings import GYROSCOPE, LINEAR, MAGNETOMETER, TOTAL
 
 _TIME = "Time (s)"
 _AXIS = re.compile(r"(.+?) ([xyz]) \((.+)\)")

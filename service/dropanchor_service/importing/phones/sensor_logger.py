@@ -12,11 +12,11 @@ import numpy as np
 from dropanchor_service.importing.files import File
 from dropanchor_service.importing.phones.phone import imu_readings
 from dropanchor_service.importing.readings import ImportingError, LeftOut, Readings, stream_of
+from dropanchor_service.importing.streams import Stream
 from dropanchor_service.importing.tables.table import exact_number, number
 from dropanchor_service.importing.tables.text_table import TextTable, read_table
-from dropanchor_service.phones.pairing import Signs
-from dropanchor_service.phones.readings import SENSORS
-from dropanchor_service.phones.streams import Stream
+from dropanchor_tag_client.sources.phones.pairing import Signs
+from dropanchor_tag_client.sources.phones.readings import SENSORS
 
 _COLUMNS = ("time", "x", "y", "z")
 _MARK = "seconds_elapsed"

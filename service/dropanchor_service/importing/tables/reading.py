@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.readings import (
     RANGE,
     ImportingError,
@@ -32,7 +33,6 @@ from dropanchor_service.importing.tables.mapping import (
 from dropanchor_service.importing.tables.table import Table, number, text_of
 from dropanchor_service.importing.tables.times import Times, times_of
 from dropanchor_service.importing.tables.units import SI, conversion
-from dropanchor_service.phones.streams import Array
 
 _FAR_NS = 30 * 86_400 * 1_000_000_000
 _NEEDED = {RANGE, *(names[0] for names in VECTORS.values()), "heading"}

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.readings import TIME
 from dropanchor_service.importing.tables.table import Exact
 from dropanchor_service.importing.tables.units import conversion
-from dropanchor_service.phones.streams import Array
 
 NS_PER_S = 1_000_000_000
 UTC_S = (1e9, 4.1e9)  # from 2001 to 2099: numbers within are taken for UTC
