@@ -39,6 +39,7 @@ _EXTRAS = {
     "sympy": "evaluation",
     "foxglove": "foxglove",
     "psycopg": "postgresql",
+    "pyarrow": "parquet",
     "ray": "cluster",
     "rosbags": "ros2",
     "xxhash": "ros2",

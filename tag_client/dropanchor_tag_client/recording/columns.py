@@ -67,7 +67,7 @@ TRUTH = Columns(
     "t_s, x, y, z, yaw_rad: true position of the tag, m, and its heading, rad",
     ("x", "y", "z", "yaw_rad"),
     may_be_nan=("z", "yaw_rad"),
-    interval_s=(1e-5, 60.0),
+    interval_s=(2e-4, 60.0),
 )
 FILES = (ANCHORS, RANGE, IMU, HEADING, TRUTH)
 FORMATS = (".csv", ".csv.gz", ".jsonl", ".jsonl.gz", ".parquet")
