@@ -86,7 +86,7 @@ def _track(arguments: argparse.Namespace, recording: Recording, samples: Samples
         for reached_s, poses in replay(engine, anchors_of(recording), settings, samples):
             steps.append(poses)
             bar.update(reached_s - samples.start_s - bar.n)
-    return smoothed(engine, arguments.lag) if arguments.smooth else track_of(steps)
+    return smoothed(engine, arguments.lag, samples.zero_ns) if arguments.smooth else track_of(steps, samples.zero_ns)
 
 
 def _engine(arguments: argparse.Namespace) -> Engine:

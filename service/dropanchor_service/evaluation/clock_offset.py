@@ -13,7 +13,7 @@ from dropanchor_service.ingest.motion_offsets.watch import WINDOW_BINS
 from dropanchor_service.store.clock_offsets import TOO_LARGE_S, MotionOffset
 
 STEP_BINS = 50
-MAX_WINDOWS = 300
+MAX_WINDOWS = 120
 MAX_OTHERS = 0.1  # share of the windows that tell something else
 MAX_UNCERTAINTY_S = 0.3  # walks whose windows agree by chance showed 0.5 s
 SHIFTS_S = (0.0, 5.0, -5.0, 10.0, -10.0)  # one fit finds lags up to 3 s
@@ -54,7 +54,7 @@ def _windows(batch: SampleBatch, shift_ns: int) -> list[Minimum | None]:
     imu_ns, range_ns = batch.imu["t_ns"] - start_ns - shift_ns, batch.ranges["t_ns"] - start_ns
     first = max(int(imu_ns[0]) // BIN_NS + MAX_LAG_BINS, int(range_ns[0]) // BIN_NS)
     last = min(int(imu_ns[-1]) // BIN_NS - MAX_LAG_BINS, int(range_ns[-1]) // BIN_NS) - WINDOW_BINS
-    step = max(STEP_BINS, (last - first) // MAX_WINDOWS)
+    step = max(STEP_BINS if shift_ns == 0 else 2 * STEP_BINS, (last - first) // MAX_WINDOWS)
     return [_window(batch, imu_ns, range_ns, begin) for begin in range(first, last + 1, step)]
 
 

@@ -15,6 +15,8 @@ from dropanchor_service.evaluation.clock_offset import is_large, motion_offset
 from dropanchor_service.evaluation.replay import NS_PER_S, Samples, samples_of
 from dropanchor_tag_client.recording import Recording, RecordingError
 
+_SECOND_NS = 1_000_000_000
+
 
 @dataclass(frozen=True)
 class Checked:
@@ -47,7 +49,20 @@ def prepared(recording: Recording, anchors: list[str], clock_offset_s: float | N
         checked = check(samples.batch)
         samples = replace(samples, batch=checked.batch)
         sentences += checked.sentences
-    return Prepared(samples, sentences)
+    return Prepared(_from_zero(samples), sentences)
+
+
+def _from_zero(samples: Samples) -> Samples:
+    """Return samples whose times are not negative: engines count from 1970, or from the start of a device."""
+    columns = (samples.batch.imu, samples.batch.ranges, samples.batch.headings)
+    first_ns = min((int(column["t_ns"][0]) for column in columns if len(column)), default=0)
+    if first_ns >= 0:
+        return samples
+    zero_ns = first_ns // _SECOND_NS * _SECOND_NS
+    moved = [column.copy() for column in columns]
+    for column in moved:
+        column["t_ns"] -= zero_ns
+    return replace(samples, batch=SampleBatch(imu=moved[0], ranges=moved[1], headings=moved[2]), zero_ns=zero_ns)
 
 
 def with_one_clock(batch: SampleBatch, given_s: float | None) -> Checked:

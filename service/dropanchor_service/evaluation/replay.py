@@ -17,6 +17,7 @@ from dropanchor_service.ingest.decode import IMU_SAMPLE, SCALAR, Decoded
 from dropanchor_service.ingest.kernels.packed import FORM
 from dropanchor_service.ingest.screening import screen
 from dropanchor_tag_client.recording import Recording
+from dropanchor_tag_client.recording.reading import FARTHEST_M
 
 NS_PER_S = 1e9
 STEP_S = 1.0
@@ -36,11 +37,13 @@ class Samples:
     """The screened samples of a recording for row 0 of an engine.
 
     rejected: counts of rejected samples by reason. first: by reason, the file and line of the first one.
+    zero_ns: time 0 of the batch on the clock of the recording.
     """
 
     batch: SampleBatch
     rejected: Counter[str]
     first: dict[str, str] = field(default_factory=dict)
+    zero_ns: int = 0
 
     @property
     def start_s(self) -> float:
@@ -60,6 +63,7 @@ def truth_of(recording: Recording) -> Truth | None:
     """Return the truth of a recording, or None if it has none."""
     columns = recording.truth
     t, x, y = (np.asarray(columns[name]) for name in ("t_s", "x", "y"))
+    x, y = (np.where(np.abs(column) < FARTHEST_M, column, np.nan) for column in (x, y))
     return Truth(t, x, y) if len(t) > 1 else None
 
 
@@ -96,9 +100,13 @@ def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) ->
         yield min((second + 1) * _STEP_NS / NS_PER_S, samples.end_s), batch.poses
 
 
-def track_of(steps: Sequence[Array]) -> Track:
-    """Return the track of the POSE rows of consecutive steps."""
-    poses = np.concatenate([np.empty(0, POSE), *steps])
+def track_of(steps: Sequence[Array], zero_ns: int = 0) -> Track:
+    """Return the track of the POSE rows of consecutive steps. zero_ns: of the samples."""
+    return _track(np.concatenate([np.empty(0, POSE), *steps]), zero_ns)
+
+
+def _track(poses: Array, zero_ns: int) -> Track:
+    poses["t_ns"] += zero_ns
     return Track(poses["t_ns"] / NS_PER_S, poses)
 
 
@@ -107,15 +115,16 @@ def smoothing_engine() -> Engine:
     return TracingEngine()
 
 
-def smoothed(engine: Engine, lag_s: float | None) -> Track:
+def smoothed(engine: Engine, lag_s: float | None, zero_ns: int = 0) -> Track:
     """Return the smoothed track of row 0. Each pose uses samples up to lag_s later; None: all samples.
+
+    zero_ns: of the samples.
 
     Raises TypeError unless the engine is a `smoothing_engine`.
     """
     if not isinstance(engine, TracingEngine):
         raise TypeError(f"the engine {engine.name} does not support smoothing: use `smoothing_engine`")
-    poses = smoothed_poses(engine, 0, lag_s)
-    return Track(poses["t_ns"] / NS_PER_S, poses)
+    return _track(smoothed_poses(engine, 0, lag_s), zero_ns)
 
 
 def _between(batch: SampleBatch, start_ns: int, end_ns: int) -> SampleBatch:

@@ -21,13 +21,16 @@ def text_of(path: Path) -> str:
         raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
     except (OSError, EOFError, zlib.error) as error:
         raise RecordingError(f"{path} cannot be read: {error}") from error
+    encoding = "utf-16" if raw.startswith(_UTF_16) else "utf-8-sig"
     try:
-        return raw.decode("utf-16" if raw.startswith(_UTF_16) else "utf-8-sig")
+        text = raw.decode(encoding)
+        end = text.find("\0")
     except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise RecordingError(
-            f"{path} line {line} cannot be read: this is not text in UTF-8. {import_hint(path.parent)}"
-        ) from error
+        text, end = raw[: error.start].decode(encoding, "replace"), error.start
+    if end >= 0:
+        line = text[:end].count("\n") + 1
+        raise RecordingError(f"{path} line {line} cannot be read: this is not text in UTF-8")
+    return text
 
 
 def why_not_ours(header: str, needed: Iterable[str]) -> str | None:

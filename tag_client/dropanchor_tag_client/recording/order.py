@@ -62,9 +62,10 @@ def _in_order(table: Table, rows: list[int], notes: list[str]) -> list[int]:
     notes += _unwrap(table, rows, t)
     glitches = _glitches(t)
     if glitches:
+        first = table.rows.place(rows[min(glitches)])
         rows = [row for i, row in enumerate(rows) if i not in glitches]
         t = [value for i, value in enumerate(t) if i not in glitches]
-        notes.append(f"{table.rows.file}: {len(glitches)} rows with a time far from that of their neighbours: left out")
+        notes.append(f"{first}: a time far from those around it: left out{_more(len(glitches) - 1)}")
     worst = 0.0
     newest = t[0]
     for row, value in zip(rows, t, strict=True):
@@ -74,6 +75,10 @@ def _in_order(table: Table, rows: list[int], notes: list[str]) -> list[int]:
     if worst:
         notes.append(f"{table.rows.file}: rows were up to {worst:.3g} s out of order: sorted by time")
     return rows
+
+
+def _more(count: int) -> str:
+    return f", and {count} more like it" if count else ""
 
 
 def _is_sorted(t: Sequence[float]) -> bool:
@@ -99,7 +104,7 @@ def _unwrap(table: Table, rows: list[int], t: list[float]) -> list[str]:
         if max(t) - min(t) <= period_s and all(0.0 <= step <= min(slack_s, period_s / 4) for step in steps):
             place = table.rows.place(rows[back[0]])
             _continue(table, rows, t, back, period_s)
-            return [f"{place}: the counter behind the times wraps at {name}: continued, {len(back)} times"]
+            return [f"{place}: the counter behind the times wraps at {name}: continued{_more(len(back) - 1)}"]
     return []
 
 

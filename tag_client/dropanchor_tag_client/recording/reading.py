@@ -9,6 +9,8 @@ from dropanchor_tag_client.recording.recording import Anchor, Recording, Recordi
 from dropanchor_tag_client.recording.table import Table, read_table
 from dropanchor_tag_client.recording.units import settle_units
 
+FARTHEST_M = 1e8  # wider than any map projection
+
 
 def read_recording(folder: Path | str) -> Recording:
     """Return the recording in a folder. Raises RecordingError.
@@ -51,6 +53,9 @@ def _columns(table: Table) -> dict[str, "array[float]"]:
 def _anchors(table: Table) -> tuple[Anchor, ...]:
     rows = zip(table.texts, *(table.values[name] for name in ("x", "y", "z")), strict=True)
     anchors = tuple(Anchor(*row) for row in rows)
+    for row, anchor in enumerate(anchors):
+        if not all(abs(value) < FARTHEST_M for value in (anchor.x, anchor.y, anchor.z)):
+            raise RecordingError(f"{table.path.parent}: {table.rows.place(row)}: a position in m was expected")
     if not anchors:
         raise RecordingError(f"{table.path} holds no anchor")
     if len({anchor.id for anchor in anchors}) < len(anchors):
