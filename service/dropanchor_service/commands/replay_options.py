@@ -58,6 +58,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="the IMU's clock is so far ahead of the ranges'; 0: not at all (default: found from turns and stops)",
     )
+    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
+    _add_output(parser)
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
     add(
         "--out",
         type=Path,
@@ -65,7 +71,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"write the poses to this file ({', '.join(FORMATS)}): {','.join(COLUMNS)}",
     )
     add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth if there is one")
-    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
 
 
 def _add_tag_settings(parser: argparse.ArgumentParser) -> None:

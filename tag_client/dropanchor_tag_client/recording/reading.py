@@ -25,9 +25,7 @@ def read_recording(folder: Path | str) -> Recording:
     anchors = _anchors(places)
     tables = [read_table(folder, file) for file in (RANGE, IMU, HEADING, TRUTH)]
     ranges, imu, headings, truth = tables
-    unknown = sorted(set(ranges.texts) - {anchor.id for anchor in anchors})
-    if unknown:
-        raise RecordingError(f"{folder}: ranges to {', '.join(unknown)}, which {places.rows.file} does not have")
+    _check_anchors(ranges, anchors, places)
     notes = settle_units(tables)
     for table in tables:
         notes += put_in_order(table)
@@ -61,6 +59,13 @@ def _anchors(table: Table) -> tuple[Anchor, ...]:
     if len({anchor.id for anchor in anchors}) < len(anchors):
         raise RecordingError(f"{table.path} names an anchor twice")
     return anchors
+
+
+def _check_anchors(ranges: Table, anchors: tuple[Anchor, ...], places: Table) -> None:
+    unknown = sorted(set(ranges.texts) - {anchor.id for anchor in anchors})
+    if unknown:
+        there = f"{', '.join(unknown)}, which {places.rows.file} does not have"
+        raise RecordingError(f"{places.path.parent}: ranges to {there}")
 
 
 def _check_common_time(table: Table, ranges: Table) -> None:
