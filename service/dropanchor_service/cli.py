@@ -42,6 +42,7 @@ _EXTRAS = {
     "sympy": "evaluation",
     "foxglove": "foxglove",
     "psycopg": "postgresql",
+    "pyarrow": "parquet",
     "ray": "cluster",
     "rosbags": "ros2",
     "xxhash": "ros2",

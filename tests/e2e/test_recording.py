@@ -13,6 +13,7 @@ from dropanchor_schemas import keys
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, encode_json, encode_packed
 from dropanchor_service.cli import main
 from dropanchor_service.engines.choose import create_engine
+from dropanchor_service.recording.mcap_file import McapFile
 from dropanchor_service.settings.sources import load_settings
 from support.service import running_service, settings_file, straight_north
 from support.zenoh_router import connected_session, wait_until
@@ -89,8 +90,9 @@ def test_a_recording_that_starts_midway_is_compared_where_both_runs_have_a_posit
 def test_options_that_an_mcap_recording_contains_itself_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "x.mcap").write_bytes(b"no recording")
-    assert main(["replay", str(tmp_path / "x.mcap"), "--start=1,2"]) == 2
-    assert "--start" in capsys.readouterr().err
+    McapFile(tmp_path / "x.mcap", {}).finish()
+    for option in ("--start=1,2", "--clock-offset=1"):
+        assert main(["replay", str(tmp_path / "x.mcap"), option]) == 2
+        assert option.partition("=")[0] in capsys.readouterr().err
     assert main(["replay", str(tmp_path / "x.mcap")]) == 2
-    assert "not a recording" in capsys.readouterr().err
+    assert "is empty" in capsys.readouterr().err

@@ -55,6 +55,7 @@ def test_the_service_with_the_engine_fleet_leaves_them_alone_where_they_are_inst
         ("scipy", "evaluation", ["evaluate", "recordings"]),
         ("sympy", "evaluation", ["evaluate", "paper"]),
         ("matplotlib", "evaluation", ["replay", "a folder", "--plot=track.png"]),
+        ("pyarrow", "parquet", ["replay", "a folder", "--out=track.parquet"]),
         ("foxglove", "foxglove", ["foxglove"]),
         ("rosbags", "ros2", ["ros2", "--tag=cart"]),
         ("xxhash", "ros2", ["ros2", "--tag=cart"]),
@@ -76,6 +77,14 @@ def test_a_replay_without_a_picture_needs_no_extra(tmp_path: Path) -> None:
     ended = python("-c", without(*EXTRA, "filterpy") + COMMAND, *replay, timeout_s=COMPILING_S)
     assert ended.returncode == 0
     assert "RMSE" in ended.stdout
+
+
+def test_a_recording_in_parquet_without_the_extra_says_how_to_install_it(tmp_path: Path) -> None:
+    (write_square(tmp_path) / "range.parquet").write_bytes(b"")
+    (tmp_path / "range.csv").unlink()
+    ended = python("-c", without("pyarrow") + COMMAND, "replay", str(tmp_path), "--anchor=A")
+    assert ended.returncode == 2
+    assert "Parquet needs the extra `parquet`: pip install 'dropanchor-service[parquet]'" in ended.stderr
 
 
 def test_a_service_without_the_extra_mqtt_delivers_otherwise_and_says_how_to_install_it() -> None:

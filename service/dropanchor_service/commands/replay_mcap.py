@@ -1,11 +1,10 @@
 """`dropanchor replay` of MCAP recordings: run all tags through the same ingest and engine as live."""
 
 import argparse
-import csv
 import math
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -16,6 +15,7 @@ from typing import Any
 from tqdm import tqdm
 
 from dropanchor_schemas.wire import Reason
+from dropanchor_service.commands.replay_output import VALUES, Write, opened, values_of
 from dropanchor_service.estimation.columns import Array, State
 from dropanchor_service.evaluation.offline import OfflineService, settings_of
 from dropanchor_service.recording.mcap_file import SESSION
@@ -23,17 +23,9 @@ from dropanchor_service.recording.reading import RecordingReader, Turn
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client.recording import RecordingError
 
-COLUMNS = ("tag", "t_ns", "x", "y", "heading_rad", "speed_mps", "var_x", "cov_xy", "var_y", "p_mode", "state")
+COLUMNS = ("tag", "t_ns", *VALUES)
 TOLERANCE_M = 1e-9
-Write = Callable[[Iterable[list[Any]]], None]
 MAX_PENDING = 100_000  # poses that wait for the recorded estimates of the same times
-
-
-def files_of(path: Path) -> list[Path]:
-    """Return the path of a file, or the MCAP files of a folder in order of time; empty if there are none."""
-    if path.is_file():
-        return [path]
-    return sorted(path.glob("*.mcap")) if path.is_dir() else []
 
 
 def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
@@ -41,9 +33,7 @@ def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
     with ExitStack() as stack:
         write: Write = _discard
         if arguments.out:
-            writer = csv.writer(stack.enter_context(arguments.out.open("w", newline="")))
-            writer.writerow(COLUMNS)
-            write = writer.writerows
+            write = stack.enter_context(opened(arguments.out, COLUMNS))
         for _, group in groupby(files, _session):
             _replay_session(arguments, [RecordingReader(file) for file in group], write)
     if arguments.out:
@@ -51,7 +41,7 @@ def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
     return 0
 
 
-def _discard(_: Iterable[list[Any]]) -> None:
+def _discard(_: Iterable[Sequence[Any]]) -> None:
     pass
 
 
@@ -70,7 +60,8 @@ def _replay_session(arguments: argparse.Namespace, readers: Sequence[RecordingRe
     settings = settings_of(readers[0].metadata, load_settings(arguments.config), arguments.engine)
     service, outcome = OfflineService(settings, first.site), Outcome()
     print(f"recorded {_utc(first.t_ns)}, {len(readers)} file(s), engine {settings.engine}")
-    for turn, poses in service.poses_of(tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc="replayed")):
+    all_turns = tqdm(chain([first], turns), unit=" turns", unit_scale=True, desc="replayed", disable=None)
+    for turn, poses in service.poses_of(all_turns):
         tags = [service.tags.at(row).name for row in poses["row"].tolist()]
         outcome.add(turn, tags, poses)
         write(_rows(tags, poses))
@@ -148,11 +139,8 @@ class Outcome:
 
 
 def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:
-    cov = poses["cov"]
-    numbers = [poses[name].tolist() for name in ("x", "y", "heading", "speed")]
-    numbers += [column.tolist() for column in (cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1], poses["p_mode"])]
-    for tag, t_ns, state, *values in zip(tags, poses["t_ns"].tolist(), poses["state"].tolist(), *numbers, strict=True):
-        yield [tag, t_ns, *(f"{value:.6f}" for value in values), State(state).name.lower()]
+    for tag, t_ns, values in zip(tags, poses["t_ns"].tolist(), values_of(poses), strict=True):
+        yield [tag, t_ns, *values]
 
 
 def _rejections(service: OfflineService, readers: Sequence[RecordingReader]) -> Iterator[str]:

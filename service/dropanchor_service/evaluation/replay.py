@@ -3,10 +3,11 @@
 from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import anchor_number
 from dropanchor_service.estimation.columns import ANCHOR, HEADING, IMU, POSE, RANGE, Array, Engine, SampleBatch
 from dropanchor_service.estimation.fleet.smoother.smoothed import smoothed_poses
@@ -16,9 +17,11 @@ from dropanchor_service.ingest.decode import IMU_SAMPLE, SCALAR, Decoded
 from dropanchor_service.ingest.kernels.packed import FORM
 from dropanchor_service.ingest.screening import screen
 from dropanchor_tag_client.recording import Recording
+from dropanchor_tag_client.recording.reading import FARTHEST_M
 
-STEP_S = 1.0
 NS_PER_S = 1e9
+STEP_S = 1.0
+_STEP_NS = round(STEP_S * NS_PER_S)
 
 
 @dataclass(frozen=True)
@@ -31,10 +34,20 @@ class Track:
 
 @dataclass(frozen=True)
 class Samples:
-    """The screened samples of a recording for row 0 of an engine. rejected: counts of rejected samples by reason."""
+    """The screened samples of a recording for row 0 of an engine.
+
+    rejected: counts of rejected samples by reason. first: by reason, the file and line of the first one.
+    zero_ns: time 0 of the batch on the clock of the recording.
+    """
 
     batch: SampleBatch
     rejected: Counter[str]
+    first: dict[str, str] = field(default_factory=dict)
+    zero_ns: int = 0
+
+    @property
+    def start_s(self) -> float:
+        return min(float(times[0]) for times in _times(self.batch) if len(times))
 
     @property
     def end_s(self) -> float:
@@ -50,6 +63,7 @@ def truth_of(recording: Recording) -> Truth | None:
     """Return the truth of a recording, or None if it has none."""
     columns = recording.truth
     t, x, y = (np.asarray(columns[name]) for name in ("t_s", "x", "y"))
+    x, y = (np.where(np.abs(column) < FARTHEST_M, column, np.nan) for column in (x, y))
     return Truth(t, x, y) if len(t) > 1 else None
 
 
@@ -59,46 +73,40 @@ def samples_of(recording: Recording, anchors: Sequence[str]) -> Samples:
     index = {anchor_number(anchor.id): i for i, anchor in enumerate(recording.anchors)}
     ranges = _scalars(recording.ranges, "range_m", "std_m")
     ranges["anchor"] = [anchor_number(anchor) for anchor in recording.range_anchors]
-    decoded, refused = screen(
-        Decoded(
-            forms=np.ones(1, FORM),
-            imu=_imu(recording.imu),
-            ranges=ranges[np.isin(ranges["anchor"], list(numbers))],
-            headings=_scalars(recording.headings, "yaw_rad", "std_rad"),
-        )
-    )
-    rejected: Counter[str] = Counter()
-    for group in refused:
-        rejected[group.reason] += len(group.messages)
-    fused = np.zeros(len(decoded.ranges), RANGE)
-    fused["t_ns"], fused["range"], fused["std"] = (decoded.ranges[name] for name in ("t_ns", "value", "std"))
-    fused["anchor"] = [index[number] for number in decoded.ranges["anchor"].tolist()]
-    headings = np.zeros(len(decoded.headings), HEADING)
-    headings["t_ns"], headings["heading"], headings["std"] = (
-        decoded.headings[name] for name in ("t_ns", "value", "std")
-    )
-    return Samples(SampleBatch(imu=decoded.imu.view(IMU), ranges=fused, headings=headings), rejected)
+    ranges = ranges[np.isin(ranges["anchor"], list(numbers))]
+    samples = Samples(SampleBatch(), Counter())
+    imu = _screened(recording, "imu", _imu(recording.imu), samples).imu
+    ranges = _screened(recording, "range", ranges, samples).ranges
+    angles = _screened(recording, "heading", _scalars(recording.headings, "yaw_rad", "std_rad"), samples).headings
+    fused, headings = np.zeros(len(ranges), RANGE), np.zeros(len(angles), HEADING)
+    fused["t_ns"], fused["range"], fused["std"] = (ranges[name] for name in ("t_ns", "value", "std"))
+    fused["anchor"] = [index[number] for number in ranges["anchor"].tolist()]
+    headings["t_ns"], headings["heading"], headings["std"] = (angles[name] for name in ("t_ns", "value", "std"))
+    imu["message"] = 0  # the row in the engine
+    return replace(samples, batch=SampleBatch(imu=imu.view(IMU), ranges=fused, headings=headings))
 
 
 def replay(engine: Engine, anchors: Array, settings: Array, samples: Samples) -> Iterator[tuple[float, Array]]:
-    """Feed row 0 of a fresh engine, one second of the recording at a time.
+    """Feed row 0 of a fresh engine, one second of the recording at a time. Seconds without samples are skipped.
 
     anchors: ANCHOR; settings: TAG_SETTINGS (0-d). Yields the time reached, s, and the POSE rows of that second. Adds
     the engine's rejections to `samples.rejected`.
     """
     engine.set_anchors(anchors)
     engine.configure(0, settings)
-    end_s = 0.0
-    while end_s <= samples.end_s:
-        end_s += STEP_S
-        batch = engine.process(_between(samples.batch, end_s - STEP_S, end_s))
+    for second in np.unique(np.concatenate([t // _STEP_NS for t in _times_ns(samples.batch)])).tolist():
+        batch = engine.process(_between(samples.batch, second * _STEP_NS, (second + 1) * _STEP_NS))
         samples.rejected.update({reason: len(rows) for reason, rows in batch.rejected.items()})
-        yield min(end_s, samples.end_s), batch.poses
+        yield min((second + 1) * _STEP_NS / NS_PER_S, samples.end_s), batch.poses
 
 
-def track_of(steps: Sequence[Array]) -> Track:
-    """Return the track of the POSE rows of consecutive steps."""
-    poses = np.concatenate([np.empty(0, POSE), *steps])
+def track_of(steps: Sequence[Array], zero_ns: int = 0) -> Track:
+    """Return the track of the POSE rows of consecutive steps. zero_ns: of the samples."""
+    return _track(np.concatenate([np.empty(0, POSE), *steps]), zero_ns)
+
+
+def _track(poses: Array, zero_ns: int) -> Track:
+    poses["t_ns"] += zero_ns
     return Track(poses["t_ns"] / NS_PER_S, poses)
 
 
@@ -107,32 +115,48 @@ def smoothing_engine() -> Engine:
     return TracingEngine()
 
 
-def smoothed(engine: Engine, lag_s: float | None) -> Track:
+def smoothed(engine: Engine, lag_s: float | None, zero_ns: int = 0) -> Track:
     """Return the smoothed track of row 0. Each pose uses samples up to lag_s later; None: all samples.
+
+    zero_ns: of the samples.
 
     Raises TypeError unless the engine is a `smoothing_engine`.
     """
     if not isinstance(engine, TracingEngine):
         raise TypeError(f"the engine {engine.name} does not support smoothing: use `smoothing_engine`")
-    poses = smoothed_poses(engine, 0, lag_s)
-    return Track(poses["t_ns"] / NS_PER_S, poses)
+    return _track(smoothed_poses(engine, 0, lag_s), zero_ns)
 
 
-def _between(batch: SampleBatch, start_s: float, end_s: float) -> SampleBatch:
+def _between(batch: SampleBatch, start_ns: int, end_ns: int) -> SampleBatch:
     parts = []
     for samples in (batch.imu, batch.ranges, batch.headings):
-        first, last = np.searchsorted(samples["t_ns"], [start_s * NS_PER_S, end_s * NS_PER_S])
-        parts.append(samples[0 if start_s == 0.0 else first : last])
+        first, last = np.searchsorted(samples["t_ns"], [start_ns, end_ns])
+        parts.append(samples[first:last])
     return SampleBatch(imu=parts[0], ranges=parts[1], headings=parts[2])
 
 
+def _times_ns(batch: SampleBatch) -> list[Array]:
+    return [samples["t_ns"] for samples in (batch.imu, batch.ranges, batch.headings)]
+
+
 def _times(batch: SampleBatch) -> list[Array]:
-    return [samples["t_ns"] / NS_PER_S for samples in (batch.imu, batch.ranges, batch.headings)]
+    return [t_ns / NS_PER_S for t_ns in _times_ns(batch)]
+
+
+def _screened(recording: Recording, table: str, column: Array, samples: Samples) -> Decoded:
+    """Return one table with the values that a sensor can have measured. Adds the others to `samples`."""
+    no_imu, none = np.empty(0, IMU_SAMPLE), np.empty(0, SCALAR)
+    columns = [column if table == kind.name else no_imu if kind is KINDS[0] else none for kind in KINDS]
+    decoded, refused = screen(Decoded(*columns, forms=np.ones(1, FORM)))
+    for group in refused:
+        samples.rejected[group.reason] += len(group.messages)
+        samples.first.setdefault(group.reason, recording.place(table, int(group.messages[0])))
+    return decoded
 
 
 def _imu(columns: dict[str, "array[float]"]) -> Array:
     imu = np.zeros(len(columns["t_s"]), IMU_SAMPLE)
-    imu["t_ns"] = _t_ns(columns["t_s"])
+    imu["t_ns"], imu["message"] = _t_ns(columns["t_s"]), np.arange(len(imu))
     for name, parts in (("acc", ("ax", "ay", "az")), ("gyro", ("gx", "gy", "gz")), ("mag", ("mx", "my", "mz"))):
         imu[name] = np.column_stack([np.asarray(columns[part]) for part in parts])
     return imu
@@ -140,7 +164,7 @@ def _imu(columns: dict[str, "array[float]"]) -> Array:
 
 def _scalars(columns: dict[str, "array[float]"], value: str, std: str) -> Array:
     scalars = np.zeros(len(columns["t_s"]), SCALAR)
-    scalars["t_ns"] = _t_ns(columns["t_s"])
+    scalars["t_ns"], scalars["message"] = _t_ns(columns["t_s"]), np.arange(len(scalars))
     scalars["value"], scalars["std"] = np.asarray(columns[value]), np.asarray(columns[std])
     return scalars
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.estimation.columns import Array, Frame, State
 from dropanchor_service.evaluation.accuracy import Truth, truth_at
 
 COLOURS = {
@@ -41,7 +41,9 @@ def plot_track(path: Path, title: str, t: Array, poses: Array, truth: Truth | No
     plane.legend(loc="best", fontsize="small")
     if truth is not None:
         true_x, true_y = truth_at(truth, t)
-        error.plot(t, np.hypot(poses["x"] - true_x, poses["y"] - true_y), linewidth=1, label="error")
+        in_site = poses["frame"] == Frame.SITE
+        errors = np.where(in_site, np.hypot(poses["x"] - true_x, poses["y"] - true_y), np.nan)
+        error.plot(t, errors, linewidth=1, label="error")
     error.plot(t, 2 * poses["sigma_pos"], linewidth=1, color="tab:orange", label="2 σ")
     error.set(ylabel="m", ylim=(0, None))
     error.legend(loc="best", fontsize="small")

@@ -14,7 +14,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.importing.join import Joined
 from dropanchor_service.importing.progress import shown
 from dropanchor_service.importing.readings import ImportingError, Position
-from dropanchor_tag_client.recording import HEADING_COLUMNS, IMU_COLUMNS
+from dropanchor_tag_client.recording.columns import HEADING, IMU
 
 _FILES = tuple(f"{name}.csv{end}" for name in ("anchors", "range", "imu", "heading", "truth") for end in ("", ".gz"))
 
@@ -38,9 +38,10 @@ def write_recording(folder: Path, joined: Joined, anchors: dict[str, Position]) 
         _write(part / "range.csv", ("t_s", "anchor_id", "range_m", "std_m"), rows)
         if len(imu):
             columns = [*imu.acc.T, *imu.gyro.T, *([] if np.isnan(imu.mag).all() else imu.mag.T)]
-            _write_columns(part / "imu.csv", IMU_COLUMNS[: 1 + len(columns)], imu.t_ns, columns)
+            _write_columns(part / "imu.csv", ("t_s", *IMU.numbers[: len(columns)]), imu.t_ns, columns)
         if len(headings):
-            _write_columns(part / "heading.csv", HEADING_COLUMNS, headings.t_ns, [headings.yaw_rad, headings.std_rad])
+            columns = [headings.yaw_rad, headings.std_rad]
+            _write_columns(part / "heading.csv", ("t_s", *HEADING.numbers), headings.t_ns, columns)
 
 
 @contextmanager

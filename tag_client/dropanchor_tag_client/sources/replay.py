@@ -46,6 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Raises RecordingError, ConnectError, ValueError."""
     recording = read_recording(arguments.recording)
+    for note in recording.notes:
+        sys.stderr.write(f"{note}\n")
     if arguments.anchor is not None:
         recording.anchor(arguments.anchor)
     first_s, last_s = span(recording, arguments.anchor)

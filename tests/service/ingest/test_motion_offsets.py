@@ -8,8 +8,8 @@ import pytest
 from dropanchor_schemas.wire import Frame, ImuSample, RangeSample
 from dropanchor_service.estimation.columns import IMU, RANGE, SampleBatch
 from dropanchor_service.ingest.motion_offsets.agreement import MAX_DEVIATION_S, MIN_WINDOWS, agreed
-from dropanchor_service.ingest.motion_offsets.bins import SIZE, TagBins
-from dropanchor_service.ingest.motion_offsets.fit import Minimum
+from dropanchor_service.ingest.motion_offsets.bins import SIZE, Motion, TagBins
+from dropanchor_service.ingest.motion_offsets.fit import Minimum, fit
 from dropanchor_service.ingest.motion_offsets.watch import MAX_TAGS, MotionOffsets
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 from dropanchor_tag_client.simulator.live import simulation
@@ -90,6 +90,13 @@ def test_an_offset_beyond_the_lags_gives_no_answer(ahead_s: float) -> None:
 
 def test_the_ranges_of_another_tag_give_no_answer() -> None:
     assert [answers(yard(seed), 0.0, yard(seed + 4)) for seed in range(7000, 7004)] == [[], [], [], []]
+
+
+def test_ranges_with_many_zeros_neither_tell_an_offset_nor_raise() -> None:
+    run = yard(7003)
+    run.ranges.range_m[::7] = 0.0
+    assert [abs(answer.offset_s) <= answer.uncertainty_s for answer in answers(run, 0.0)] == []
+    assert fit(Motion(np.zeros(260), np.ones(260)), np.where(np.arange(200) % 2, 50.0, 0.0)) is None
 
 
 def test_windows_that_are_few_or_contradict_each_other_give_no_answer() -> None:

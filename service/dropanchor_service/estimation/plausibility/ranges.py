@@ -183,7 +183,7 @@ def _judge(c: Check) -> None:
     number, sign = _averaged(c)
     sure = sign * math.sqrt(c.products_n) < -SURE * DEVIATION and c.products_n >= LEAST_CHANGES
     if c.range_verdict == AVERAGED:
-        c.calm = c.calm + 1 if sign > GONE else 0
+        c.calm = c.calm + 1 if sign > GONE and c.products_n >= LEAST_CHANGES else 0
         if c.calm > CALM:
             c.range_verdict = GOOD
     elif close and sign < SIGN and sure and number * c.range_dt[0] > LEAST_S:

@@ -79,7 +79,9 @@ def _profile(x: Array, y: Array, ranges: Array) -> Profile:
     residuals = profile.residuals
     std = 1.48 * float(np.median(np.abs(residuals - np.median(residuals))))
     kept = np.abs(residuals) < _OUTLIER * max(std, MIN_NOISE_M / 2)
-    return profile if kept.all() else _least_squares(x[:, kept], y[:, kept], ranges[kept])
+    if kept.all() or kept.sum() < MIN_RANGES // 2:  # the lag is wrong rather than most ranges
+        return profile
+    return _least_squares(x[:, kept], y[:, kept], ranges[kept])
 
 
 def _least_squares(x: Array, y: Array, ranges: Array) -> Profile:

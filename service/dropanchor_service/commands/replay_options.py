@@ -1,0 +1,143 @@
+"""The options of `dropanchor replay`."""
+
+import argparse
+import math
+from pathlib import Path
+
+from dropanchor_schemas.site import StartPose
+from dropanchor_service.commands.replay_output import FORMATS, VALUES
+from dropanchor_tag_client.recording.columns import described
+
+DESCRIPTION = """\
+Runs the engine of the service on a recording, as fast as possible, and reports its error if the recording has a truth.
+A recording is a folder with range.csv and anchors.csv, and optionally imu.csv, heading.csv and truth.csv. x and y are
+in the coordinates of anchors.csv. `dropanchor import` makes recordings of other files.
+A recording can also be an MCAP file from the service, or a folder of such files. All its tags then run with the site
+and the settings of the recording; only --engine, --config and --out can be given.
+"""
+EPILOG = f"""\
+{described()}
+examples:
+  dropanchor replay recordings/yard --anchor 1 --start=10,0,1.57
+  dropanchor replay recordings/yard --anchor 1 --start=10,0 --tag-height 1.2 --range-std 0.1 --out poses.csv
+  dropanchor replay recordings/yard --anchor 1 --start=10,0 --smooth --out track.parquet
+  dropanchor replay yard-20270115T080000-000000Z.mcap --out poses.csv
+  dropanchor-tag simulate --out recordings/yard      creates a recording with truth to try it on
+"""
+LAG_S, MAX_LAG_S = 2.0, 60.0
+COLUMNS = ("t_s", *VALUES)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("recording", type=Path, metavar="RECORDING", help="folder of the recording, or MCAP file")
+    add(
+        "--anchor",
+        action="append",
+        metavar="ID",
+        help="use the ranges of this anchor; may be repeated; needed if the recording has several anchors",
+    )
+    add("--engine", metavar="NAME", help="estimator: fleet (default) or paper")
+    add(
+        "--start",
+        type=_start,
+        metavar="X,Y[,HEADING]",
+        help="start of the tag: m, m, rad counter-clockwise from east (default: unknown)",
+    )
+    add(
+        "--heading",
+        choices=("auto", "imu", "platform"),
+        default="auto",
+        help="source of the heading: the IMU, or heading.csv (default: auto, the IMU if the recording has one)",
+    )
+    _add_tag_settings(parser)
+    _add_smoothing(parser)
+    add(
+        "--clock-offset",
+        type=_seconds,
+        metavar="S",
+        help="the IMU's clock is so far ahead of the ranges'; 0: not at all (default: found from turns and stops)",
+    )
+    add("--config", type=Path, metavar="FILE", help="settings file of the service, for the engine's parameters")
+    _add_output(parser)
+
+
+def _add_output(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help=f"write the poses to this file ({', '.join(FORMATS)}): {','.join(COLUMNS)}",
+    )
+    add("--plot", type=Path, metavar="PNG", help="write a picture of the track, with the truth if there is one")
+
+
+def _add_tag_settings(parser: argparse.ArgumentParser) -> None:
+    known = parser.add_argument_group("settings of the tag (measured range = scale · distance + bias)")
+    known.add_argument("--tag-height", type=float, default=0.0, metavar="M", help="on the z axis of anchors.csv (0)")
+    known.add_argument("--range-std", type=float, metavar="M", help="standard deviation of one range")
+    known.add_argument("--range-bias", type=float, default=0.0, metavar="M")
+    known.add_argument("--range-bias-std", type=float, metavar="M", help="standard deviation of the bias; 0: exact")
+    known.add_argument("--range-scale", type=float, default=1.0, metavar="K")
+    known.add_argument("--mount-angle", type=float, metavar="RAD", help="direction of travel minus body x axis")
+    known.add_argument("--mount-angle-std", type=float, metavar="RAD", help="standard deviation of that; 0: exact")
+    known.add_argument(
+        "--lever-forward",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="distance of the tag in front of the point that follows the course",
+    )
+    known.add_argument("--lever-left", type=float, default=0.0, metavar="M", help="distance to the left of that point")
+    known.add_argument("--slip-std", type=float, metavar="RAD", help="standard deviation of the slip angle; 0: no slip")
+    known.add_argument(
+        "--heading-std", type=float, metavar="RAD", help="error of a platform heading that does not drift"
+    )
+    known.add_argument("--speed-max", type=float, metavar="M/S", help="top speed of the tag")
+    known.add_argument("--acc-unit", choices=("m/s2", "g", "mg"), default="m/s2", help="of the accelerations (m/s2)")
+    known.add_argument("--acc-reversed", choices=("yes", "no"), help="accelerations have the opposite sign, as on iOS")
+    known.add_argument("--gyro-unit", choices=("rad/s", "deg/s"), default="rad/s", help="of the rates (rad/s)")
+    known.add_argument("--range-unit", choices=("m", "cm", "mm", "ft"), default="m", help="of the ranges (m)")
+    known.add_argument("--reverse", action="store_true", help="the tag may move backwards")
+
+
+def _add_smoothing(parser: argparse.ArgumentParser) -> None:
+    smoothing = parser.add_argument_group("smoothing (engine fleet): estimate each pose from later samples too")
+    smoothing.add_argument("--smooth", action="store_true", help="use all samples of the recording")
+    smoothing.add_argument(
+        "--lag",
+        type=_lag,
+        nargs="?",
+        const=LAG_S,
+        metavar="S",
+        help=f"with --smooth: use only samples up to S seconds after the pose ({LAG_S:g})",
+    )
+
+
+def _start(text: str) -> StartPose:
+    parts = text.split(",")
+    if len(parts) not in (2, 3):
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y or X,Y,HEADING (m, m, rad)")
+    try:
+        x, y, *heading = (float(part) for part in parts)
+        return StartPose(x=x, y=y, heading_rad=heading[0] if heading else None)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not X,Y or X,Y,HEADING (m, m, rad)") from error
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds") from error
+    if not math.isfinite(seconds):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds")
+    return seconds
+
+
+def _lag(text: str) -> float:
+    lag_s = _seconds(text)
+    if not 0.0 <= lag_s <= MAX_LAG_S:
+        raise argparse.ArgumentTypeError(f"{text} s is not within 0 and {MAX_LAG_S:g} s")
+    return lag_s
