@@ -27,7 +27,9 @@ def test_an_iso_time_is_read_to_the_nanosecond(text: str, t_ns: int) -> None:
     assert ns_of_iso(text) == t_ns
 
 
-@pytest.mark.parametrize(("t_ns", "unit"), [(T // S, "seconds"), (T // 10**6, "milliseconds"), (T // 1000, "microseconds")])
+@pytest.mark.parametrize(
+    ("t_ns", "unit"), [(T // S, "seconds"), (T // 10**6, "milliseconds"), (T // 1000, "microseconds")]
+)
 def test_a_time_of_our_days_in_another_unit_is_named_with_the_factor(t_ns: int, unit: str) -> None:
     said = why_not_utc(t_ns)
     assert said is not None

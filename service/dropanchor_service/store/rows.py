@@ -13,6 +13,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.records import enlarged, take
+from dropanchor_service.store.wrong_times import WrongTimes
 
 FEW = 128  # entries up to which a dictionary counts faster than NumPy
 KINDS = tuple(kind.name for kind in kinds.KINDS)
@@ -80,6 +81,7 @@ class Rows:
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
+        self.wrong_times = WrongTimes()
         self.online_until = OnlineUntil()
 
     def __len__(self) -> int:
