@@ -50,8 +50,10 @@ def why_not_utc(t_ns: int) -> str | None:
 def _looks(t_ns: int) -> str:
     unit = unit_of(t_ns)
     if unit is not None:
-        return f"looks like {unit.name}; multiply it by {unit.ns}"
-    return "counts from a start, such as boot; say so with clock boot (flag bit 0), or set the clock"
+        return (
+            f"looks like {unit.name}; multiply it by {unit.ns}, or say clock boot (flag bit 0) if it counts from boot"
+        )
+    return "counts from a start, such as boot; say clock boot (flag bit 0), or set the clock"
 
 
 def _iso(t_ns: int) -> str:

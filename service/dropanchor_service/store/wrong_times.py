@@ -47,8 +47,11 @@ def hint_about_time(sent_ns: int) -> str:
     """Return what a person can do about a tag that sends such times."""
     unit = unit_of(sent_ns)
     if unit is not None:
-        return f"Its times (`t_ns`) look like {unit.name}, not nanoseconds: multiply them by {unit.ns}."
+        return (
+            f"Its times (`t_ns`) look like {unit.name}, not nanoseconds: multiply them by {unit.ns}, or say clock boot "
+            "(flag bit 0) if they count from boot."
+        )
     return (
-        "Its times (`t_ns`) count from a start, such as boot, not from 1970: say so with clock boot (flag bit 0), or "
-        "set its clock."
+        "Its times (`t_ns`) count from a start, such as boot, not from 1970: say clock boot (flag bit 0), or set its "
+        "clock."
     )
