@@ -79,9 +79,9 @@ def test_motion_from_the_future_is_aligned_with_the_ranges_of_its_tag(service: R
             time.sleep(0.02)
     finally:
         process.communicate(timeout=30)
+    wait_until(lambda: service.get("/api/v1/tags/cart")["samples"] == {"imu": 200, "range": 40})
     status = service.get("/api/v1/tags/cart")
     assert status["clock_offset"]["corrected"]
     assert status["clock_offset"]["offset_s"] == pytest.approx(3.1, abs=0.3)
     assert [care["reason"] for care in status["needs_care"]] == ["clock_offset"]
     assert status["rejected"] == {}
-    assert status["samples"] == {"imu": 200, "range": 40}

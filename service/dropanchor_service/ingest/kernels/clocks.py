@@ -131,21 +131,23 @@ def _is_no_utc(form: Any, publisher: Any, t_ns: int, arrival_ns: int) -> bool:
 
 
 @njit(nogil=True)
-def _move(publisher: Any, time: Any, is_reference: bool, boot_clock: bool, moved_ns: int) -> None:
-    """Go on with a publisher whose newest sample is moved by `moved_ns`, because the times of its motion are.
+def _move(publisher: Any, newest_ns: int, boot_clock: bool, back: bool) -> None:
+    """Go on with a publisher after the shift of its motion has changed, which changes the newest time of its message.
 
-    A boot clock keeps the UTC of its newest sample, and the estimator the times of its ranges.
+    back: the motion goes back. A boot clock that was mapped by it is mapped again.
     """
-    publisher.newest_ns += moved_ns
+    moved_ns = newest_ns - publisher.newest_ns
+    publisher.newest_ns = newest_ns
+    if boot_clock:
+        if back:
+            publisher.shift_ns = publisher.least_ns = publisher.arrival_ns - newest_ns
+            publisher.previous_least_ns, publisher.epoch_end_ns = NONE_NS, publisher.arrival_ns + EPOCH_NS
+        return
     if publisher.least_ns != NONE_NS:
         publisher.least_ns -= moved_ns
     if publisher.previous_least_ns != NONE_NS:
         publisher.previous_least_ns -= moved_ns
-    if boot_clock:
-        publisher.shift_ns -= moved_ns
-        if is_reference:
-            time.correction_ns -= moved_ns
-    elif abs(publisher.newest_ns - publisher.arrival_ns) <= AHEAD_NS:
+    if abs(newest_ns - publisher.arrival_ns) <= AHEAD_NS:
         publisher.shift_ns = 0  # what looked like a jump was the motion
 
 
@@ -182,13 +184,11 @@ def time_offsets(
         if publisher.arrival_ns == 0 and not forms[i].boot_clock and not forms[i].replay:
             publisher.motion_shift_ns = first_shift(newest[i], arrivals[i])
         t_ns = _newest(newest[i], publisher.motion_shift_ns)
-        is_reference = False
         if forms[i].boot_clock:
             utc = _since_start(publisher, t_ns, arrivals[i])
             known, change = publisher.arrival_ns != 0, utc - publisher.shift_ns
             jumps += known and abs(change) > STEP_NS
-            is_reference = _is_reference(time, publishers, slots[i], arrivals[i])
-            if is_reference and known and abs(change) <= STEP_NS:
+            if _is_reference(time, publishers, slots[i], arrivals[i]) and known and abs(change) <= STEP_NS:
                 time.correction_ns += change
         else:
             utc = _shift(publisher, t_ns, arrivals[i])
@@ -199,11 +199,9 @@ def time_offsets(
                 _note_difference(publisher, arrivals[i] - t_ns, arrivals[i])
         offsets[i], motion[i] = utc - time.correction_ns, publisher.motion_shift_ns
         publisher.shift_ns, publisher.newest_ns, publisher.arrival_ns = utc, t_ns, arrivals[i]
-        removed_ns = utc if forms[i].boot_clock or abs(utc) > AHEAD_NS else 0
-        if not forms[i].replay and compare(publishers, slots[i], newest[i], counts[i], removed_ns, arrivals[i]):
+        if not forms[i].replay and compare(publishers, slots[i], newest[i], counts[i], arrivals[i]):
             restarts[i] = publisher.motion_shift_ns - motion[i] < -STEP_NS
-            moved_ns = _newest(newest[i], publisher.motion_shift_ns) - t_ns
-            _move(publisher, time, is_reference, forms[i].boot_clock, moved_ns)
+            _move(publisher, _newest(newest[i], publisher.motion_shift_ns), forms[i].boot_clock, restarts[i])
             offsets[i], motion[i] = publisher.shift_ns - time.correction_ns, publisher.motion_shift_ns
     return jumps
 

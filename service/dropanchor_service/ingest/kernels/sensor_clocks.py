@@ -38,11 +38,14 @@ def _begin(publisher: Any, arrival_ns: int) -> None:
 
 
 @njit(nogil=True)
-def _note(publisher: Any, kind: int, t_ns: int, samples: int, shift_ns: int, arrival_ns: int) -> None:
-    """Note the newest of the samples of one kind in a message. One whose time cannot be right says nothing."""
-    if t_ns < 0 or t_ns + shift_ns < EARLIEST_UTC_NS:
+def _note(publisher: Any, kind: int, t_ns: int, samples: int, arrival_ns: int) -> None:
+    """Note the newest of the samples of one kind in a message. One whose time cannot be UTC says nothing.
+
+    The delays are those of the publisher's own clock: what it is off is the same for both kinds.
+    """
+    if t_ns < 0 or t_ns + publisher.shift_ns < EARLIEST_UTC_NS:
         return
-    publisher.delay_ns[kind] = min(publisher.delay_ns[kind], arrival_ns - t_ns - shift_ns)
+    publisher.delay_ns[kind] = min(publisher.delay_ns[kind], arrival_ns - t_ns)
     publisher.kind_messages[kind] += 1
     publisher.kind_samples[kind] += samples
 
@@ -116,16 +119,16 @@ def first_shift(newest: Any, arrival_ns: int) -> int:
 
 
 @njit(nogil=True)
-def compare(publishers: Any, slot: int, newest: Any, counts: Any, shift_ns: int, arrival_ns: int) -> bool:
+def compare(publishers: Any, slot: int, newest: Any, counts: Any, arrival_ns: int) -> bool:
     """Note a message. Return whether the times of the motion of its publisher are to be moved by another shift.
 
-    newest: times of its newest motion and range, -1 for none. counts: of these. shift_ns: UTC minus these times.
+    newest: times of its newest motion and range, -1 for none. counts: of these.
     """
     publisher = publishers[slot]
     if publisher.period_ns == 0 or not 0 <= arrival_ns - publisher.period_ns <= MAX_PERIOD_NS:
         _begin(publisher, arrival_ns)
     for kind in range(2):
-        _note(publisher, kind, newest[kind], counts[kind], shift_ns, arrival_ns)
+        _note(publisher, kind, newest[kind], counts[kind], arrival_ns)
     if not _is_over(publisher, arrival_ns):
         return False
     changed = _judge(publishers, slot, arrival_ns)
