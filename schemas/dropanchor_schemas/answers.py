@@ -41,6 +41,7 @@ class ClockOffset(_Answer):
     from_motion: MotionOffset | None = Field(
         description="A second estimate; null while the tag does not move, or its motion does not tell."
     )
+    corrected: bool = Field(description="Whether the service moves the times of the motion by the offset.")
 
 
 class TagStatus(_Answer):
@@ -65,7 +66,8 @@ class TagStatus(_Answer):
     )
     health: TagHealth | None = Field(description="What the tag has reported about itself; null if nothing.")
     clock_offset: ClockOffset | None = Field(
-        description="null: one program sends motion and ranges, or one of them has not come for a minute."
+        description="null: one program sends motion and ranges and stamps both by one clock, or one of them has not "
+        "come for a minute."
     )
     needs_care: list[Care] = Field(description="What a person should do for the tag; empty if nothing.")
     remote_settings: RemoteSettingsStatus

@@ -72,7 +72,7 @@ REASONS_EXPLAINED: dict[Reason, Explanation] = {
     Reason.NO_SAMPLES: Explanation("message", "the message has no samples"),
     Reason.JSON_SYNTAX: Explanation("message", "not JSON in UTF-8"),
     Reason.JSON_SCHEMA: Explanation("message", "JSON that does not match the schema"),
-    Reason.TIME_OUT_OF_RANGE: Explanation("message, sample", "a time before 0 or not before 2⁶² ns"),
+    Reason.TIME_OUT_OF_RANGE: Explanation("message, sample", "a time before 0, or not before 2⁶² ns, which is in 2116"),
     Reason.NOT_FINITE: Explanation("sample", "NaN or infinity where a value belongs"),
     Reason.RANGE_NEGATIVE: Explanation("sample", "a range below zero"),
     Reason.RANGE_ABSURD: Explanation("sample", "a range beyond the reach of UWB radios"),

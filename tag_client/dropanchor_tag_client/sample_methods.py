@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from operator import index
 
 from dropanchor_schemas.kinds import BearingSample, HeadingSample, ImuSample, RangeSample, Sample
+from dropanchor_schemas.times import why_not_utc
 from dropanchor_tag_client.buffer import number_of, vector
 from dropanchor_tag_client.calibration import Calibration
 
@@ -15,6 +16,8 @@ class SampleMethods(ABC):
     """Make samples of measurements. Samples without a time are of now, on the clock of the client."""
 
     _boot_clock: bool
+    _replay: bool
+    _was_utc = False  # a time that it was asked about was UTC
     _calibration: Calibration | None
 
     @abstractmethod
@@ -52,6 +55,17 @@ class SampleMethods(ABC):
     ) -> None:
         """Publish the bearing of the tag, seen from the anchor, counter-clockwise from east, rad."""
         self._add(BearingSample(self._time(t_ns), number_of(anchor), float(bearing_rad), float(std_rad)), anchor)
+
+    def why_not_utc(self, t_ns: int) -> str | None:
+        """Return what is wrong with a time, None if nothing is.
+
+        After a time that was UTC, an early one shows a clock that was reset, with which the service can deal.
+        """
+        if self._boot_clock or self._replay or self._was_utc:
+            return None
+        wrong = why_not_utc(t_ns)
+        self._was_utc = wrong is None
+        return wrong
 
     def _time(self, t_ns: int | None) -> int:
         if t_ns is not None:

@@ -27,6 +27,7 @@ from dropanchor_service.store.pending_tags import PendingTags
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import Tag, TagTable
 from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
+from dropanchor_service.store.wrong_times import hint_about_time
 
 Answer = dict[str, Any]
 
@@ -72,6 +73,10 @@ class Answers:
 
     def hint_of(self, tag: Tag) -> str:
         """Return what a person can do so that more of the tag's samples are used; empty if there is nothing to do."""
+        now_ns = self.now_ns()
+        sent_ns = self.tags.rows.wrong_times.of(tag.row, now_ns)
+        if sent_ns is not None:
+            return hint_about_time(sent_ns)
         found = self.tags.rows.findings.of(tag.row)
         if found:
             return found[0].sentence
@@ -79,7 +84,7 @@ class Answers:
         if unknown is None:
             return ""
         range_ns = int(self.tags.arrivals.of(np.array([tag.row]))["range_ns"][0])
-        return hint_about(unknown, hears_others=self.now_ns() - range_ns <= FRESH_NS)
+        return hint_about(unknown, hears_others=now_ns - range_ns <= FRESH_NS)
 
     def tags_in_group(self, group: str) -> list[str]:
         """Return the tags whose settings name this group."""

@@ -70,6 +70,8 @@ def _clock_hint(offset: ClockOffset) -> str | None:
     if not offset.is_too_large:
         return None
     side = "the ranges always come" if offset.offset_s > 0 else "the motion always comes"
+    if offset.corrected:
+        return f"{where}, or {side} so late: the service corrects this. Let one clock stamp both, or set both clocks."
     return f"{where}, or {side} so late: let both devices set their time automatically, and check the network."
 
 

@@ -9,6 +9,7 @@ from dropanchor_service.store.arrivals import BURSTS, FORGOTTEN_BURSTS, LATE_S, 
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import KINDS, TagTable
 from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
+from dropanchor_service.store.wrong_times import hint_about_time
 
 _MOVE_HINT = "Walk a few metres, but not straight towards the anchor or away from it."
 _HINTS = {
@@ -75,6 +76,9 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     for text, one in _about_sensors(poses, tags):
         hint[one] = len(texts)
         texts.append(text)
+    for text, place in _wrong_times(poses, tags, now_ns):
+        hint[place] = len(texts)
+        texts.append(text)
     return texts, hint
 
 
@@ -130,4 +134,16 @@ def _unknown_anchors(poses: Array, site: SiteStore, tags: TagTable, now_ns: int)
         if row in unknown:
             text = hint_about(unknown[row], hears_others=now_ns - range_ns <= FRESH_NS)
             places.setdefault(text, []).append(place)
+    return [(text, np.array(where)) for text, where in places.items()]
+
+
+def _wrong_times(poses: Array, tags: TagTable, now_ns: int) -> list[tuple[str, Array]]:
+    """Return the hints for tags that send times that cannot be UTC, whatever the reasons of their poses are."""
+    sent = dict(tags.rows.wrong_times.fresh(now_ns))
+    if not sent:
+        return []
+    places: dict[str, list[int]] = {}
+    for place, row in enumerate(poses["row"].tolist()):
+        if row in sent:
+            places.setdefault(hint_about_time(sent[row]), []).append(place)
     return [(text, np.array(where)) for text, where in places.items()]

@@ -186,9 +186,9 @@ def _ingest(payloads: list[bytes]) -> None:
     sequenced = publishers.sequence(read.forms, np.zeros(len(payloads), np.int32), arrivals, 0)
     decoded, _ = screen(read_samples(read, sequenced.due))
     samples = [(decoded.imu["message"], decoded.imu["t_ns"]), (decoded.ranges["message"], decoded.ranges["t_ns"])]
-    offsets, _ = publishers.time_offsets(read.forms, sequenced, arrivals, samples)
+    offsets = publishers.time_offsets(read.forms, sequenced, arrivals, samples)
     for messages, t_ns in samples:
-        shift_times(t_ns, messages, offsets)
+        shift_times(t_ns, messages, offsets.messages)
         time_spans(t_ns, messages, np.zeros(len(payloads), np.int64), np.zeros(len(payloads), np.int64))
 
 

@@ -151,6 +151,11 @@ class GuardedEngine:
             self._reserve(row + 1)
             self._configure(row)
 
+    def restart(self, row: int) -> None:
+        """Let a row start afresh, wherever its tag is now."""
+        if row in self._configured:
+            self._configure(row, start_known=False)
+
     def process(self, samples: SampleBatch, now_ns: int) -> Iterator[PoseBatch]:
         """Yield the poses of all rows. A row that makes the engine fail starts afresh."""
         for row in self._new_rows(samples):
@@ -221,7 +226,7 @@ class GuardedEngine:
         current = self._current(row)
         self._configured[row] = current
         self._has_configured[row] = True
-        # After a fault the tag is no longer where it started.
+        # After a fault or a restart the tag is no longer where it started.
         tag = current.tag if start_known else current.tag.model_copy(update={"start": None})
         self._engine.configure(row, tag_columns(tag, current.declination_rad))
         if start_known:

@@ -1,5 +1,6 @@
 """Track each publisher of a tag: which of its messages have arrived, in which order, and its clock."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ from dropanchor_service.store.clock_offsets import LEAST_DELAYS_S, ClockOffset
 from dropanchor_service.store.records import enlarged
 
 WATCH_NS = 5_000_000_000  # time between two searches for tags with two publishers
+_NONE = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,18 @@ class Sequenced:
     duplicates: Array
     missing: int
     slots: Array
+
+
+class TimeOffsets(NamedTuple):
+    """What to add to the times of messages, ns; an array is empty if all of it is 0. motion: to those of IMU samples.
+
+    jumps: how many clocks jumped. restarts: indices of messages from which on the motion is of an earlier time.
+    """
+
+    messages: Array
+    motion: Array
+    jumps: int
+    restarts: Array
 
 
 class SequenceState(NamedTuple):
@@ -119,26 +133,31 @@ class Publishers:
         self._columns["gap_allowed"].reshape(-1, PER_TAG)[known] = True
 
     def time_offsets(
-        self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: list[tuple[Array, Array]]
-    ) -> tuple[Array, int]:
-        """Return the estimator's time minus the publisher's clock for each message, and how many clocks jumped.
+        self, forms: Array, sequenced: Sequenced, arrivals: Array, samples: Sequence[tuple[Array, Array]]
+    ) -> TimeOffsets:
+        """Return the estimator's time minus the publisher's clock for each message.
 
-        The offsets are in ns; the array is empty if all of them are 0. samples: for each kind, the index of the message
-        and the time of every sample.
+        samples: for each of `KINDS`, the index of the message and the time of every sample.
         """
-        newest, offsets = np.full(len(forms), -1, np.int64), np.zeros(len(forms), np.int64)
-        for messages, t_ns in samples:
-            newest_times(t_ns, messages, newest)
+        n = len(forms)
+        newest, counts = np.full((n, 3), -1, np.int64), np.zeros((n, 3), np.int64)
+        offsets, motion, restarts = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, bool)
+        for kind, (messages, t_ns) in enumerate(samples):
+            newest_times(t_ns, messages, kind, newest, counts)
         jumps = time_offsets(
-            forms, sequenced.slots, newest, arrivals, sequenced.due, self._columns, self._times, offsets
+            *(forms, sequenced.slots, newest, counts, arrivals, sequenced.due, self._columns, self._times),
+            *(offsets, motion, restarts),
         )
-        return offsets if offsets.any() else np.zeros(0, np.int64), jumps
+        used = offsets if offsets.any() else _NONE
+        of_motion = offsets + motion if motion.any() else used
+        return TimeOffsets(used, of_motion, jumps, np.flatnonzero(restarts) if restarts.any() else _NONE)
 
     def compare_clocks(self, samples: SampleBatch, now_ns: int) -> None:
         """Use the samples of tags whose motion and ranges come from two publishers to compare their clocks."""
         if abs(now_ns - self._watched_ns) >= WATCH_NS:
             self._watched_ns = now_ns
-            self._motion_offsets.watch(offsets_of(self._columns.reshape(-1, PER_TAG), now_ns)[0].tolist())
+            found = offsets_of(self._columns.reshape(-1, PER_TAG), now_ns)
+            self._motion_offsets.watch(dict(zip(found.tags.tolist(), found.moved_ns.tolist(), strict=True)))
         self._motion_offsets.add(samples)
 
     def clock_offset(self, row: int, now_ns: int) -> ClockOffset | None:
@@ -150,12 +169,11 @@ class Publishers:
         return self._clock_offsets(0, len(self._times), now_ns)
 
     def _clock_offsets(self, first: int, end: int, now_ns: int) -> dict[int, ClockOffset]:
-        of_rows = self._columns[first * PER_TAG : end * PER_TAG].reshape(-1, PER_TAG)
-        rows, offset_ns, spread_ns = offsets_of(of_rows, now_ns)
-        found = zip((first + rows).tolist(), (offset_ns * 1e-9).tolist(), (spread_ns * 1e-9).tolist(), strict=True)
+        found = offsets_of(self._columns[first * PER_TAG : end * PER_TAG].reshape(-1, PER_TAG), now_ns)
+        columns = (found.tags + first, found.offset_ns * 1e-9, found.spread_ns * 1e-9, found.moved_ns != 0)
         return {
-            row: ClockOffset(offset_s, LEAST_DELAYS_S + spread_s, self._motion_offsets.offset(row))
-            for row, offset_s, spread_s in found
+            row: ClockOffset(offset_s, LEAST_DELAYS_S + spread_s, self._motion_offsets.offset(row), corrected)
+            for row, offset_s, spread_s, corrected in zip(*(column.tolist() for column in columns), strict=True)
         }
 
     def to_utc(self, outcomes: Array) -> None:

@@ -11,11 +11,12 @@ from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
-from dropanchor_service.ingest.kernels.values import shift_times, time_spans
+from dropanchor_service.ingest.kernels.values import time_spans
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
 from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
-from dropanchor_service.ingest.screening import Rejected, absurd_imu, keep, screen, within_time
+from dropanchor_service.ingest.screening import Rejected, absurd_imu, keep, screen
+from dropanchor_service.ingest.times import in_time, times_of
 from dropanchor_service.store import Sites
 from dropanchor_service.store.rings import rank_in_row
 
@@ -115,12 +116,16 @@ class SampleReader:
             decoded, rejected = screen(sent)
             self._note_absurd(sent, rejected, of_row)
             of_batch = replace(sequenced, due=due)
-            offsets, jumps = self._publishers.time_offsets(read.forms, of_batch, arrived, _times(decoded))
-            self._rejections.count_clock_jumps(jumps)
-            in_time = _in_time(decoded, offsets, rejected)
-            spans = _spans(in_time)
-            self._note_replays(in_time, due, of_row, arrived, spans[1])
-            yield self._batch(in_time, rejected, due, of_row, arrived, spans)
+            offsets = self._publishers.time_offsets(read.forms, of_batch, arrived, times_of(decoded))
+            self._rejections.count_clock_jumps(offsets.jumps)
+            for row in of_row[offsets.restarts].tolist():
+                self._engine.restart(row)
+            timed, early = in_time(decoded, offsets, rejected)
+            for samples in early:
+                samples.record(self._rows, of_row, arrived)
+            spans = _spans(timed)
+            self._note_replays(timed, due, of_row, arrived, spans[1])
+            yield self._batch(timed, rejected, due, of_row, arrived, spans)
 
     def _note_absurd(self, sent: Decoded, rejected: list[Rejected], of_row: Array) -> None:
         """Tell the check of the sensors about values that no sensor measures: they look like another unit."""
@@ -249,27 +254,12 @@ def _one_per_row(due: Array, of_row: Array) -> list[Array]:
     return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]
 
 
-def _in_time(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Decoded:
-    """Add the offset of its message to the time of each sample, and reject samples whose time is then out of range."""
-    if not sum(shift_times(t_ns, messages, offsets) for messages, t_ns in _times(decoded)):
-        return decoded
-    columns = [
-        keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected) for column in decoded.columns()
-    ]
-    return decoded.with_columns(columns)
-
-
 def _spans(decoded: Decoded) -> tuple[Array, Array]:
     """Return the times of the oldest and the newest sample of each message; the newest is -1 without a sample."""
     oldest, newest = np.full(len(decoded.forms), MAX_T_NS, np.int64), np.full(len(decoded.forms), -1, np.int64)
-    for messages, t_ns in _times(decoded):
+    for messages, t_ns in times_of(decoded):
         time_spans(t_ns, messages, oldest, newest)
     return oldest, newest
-
-
-def _times(decoded: Decoded) -> list[tuple[Array, Array]]:
-    """Return the index of the message and the time of each sample, for every kind."""
-    return [(column["message"], column["t_ns"]) for column in decoded.columns()]
 
 
 def _imu_column(samples: Array, of_row: Array) -> Array:

@@ -12,7 +12,7 @@ from typing import Generic, Protocol, TypeVar
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, ImuSample, encode_packed
 from dropanchor_tag_client.sources.phones.pairing import Signs
-from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.readings import PhoneError, require_utc
 from dropanchor_tag_client.sources.phones.session import WAIT_S, Taken
 
 SESSIONS_PER_TAG = 2
@@ -101,7 +101,7 @@ class PhoneIntake(Generic[M]):
         self._recordings: OrderedDict[tuple[str, str], _Recording[M]] = OrderedDict()
 
     def post(self, tag: str, body: bytes, signs: Signs = Signs.AUTO) -> Outcome:
-        """Take a message of the phone that is this tag. Raises PhoneError."""
+        """Take a message of the phone that is this tag. Raises PhoneError, and PhoneTimeError."""
         try:
             message = self._parse(body)
         except PhoneError:
@@ -115,6 +115,7 @@ class PhoneIntake(Generic[M]):
             self._publish(recording, taken.samples)
             if not taken.duplicate:
                 self._report(recording, message.battery_fraction)
+        require_utc(taken.samples)  # after they were passed on: the service counts them, and says so on the page
         if taken.problem:
             raise PhoneError(taken.problem)
         return Outcome(len(taken.samples), taken.unpaired, message.damaged, taken.duplicate, taken.waiting)

@@ -5,6 +5,7 @@ from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.answers.hints import FEW_RANGES, HINTS, IN_BURSTS, LATE, MOUNT_UNKNOWN, RELATIVE_HINT
 from dropanchor_service.reference.markdown import table
 from dropanchor_service.store.unknown_anchors import hint_about
+from dropanchor_service.store.wrong_times import hint_about_time
 
 _MEANING = {
     TrackingState.INITIALISING: ("The engine has too little to say anything.", "unknown"),
@@ -32,6 +33,8 @@ _CAUSES = (
     ("ranges to such an anchor and to others", hint_about("9", hears_others=True)),
     ("`uncertain`, an IMU alone, and no `mount_angle_rad` in the settings", MOUNT_UNKNOWN),
     ("`resolved` in the frame `relative`", RELATIVE_HINT),
+    ("times that look like seconds, milliseconds or microseconds", hint_about_time(1_800_000_000_000)),
+    ("other times before 2015, without the flag for a clock that counts from boot", hint_about_time(0)),
 )
 
 

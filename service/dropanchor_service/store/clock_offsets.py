@@ -1,4 +1,4 @@
-"""How far the clock of a tag's motion is ahead of that of its ranges, where two programs or devices send them."""
+"""How far the clock of a tag's motion is ahead of that of its ranges."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -16,12 +16,13 @@ class MotionOffset(NamedTuple):
 class ClockOffset(NamedTuple):
     """offset_s: motion minus ranges, from message times. uncertainty_s: the offset lies within this much of it.
 
-    from_motion: None while the motion does not tell.
+    from_motion: None while the motion does not tell. corrected: whether the times of the motion are moved by it.
     """
 
     offset_s: float
     uncertainty_s: float
     from_motion: MotionOffset | None = None
+    corrected: bool = False
 
     @property
     def is_too_large(self) -> bool:

@@ -14,6 +14,7 @@ from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.findings import SensorFindings
 from dropanchor_service.store.presence import OnlineUntil, Presence
 from dropanchor_service.store.records import enlarged, take
+from dropanchor_service.store.wrong_times import WrongTimes
 
 FEW = 128  # entries up to which a dictionary counts faster than NumPy
 KINDS = tuple(kind.name for kind in kinds.KINDS)
@@ -82,6 +83,7 @@ class Rows:
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
         self.findings = SensorFindings()
+        self.wrong_times = WrongTimes()
         self.online_until = OnlineUntil()
 
     def __len__(self) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, BinaryIO, TextIO
 
 from dropanchor_schemas.kinds import KINDS
+from dropanchor_schemas.times import EXPECTED, ns_of_iso
 from dropanchor_schemas.wire import ImuSample
 from dropanchor_tag_client.client import TagClient
 from dropanchor_tag_client.health import HealthValues
@@ -53,8 +54,11 @@ def publish_lines(client: TagClient, lines: BinaryIO, errors: TextIO, *, clock: 
         if line.isspace() and len(line) < _MAX_LINE_BYTES:
             continue
         try:
-            for publish in [publisher_of(kind, sample) for kind, sample in samples_of(line, clock)]:
-                publish(client)
+            samples = [(kind, checked(kind, sample)) for kind, sample in samples_of(line, clock)]
+            for _, fields in samples:
+                _require_utc(client, fields)
+            for kind, fields in samples:
+                _publish(client, kind, fields)
         except ValueError as error:
             bad += 1
             errors.write(f"line {number}: {error}\n")
@@ -132,21 +136,46 @@ def _message(value: dict[str, Any], clock: str) -> list[tuple[str, dict[str, Any
 
 
 def publisher_of(kind: str, sample: dict[str, Any]) -> Callable[[TagClient], None]:
-    """What publishes the sample, after all of it has been checked. Raises BadLineError."""
+    """What publishes the sample, after all of it has been checked. Both raise BadLineError."""
     given = checked(kind, sample)
-    return lambda client: getattr(client, f"publish_{kind}")(**given)
+
+    def publish(client: TagClient) -> None:
+        _require_utc(client, given)
+        _publish(client, kind, given)
+
+    return publish
+
+
+def _require_utc(client: TagClient, fields: dict[str, Any]) -> None:
+    wrong = client.why_not_utc(fields["t_ns"]) if "t_ns" in fields else None
+    if wrong is not None:
+        raise BadLineError(wrong)
+
+
+def _publish(client: TagClient, kind: str, fields: dict[str, Any]) -> None:
+    getattr(client, f"publish_{kind}")(**fields)
 
 
 def checked(kind: str, sample: dict[str, Any]) -> dict[str, Any]:
     """Return the fields of a sample as `publish_…` takes them. Raises BadLineError."""
     needed, optional = fields_of(kind)
     known = {*needed, *optional}
+    if "t" in sample and "t_ns" in known:
+        sample = _with_t_ns(sample)
     for name in needed:
         if name not in sample:
             raise BadLineError(f"{kind}: {name} is missing")
     for name in sample.keys() - known:
         raise BadLineError(f"{kind}: there is no field {name!r}; known are {', '.join(sorted(known))}")
     return {name: _checked(name, value) for name, value in sample.items() if value is not None or name in needed}
+
+
+def _with_t_ns(sample: dict[str, Any]) -> dict[str, Any]:
+    """Return a sample whose field `t`, ISO 8601, has become its `t_ns`. Raises BadLineError."""
+    if "t_ns" in sample:
+        raise BadLineError("there are both t and t_ns; one time was expected")
+    rest = {name: value for name, value in sample.items() if name != "t"}
+    return rest | {"t_ns": _iso("t", sample["t"])}
 
 
 def _number(name: str, value: Any) -> float:
@@ -176,7 +205,16 @@ def _text(name: str, value: Any) -> str:
     return value
 
 
+def _iso(name: str, value: Any) -> int:
+    try:
+        return ns_of_iso(value)
+    except (ValueError, AttributeError):
+        raise BadLineError(f"{name} is {value!r}, {EXPECTED}") from None
+
+
 def _time(name: str, value: Any) -> int:
+    if isinstance(value, str):
+        return _iso(name, value)
     if isinstance(value, bool) or not isinstance(value, int):
         raise BadLineError(f"{name} is {value!r}, an integer was expected")
     return value

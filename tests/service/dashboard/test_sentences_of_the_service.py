@@ -25,6 +25,7 @@ from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 from dropanchor_service.store.tags import KINDS
 from dropanchor_service.store.unknown_anchors import hint_about
+from dropanchor_service.store.wrong_times import hint_about_time
 from dropanchor_service.zones.shapes import ShapeError, vertices_of
 from support.refusals import sentences_about_bodies, sentences_of_the_code
 
@@ -48,6 +49,8 @@ def hints_of_poses() -> Iterator[str]:
         yield template.format(8)
     for hears_others in (True, False):
         yield hint_about("9A", hears_others=hears_others)
+    for unit_ns in (1, 10**3, 10**6, 10**9):
+        yield hint_about_time(1_800_000_000 * 10**9 // unit_ns if unit_ns > 1 else 0)
 
 
 def hints_of_care() -> Iterator[str]:
@@ -60,6 +63,8 @@ def hints_of_care() -> Iterator[str]:
     for offset in (
         ClockOffset(2.5, 0.1, None),
         ClockOffset(-2.5, 0.1, None),
+        ClockOffset(2.5, 0.1, None, corrected=True),
+        ClockOffset(-2.5, 0.1, None, corrected=True),
         *(ClockOffset(a, 0.01, MotionOffset(b, 0.01)) for a in (3.0, -3.0) for b in (5.0, 1.0, -1.0, -5.0)),
     ):
         for age_s in (400, 9000):

@@ -35,7 +35,10 @@ class Tag:
         self.sent[boot_id] = self.sent.get(boot_id, 0) + 1
         arrival = np.array([true_ns + delay_ns])
         sequenced = self.publishers.sequence(forms, zero, arrival, 0)
-        self.publishers.time_offsets(forms, sequenced, arrival, [(zero, np.array([true_ns + error_ns]))])
+        times = [
+            (zero, np.array([true_ns + error_ns])) if kind in kinds else (zero[:0], arrival[:0]) for kind in range(2)
+        ]
+        self.publishers.time_offsets(forms, sequenced, arrival, times)
 
     def send_apart(self, seconds: float, error_ns: int, begin_s: float = 0.0, **form: bool) -> None:
         """Send motion from a clock with this error, and ranges from one that is right."""

@@ -41,9 +41,9 @@ class Tag:
         arrival = np.array([true_ns + delay_ns])
         sequenced = self._publishers.sequence(form, zero, arrival, 0)
         own_ns = true_ns + error_ns
-        offsets, jumps = self._publishers.time_offsets(form, sequenced, arrival, [(zero, np.array([own_ns]))])
-        self.jumps += jumps
-        self.estimator_ns = own_ns + int(offsets.sum())
+        offsets = self._publishers.time_offsets(form, sequenced, arrival, [(zero, np.array([own_ns]))])
+        self.jumps += offsets.jumps
+        self.estimator_ns = own_ns + int(offsets.messages.sum())
         pose = np.array([(0, self.estimator_ns)], [("row", "i4"), ("t_ns", "i8")])
         self._publishers.to_utc(pose)
         return int(pose["t_ns"][0]) - true_ns
@@ -65,11 +65,31 @@ def test_times_of_a_clock_that_jumps_stay_within_a_delay_and_are_exact_once_it_i
     assert tag.jumps == 2
 
 
-@pytest.mark.parametrize("error_ns", [HOUR, -T])
-def test_times_of_a_clock_that_is_ahead_or_was_never_set_follow_the_arrival_until_it_is_set(error_ns: int) -> None:
+@pytest.mark.parametrize("error_ns", [HOUR, -9 * 365 * 24 * HOUR])
+def test_times_of_a_clock_that_is_ahead_or_years_behind_follow_the_arrival_until_it_is_set(error_ns: int) -> None:
     tag = Tag()
     assert max(map(abs, tag.errors(0, 5, error_ns))) < 100 * MS
     assert set(tag.errors(5, 10, 0)) == {0}
+
+
+def test_a_clock_that_begins_before_2015_is_not_believed_and_one_that_was_right_before_goes_on() -> None:
+    tag = Tag()
+    assert set(tag.errors(0, 2, -T)) == {-T}
+    assert set(tag.errors(2, 4, 0)) == {0}
+    assert max(map(abs, tag.errors(4, 6, -T))) < 100 * MS
+    assert tag.jumps == 1
+
+
+@pytest.mark.parametrize("unit_ns", [S, 10**6, 10**3])
+def test_a_publisher_that_changes_to_another_unit_is_not_taken_for_a_clock_that_was_reset(unit_ns: int) -> None:
+    tag = Tag()
+    tag.errors(0, 2, 0)
+    for step in range(20, 30):
+        true_ns = T + step * S // 10
+        error_ns = true_ns // unit_ns - true_ns
+        assert tag.send(true_ns, error_ns) == error_ns
+    assert set(tag.errors(3, 4, 0)) == {0}
+    assert tag.jumps == 0
 
 
 def test_a_backlog_of_minutes_is_no_clock_error() -> None:

@@ -48,7 +48,7 @@ def answers(motion: Simulation, ahead_s: float, ranges: Simulation | None = None
     """Return all answers for the motion of one run, by a clock that is ahead, and the ranges of the same or another."""
     offsets = MotionOffsets()
     found: list[MotionOffset] = []
-    offsets.watch([0])
+    offsets.watch({0: 0})
     for batch in batches(motion, ahead_s, ranges):
         offsets.add(batch)
         answer = offsets.offset(0)
@@ -129,13 +129,13 @@ def test_another_anchor_is_used_when_the_first_one_has_been_silent() -> None:
 
 def test_the_number_of_watched_tags_is_bounded_and_other_rows_are_ignored() -> None:
     offsets, run = MotionOffsets(), yard(7001)
-    offsets.watch(range(MAX_TAGS + 1))
+    offsets.watch(dict.fromkeys(range(MAX_TAGS + 1), 0))
     for row in (MAX_TAGS - 1, MAX_TAGS, 3 * MAX_TAGS):
         for batch in batches(run, 0.5, row=row):
             offsets.add(batch)
     assert offsets.offset(MAX_TAGS - 1) is not None
     assert offsets.offset(MAX_TAGS) is offsets.offset(3 * MAX_TAGS) is None
-    offsets.watch([])
+    offsets.watch({})
     assert offsets.offset(MAX_TAGS - 1) is None
 
 

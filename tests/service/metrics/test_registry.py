@@ -11,6 +11,7 @@ from support.ingest import IngestBench
 from support.sites import make_sites
 
 S = 1_000_000_000
+T = 1_760_000_000 * S
 
 
 def lines(metrics: Metrics) -> dict[str, float]:
@@ -20,7 +21,7 @@ def lines(metrics: Metrics) -> dict[str, float]:
 
 def test_samples_rejections_and_times_are_counted() -> None:
     bench = IngestBench()
-    bench.send("a", Frame(ranges=[RangeSample(S, 7, 1.0), RangeSample(S, 7, -1.0)]))
+    bench.send("a", Frame(ranges=[RangeSample(T, 7, 1.0), RangeSample(T, 7, -1.0)]))
     found = lines(bench.metrics)
     assert found['dropanchor_samples_total{kind="range"}'] == 1
     assert found['dropanchor_rejected_total{reason="range_negative"}'] == 1

@@ -8,6 +8,7 @@ from dropanchor_service.store import SiteStore
 from support.ingest import IngestBench
 
 S = 1_000_000_000
+T = 1_760_000_000 * S
 
 
 def test_remote_settings_are_kept_over_a_restart(tmp_path: Path) -> None:
@@ -26,10 +27,10 @@ def test_settings_change_only_from_the_expected_ones() -> None:
 
 def test_a_change_does_not_restart_the_estimator_of_the_tag() -> None:
     bench = IngestBench()
-    bench.send("a", Frame(ranges=[RangeSample(S, 7, 1.0)]))
+    bench.send("a", Frame(ranges=[RangeSample(T, 7, 1.0)]))
     tag = bench.tags.find("a")
     assert tag is not None
     configured = len(bench.engine.configured[tag.row])
     bench.site.set_remote("a", RemoteSettings(imu_hz=50.0))
-    bench.send("a", Frame(ranges=[RangeSample(2 * S, 7, 1.0)]))
+    bench.send("a", Frame(ranges=[RangeSample(T + S, 7, 1.0)]))
     assert len(bench.engine.configured[tag.row]) == configured

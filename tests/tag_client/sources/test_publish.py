@@ -73,6 +73,9 @@ BAD_LINES = [
     (b'{"range": [], "ranges": []}', "a samples message has no field 'ranges'"),
     (b'{"version": 2, "range": []}', "version 2 is not known"),
     (b'{"clock": "boot", "range": []}', "the clock is 'boot'"),
+    (b'{"anchor": 7, "range_m": 1, "t_ns": "yesterday"}', "t_ns is 'yesterday', a time in ns, or as ISO 8601"),
+    (b'{"anchor": 7, "range_m": 1, "t": 5}', "t is 5, a time in ns, or as ISO 8601 with a time zone"),
+    (b'{"anchor": 7, "range_m": 1, "t": "2026-11-26T12:00:00Z", "t_ns": 1}', "there are both t and t_ns"),
     (b"[" * 100_000, "the JSON is nested too deeply"),
     (b" " * 3_000_000 + b"1", "the line is longer than"),
 ]
@@ -89,6 +92,53 @@ def test_every_kind_of_bad_line_is_named_and_the_good_ones_between_are_sent(rout
         assert len(line) < 300
     assert heard.ranges() == [1.5] * len(BAD_LINES)
     assert not client.refused
+
+
+def test_times_may_be_written_as_iso_8601(router_endpoint: str) -> None:
+    lines = b"""
+{"anchor": 7, "range_m": 3.5, "t": "2026-11-26T12:00:00.123456789Z"}
+{"anchor": 7, "range_m": 3.5, "t_ns": "2026-11-26t13:00:00.123456789+01:00"}
+{"range": [{"anchor": 7, "range_m": 3.5, "t": "2026-11-26T12:00:00.123456789z"}]}
+"""
+    heard, bad, said, _ = published(router_endpoint, lines, 3)
+    assert (bad, said) == (0, [])
+    assert {sample.t_ns for frame in heard.frames for sample in frame.ranges} == {1_795_694_400_123_456_789}
+
+
+@pytest.mark.parametrize(
+    ("t_ns", "said"),
+    [
+        (T // 10**9, "looks like seconds; multiply it by 1000000000"),
+        (T // 10**6, "looks like milliseconds; multiply it by 1000000"),
+        (T // 10**3, "looks like microseconds; multiply it by 1000"),
+        (12_345_000_000, "counts from a start, such as boot; say clock boot (flag bit 0)"),
+    ],
+)
+def test_a_time_that_cannot_be_utc_is_named_with_its_unit_and_none_of_its_line_is_sent(
+    router_endpoint: str, t_ns: int, said: str
+) -> None:
+    line = f'{{"range": [{{"anchor": 7, "range_m": 1}}, {{"anchor": 7, "range_m": 2, "t_ns": {t_ns}}}]}}\n'
+    heard, bad, errors, _ = published(router_endpoint, f'{line}{{"heading_rad": 1, "t_ns": {T}}}'.encode(), 1)
+    assert bad == 1
+    assert errors[0].startswith("line 1: t_ns is 1970-01-")
+    assert f"{t_ns} {said}" in errors[0]
+    assert heard.ranges() == []
+
+
+def test_a_clock_that_is_reset_while_lines_come_goes_on(router_endpoint: str) -> None:
+    lines = f'{{"heading_rad": 1, "t_ns": {T}}}\n{{"heading_rad": 2, "t_ns": 5000000000}}'
+    heard, bad, _, _ = published(router_endpoint, lines.encode(), 2)
+    assert bad == 0
+    assert [sample.t_ns for frame in heard.frames for sample in frame.headings] == [T, 5_000_000_000]
+
+
+def test_a_boot_clock_may_have_any_time(router_endpoint: str) -> None:
+    errors = io.StringIO()
+    with listening(router_endpoint) as heard:
+        with TagClient("a", connect=router_endpoint, clock="boot") as client:
+            assert publish_lines(client, io.BytesIO(b'{"heading_rad": 1, "t_ns": 5}'), errors, clock="boot") == 0
+        wait_until(lambda: heard.frames)
+    assert heard.frames[0].boot_clock
 
 
 def test_a_line_about_the_tag_is_reported_as_its_health(router_endpoint: str) -> None:

@@ -17,7 +17,14 @@ from starlette.responses import Response, StreamingResponse
 from dropanchor_schemas.events import EventList, EventType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import event_examples as examples
-from dropanchor_service.api.routes.parameters import Ids, TagFilter, example_response, json_response, split_ids
+from dropanchor_service.api.routes.parameters import (
+    Ids,
+    TagFilter,
+    TimeNs,
+    example_response,
+    json_response,
+    split_ids,
+)
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.stream import HEARTBEAT_S, MEDIA_TYPE, stopped_within
 from dropanchor_service.events.store import EventStore, Selection, StoredEvent
@@ -51,8 +58,11 @@ class EventFilter(TagFilter):
 
 
 class EventQuery(EventFilter):
-    since: int | None = Field(
-        default=None, ge=0, lt=2**63, description="Return events from this time on (UTC, ns), the oldest first."
+    since: TimeNs | None = Field(
+        default=None,
+        ge=0,
+        lt=2**63,
+        description="Return events from this time on, UTC in ns, or ISO 8601 with a time zone; the oldest first.",
     )
     limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")
 

@@ -117,7 +117,12 @@ TAG: dict[str, Any] = {
     "hint": "",
     "unknown_anchor": None,
     "health": HEALTH | {"age_s": 12.5},
-    "clock_offset": {"offset_s": 0.02, "uncertainty_s": 0.1, "from_motion": {"offset_s": -0.05, "uncertainty_s": 0.25}},
+    "clock_offset": {
+        "offset_s": 0.02,
+        "uncertainty_s": 0.1,
+        "from_motion": {"offset_s": -0.05, "uncertainty_s": 0.25},
+        "corrected": False,
+    },
     "needs_care": [{"reason": "battery_low", "hint": "The battery is at 15%: charge it."}],
     "remote_settings": REMOTE_SETTINGS,
     "settings": TAG_SETTINGS,

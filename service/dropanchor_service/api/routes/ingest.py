@@ -11,8 +11,10 @@ from starlette.responses import PlainTextResponse, Response
 
 from dropanchor_schemas.answers import PhoneReadingsReceived, SamplesReceived
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.kinds import KINDS, Frame
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.site import ID_SCHEMA
+from dropanchor_schemas.times import why_not_utc
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Reason, Rejection, read_header
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
@@ -92,7 +94,8 @@ def _add_samples_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="ingest_samples",
         summary="Send samples of a tag",
         description="One payload of the contract, chosen by Content-Type as over Zenoh by the encoding, of at most "
-        "65,536 bytes. It is treated as if it had come over Zenoh: order, clocks, admission and counters are the same.",
+        "65,536 bytes. It is treated as if it had come over Zenoh: order, clocks, admission and counters are the same. "
+        "Times before 2015 that do not count from boot are refused: they are not UTC in ns.",
         status_code=202,
         response_model=SamplesReceived,
         responses=example_response({"samples": 1}, 202)
@@ -156,11 +159,26 @@ def tag_of(request: Request, query: OfTag) -> str:
 
 
 def count_samples(payload: bytes, encoding: str) -> int | Rejection:
-    """Return how many samples a payload holds, or why it cannot be decoded."""
+    """Return how many samples a payload holds, or why it cannot be decoded or has times that cannot be UTC."""
     if encoding == ENCODING_PACKED:
         header = read_header(payload)
-        return header if isinstance(header, Rejection) else sum(header[1])
+        if isinstance(header, Rejection):
+            return header
+        flags, counts, _, _, t0_ns = header
+        wrong = None if flags else why_not_utc(t0_ns)  # both flags allow other times
+        return sum(counts) if wrong is None else Rejection(Reason.TIME_NOT_UTC, wrong)
     if encoding == ENCODING_JSON:
         frame = decode_json(payload)
-        return frame if isinstance(frame, Rejection) else len(frame)
+        if isinstance(frame, Rejection):
+            return frame
+        return _wrong_time(frame) or len(frame)
     return Rejection(Reason.ENCODING_UNKNOWN, f"the Content-Type is neither {ENCODING_JSON} nor {ENCODING_PACKED}")
+
+
+def _wrong_time(frame: Frame) -> Rejection | None:
+    """Return why the first sample whose time cannot be UTC is refused, None without one."""
+    if frame.boot_clock or frame.replay:
+        return None
+    named = ((f"{kind.name}.{at}", sample) for kind in KINDS for at, sample in enumerate(getattr(frame, kind.field)))
+    found = ((place, why_not_utc(sample.t_ns)) for place, sample in named)
+    return next((Rejection(Reason.TIME_NOT_UTC, f"{place}: {why}") for place, why in found if why), None)

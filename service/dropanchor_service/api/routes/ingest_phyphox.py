@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from dropanchor_schemas.answers import PhoneReadingsReceived
 from dropanchor_schemas.samples import decode_json
-from dropanchor_schemas.wire import Rejection
+from dropanchor_schemas.wire import Reason, Rejection
 from dropanchor_service.api.http.access import secret_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
@@ -24,7 +24,7 @@ from dropanchor_service.phones.intake import PhoneIntake
 from dropanchor_service.phones.phyphox import Message, parse
 from dropanchor_service.phones.phyphox_experiment import AXES, COLUMNS, MEDIA_TYPE, experiment, link_of
 from dropanchor_service.phones.phyphox_session import PhyphoxSession
-from dropanchor_tag_client.sources.phones.readings import PhoneError
+from dropanchor_tag_client.sources.phones.readings import PhoneError, PhoneTimeError
 from dropanchor_tag_client.sources.phones.session import WAIT_S
 
 SVG = "image/svg+xml"
@@ -105,6 +105,8 @@ def _add_readings_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Me
         tag, phones, body = tag_of(request, query), phones_of(request), await request.body()
         try:
             outcome = await run_in_threadpool(phones.post, tag, body)
+        except PhoneTimeError as error:
+            raise ProblemError(Kind.SAMPLES_REJECTED, str(error), reason=Reason.TIME_NOT_UTC) from error
         except PhoneError as error:
             counted = decode_json(body)
             reason = {"reason": counted.reason} if isinstance(counted, Rejection) else {}

@@ -13,9 +13,9 @@ from starlette.responses import Response
 from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.site import ID_SCHEMA, Label
+from dropanchor_schemas.times import ns_of_iso
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.pose_filter import PoseFilter
-from dropanchor_service.answers.times import ns_of_iso
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.etags import etag_of
 from dropanchor_service.store.preconditions import ChangedMeanwhileError

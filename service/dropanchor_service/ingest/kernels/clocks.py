@@ -12,6 +12,8 @@ from typing import Any, Final
 import numpy as np
 from numba import njit
 
+from dropanchor_schemas.times import EARLIEST_UTC_NS
+from dropanchor_service.ingest.kernels.sensor_clocks import compare, first_shift
 from dropanchor_service.ingest.kernels.sequences import NONE_NS, PER_TAG
 
 EPOCH_NS: Final = 30_000_000_000
@@ -22,6 +24,7 @@ SLOW: Final = 5_000  # correct by 1/SLOW of the time that passes: 200 ppm, while
 FAST: Final = 100
 FAST_MAX_NS: Final = 1_000_000  # per message; less than the time between samples, so that their order stays
 BACK_NS: Final = 2_000_000_000  # a clock that goes back farther has been set
+DAY_NS: Final = 86_400_000_000_000
 AHEAD_NS: Final = 10_000_000_000  # ahead of our UTC: no sample is from the future
 NEVER_SET_NS: Final = 1_577_836_800_000_000_000  # 2020: an earlier UTC comes from a clock that was never set
 
@@ -108,34 +111,103 @@ def _is_reference(time: Any, publishers: Any, slot: int, arrival_ns: int) -> boo
     return bool(first + time.reference - 1 == slot)
 
 
+@njit(nogil=True)
+def _looks_like_now(t_ns: int, arrival_ns: int) -> bool:
+    """Return whether a time is that of the arrival, to the day, in s, ms or µs."""
+    in_s = abs(arrival_ns // 1_000_000_000 - t_ns) <= DAY_NS // 1_000_000_000
+    in_ms = abs(arrival_ns // 1_000_000 - t_ns) <= DAY_NS // 1_000_000
+    return bool(in_s or in_ms or abs(arrival_ns // 1_000 - t_ns) <= DAY_NS // 1_000)
+
+
+@njit(nogil=True)
+def _is_no_utc(form: Any, publisher: Any, t_ns: int, arrival_ns: int) -> bool:
+    """Return whether a time that should be UTC is in another unit, or counts from a start without saying so.
+
+    A publisher that was right before has a clock that was reset, which goes on. So does a replay of an old recording.
+    """
+    if form.boot_clock or form.replay or t_ns >= EARLIEST_UTC_NS:
+        return False
+    return bool(publisher.arrival_ns == 0 or _looks_like_now(t_ns, arrival_ns))
+
+
+@njit(nogil=True)
+def _move(publisher: Any, newest_ns: int, boot_clock: bool, back: bool) -> None:
+    """Go on with a publisher after the shift of its motion has changed, which changes the newest time of its message.
+
+    back: the motion goes back. A boot clock that was mapped by it is mapped again.
+    """
+    moved_ns = newest_ns - publisher.newest_ns
+    publisher.newest_ns = newest_ns
+    if boot_clock:
+        if back:
+            publisher.shift_ns = publisher.least_ns = publisher.arrival_ns - newest_ns
+            publisher.previous_least_ns, publisher.epoch_end_ns = NONE_NS, publisher.arrival_ns + EPOCH_NS
+        return
+    if publisher.least_ns != NONE_NS:
+        publisher.least_ns -= moved_ns
+    if publisher.previous_least_ns != NONE_NS:
+        publisher.previous_least_ns -= moved_ns
+    if abs(newest_ns - publisher.arrival_ns) <= AHEAD_NS:
+        publisher.shift_ns = 0  # what looked like a jump was the motion
+
+
 @njit(cache=True, nogil=True)
 def time_offsets(
-    forms: Any, slots: Any, newest: Any, arrivals: Any, chosen: Any, publishers: Any, times: Any, offsets: Any
+    forms: Any,
+    slots: Any,
+    newest: Any,
+    counts: Any,
+    arrivals: Any,
+    chosen: Any,
+    publishers: Any,
+    times: Any,
+    offsets: Any,
+    motion: Any,
+    restarts: Any,
 ) -> int:
     """Fill `offsets` with the estimator's time minus the publisher's clock, ns. Return how many clocks jumped.
 
-    chosen: indices of the messages, in the order of their publishers. newest: time of each message's newest sample, ns,
-    negative for none. slots: its publisher, -1 for none. times: TAG_TIME of each row.
+    chosen: indices of the messages, in the order of their publishers. newest: (n, 3), time of each message's newest
+    motion, range and other sample, ns, negative for none. counts: (n, 3), of these samples. slots: its publisher, -1
+    for none. times: TAG_TIME of each row. motion: filled with what to add to the times of motion besides. restarts: set
+    where the motion goes back in time, which an estimator does not see: the motion that it left out is missing.
     """
     jumps = 0
     for i in chosen:
-        if slots[i] < 0 or newest[i] < 0:
+        t_ns = max(newest[i, 0], newest[i, 1], newest[i, 2])
+        if slots[i] < 0 or t_ns < 0:
             continue
         publisher, time = publishers[slots[i]], times[slots[i] // PER_TAG]
+        if _is_no_utc(forms[i], publisher, t_ns, arrivals[i]):
+            continue
         publisher.kinds |= forms[i].kinds
+        if publisher.arrival_ns == 0 and not forms[i].boot_clock and not forms[i].replay:
+            publisher.motion_shift_ns = first_shift(newest[i], arrivals[i])
+        t_ns = _newest(newest[i], publisher.motion_shift_ns)
         if forms[i].boot_clock:
-            utc = _since_start(publisher, newest[i], arrivals[i])
+            utc = _since_start(publisher, t_ns, arrivals[i])
             known, change = publisher.arrival_ns != 0, utc - publisher.shift_ns
             jumps += known and abs(change) > STEP_NS
             if _is_reference(time, publishers, slots[i], arrivals[i]) and known and abs(change) <= STEP_NS:
                 time.correction_ns += change
         else:
-            utc = _shift(publisher, newest[i], arrivals[i])
+            utc = _shift(publisher, t_ns, arrivals[i])
             if utc != publisher.shift_ns:
                 jumps += 1
                 publisher.least_ns, publisher.epoch_end_ns = NONE_NS, 0  # differences of another clock, in effect
             if not forms[i].replay:
-                _note_difference(publisher, arrivals[i] - newest[i], arrivals[i])
-        offsets[i] = utc - time.correction_ns
-        publisher.shift_ns, publisher.newest_ns, publisher.arrival_ns = utc, newest[i], arrivals[i]
+                _note_difference(publisher, arrivals[i] - t_ns, arrivals[i])
+        offsets[i], motion[i] = utc - time.correction_ns, publisher.motion_shift_ns
+        publisher.shift_ns, publisher.newest_ns, publisher.arrival_ns = utc, t_ns, arrivals[i]
+        if not forms[i].replay and compare(publishers, slots[i], newest[i], counts[i], arrivals[i]):
+            restarts[i] = publisher.motion_shift_ns - motion[i] < -STEP_NS
+            _move(publisher, _newest(newest[i], publisher.motion_shift_ns), forms[i].boot_clock, restarts[i])
+            offsets[i], motion[i] = publisher.shift_ns - time.correction_ns, publisher.motion_shift_ns
     return jumps
+
+
+@njit(nogil=True)
+def _newest(newest: Any, motion_shift_ns: int) -> int:
+    """Return the time of the newest sample of a message. newest: of its motion, ranges and other samples."""
+    moved_ns = newest[0] + motion_shift_ns if newest[0] >= 0 else newest[0]
+    return int(max(moved_ns, newest[1], newest[2]))

@@ -36,6 +36,13 @@ PUBLISHER: Final = np.dtype(
         ("newest_ns", "i8"),  # newest sample of its last message, on its own clock; 0: none yet
         ("arrival_ns", "i8"),
         ("shift_ns", "i8"),  # added to its times; for a UTC clock 0 until it jumps
+        ("motion_shift_ns", "i8"),  # added to the times of its motion too: minus how far their clock is ahead
+        ("ahead_ns", "i8"),  # how far that was in the last period; see `sensor_clocks.py`
+        ("ahead_known", "?"),
+        ("period_ns", "i8"),  # begin of the present period; 0: there is none
+        ("delay_ns", "i8", 2),  # least arrival minus time in this period, of motion and of ranges
+        ("kind_messages", "i4", 2),  # messages with motion, and with ranges, in this period
+        ("kind_samples", "i4", 2),
         ("seen", "u8", _LANES),  # bit n % WINDOW: message n has arrived
     ],
     align=True,
@@ -126,6 +133,8 @@ def _slot(publishers: Any, row: int, boot_id: int, sequence: int, arrival_ns: in
     publisher.gap_allowed, publisher.used_ns, publisher.epoch_end_ns, publisher.kinds = False, arrival_ns, 0, 0
     publisher.least_ns = publisher.previous_least_ns = NONE_NS
     publisher.newest_ns = publisher.arrival_ns = publisher.shift_ns = 0
+    publisher.motion_shift_ns = publisher.ahead_ns = publisher.period_ns = 0
+    publisher.ahead_known = False
     return found
 
 

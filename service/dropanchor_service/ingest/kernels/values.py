@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from numba import njit
 
+from dropanchor_schemas.times import EARLIEST_UTC_NS
 from dropanchor_schemas.wire import MAX_T_NS
 
 # A value beyond what such sensors can measure is absurd. The widest ranges of consumer IMUs are ±30 g and ±4,000 °/s
@@ -73,7 +74,7 @@ def judge_scalars(
 
 @njit(cache=True, nogil=True)
 def shift_times(t_ns: Any, messages: Any, offsets: Any) -> int:
-    """Add to each time the offset of its message. Return how many times then lie outside the range of valid UTC times.
+    """Add to each time the offset of its message. Return how many times then cannot be UTC.
 
     offsets: ns, empty if all of them are 0.
     """
@@ -81,16 +82,20 @@ def shift_times(t_ns: Any, messages: Any, offsets: Any) -> int:
     for i in range(len(t_ns)):
         if len(offsets):
             t_ns[i] += offsets[messages[i]]
-        outside += not 0 <= t_ns[i] < MAX_T_NS
+        outside += not EARLIEST_UTC_NS <= t_ns[i] < MAX_T_NS
     return outside
 
 
 @njit(cache=True, nogil=True)
-def newest_times(t_ns: Any, messages: Any, newest: Any) -> None:
-    """Raise `newest` of each message to the latest time of its samples."""
+def newest_times(t_ns: Any, messages: Any, kind: int, newest: Any, counts: Any) -> None:
+    """Raise `newest` of each message to the latest time of its samples of one kind, and count them.
+
+    newest: (n, 3), of motion, ranges and the other kinds. counts: (n, 3). kind: index in `KINDS`.
+    """
+    column = min(kind, 2)
     for i in range(len(t_ns)):
-        if t_ns[i] > newest[messages[i]]:
-            newest[messages[i]] = t_ns[i]
+        counts[messages[i], column] += 1
+        newest[messages[i], column] = max(newest[messages[i], column], t_ns[i])
 
 
 @njit(cache=True, nogil=True)

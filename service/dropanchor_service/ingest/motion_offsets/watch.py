@@ -1,7 +1,7 @@
 """Watch the tags whose motion and ranges come from two publishers, and estimate the offset of their clocks."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from itertools import islice
 
 import numpy as np
@@ -19,9 +19,13 @@ WINDOWS = 10
 
 
 class WatchedTag:
-    """The samples of one tag and the results of its last windows."""
+    """The samples of one tag and the results of its last windows.
 
-    def __init__(self) -> None:
+    moved_ns: what was added to the times of its motion.
+    """
+
+    def __init__(self, moved_ns: int) -> None:
+        self.moved_ns = moved_ns
         self.bins = TagBins()
         self.offset: MotionOffset | None = None
         self._end = 0  # of the last window, number of a bin
@@ -56,16 +60,22 @@ class MotionOffsets:
         self._tags: dict[int, WatchedTag] = {}
         self._is_watched = np.zeros(1, np.bool_)  # of each row; the last one stands for all higher rows
 
-    def watch(self, rows: Iterable[int]) -> None:
-        """Watch these rows and forget the others."""
-        self._tags = {row: self._tags.get(row) or WatchedTag() for row in islice(rows, MAX_TAGS)}
+    def watch(self, rows: Mapping[int, int]) -> None:
+        """Watch these rows and forget the others. rows: what is added to the times of their motion, ns."""
+        self._tags = {row: self._watched(row, moved_ns) for row, moved_ns in islice(rows.items(), MAX_TAGS)}
         self._is_watched = np.zeros(max(self._tags, default=-1) + 2, np.bool_)
         self._is_watched[list(self._tags)] = True
 
     def offset(self, row: int) -> MotionOffset | None:
         """Return how far the clock of a tag's motion is ahead of that of its ranges, None if that is not known."""
         tag = self._tags.get(row)
-        return None if tag is None else tag.offset
+        if tag is None or tag.offset is None:
+            return None
+        return tag.offset._replace(offset_s=tag.offset.offset_s - tag.moved_ns * 1e-9)
+
+    def _watched(self, row: int, moved_ns: int) -> WatchedTag:
+        known = self._tags.get(row)
+        return known if known is not None and known.moved_ns == moved_ns else WatchedTag(moved_ns)
 
     def add(self, samples: SampleBatch) -> None:
         """Add the samples of the tags that are watched."""

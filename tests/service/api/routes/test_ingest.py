@@ -104,6 +104,50 @@ def test_without_credentials_the_tag_is_named(path: str) -> None:
     assert bench.received == []
 
 
+EARLY = {
+    "seconds": Frame(ranges=[RangeSample(T_NS // 10**9, 17, 12.5)]),
+    "milliseconds": Frame(ranges=[RangeSample(T_NS, 17, 12.5), RangeSample(T_NS // 10**6, 17, 12.5)]),
+    "microseconds": Frame(ranges=[RangeSample(T_NS // 1000, 17, 12.5)]),
+    "counts from a start": Frame(ranges=[RangeSample(12_345_000_000, 17, 12.5)]),
+}
+
+
+@pytest.mark.parametrize("said", EARLY)
+def test_a_time_that_cannot_be_utc_is_named_with_its_unit_and_passed_on_to_be_counted(said: str) -> None:
+    bench = make_api_bench()
+    bodies = [(encode_json(EARLY[said]), ENCODING_JSON)]
+    if len(EARLY[said].ranges) == 1:  # the others do not fit into one packed payload
+        bodies.append((encode_packed(EARLY[said]), ENCODING_PACKED))
+    for body, encoding in bodies:
+        response = post(bench, f"{SAMPLES}?tag=a", body, encoding)
+        assert (response.status_code, response.json()["reason"]) == (422, "time_not_utc")
+        assert said in response.json()["detail"]
+    assert [encoding for _, _, encoding in bench.received] == [encoding for _, encoding in bodies]
+
+
+@pytest.mark.parametrize("flag", ["boot_clock", "replay"])
+def test_a_boot_clock_and_a_replay_have_any_times(flag: str) -> None:
+    frame = EARLY["counts from a start"].replaced(**{flag: True})
+    for body, encoding in ((encode_json(frame), ENCODING_JSON), (encode_packed(frame), ENCODING_PACKED)):
+        assert post(make_api_bench(), f"{SAMPLES}?tag=a", body, encoding).status_code == 202
+
+
+def test_the_contract_takes_no_iso_times() -> None:
+    body = b'{"range": [{"t_ns": "2026-11-26T12:00:00Z", "anchor": 1, "range_m": 2.5}]}'
+    response = post(make_api_bench(), f"{SAMPLES}?tag=a", body)
+    assert (response.status_code, response.json()["reason"]) == (422, "json_schema")
+    assert "range.0.t_ns" in response.json()["detail"]
+
+
+def test_a_phone_whose_times_are_no_utc_in_ns_is_told_and_its_samples_are_passed_on_to_be_counted() -> None:
+    bench, t_ms = make_api_bench(), T_NS // 10**6
+    batch = [reading("gyroscope", t_ms, (0, 0, 0)), reading("totalacceleration", t_ms, (0, 0, G))]
+    response = post(bench, f"{PHONE}?tag=anna", message(0, batch))
+    assert response.status_code == 499
+    assert f"{t_ms} looks like milliseconds; multiply it by 1000000" in response.text
+    assert [(tag, encoding) for tag, _, encoding in bench.received] == [("anna", ENCODING_PACKED)]
+
+
 def test_a_phones_batch_becomes_a_payload_of_its_tag() -> None:
     bench = make_api_bench()
     response = post(bench, f"{PHONE}?tag=anna", BATCH)

@@ -14,7 +14,7 @@ from dropanchor_service.phones.phyphox import parse
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
 from support.api import ApiBench, ask, kind_of, make_api_bench
-from support.phyphox import message, recording
+from support.phyphox import event, message, recording
 from support.sensor_logger import G
 
 PHYPHOX = "/api/v1/ingest/phyphox"
@@ -115,3 +115,12 @@ def test_what_is_no_message_is_answered_with_a_sentence_and_counted(
     assert sentence in response.json()["detail"]
     assert response.json()["reason"] == (reason or "json_schema")
     assert bench.received == [("anna", body, ENCODING_JSON)]
+
+
+def test_a_phone_whose_clock_was_never_set_is_told() -> None:
+    bench, events = make_api_bench(), [event("START", 0.0, 10_000.0)]
+    readings = {name: [(t, (0.0, 0.0, 1.0)) for t in (0.01, 0.02)] for name in ("gyroscope", "accelerometer")}
+    response = ask(bench.app(), "POST", f"{PHYPHOX}?tag=anna", content=message(events, 10_001.0, readings))
+    assert (response.status_code, response.json()["reason"]) == (422, "time_not_utc")
+    assert "counts from a start" in response.json()["detail"]
+    assert [encoding for _, _, encoding in bench.received] == [ENCODING_PACKED]

@@ -116,6 +116,18 @@ def test_a_payload_that_cannot_be_decoded_is_passed_on_to_be_counted_and_the_ans
     assert len(place.bench.received) == 6
 
 
+def test_a_time_that_cannot_be_utc_is_acknowledged_with_what_it_looks_like(place: Place) -> None:
+    early = Frame(ranges=[RangeSample(T_NS // 10**6, 17, 12.5)], sequence=0, boot_id=9)
+    with place.running(), place.connect(place.anna) as socket:
+        answer(socket)
+        for payload in (encode_json(early).decode(), encode_packed(early)):
+            socket.send(payload)
+            acknowledged = answer(socket)
+            assert (acknowledged.samples, acknowledged.rejected) == (0, "time_not_utc")
+            assert "looks like milliseconds" in acknowledged.detail
+    assert len(place.bench.received) == 2
+
+
 def test_a_message_of_more_than_a_mebibyte_ends_the_connection(place: Place) -> None:
     with place.running(), place.connect(place.anna) as socket:
         answer(socket)
