@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.kinds import SCALARS
+from dropanchor_schemas.kinds import KINDS, SCALARS, Kind
 from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
@@ -17,7 +18,9 @@ from dropanchor_service.ingest.rejections import Rejections
 from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import Rejected, keep, screen, within_time
 from dropanchor_service.store import Sites
+from dropanchor_service.store.arrivals import Arrived
 from dropanchor_service.store.rings import rank_in_row
+from dropanchor_service.store.rows import MESSAGE
 
 REORDER_BYTES = 2**26
 _DTYPES = [column.dtype for column in SampleBatch().columns()]
@@ -39,6 +42,14 @@ class Ordered:
     sequenced: Sequenced
     of_row: Array
     arrived: Array
+
+
+class _Spans(NamedTuple):
+    """The times of the oldest and the newest sample of each message, and of the newest of each kind; -1 for none."""
+
+    oldest: Array
+    newest: Array
+    newest_of: Array  # (kinds, messages)
 
 
 class SampleReader:
@@ -80,7 +91,8 @@ class SampleReader:
         read = self._forms(payloads, encodings)
         of_row, arrived = np.array(rows, np.int32), np.array(arrivals, np.int64)
         for reason in {reason for _, reason in read.rejected}:
-            self._rejections.count_rejected(reason, of_row[[index for index, why in read.rejected if why == reason]])
+            refused = [index for index, why in read.rejected if why == reason]
+            self._rejections.count_rejected(reason, of_row[refused], MESSAGE)
         waited = len(messages) - len(fresh)
         sequenced = self._publishers.sequence(read.forms, of_row, arrived, due_ns, waited)
         self._rejections.count_given_up(sequenced.missing)
@@ -116,7 +128,7 @@ class SampleReader:
             self._rejections.count_clock_jumps(jumps)
             in_time = _in_time(decoded, offsets, rejected)
             spans = _spans(in_time)
-            self._note_replays(in_time, due, of_row, arrived, spans[1])
+            self._note_replays(in_time, due, of_row, arrived, spans.newest)
             yield self._batch(in_time, rejected, due, of_row, arrived, spans)
 
     def _due_ns(self, fresh: list[Message], now_ns: int) -> int:
@@ -145,15 +157,19 @@ class SampleReader:
         self._rows.set_replay_lag(of_row[due], np.where(replayed, arrived[due] - newest[due], 0))
 
     def _note_arrivals(
-        self, decoded: Decoded, ranges: Array, due: Array, of_row: Array, arrived: Array, spans: tuple[Array, Array]
+        self, decoded: Decoded, ranges: Array, due: Array, of_row: Array, arrived: Array, spans: _Spans
     ) -> None:
         """Record when the samples of live tags arrived. ranges: those to anchors of the site."""
-        oldest, newest = spans
+        oldest, newest, newest_of = spans
         filled = due[newest[due] >= 0]
         self.span_ns = int((newest[filled] - oldest[filled]).min(initial=MAX_T_NS))
         live = filled[~decoded.forms["replay"][filled].astype(bool)]
         counts = np.bincount(ranges["message"], minlength=len(of_row))
-        self._rows.arrivals.record(of_row[live], arrived[live], oldest[live], newest[live], counts[live])
+        zeros = np.bincount(ranges["message"][ranges["value"] == 0.0], minlength=len(of_row))
+        columns = (of_row, arrived, oldest, newest)
+        self._rows.arrivals.record(
+            Arrived(*(column[live] for column in columns), newest_of[:, live], counts[live], zeros[live])
+        )
 
     def _batch(
         self,
@@ -162,16 +178,16 @@ class SampleReader:
         due: Array,
         of_row: Array,
         arrived: Array,
-        spans: tuple[Array, Array],
+        spans: _Spans,
     ) -> SampleBatch:
         self._note_unknown_anchors(decoded, of_row, arrived)
         scalars = [
-            self._anchored(column, of_row, rejected) if kind.has_anchor else column
+            self._anchored(column, kind, of_row, rejected) if kind.has_anchor else column
             for kind, column in zip(SCALARS, decoded.columns()[1:], strict=True)
         ]
         self._note_arrivals(decoded, scalars[0], due, of_row, arrived, spans)
         for entry in rejected:
-            self._rejections.count_rejected(entry.reason, of_row[entry.messages])
+            self._rejections.count_rejected(entry.reason, of_row[entry.messages], entry.kind)
         return SampleBatch(
             _imu_column(decoded.imu, of_row),
             *(_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
@@ -211,13 +227,13 @@ class SampleReader:
         """Return the engine's index of the anchor of each sample, -1 if the site of its tag lacks it."""
         return self._engine.anchor_indices(of_row[samples["message"]], samples["anchor"])
 
-    def _anchored(self, samples: Array, of_row: Array, rejected: list[Rejected]) -> Array:
+    def _anchored(self, samples: Array, kind: Kind, of_row: Array, rejected: list[Rejected]) -> Array:
         """Return the samples of known anchors, with the engine's index of the anchor in `anchor`."""
         if not len(samples):
             return samples
         indices = self._indices(samples, of_row)
         unknown = indices < 0
-        kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, rejected)
+        kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, rejected)
         kept["anchor"] = indices[~unknown]
         return kept
 
@@ -242,17 +258,18 @@ def _in_time(decoded: Decoded, offsets: Array, rejected: list[Rejected]) -> Deco
     if not sum(shift_times(t_ns, messages, offsets) for messages, t_ns in _times(decoded)):
         return decoded
     columns = [
-        keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected) for column in decoded.columns()
+        keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, kind.name, rejected)
+        for kind, column in zip(KINDS, decoded.columns(), strict=True)
     ]
     return decoded.with_columns(columns)
 
 
-def _spans(decoded: Decoded) -> tuple[Array, Array]:
-    """Return the times of the oldest and the newest sample of each message; the newest is -1 without a sample."""
-    oldest, newest = np.full(len(decoded.forms), MAX_T_NS, np.int64), np.full(len(decoded.forms), -1, np.int64)
-    for messages, t_ns in _times(decoded):
-        time_spans(t_ns, messages, oldest, newest)
-    return oldest, newest
+def _spans(decoded: Decoded) -> _Spans:
+    messages = len(decoded.forms)
+    oldest, newest_of = np.full(messages, MAX_T_NS, np.int64), np.full((len(KINDS), messages), -1, np.int64)
+    for (indices, t_ns), newest in zip(_times(decoded), newest_of, strict=True):
+        time_spans(t_ns, indices, oldest, newest)
+    return _Spans(oldest, newest_of.max(axis=0), newest_of)
 
 
 def _times(decoded: Decoded) -> list[tuple[Array, Array]]:
