@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "6-5230a879474648be"
+LAYOUT = "6-ff68b5a50f18224d"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 

@@ -14,11 +14,13 @@ from dropanchor_service.estimation.fleet.compiled import njit
 REORDER_WINDOW: Final = 250_000_000  # ns in which late samples are put in order
 MARGIN: Final = 150_000_000  # ns, for batches that come later than those before
 FORGET: Final = 30_000_000_000  # ns of samples, after which a wait that no batch needs ends, or twice that
-MAX_DELAY: Final = 1_000_000_000  # ns by which the newest sample of a batch may be behind: beyond, its clock is
+MAX_DELAY: Final = 1_000_000_000  # ns behind at which the last part of a batch may end: a later end is a slow clock
 MAX_LAG_S: Final = 3.5
 
 BATCHING: Final = np.dtype(
     [
+        ("oldest", np.int64),  # ns, first sample of a batch of which parts are still missing; 0: none
+        ("heard", np.int64),  # ns, newest sample of the row when the last batch came
         ("since", np.int64),  # ns, time of the sample since which the next two count; 0: no batch needed a wait
         ("longest", np.int64),  # ns, the longest wait that a batch needed
         ("needed", np.int64),  # ns, the second longest
@@ -33,14 +35,21 @@ Batching: TypeAlias = Any  # a record of BATCHING
 def learn_lag(b: Batching, before: int, oldest: int, newest: int, limit: int) -> None:
     """Learn from a batch of IMU samples, from `oldest` to `newest`, ns, of a row whose newest sample was of `before`.
 
-    limit: of the lag, ns. A longer one would be of no use: some samples would still come too late.
+    A batch may come in parts. limit: of the lag, ns: a longer one is of no use, some samples would still be too late.
     """
+    b.oldest = oldest if b.oldest == 0 else b.oldest
+    if before - newest > MAX_DELAY:
+        return
+    wait, b.oldest = before - b.oldest, 0
+    if wait <= REORDER_WINDOW and b.since == 0:
+        return
+    is_rest = before - b.heard < REORDER_WINDOW
+    b.heard = b.heard if is_rest else before
     if b.since > 0 and before - b.since > FORGET:
         b.before = b.needed if before - b.since <= 2 * FORGET else 0
         b.longest = b.needed = 0
         b.since = before if b.before > 0 else 0
-    wait = before - oldest
-    if wait > REORDER_WINDOW and before - newest <= MAX_DELAY and _lag_of(wait) <= limit:
+    if wait > REORDER_WINDOW and not is_rest and _lag_of(wait) <= limit:
         b.since = before if b.since == 0 else b.since
         if wait > b.longest:
             b.needed, b.longest = b.longest, wait
