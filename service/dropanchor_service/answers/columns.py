@@ -95,7 +95,8 @@ def _lat_lon_of(poses: Array, site: Site) -> tuple[Array | None, Array | None]:
 def aged_poses(poses: Array, age_s: Array) -> Array:
     """Return these POSE with the state and reason that they have at this age.
 
-    age_s: their age, without the time that they waited for IMU samples in batches. No engine runs while a tag is silent, and an old pose must not look like a good one.
+    age_s: their age, without the time that they waited for IMU samples in batches. No engine runs while a tag is
+    silent, and an old pose must not look like a good one.
     """
     if age_s.max(initial=0.0) <= STALE_AFTER_S:
         return poses

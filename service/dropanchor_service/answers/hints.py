@@ -75,9 +75,11 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     for text, where in _about_arrivals(poses[conspicuous], tags, now_ns) if len(conspicuous) else ():
         hint[conspicuous[where]] = len(texts)
         texts.append(text)
-    unused = hints_about_unused(poses["row"], tags, now_ns)
-    for text, place in (*_unknown_anchors(poses, site, tags, now_ns), *unused, *_zeros(poses, tags, now_ns)):
+    for text, place in _unknown_anchors(poses, site, tags, now_ns):
         hint[place] = len(texts)
+        texts.append(text)
+    for text, at in (*hints_about_unused(poses["row"], tags, now_ns), *_zeros(poses, tags, now_ns)):
+        hint[at] = len(texts)
         texts.append(text)
     for text, where in _lags(poses, tags, hint):
         hint[where] = len(texts)
@@ -112,9 +114,7 @@ def _about_missing(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[
     if not len(places):
         return
     arrivals, lag_s = tags.arrivals.of(poses["row"][places]), tags.rows.lag_s(poses["row"][places])
-    ranges, motion = (
-        (now_ns - arrivals[name]) * 1e-9 < SENDING_S + lag_s for name in ("range_ns", "motion_ns")
-    )
+    ranges, motion = ((now_ns - arrivals[name]) * 1e-9 < SENDING_S + lag_s for name in ("range_ns", "motion_ns"))
     reasons, placed = poses["reason"][places], np.isfinite(poses["x"][places])
     yield RANGES_COME, places[placed & ranges & np.isin(reasons, _NO_RANGES)]
     yield MOTION_COMES, places[placed & motion & np.isin(reasons, _NO_MOTION)]

@@ -30,7 +30,7 @@ STD_WRONG: Final = "their standard deviation is not one"
 FAULT: Final = "the estimator failed on them, so look at the service's log"
 DAMAGED: Final = "they are damaged, or not of this protocol"
 
-_ANY = {
+_ANY: Final[dict[Reason, str | None]] = {
     Reason.LATE: OUT_OF_ORDER,
     Reason.NOT_FINITE: NOT_NUMBERS,
     Reason.STD_INVALID: STD_WRONG,
@@ -40,7 +40,7 @@ _ANY = {
     Reason.ANCHOR_UNKNOWN: None,  # its hint names the anchor
     Reason.SENSOR_FAULT: None,  # its hint names the sensor
 }
-WHY: Final = {
+WHY: Final[dict[str, dict[Reason, str | None]]] = {
     "imu": _ANY
     | {
         Reason.IMU_ABSURD: "no sensor measures such values, so send m/s² and rad/s",

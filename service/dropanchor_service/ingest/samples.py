@@ -166,10 +166,8 @@ class SampleReader:
         live = filled[~decoded.forms["replay"][filled].astype(bool)]
         counts = np.bincount(ranges["message"], minlength=len(of_row))
         zeros = np.bincount(ranges["message"][ranges["value"] == 0.0], minlength=len(of_row))
-        columns = (of_row, arrived, oldest, newest)
-        self._rows.arrivals.record(
-            Arrived(*(column[live] for column in columns), newest_of[:, live], counts[live], zeros[live])
-        )
+        times = (arrived[live], oldest[live], newest[live], newest_of[:, live])
+        self._rows.arrivals.record(Arrived(of_row[live], *times, counts[live], zeros[live]))
 
     def _batch(
         self,

@@ -63,9 +63,7 @@ def _screened(
     return _good(samples, verdicts, reasons, kind, rejected)
 
 
-def _good(
-    samples: Array, verdicts: Array, reasons: Mapping[int, Reason], kind: str, rejected: list[Rejected]
-) -> Array:
+def _good(samples: Array, verdicts: Array, reasons: Mapping[int, Reason], kind: str, rejected: list[Rejected]) -> Array:
     for verdict in np.unique(verdicts[verdicts != values.GOOD]).tolist():
         rejected.append(Rejected(reasons[verdict], kind, samples["message"][verdicts == verdict]))
     good: Array = samples[verdicts == values.GOOD]

@@ -146,8 +146,8 @@ class IngestSettings(_Section):
     )
     max_lag_s: Annotated[float, Field(ge=0.25, le=10)] = Field(
         default=3.5,
-        description="How long the ranges of a tag wait at most for its IMU samples, once these have been seen to arrive in "
-        "batches, as phones post them. Its poses come that much later. 0.25: never longer than usual.",
+        description="How long the ranges of a tag wait at most for its IMU samples, once these have been seen to "
+        "arrive in batches, as phones post them. Its poses come that much later. 0.25: never longer than usual.",
     )
     max_wait_ms: Annotated[float, Field(ge=10, le=60_000)] = Field(
         default=500.0,

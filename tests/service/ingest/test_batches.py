@@ -1,4 +1,4 @@
-"""A phone posts its motion every second or so, and ranges come from elsewhere: they wait for the motion and are used."""
+"""A phone posts its motion every second or so. The ranges, which come from elsewhere, wait for it and are used."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -174,7 +174,7 @@ def imu_at(t_ns: int) -> Array:
 
 
 def newest_ns(frame: Frame) -> int:
-    return max(sample.t_ns for sample in (*frame.imu, *frame.ranges))
+    return max(*(sample.t_ns for sample in frame.imu), *(sample.t_ns for sample in frame.ranges), 0)
 
 
 def renumbered(arrivals: Iterable[Arrival]) -> Iterator[Arrival]:

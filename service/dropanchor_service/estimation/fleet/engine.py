@@ -13,7 +13,14 @@ from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
-from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of, skipped_of, stuck_ranges_of, with_rows
+from dropanchor_service.estimation.fleet.outputs import (
+    innovations_of,
+    modes_of,
+    poses_of,
+    skipped_of,
+    stuck_ranges_of,
+    with_rows,
+)
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 HARD_IRON, HARD_IRON_CALIBRATED = 1.0, 0.05  # prior sd of a magnetometer's hard iron, in units of the field

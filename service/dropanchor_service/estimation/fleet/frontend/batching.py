@@ -1,8 +1,8 @@
 """How long the measurements of a row wait for IMU samples that arrive in batches, as phones post them.
 
 A batch needs the wait from its oldest sample to the newest sample that its row had before. The row's measurements wait
-as long as the second longest of these in the last 30 to 60 s of samples, because one late batch is no habit. A row whose
-IMU samples come sooner than REORDER_WINDOW never waits longer than that.
+as long as the second longest of these in the last 30 to 60 s of samples, because one late batch is no habit. A row
+whose IMU samples come sooner than REORDER_WINDOW never waits longer than that.
 """
 
 from typing import Any, Final, TypeAlias

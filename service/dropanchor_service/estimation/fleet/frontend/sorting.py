@@ -66,7 +66,8 @@ def order_samples(
 ) -> int:
     """Fill batch.order and return how many samples are due.
 
-    max_lag: ns by which a row's measurements wait longer than REORDER_WINDOW, at most. Return NONE, with nothing changed, where a sample belongs to a row that is not configured.
+    max_lag: ns by which a row's measurements wait longer than REORDER_WINDOW, at most. Return NONE, with nothing
+    changed, where a sample belongs to a row that is not configured.
     """
     rows = len(queues)
     if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
