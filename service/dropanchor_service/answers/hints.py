@@ -43,6 +43,7 @@ RANGES_COME = "Ranges arrive, but too late or too rarely: check the network, and
 MOTION_COMES = "The motion of this tag had a gap, and is used again after some seconds without one: check its network."
 NEEDS_BOTH = "A position needs about 20 s of ranges and of motion samples: {0} and {1} have arrived."
 LAGS = "Its poses come up to {0} s late, because its IMU samples come in batches: shorter ones make them fresher."
+LAG_S = 1.0  # from which on people see that poses come late
 SENDING_S = 2.0  # a tag that has sent nothing for so long no longer sends
 
 _ALL_HINTS = [*HINTS, RELATIVE_HINT]
@@ -139,7 +140,7 @@ def _zeros(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, int
 def _lags(poses: Array, tags: TagTable, hint: Array) -> Iterator[tuple[str, Array]]:
     """Yield how late the poses come of tags that wait for their IMU and need nothing else."""
     lag_s = tags.rows.lag_s(poses["row"])
-    places = np.flatnonzero((lag_s > 0.0) & (hint == StateReason.RESOLVED))
+    places = np.flatnonzero((lag_s >= LAG_S) & (hint == StateReason.RESOLVED))
     for place in places.tolist():
         yield LAGS.format(f"{lag_s[place]:.1f}"), places[places == place]
 
