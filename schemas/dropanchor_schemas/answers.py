@@ -55,8 +55,15 @@ class TagStatus(_Answer):
     first_heard_ns: int | None = Field(description="UTC, ns; null if the tag has sent nothing yet.")
     last_heard_ns: int | None
     messages: int
-    samples: dict[str, int] = Field(description="Samples that were used, by kind.")
+    samples: dict[str, int] = Field(description="Samples that the engine was given, by kind.")
+    arrived: dict[str, int] = Field(default={}, description="Samples that arrived in readable messages, by kind.")
+    used: dict[str, int] = Field(default={}, description="Samples that the engine used, by kind.")
     rejected: dict[str, int] = Field(description="Messages and samples that were not used, by reason.")
+    lag_s: float = Field(
+        default=0.0,
+        description="How late the poses come at most, because the tag's IMU samples arrive in batches and its ranges "
+        "wait for them; 0 for a tag whose samples come in time.",
+    )
     hint: str = Field(
         description="What an operator can do about rejected data, for example add a missing anchor to the site; empty "
         "if nothing needs to be done."

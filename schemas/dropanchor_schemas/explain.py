@@ -64,5 +64,12 @@ class Explanation(_Answer):
     speed_track: SpeedTrack
     innovations: list[Innovation] = Field(description="The most recent innovations, oldest first.")
     refused: int = Field(description="How many of these innovations were not fused.")
-    samples: dict[str, int] = Field(description="Samples that were used, by kind.")
+    samples: dict[str, int] = Field(description="Samples that the engine was given, by kind.")
+    arrived: dict[str, int] = Field(default={}, description="Samples that arrived in readable messages, by kind.")
+    used: dict[str, int] = Field(default={}, description="Samples that the engine used, by kind.")
     rejected: dict[str, int] = Field(description="Messages and samples that were not used, by reason.")
+    lag_s: float = Field(
+        default=0.0,
+        description="How late the poses come at most, because the tag's IMU samples arrive in batches and its ranges "
+        "wait for them; 0 for a tag whose samples come in time.",
+    )

@@ -80,7 +80,7 @@ def test_a_gap_that_the_cache_holds_is_filled_in_order() -> None:
     assert bench.used() == 3
     bench.answer()
     assert bench.used() == 10
-    assert bench.rejected() == {}
+    assert bench.rejected().keys() <= {"imu_stuck"}  # the IMU of this tag never changes
     assert bench.total(bench.metrics.given_up) == 0
     assert bench.asked == 1
     bench.arrive(10)
@@ -114,7 +114,7 @@ def test_a_gap_that_the_cache_no_longer_holds_is_given_up_once() -> None:
     bench.arrive(8)
     assert bench.used() == 7
     assert bench.total(bench.metrics.given_up) == 2
-    assert bench.rejected() == {}
+    assert bench.rejected().keys() <= {"imu_stuck"}  # the IMU of this tag never changes
     assert bench.asked == 1
 
 

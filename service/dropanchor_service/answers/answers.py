@@ -18,6 +18,7 @@ from dropanchor_service.answers.pose_fields import FRAME_FIELDS, POSE_FIELDS, el
 from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
 from dropanchor_service.answers.track_pages import pose_in_tracks
+from dropanchor_service.answers.unused import hints_about_unused
 from dropanchor_service.estimation.columns import POSE, Array, State
 from dropanchor_service.history.tracks import Tracks
 from dropanchor_service.store.clock_offsets import ClockOffsets, NoClockOffsets
@@ -82,7 +83,8 @@ class Answers:
             return found[0].sentence
         unknown = self.unknown_anchor_of(tag)
         if unknown is None:
-            return ""
+            unused = hints_about_unused(np.array([tag.row]), self.tags, self.now_ns())
+            return next((hint for hint, _ in unused), "")
         range_ns = int(self.tags.arrivals.of(np.array([tag.row]))["range_ns"][0])
         return hint_about(unknown, hears_others=now_ns - range_ns <= FRESH_NS)
 
@@ -124,7 +126,7 @@ class Answers:
         return self._poses(pose[None], now_ns, historical=True, names=[name])[0] | {"hypotheses": []}
 
     def _pose_in_memory(self, latest: Array, t_ns: int, now_ns: int) -> Array:
-        aged = aged_poses(latest[None], self.tags.age_s(latest[None], now_ns))[0]
+        aged = aged_poses(latest[None], self.tags.rows.overdue_s(latest[None], now_ns))[0]
         return pose_at(self.latest.history(int(latest["row"])), latest if t_ns <= latest["t_ns"] else aged, t_ns)
 
     def _memory(self, latest: Array) -> Array:

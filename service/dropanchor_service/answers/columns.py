@@ -59,7 +59,7 @@ def columns_of(
     tags of the poses, if they may have no row.
     """
     age_s = (now_ns - poses["t_ns"]) * 1e-9 if historical else tags.age_s(poses, now_ns)
-    aged = poses if historical else aged_poses(poses, age_s)
+    aged = poses if historical else aged_poses(poses, tags.rows.overdue_s(poses, now_ns))
     if names is None:
         of_tags, online = tags.names(aged["row"].tolist()), tags.presence.are_online(aged["row"])
     else:
@@ -95,7 +95,8 @@ def _lat_lon_of(poses: Array, site: Site) -> tuple[Array | None, Array | None]:
 def aged_poses(poses: Array, age_s: Array) -> Array:
     """Return these POSE with the state and reason that they have at this age.
 
-    No engine runs while a tag is silent, and an old pose must not look like a good one.
+    age_s: their age, without the time that they waited for IMU samples in batches. No engine runs while a tag is
+    silent, and an old pose must not look like a good one.
     """
     if age_s.max(initial=0.0) <= STALE_AFTER_S:
         return poses

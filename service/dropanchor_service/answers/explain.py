@@ -31,7 +31,10 @@ def explanation_of(answers: Answers, tag: Tag, last: int) -> Answer | None:
         "innovations": _innovations(latest, [anchor.id for anchor in answers.site.anchors_by_index()]),
         "refused": int(np.count_nonzero(~latest["fused"])),
         "samples": dict(tag.samples),
+        "arrived": dict(tag.arrived),
+        "used": dict(tag.used),
         "rejected": dict(tag.rejected),
+        "lag_s": float(tag.rows.lag_s(tag.row)),
     }
 
 

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from dropanchor_service.answers.unused import hints_about_unused
 from dropanchor_service.estimation.columns import Array, Frame, StateReason
-from dropanchor_service.store.arrivals import BURSTS, FORGOTTEN_BURSTS, LATE_S, RANGE_S
+from dropanchor_service.store.arrivals import BURSTS, FORGOTTEN_BURSTS, LATE_S, RANGE_S, ZEROS
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import KINDS, TagTable
 from dropanchor_service.store.unknown_anchors import FRESH_NS, hint_about
@@ -19,8 +20,7 @@ _HINTS = {
     StateReason.SEVERAL_MODES: _MOVE_HINT,
     StateReason.RESOLVED: "",
     StateReason.RANGES_MISSING: "No more ranges arrive: is the anchor on, and is the tag in range?",
-    StateReason.IMU_MISSING: "No IMU samples have arrived for a while, or all were equal: check the tag, then walk "
-    "a few metres.",
+    StateReason.IMU_MISSING: "No IMU samples have arrived for a while: check the tag, then walk a few metres.",
     StateReason.RANGES_REJECTED: "The ranges contradict the track: is the line of sight free, and is the anchor where "
     "the site says it is?",
     StateReason.HEADING_DISTURBED: "Iron or a magnet disturbs the compass: move the tag away from it.",
@@ -39,13 +39,20 @@ LATE = "Samples arrive {0} s late: check the clock of the tag, and its network."
 IN_BURSTS = "Samples come in bursts of {0} s: let the tag send smaller batches, and check its network."
 FEW_RANGES = "One range in {0} s is too few: raise the rate of the radio, or bring the tag nearer to the anchor."
 MOUNT_UNKNOWN = "The mounting angle is not known yet: turn left and right once, or set it (`mount_angle_rad`)."
+ALL_ZERO = "Its last {0} ranges are all 0: the radio measures no distance, so check it and the anchor."
+RANGES_COME = "Ranges arrive, but too late or too rarely: check the network, and the rate of the radio."
+MOTION_COMES = "The motion of this tag had a gap, and is used again after some seconds without one: check its network."
+NEEDS_BOTH = "A position needs about 20 s of ranges and of motion samples: {0} and {1} have arrived."
+LAGS = "Its poses come up to {0} s late, because its IMU samples come in batches: shorter ones make them fresher."
+LAG_S = 1.0  # from which on people see that poses come late
 SENDING_S = 2.0  # a tag that has sent nothing for so long no longer sends
 
 _ALL_HINTS = [*HINTS, RELATIVE_HINT]
 _NO_RANGES = (StateReason.NO_RANGE, StateReason.RANGES_MISSING)
+_NO_MOTION = (StateReason.NO_HEADING, StateReason.IMU_MISSING)
 _NOTHING_NEW = (StateReason.RESOLVED, *_NO_RANGES, StateReason.IMU_MISSING)
 _LITTLE_KNOWN = (StateReason.RESOLVED, *_NO_RANGES, StateReason.SEVERAL_MODES, StateReason.UNCERTAIN)
-_IMU, _HEADING = KINDS.index("imu"), KINDS.index("heading")
+_IMU, _RANGE, _HEADING = (KINDS.index(name) for name in ("imu", "range", "heading"))
 
 Hints = tuple[Sequence[str], Array]
 """All texts, and the index of the text of each POSE."""
@@ -63,7 +70,7 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     A cause that only the arrivals show comes before the reason: to a tag whose samples come late, ranges are missing.
     """
     texts, hint = list(_ALL_HINTS), past_hints(poses)[1]
-    for text, where in _mounts(poses, site, tags):
+    for text, where in (*_mounts(poses, site, tags), *_about_missing(poses, tags, now_ns)):
         hint[where] = len(texts)
         texts.append(text)
     conspicuous = np.flatnonzero(tags.arrivals.conspicuous(poses["row"]))
@@ -73,11 +80,17 @@ def hints_of(poses: Array, site: SiteStore, tags: TagTable, now_ns: int) -> Hint
     for text, place in _unknown_anchors(poses, site, tags, now_ns):
         hint[place] = len(texts)
         texts.append(text)
+    for text, at in (*hints_about_unused(poses["row"], tags, now_ns), *_zeros(poses, tags, now_ns)):
+        hint[at] = len(texts)
+        texts.append(text)
     for text, one in _about_sensors(poses, tags):
         hint[one] = len(texts)
         texts.append(text)
-    for text, place in _wrong_times(poses, tags, now_ns):
-        hint[place] = len(texts)
+    for text, wrong in _wrong_times(poses, tags, now_ns):
+        hint[wrong] = len(texts)
+        texts.append(text)
+    for text, where in _lags(poses, tags, hint):
+        hint[where] = len(texts)
         texts.append(text)
     return texts, hint
 
@@ -108,6 +121,42 @@ def _with_seconds(text: str, seconds: Array, where: Array) -> Iterator[tuple[str
     whole = np.round(seconds[places]).astype(np.int64)
     for number in np.unique(whole).tolist():
         yield text.format(number), places[whole == number]
+
+
+def _about_missing(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, Array]]:
+    """Yield what is true instead where the reason says that ranges or motion are missing, but they arrive."""
+    places = np.flatnonzero(np.isin(poses["reason"], (*_NO_RANGES, *_NO_MOTION)))
+    if not len(places):
+        return
+    arrivals, lag_s = tags.arrivals.of(poses["row"][places]), tags.rows.lag_s(poses["row"][places])
+    ranges, motion = ((now_ns - arrivals[name]) * 1e-9 < SENDING_S + lag_s for name in ("range_ns", "motion_ns"))
+    reasons, placed = poses["reason"][places], np.isfinite(poses["x"][places])
+    yield RANGES_COME, places[placed & ranges & np.isin(reasons, _NO_RANGES)]
+    yield MOTION_COMES, places[placed & motion & np.isin(reasons, _NO_MOTION)]
+    samples = tags.counts(poses["row"][places])["samples"]
+    counts = np.column_stack([samples[:, _RANGE], samples[:, _IMU] + samples[:, _HEADING]])
+    begins = ~placed & (counts > 0).all(axis=1)
+    yield HINTS[StateReason.RANGES_MISSING], places[begins & motion & ~ranges]
+    yield HINTS[StateReason.IMU_MISSING], places[begins & ranges & ~motion]
+    for i in np.flatnonzero(begins & (ranges == motion)).tolist():
+        yield NEEDS_BOTH.format(*counts[i].tolist()), places[i : i + 1]
+
+
+def _zeros(poses: Array, tags: TagTable, now_ns: int) -> Iterator[tuple[str, int]]:
+    """Yield the hint for each tag whose radio only gives ranges of 0, and its place."""
+    places = np.flatnonzero(tags.arrivals.conspicuous(poses["row"]))
+    arrivals = tags.arrivals.of(poses["row"][places])
+    zero = (arrivals["zeros"] >= ZEROS) & ((now_ns - arrivals["range_ns"]) * 1e-9 < SENDING_S)
+    for place, count in zip(places[zero].tolist(), arrivals["zeros"][zero].tolist(), strict=True):
+        yield ALL_ZERO.format(count), place
+
+
+def _lags(poses: Array, tags: TagTable, hint: Array) -> Iterator[tuple[str, Array]]:
+    """Yield how late the poses come of tags that wait for their IMU and need nothing else."""
+    lag_s = tags.rows.lag_s(poses["row"])
+    places = np.flatnonzero((lag_s >= LAG_S) & (hint == StateReason.RESOLVED))
+    for place in places.tolist():
+        yield LAGS.format(f"{lag_s[place]:.1f}"), places[places == place]
 
 
 def _mounts(poses: Array, site: SiteStore, tags: TagTable) -> list[tuple[str, Array]]:

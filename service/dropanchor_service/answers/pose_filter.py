@@ -32,7 +32,7 @@ class PoseFilter:
         """Return whether each of these POSE rows, which are the latest, meets the conditions now."""
         matching = np.ones(len(poses), bool)
         if self.states:
-            aged = aged_poses(poses, tags.age_s(poses, now_ns))
+            aged = aged_poses(poses, tags.rows.overdue_s(poses, now_ns))
             matching &= np.isin(aged["state"], [STATES.index(state) for state in self.states])
         if self.box is not None:
             x_min, y_min, x_max, y_max = self.box

@@ -35,7 +35,7 @@ def _states(sites: Sequence[Answers], now_ns: int) -> Array:
     """Return how many tags are in which state now: a line for each site, a column for each state."""
     rows = sites[0].tags.rows
     poses = sites[0].latest.since()[1]
-    aged = aged_poses(poses, rows.age_s(poses, now_ns))
+    aged = aged_poses(poses, rows.overdue_s(poses, now_ns))
     counts = np.zeros((len(sites), len(STATES)), np.int64)
     np.add.at(counts, (rows.sites(aged["row"]), aged["state"]), 1)
     return counts

@@ -18,4 +18,4 @@ def create_engine(settings: Settings, progress: CompilationProgress | None = Non
             from dropanchor_service.estimation.fleet.engine import FleetEngine
 
             warm_up(FleetEngine(), progress)
-            return FleetEngine()
+            return FleetEngine(max_lag_s=settings.ingest.max_lag_s)

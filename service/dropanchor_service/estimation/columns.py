@@ -115,6 +115,9 @@ INNOVATION = np.dtype(
 )
 
 
+LAG = np.dtype([("row", "i4"), ("lag_ns", "i8")])  # how long measurements wait for IMU samples in batches; 0: not
+
+
 class MeasurementKind(IntEnum):
     """What an innovation belongs to; it is in m or rad accordingly."""
 
@@ -204,12 +207,16 @@ class PoseBatch:
     innovations: INNOVATION of the likeliest hypothesis, one for every range or bearing that met a running belief, per
     row in order of time.
     rejected: by reason (names of the contract), the row of each sample that was not used.
+    unused: the same samples by kind.
+    lags: LAG of rows with samples in the batch; none from an engine that does not wait.
     """
 
     poses: Array = field(default_factory=lambda: np.empty(0, POSE))
     hypotheses: Array = field(default_factory=lambda: np.empty(0, HYPOTHESIS))
     innovations: Array = field(default_factory=lambda: np.empty(0, INNOVATION))
     rejected: dict[str, Array] = field(default_factory=dict)
+    unused: dict[str, Array] = field(default_factory=dict)
+    lags: Array = field(default_factory=lambda: np.empty(0, LAG))
 
 
 class Engine(Protocol):

@@ -1,5 +1,7 @@
 """Check the sensors of a recording as those of a live tag are checked, and a little better: the end is known, too."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from dropanchor_schemas.rejections import Reason
@@ -51,9 +53,9 @@ class CheckedEngine:
             self._engine.configure(row, self._without_start())
         if len(checked.found):
             self._note(samples)
-            left_out = {Reason.SENSOR_FAULT: checked.left_out} if len(checked.left_out) else {}
-            poses = np.concatenate([made.poses, checked.poses])
-            return PoseBatch(poses, made.hypotheses, made.innovations, made.rejected | left_out)
+            left_out = np.concatenate(checked.left_out)
+            rejected = made.rejected | ({Reason.SENSOR_FAULT: left_out} if len(left_out) else {})
+            return replace(made, poses=np.concatenate([made.poses, checked.poses]), rejected=rejected)
         return made
 
     @property

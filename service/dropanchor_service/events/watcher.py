@@ -122,12 +122,12 @@ class Watcher:
         poses = self._known(poses, waiting)
         if not self._zones.has_zones or not len(poses):
             return
-        for change in self._zones.judge(placed(poses, self._rows.age_s(poses, now_ns), self._latest)):
+        for change in self._zones.judge(placed(poses, self._rows.overdue_s(poses, now_ns), self._latest)):
             self.sites[self._rows.at(change.row).site].note(change)
 
     def _judge_pairs(self, now_ns: int, waiting: set[int]) -> None:
         poses = self._known(self._latest.since()[1], waiting)
-        rows, modes = placed(poses, self._rows.age_s(poses, now_ns), self._latest).single()
+        rows, modes = placed(poses, self._rows.overdue_s(poses, now_ns), self._latest).single()
         of_site = self._rows.sites(rows)
         order = np.argsort(of_site, kind="stable")
         rows, modes, of_site = rows[order], modes[order], of_site[order]
@@ -139,7 +139,7 @@ class Watcher:
     def _judge_tags(self, now_ns: int, waiting: set[int]) -> None:
         states = np.full(len(self._zones), -1, np.int64)
         poses = self._known(self._latest.since()[1], waiting)
-        aged = aged_poses(poses, self._rows.age_s(poses, now_ns))
+        aged = aged_poses(poses, self._rows.overdue_s(poses, now_ns))
         states[aged["row"]] = aged["state"]
         for index in self._with_tag_rules.keys() - waiting:
             self._with_tag_rules[index].judge_tags(states, now_ns)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.site import TagSettings
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import (
@@ -168,14 +169,19 @@ class GuardedEngine:
             yield batch
         if len(checked.found):
             self._note_findings(checked)
-            yield PoseBatch(poses=checked.poses, rejected={Reason.SENSOR_FAULT: checked.left_out})
+            unused = dict(zip((kind.name for kind in KINDS), checked.left_out, strict=True))
+            yield PoseBatch(
+                poses=checked.poses,
+                rejected={Reason.SENSOR_FAULT: np.concatenate(checked.left_out)},
+                unused={name: rows for name, rows in unused.items() if len(rows)},
+            )
 
     def _note_findings(self, checked: Checked) -> None:
         """Tell what is wrong with sensors, and forget what was estimated with them."""
         for row in checked.found.tolist():
             self._sites.rows.findings.set(row, self._sensors.findings(row))
         for row in checked.failed.tolist():
-            self._configure(row, start_known=False)
+            self.restart(row)
 
     def note_absurd(self, imu_rows: Array, imu_sizes: Array, range_rows: Array) -> None:
         """Note samples that no sensor can have measured. imu_sizes: the greatest value of each."""

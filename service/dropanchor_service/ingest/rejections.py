@@ -17,9 +17,14 @@ class Rejections:
         self._rows = rows
         self._metrics = metrics
 
-    def count_rejected(self, reason: Reason, rows: Array) -> None:
-        """Count a rejected message or sample for each entry of `rows`."""
+    def count_rejected(self, reason: Reason, rows: Array, what: str | None = None) -> None:
+        """Count a rejected message or sample for each entry of `rows`.
+
+        what: the kind of samples that do not reach the engine, or MESSAGE for unreadable messages.
+        """
         if len(rows):
+            if what is not None:
+                self._rows.count_screened(what, rows)
             self._rows.count_rejected(reason, rows)
             self._metrics.rejected.labels(reason).inc(len(rows))
 

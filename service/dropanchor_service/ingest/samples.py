@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from dropanchor_schemas.kinds import SCALARS
+from dropanchor_schemas.kinds import KINDS, SCALARS, Kind
 from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
 from dropanchor_service.ingest.buffer import Message
@@ -18,7 +19,9 @@ from dropanchor_service.ingest.reorder_buffer import ReorderBuffer
 from dropanchor_service.ingest.screening import Rejected, absurd_imu, keep, screen
 from dropanchor_service.ingest.times import in_time, times_of
 from dropanchor_service.store import Sites
+from dropanchor_service.store.arrivals import Arrived
 from dropanchor_service.store.rings import rank_in_row
+from dropanchor_service.store.rows import MESSAGE
 
 REORDER_BYTES = 2**26
 _DTYPES = [column.dtype for column in SampleBatch().columns()]
@@ -40,6 +43,14 @@ class Ordered:
     sequenced: Sequenced
     of_row: Array
     arrived: Array
+
+
+class _Spans(NamedTuple):
+    """The times of the oldest and the newest sample of each message, and of the newest of each kind; -1 for none."""
+
+    oldest: Array
+    newest: Array
+    newest_of: Array  # (kinds, messages)
 
 
 class SampleReader:
@@ -81,7 +92,8 @@ class SampleReader:
         read = self._forms(payloads, encodings)
         of_row, arrived = np.array(rows, np.int32), np.array(arrivals, np.int64)
         for reason in {reason for _, reason in read.rejected}:
-            self._rejections.count_rejected(reason, of_row[[index for index, why in read.rejected if why == reason]])
+            refused = [index for index, why in read.rejected if why == reason]
+            self._rejections.count_rejected(reason, of_row[refused], MESSAGE)
         waited = len(messages) - len(fresh)
         sequenced = self._publishers.sequence(read.forms, of_row, arrived, due_ns, waited)
         self._rejections.count_given_up(sequenced.missing)
@@ -124,7 +136,7 @@ class SampleReader:
             for samples in early:
                 samples.record(self._rows, of_row, arrived)
             spans = _spans(timed)
-            self._note_replays(timed, due, of_row, arrived, spans[1])
+            self._note_replays(timed, due, of_row, arrived, spans.newest)
             yield self._batch(timed, rejected, due, of_row, arrived, spans)
 
     def _note_absurd(self, sent: Decoded, rejected: list[Rejected], of_row: Array) -> None:
@@ -162,15 +174,17 @@ class SampleReader:
         self._rows.set_replay_lag(of_row[due], np.where(replayed, arrived[due] - newest[due], 0))
 
     def _note_arrivals(
-        self, decoded: Decoded, ranges: Array, due: Array, of_row: Array, arrived: Array, spans: tuple[Array, Array]
+        self, decoded: Decoded, ranges: Array, due: Array, of_row: Array, arrived: Array, spans: _Spans
     ) -> None:
         """Record when the samples of live tags arrived. ranges: those to anchors of the site."""
-        oldest, newest = spans
+        oldest, newest, newest_of = spans
         filled = due[newest[due] >= 0]
         self.span_ns = int((newest[filled] - oldest[filled]).min(initial=MAX_T_NS))
         live = filled[~decoded.forms["replay"][filled].astype(bool)]
         counts = np.bincount(ranges["message"], minlength=len(of_row))
-        self._rows.arrivals.record(of_row[live], arrived[live], oldest[live], newest[live], counts[live])
+        zeros = np.bincount(ranges["message"][ranges["value"] == 0.0], minlength=len(of_row))
+        times = (arrived[live], oldest[live], newest[live], newest_of[:, live])
+        self._rows.arrivals.record(Arrived(of_row[live], *times, counts[live], zeros[live]))
 
     def _batch(
         self,
@@ -179,16 +193,16 @@ class SampleReader:
         due: Array,
         of_row: Array,
         arrived: Array,
-        spans: tuple[Array, Array],
+        spans: _Spans,
     ) -> SampleBatch:
         self._note_unknown_anchors(decoded, of_row, arrived)
         scalars = [
-            self._anchored(column, of_row, rejected) if kind.has_anchor else column
+            self._anchored(column, kind, of_row, rejected) if kind.has_anchor else column
             for kind, column in zip(SCALARS, decoded.columns()[1:], strict=True)
         ]
         self._note_arrivals(decoded, scalars[0], due, of_row, arrived, spans)
         for entry in rejected:
-            self._rejections.count_rejected(entry.reason, of_row[entry.messages])
+            self._rejections.count_rejected(entry.reason, of_row[entry.messages], entry.kind)
         return SampleBatch(
             _imu_column(decoded.imu, of_row),
             *(_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
@@ -228,13 +242,13 @@ class SampleReader:
         """Return the engine's index of the anchor of each sample, -1 if the site of its tag lacks it."""
         return self._engine.anchor_indices(of_row[samples["message"]], samples["anchor"])
 
-    def _anchored(self, samples: Array, of_row: Array, rejected: list[Rejected]) -> Array:
+    def _anchored(self, samples: Array, kind: Kind, of_row: Array, rejected: list[Rejected]) -> Array:
         """Return the samples of known anchors, with the engine's index of the anchor in `anchor`."""
         if not len(samples):
             return samples
         indices = self._indices(samples, of_row)
         unknown = indices < 0
-        kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, rejected)
+        kept = keep(samples, unknown, Reason.ANCHOR_UNKNOWN, kind.name, rejected)
         kept["anchor"] = indices[~unknown]
         return kept
 
@@ -254,12 +268,12 @@ def _one_per_row(due: Array, of_row: Array) -> list[Array]:
     return [due[ranks == rank] for rank in range(int(ranks.max(initial=-1)) + 1)]
 
 
-def _spans(decoded: Decoded) -> tuple[Array, Array]:
-    """Return the times of the oldest and the newest sample of each message; the newest is -1 without a sample."""
-    oldest, newest = np.full(len(decoded.forms), MAX_T_NS, np.int64), np.full(len(decoded.forms), -1, np.int64)
-    for messages, t_ns in times_of(decoded):
-        time_spans(t_ns, messages, oldest, newest)
-    return oldest, newest
+def _spans(decoded: Decoded) -> _Spans:
+    messages = len(decoded.forms)
+    oldest, newest_of = np.full(messages, MAX_T_NS, np.int64), np.full((len(KINDS), messages), -1, np.int64)
+    for (indices, t_ns), newest in zip(times_of(decoded), newest_of, strict=True):
+        time_spans(t_ns, indices, oldest, newest)
+    return _Spans(oldest, newest_of.max(axis=0), newest_of)
 
 
 def _imu_column(samples: Array, of_row: Array) -> Array:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropanchor_schemas.kinds import SCALARS
+from dropanchor_schemas.kinds import IMU, SCALARS
 from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.ingest.decode import Decoded
@@ -18,9 +18,10 @@ _OF_SCALARS = [_COMMON | {values.NEGATIVE: kind.below, values.ABSURD: kind.above
 
 @dataclass(frozen=True)
 class Rejected:
-    """Rejected samples. messages: index of the message of each."""
+    """Rejected samples of one kind. messages: index of the message of each."""
 
     reason: Reason
+    kind: str
     messages: Array
 
 
@@ -30,7 +31,7 @@ def screen(decoded: Decoded) -> tuple[Decoded, list[Rejected]]:
     imu, *scalars = decoded.columns()
     columns = [_screened_imu(imu, rejected)]
     for kind, reasons, column in zip(SCALARS, _OF_SCALARS, scalars, strict=True):
-        columns.append(_screened(column, (*kind.limits, *kind.std_limits), reasons, rejected))
+        columns.append(_screened(column, (*kind.limits, *kind.std_limits), reasons, kind.name, rejected))
     return decoded.with_columns(columns), rejected
 
 
@@ -41,11 +42,11 @@ def absurd_imu(imu: Array) -> tuple[Array, Array]:
     return imu[beyond], sizes[beyond].max(axis=1, initial=0.0)
 
 
-def keep(samples: Array, bad: Array, reason: Reason, rejected: list[Rejected]) -> Array:
+def keep(samples: Array, bad: Array, reason: Reason, kind: str, rejected: list[Rejected]) -> Array:
     """Return the samples that are not `bad`, and add the others to `rejected`."""
     if not bad.any():
         return samples
-    rejected.append(Rejected(reason, samples["message"][bad]))
+    rejected.append(Rejected(reason, kind, samples["message"][bad]))
     return samples[~bad]
 
 
@@ -53,21 +54,25 @@ def _screened_imu(imu: Array, rejected: list[Rejected]) -> Array:
     verdicts = np.empty(len(imu), np.uint8)
     if not len(imu) or not values.judge_imu(imu, verdicts):
         return imu
-    return _good(imu, verdicts, _OF_IMU, rejected)
+    return _good(imu, verdicts, _OF_IMU, IMU.name, rejected)
 
 
 def _screened(
-    samples: Array, limits: tuple[float, float, float, float], reasons: Mapping[int, Reason], rejected: list[Rejected]
+    samples: Array,
+    limits: tuple[float, float, float, float],
+    reasons: Mapping[int, Reason],
+    kind: str,
+    rejected: list[Rejected],
 ) -> Array:
     verdicts = np.empty(len(samples), np.uint8)
     if not len(samples) or not values.judge_scalars(samples["value"], samples["std"], *limits, verdicts):
         return samples
-    return _good(samples, verdicts, reasons, rejected)
+    return _good(samples, verdicts, reasons, kind, rejected)
 
 
-def _good(samples: Array, verdicts: Array, reasons: Mapping[int, Reason], rejected: list[Rejected]) -> Array:
+def _good(samples: Array, verdicts: Array, reasons: Mapping[int, Reason], kind: str, rejected: list[Rejected]) -> Array:
     for verdict in np.unique(verdicts[verdicts != values.GOOD]).tolist():
-        rejected.append(Rejected(reasons[verdict], samples["message"][verdicts == verdict]))
+        rejected.append(Rejected(reasons[verdict], kind, samples["message"][verdicts == verdict]))
     good: Array = samples[verdicts == values.GOOD]
     return good
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.times import EARLIEST_UTC_NS
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array
@@ -41,14 +42,13 @@ def in_time(decoded: Decoded, offsets: TimeOffsets, rejected: list[Rejected]) ->
     if not outside:
         return decoded, []
     columns, every = [], []
-    for column, of_messages in zip(
-        decoded.columns(), [offsets.motion, *[offsets.messages] * len(scalars)], strict=True
-    ):
-        kept = keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, rejected)
+    of_kinds = [offsets.motion, *[offsets.messages] * len(scalars)]
+    for kind, column, of_messages in zip(KINDS, decoded.columns(), of_kinds, strict=True):
+        kept = keep(column, ~within_time(column["t_ns"]), Reason.TIME_OUT_OF_RANGE, kind.name, rejected)
         is_early = kept["t_ns"] < EARLIEST_UTC_NS
         if is_early.any():
             every.append(_early(kept[is_early], of_messages))
-        columns.append(keep(kept, is_early, Reason.TIME_NOT_UTC, rejected))
+        columns.append(keep(kept, is_early, Reason.TIME_NOT_UTC, kind.name, rejected))
     return decoded.with_columns(columns), every
 
 

@@ -184,11 +184,12 @@ class Ingest:
     def _outside_quarantine(self, samples: SampleBatch, now_ns: int) -> SampleBatch:
         if not self._engine.any_quarantined(now_ns):
             return samples
-        return SampleBatch(*(self._accepted(column, now_ns) for column in samples.columns()))
+        columns = zip(KINDS, samples.columns(), strict=True)
+        return SampleBatch(*(self._accepted(column, kind.name, now_ns) for kind, column in columns))
 
-    def _accepted(self, column: Array, now_ns: int) -> Array:
+    def _accepted(self, column: Array, kind: str, now_ns: int) -> Array:
         quarantined = self._engine.quarantined(column["row"], now_ns)
-        self._rejections.count_rejected(Reason.ESTIMATOR_FAULT, column["row"][quarantined])
+        self._rejections.count_rejected(Reason.ESTIMATOR_FAULT, column["row"][quarantined], kind)
         accepted: Array = column[~quarantined] if quarantined.any() else column
         return accepted
 
@@ -199,8 +200,11 @@ class Ingest:
         for row in self._rows.deleted.intersection(batch.poses["row"].tolist()):
             self._latest.forget(row)  # the samples were pending when the tag was deleted
         self._metrics.poses.inc(len(batch.poses))
+        for kind, rows in batch.unused.items():
+            self._rows.count_unused(kind, rows)
         for reason, rows in batch.rejected.items():
             self._rejections.count_rejected(Reason(reason), rows)
+        self._rows.set_lag(batch.lags)
         self._notify(self._observers.poses, batch.poses)
 
     def _notify(self, observer: Callable[..., None], *values: object) -> None:

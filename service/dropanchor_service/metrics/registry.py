@@ -95,7 +95,7 @@ class FleetGauges(Collector):
 
     def collect(self) -> Iterable[Metric]:
         poses = self._latest.since()[1]
-        aged = aged_poses(poses, self._sites.rows.age_s(poses, self._now_ns()))
+        aged = aged_poses(poses, self._sites.rows.overdue_s(poses, self._now_ns()))
         by_state = np.bincount(aged["state"], minlength=len(STATES))
         tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
         for state, count in zip(STATES, by_state, strict=True):

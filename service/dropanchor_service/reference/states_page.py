@@ -1,9 +1,24 @@
 """The page of tracking states and their reasons, from the enumerations and the hints that people see."""
 
 from dropanchor_schemas.pose import StateReason, TrackingState
+from dropanchor_schemas.rejections import Reason
 from dropanchor_service.answers.columns import REASONS
-from dropanchor_service.answers.hints import FEW_RANGES, HINTS, IN_BURSTS, LATE, MOUNT_UNKNOWN, RELATIVE_HINT
+from dropanchor_service.answers.hints import (
+    ALL_ZERO,
+    FEW_RANGES,
+    HINTS,
+    IN_BURSTS,
+    LAGS,
+    LATE,
+    MOTION_COMES,
+    MOUNT_UNKNOWN,
+    NEEDS_BOTH,
+    RANGES_COME,
+    RELATIVE_HINT,
+)
+from dropanchor_service.answers.unused import BEHIND, NOT_USED, NOUNS, WHY
 from dropanchor_service.reference.markdown import table
+from dropanchor_service.store.rows import MESSAGE
 from dropanchor_service.store.unknown_anchors import hint_about
 from dropanchor_service.store.wrong_times import hint_about_time
 
@@ -25,7 +40,29 @@ Every pose carries a state, a reason for machines and a hint for people. Whoever
 _CAUSES_INTRODUCTION = """\
 Some causes show only in what the tag sends, and not in its state. A hint about one of them replaces that of the reason.
 """
+
+
+def _unused(count: int, of: int, what: str, why: str | None) -> str:
+    return NOT_USED.format(count, of, NOUNS[what], why)
+
+
 _CAUSES = (
+    (
+        "most of the last 5 to 10 s of a kind were not used: `late`, behind the IMU",
+        _unused(399, 401, "range", BEHIND.format(3.1)),
+    ),
+    ("`time_repeated`", _unused(990, 1000, "imu", WHY["imu"][Reason.TIME_REPEATED])),
+    ("`imu_stuck`", _unused(950, 1000, "imu", WHY["imu"][Reason.IMU_STUCK])),
+    ("`range_stuck`", _unused(98, 98, "range", WHY["range"][Reason.RANGE_STUCK])),
+    (
+        "any other [reason](rejections.md), such as `json_schema`",
+        _unused(12, 12, MESSAGE, WHY[MESSAGE][Reason.JSON_SCHEMA]),
+    ),
+    ("five or more ranges of 0, and none other since", ALL_ZERO.format(218)),
+    ("no position yet", NEEDS_BOTH.format(5, 120)),
+    ("`ranges_missing` or `no_range` although ranges arrive", RANGES_COME),
+    ("`imu_missing` although motion arrives", MOTION_COMES),
+    ("nothing is needed, and the IMU samples come in batches", LAGS.format("1.2")),
     ("no message of the last seconds had samples less than a second old", LATE.format(8)),
     ("three times in a row, silence for more than a second and then the samples of that time", IN_BURSTS.format(3)),
     ("more than 1.5 s between two ranges, on average over 6 s", FEW_RANGES.format(2)),

@@ -144,6 +144,11 @@ class IngestSettings(_Section):
     reorder_ms: Annotated[float, Field(ge=0, le=10_000)] = Field(
         default=250.0, description="How long a message waits for missing ones that its publisher numbered before it."
     )
+    max_lag_s: Annotated[float, Field(ge=0.25, le=10)] = Field(
+        default=3.5,
+        description="How long the ranges of a tag wait at most for its IMU samples, once these have been seen to "
+        "arrive in batches, as phones post them. Its poses come that much later. 0.25: never longer than usual.",
+    )
     max_wait_ms: Annotated[float, Field(ge=10, le=60_000)] = Field(
         default=500.0,
         description="When live messages wait longer than this, and longer and longer, each tag loses its oldest ones.",

@@ -13,11 +13,14 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.store.arrivals import Arrivals
 from dropanchor_service.store.findings import SensorFindings
 from dropanchor_service.store.presence import OnlineUntil, Presence
+from dropanchor_service.store.recent import Recent
 from dropanchor_service.store.records import enlarged, take
 from dropanchor_service.store.wrong_times import WrongTimes
 
 FEW = 128  # entries up to which a dictionary counts faster than NumPy
 KINDS = tuple(kind.name for kind in kinds.KINDS)
+MESSAGE = "message"
+SCREENED = (*KINDS, MESSAGE)
 REASONS = tuple(Reason)
 
 COUNTS = np.dtype(
@@ -27,6 +30,8 @@ COUNTS = np.dtype(
         ("messages", "i8"),
         ("samples", "i8", len(KINDS)),
         ("rejected", "u4", len(REASONS)),
+        ("screened", "u4", len(SCREENED)),  # samples that did not reach the engine, and unreadable messages
+        ("unused", "u4", len(KINDS)),  # samples that the engine did not use
     ]
 )
 
@@ -63,6 +68,18 @@ class Tag:
         return _named(KINDS, self.rows.counts(self.row)["samples"])
 
     @property
+    def arrived(self) -> Counter[str]:
+        """The number of samples that arrived in readable messages, by kind."""
+        counts = self.rows.counts(self.row)
+        return _named(KINDS, counts["samples"] + counts["screened"][: len(KINDS)])
+
+    @property
+    def used(self) -> Counter[str]:
+        """The number of samples that the engine used, by kind."""
+        counts = self.rows.counts(self.row)
+        return _named(KINDS, counts["samples"] - counts["unused"])
+
+    @property
     def rejected(self) -> Counter[str]:
         """The number of messages and samples that were rejected, by reason."""
         return _named(REASONS, self.rows.counts(self.row)["rejected"])
@@ -80,10 +97,12 @@ class Rows:
         self._sites = np.zeros(16, np.int32)
         self._counts = np.zeros(16, COUNTS)
         self._replay_lag_ns = np.zeros(16, np.int64)  # how far a replayed tag lies in the past
+        self._lag_ns = np.zeros(16, np.int64)  # how long measurements wait for IMU samples in batches
         self._deleted: frozenset[int] = frozenset()
         self.arrivals = Arrivals()
         self.findings = SensorFindings()
         self.wrong_times = WrongTimes()
+        self.recent = Recent(COUNTS)
         self.online_until = OnlineUntil()
 
     def __len__(self) -> int:
@@ -137,6 +156,7 @@ class Rows:
         """Clear the counters of a row, and note that its tag is deleted."""
         with self._lock:
             self._counts[row] = 0
+            self.recent.drop(row)
             self._deleted |= {row}
 
     def hide(self, row: int) -> None:
@@ -158,6 +178,20 @@ class Rows:
         age_s: Array = (now_ns - self._replay_lag_ns[poses["row"]] - poses["t_ns"]) * 1e-9
         return age_s
 
+    def set_lag(self, lags: Array) -> None:
+        """Set how long the measurements of rows wait for IMU samples. lags: LAG."""
+        self._lag_ns[lags["row"]] = lags["lag_ns"]
+
+    def lag_s(self, rows: int | Array) -> Array:
+        """Return how late the poses of these rows come, at most, because they wait for IMU samples in batches; s."""
+        lag_s: Array = self._lag_ns[rows] * 1e-9
+        return lag_s
+
+    def overdue_s(self, poses: Array, now_ns: int) -> Array:
+        """Return the age of each POSE without the time that it waited for IMU samples in batches, s."""
+        overdue_s: Array = self.age_s(poses, now_ns) - self.lag_s(poses["row"])
+        return overdue_s
+
     def counts(self, row: int | Array) -> Array:
         """Return the counters of one row, or of several."""
         return self._counts[row]
@@ -169,9 +203,11 @@ class Rows:
     def restore_counts(self, counts: Array) -> None:
         """Load the counters of the rows that earlier rows had."""
         self._counts[: len(counts)] = counts
+        self.recent.forget()
 
     def count_messages(self, rows: Array, now_ns: int) -> None:
         """Count one message for each entry of `rows`, and note the time. A row may appear several times."""
+        self.recent.follow(rows, self._counts, now_ns)
         first = self._counts["first_heard_ns"]
         first[rows[first[rows] == 0]] = now_ns
         self._counts["last_heard_ns"][rows] = now_ns
@@ -181,15 +217,31 @@ class Rows:
         """Count one sample for each entry of `rows`. The entries of one message stand side by side."""
         _count(self._counts["samples"][:, KINDS.index(kind)], rows)
 
+    def count_screened(self, what: str, rows: Array) -> None:
+        """Count one sample of this kind that did not reach the engine, or a message, for each entry of `rows`."""
+        self.recent.begin(rows, self._counts)
+        _count(self._counts["screened"][:, SCREENED.index(what)], rows)
+
+    def count_unused(self, kind: str, rows: Array) -> None:
+        """Count one sample that the engine did not use for each entry of `rows`."""
+        self.recent.begin(rows, self._counts)
+        _count(self._counts["unused"][:, KINDS.index(kind)], rows)
+
+    def recent_counts(self, rows: Array) -> dict[str, Array]:
+        """Return the counters of these rows, which `recent` knows, in the last 5 to 10 s that they sent something."""
+        return self.recent.of(rows, self._counts)
+
     def count_rejected(self, reason: Reason, rows: Array) -> None:
         """Count one rejection for each entry of `rows`."""
         _count(self._counts["rejected"][:, REASONS.index(reason)], rows)
 
     def _grow(self, rows: int) -> None:
         self.arrivals.grow(rows)
+        self.recent.grow(rows)
         if rows > len(self._counts):
             self._counts = enlarged(self._counts, 2 * len(self._counts))
             self._replay_lag_ns = enlarged(self._replay_lag_ns, len(self._counts))
+            self._lag_ns = enlarged(self._lag_ns, len(self._counts))
             self._sites = enlarged(self._sites, len(self._counts))
 
 

@@ -68,6 +68,13 @@ test("the age grows while no frames arrive", () => {
   assert.equal(fleet.age(0, 3000), 2.5);
 });
 
+test("a pose that comes late because the tag sends its motion in batches is not stale", () => {
+  const fleet = new Fleet();
+  fleet.replace(frame(["a", "b"], { age_s: [2.5, 2.5] }), 1000);
+  fleet.describe(new Map([["a", { settings: {}, lag_s: 3.1 }]]));
+  assert.deepEqual([fleet.staleness(0, 1000), fleet.staleness(1, 1000)], [0, 1]);
+});
+
 test("an unknown state is not trusted", () => {
   assert.equal(STATES[stateNumber("splendid")].trusted, false);
 });

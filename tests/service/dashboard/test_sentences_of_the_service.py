@@ -11,7 +11,7 @@ import pytest
 
 from dropanchor_schemas.rejections import Reason
 from dropanchor_schemas.zones import Polygon
-from dropanchor_service.answers import hints
+from dropanchor_service.answers import hints, unused
 from dropanchor_service.answers.care import care_of
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.api.app import DASHBOARD
@@ -44,9 +44,12 @@ console.log(JSON.stringify([...sentences.map(said), ...codes.map(words), ...refu
 def hints_of_poses() -> Iterator[str]:
     yield from filter(None, hints.HINTS)
     yield hints.RELATIVE_HINT
-    yield hints.MOUNT_UNKNOWN
-    for template in (hints.LATE, hints.IN_BURSTS, hints.FEW_RANGES):
+    yield from (hints.MOUNT_UNKNOWN, hints.RANGES_COME, hints.MOTION_COMES, hints.NEEDS_BOTH.format(5, 120))
+    for template in (hints.LATE, hints.IN_BURSTS, hints.FEW_RANGES, hints.ALL_ZERO, hints.LAGS):
         yield template.format(8)
+    for what, reasons in unused.WHY.items():
+        for why in (*filter(None, reasons.values()), unused.BEHIND.format(3.1)):
+            yield unused.NOT_USED.format(399, 401, unused.NOUNS[what], why)
     for hears_others in (True, False):
         yield hint_about("9A", hears_others=hears_others)
     for unit_ns in (1, 10**3, 10**6, 10**9):

@@ -1,7 +1,7 @@
 """What the engine does not use is counted for its tag, as what the ingest rejects is."""
 
 from dropanchor_schemas import Anchor, Site, StartPose, TagSettings
-from dropanchor_schemas.wire import Frame, HeadingSample, RangeSample
+from dropanchor_schemas.wire import Frame, HeadingSample, ImuSample, RangeSample
 from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.store import Tag
 from support.ingest import IngestBench
@@ -47,3 +47,23 @@ def test_the_ranges_of_a_stuck_radio_are_counted_for_their_tag() -> None:
         bench.ingest.turn()
     assert tag_of(bench, "stuck").rejected == bench.rejected() == {"range_stuck": 8}
     assert tag_of(bench, "sound").rejected == {}
+
+
+def test_imu_samples_that_share_a_time_or_repeat_themselves_are_counted_for_their_tag() -> None:
+    bench = bench_with("same-time", "frozen", "sound")
+    for step in range(100):
+        t_ns, turning = T + step * STEP_NS // 10, (0.0, 0.0, 0.01 * (step % 7))
+        for tag, t, gyro in (
+            ("sound", t_ns, turning),
+            ("same-time", t_ns - t_ns % STEP_NS, turning),
+            ("frozen", t_ns, (0.0, 0.0, 0.01) if step > 20 else turning),
+        ):
+            bench.put(tag, Frame(imu=[ImuSample(t, (0.0, 0.0, 9.81), gyro)]))
+        bench.ingest.turn()
+    assert tag_of(bench, "same-time").rejected == {"time_repeated": 90}
+    assert tag_of(bench, "same-time").used == {"imu": 10}
+    stuck = tag_of(bench, "frozen").rejected["imu_stuck"]
+    assert 50 < stuck < 60  # it takes a quarter of a second to tell
+    assert tag_of(bench, "frozen").used == {"imu": 100 - stuck}
+    assert tag_of(bench, "sound").rejected == {}
+    assert tag_of(bench, "sound").used == tag_of(bench, "sound").arrived == {"imu": 100}

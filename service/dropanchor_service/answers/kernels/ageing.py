@@ -21,8 +21,10 @@ _RANGES_MISSING: Final = int(StateReason.RANGES_MISSING)
 
 @njit(cache=True, nogil=True)
 def age_poses(poses: Any, age_s: Any) -> None:
-    """Set the state and reason that POSE rows have at this age, in place."""
+    """Set the state and reason that POSE rows have at this age, in place. What never had a place cannot lose it."""
     for i in range(len(poses)):
+        if not math.isfinite(poses[i].x):
+            continue
         lost = age_s[i] > LOST_AFTER_S
         if lost or (age_s[i] > STALE_AFTER_S and poses[i].state == _TRACKING):
             poses[i].state = _LOST if lost else _COASTING

@@ -199,7 +199,7 @@ def _statuses(
     configured = answers.site.tags
     for tag in tags:
         offset = offsets.get(tag.row)
-        first, last, messages, samples, rejected = answers.tags.counts(tag.row).item()
+        first, last, messages, samples, rejected, *_ = answers.tags.counts(tag.row).item()
         yield {
             "tag": tag.name,
             "online": tag.online,
@@ -207,7 +207,10 @@ def _statuses(
             "last_heard_ns": last or None,
             "messages": messages,
             "samples": {kind: count for kind, count in zip(KINDS, samples.tolist(), strict=True) if count},
+            "arrived": dict(tag.arrived),
+            "used": dict(tag.used),
             "rejected": {name: count for name, count in zip(_REASON_NAMES, rejected.tolist(), strict=True) if count},
+            "lag_s": float(answers.tags.rows.lag_s(tag.row)),
             "hint": answers.hint_of(tag),
             "unknown_anchor": answers.unknown_anchor_of(tag),
             "health": health_answer(answers.health.of(tag.row), now_ns),

@@ -23,6 +23,8 @@ const VALUES = /** @type {const} */ (["reason", "hint", "frame", "anchor", "hypo
 
 /** @typedef {{name?: string, group?: string, colour?: string | null}} Given by an operator to a tag */
 
+/** @typedef {{settings: Given, lag_s?: number}} Described */
+
 /**
  * A frame of the stream: `tags` and columns beside it. Values of a missing column stay unchanged.
  * @typedef {{t_ns: number, tags: string[]} & Record<string, any>} Frame
@@ -44,7 +46,9 @@ export class Fleet {
   groups = [];
   /** Empty: none. @type {string[]} */
   colours = [];
-  /** @type {ReadonlyMap<string, {settings: Given}>} */
+  /** Seconds by which the poses come late, because the tag sends its motion in batches. @type {number[]} */
+  lags = [];
+  /** @type {ReadonlyMap<string, Described>} */
   #described = new Map();
   /** @type {Map<string, number>} */
   #rows = new Map();
@@ -77,7 +81,7 @@ export class Fleet {
 
   /** 0 fresh, 1 stale, 2 old. @param {number} row @param {number} now_ms @returns {0 | 1 | 2} */
   staleness(row, now_ms) {
-    return this.current ? staleness(this.age(row, now_ms)) : 2;
+    return this.current ? staleness(this.age(row, now_ms) - this.lags[row]) : 2;
   }
 
   /** Return whether a pose is turned about the anchor by an unknown angle, so that it is no place of the map. @param {number} row */
@@ -90,7 +94,7 @@ export class Fleet {
     return row >= 0 && !Number.isNaN(this.poseTime[row]);
   }
 
-  /** Set what an operator has given to the tags, by name. @param {ReadonlyMap<string, {settings: Given}>} statuses */
+  /** Set what an operator has given to the tags, and how late they are, by name. @param {ReadonlyMap<string, Described>} statuses */
   describe(statuses) {
     this.#described = statuses;
     for (let row = 0; row < this.size; row++) this.#describeRow(row);
@@ -98,12 +102,14 @@ export class Fleet {
 
   /** @param {number} row */
   #describeRow(row) {
-    const { name = "", group = "", colour = null } = this.#described.get(this.names[row])?.settings ?? {};
+    const { settings, lag_s = 0 } = this.#described.get(this.names[row]) ?? {};
+    const { name = "", group = "", colour = null } = settings ?? {};
     const label = name || this.names[row];
     if (label !== this.labels[row] || group !== this.groups[row]) this.membership++;
     this.labels[row] = label;
     this.groups[row] = group;
     this.colours[row] = colour ?? "";
+    this.lags[row] = lag_s;
   }
 
   /** Apply a frame that changes some tags. @param {Frame} frame @param {number} now_ms */
@@ -130,6 +136,7 @@ export class Fleet {
     this.labels = [];
     this.groups = [];
     this.colours = [];
+    this.lags = [];
     this.#rows.clear();
     this.membership++;
   }

@@ -15,6 +15,7 @@ const REQUEST_MS_PER_TAG = 5;
  * @property {boolean} online
  * @property {Record<string, number>} samples by kind
  * @property {Record<string, number>} rejected by reason
+ * @property {number} [lag_s] how late its poses come at most, because it sends its motion in batches
  * @property {string} hint what a person can do so that more samples are used; empty when there is nothing to do
  * @property {string | null} unknown_anchor an anchor that the tag ranges to although the site does not have it
  * @property {Health | null} health what the tag reports about itself

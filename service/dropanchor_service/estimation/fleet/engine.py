@@ -8,11 +8,19 @@ from dropanchor_service.estimation.fleet.belief.pool import make_pool, release, 
 from dropanchor_service.estimation.fleet.belief.step import advance
 from dropanchor_service.estimation.fleet.configure import configure_row
 from dropanchor_service.estimation.fleet.frontend.assembly import assemble_nodes
+from dropanchor_service.estimation.fleet.frontend.batching import MAX_LAG_S
 from dropanchor_service.estimation.fleet.frontend.node import NODE
 from dropanchor_service.estimation.fleet.frontend.ordering import SampleQueue
 from dropanchor_service.estimation.fleet.frontend.platform import PLATFORM
 from dropanchor_service.estimation.fleet.frontend.state import FRONTEND, start_frontend
-from dropanchor_service.estimation.fleet.outputs import innovations_of, modes_of, poses_of, stuck_ranges_of
+from dropanchor_service.estimation.fleet.outputs import (
+    innovations_of,
+    modes_of,
+    poses_of,
+    skipped_of,
+    stuck_ranges_of,
+    with_rows,
+)
 from dropanchor_service.estimation.fleet.tuning import Tuning
 
 HARD_IRON, HARD_IRON_CALIBRATED = 1.0, 0.05  # prior sd of a magnetometer's hard iron, in units of the field
@@ -21,11 +29,14 @@ _BY_ROW = ("rows", "fronts", "platforms")
 
 
 class FleetEngine:
-    """Implement `Engine` and `Restorable`. A checkpoint copies the rows, the pool and the pending samples."""
+    """Implement `Engine` and `Restorable`. A checkpoint copies the rows, the pool and the pending samples.
+
+    max_lag_s: how long the measurements of a row wait at most for IMU samples that come in batches.
+    """
 
     name = "fleet"
 
-    def __init__(self, tuning: Tuning | None = None) -> None:
+    def __init__(self, tuning: Tuning | None = None, max_lag_s: float = MAX_LAG_S) -> None:
         self._tuning = tuning or Tuning()
         self._tuning_record = self._tuning.record()
         self._anchors = np.zeros(0, ANCHOR)
@@ -35,7 +46,7 @@ class FleetEngine:
         self._platforms = np.zeros(0, PLATFORM)
         self._pool = make_pool(MAX_HYPOTHESES * 2)
         self._workspace = make_workspace()
-        self._queue = SampleQueue()
+        self._queue = SampleQueue(max_lag_s)
 
     def set_anchors(self, anchors: Array) -> None:
         """Set ANCHOR, which the `anchor` columns of samples index."""
@@ -52,20 +63,25 @@ class FleetEngine:
         self._queue.forget(row)
 
     def process(self, samples: SampleBatch) -> PoseBatch:
-        """Fuse the samples that are due. Measurements ahead of their row's IMU wait for it, 250 ms at most."""
+        """Fuse the samples that are due. Measurements ahead of their row's IMU wait for it.
+
+        They wait 250 ms at most, or as long as the row's IMU samples have been seen to need, up to max_lag_s.
+        """
         due = self._queue.due(samples, len(self._anchors))
         if not len(due.order):
-            return PoseBatch(rejected=due.rejected)
-        nodes = np.zeros(len(due.order), NODE)
-        nodes = nodes[
-            : assemble_nodes(samples.imu, due.events, due.order, self._fronts, self._platforms, self._rows, nodes)
-        ]
+            return PoseBatch(rejected=due.rejected, unused=due.unused, lags=due.lags)
+        nodes, verdicts = np.zeros(len(due.order), NODE), np.zeros(len(samples.imu), np.uint8)
+        rows = (self._fronts, self._platforms, self._rows)
+        nodes = nodes[: assemble_nodes(samples.imu, due.events, due.order, *rows, nodes, verdicts)]
         beliefs = self._run_belief(nodes)
+        skipped, stuck = skipped_of(samples.imu, verdicts), stuck_ranges_of(nodes, beliefs)
         return PoseBatch(
             poses_of(nodes, beliefs),
             modes_of(nodes, beliefs, self._rows, self._pool, self._anchors, self._workspace),
             innovations_of(nodes, beliefs),
-            due.rejected | stuck_ranges_of(nodes, beliefs),
+            due.rejected | skipped | stuck,
+            with_rows(with_rows(due.unused, "imu", skipped), "range", stuck),
+            due.lags,
         )
 
     def _reserve_rows(self, rows: int) -> None:

@@ -9,10 +9,12 @@ from dropanchor_service.estimation.fleet.belief.layout import Anchors, Beliefs, 
 from dropanchor_service.estimation.fleet.belief.modes import list_modes
 from dropanchor_service.estimation.fleet.belief.states import AMBIGUOUS
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.inertial import REPEATED, STUCK
 from dropanchor_service.estimation.fleet.frontend.node import BEARING, RANGE, Nodes
 
 MODES: Final = 8
 REJECTED_ABOVE: Final = 0.5  # outlier probability above which a measurement hardly moved the belief
+SKIPPED: Final = {REPEATED: "time_repeated", STUCK: "imu_stuck"}
 OF_RANGE, OF_BEARING = int(MeasurementKind.RANGE), int(MeasurementKind.BEARING)
 
 
@@ -32,6 +34,21 @@ def stuck_ranges_of(nodes: Nodes, beliefs: Beliefs) -> dict[str, Array]:
     """Return the row of each range that a stuck radio repeated, under the reason of its rejection."""
     stuck = beliefs["stuck"]
     return {"range_stuck": nodes["row"][stuck]} if stuck.any() else {}
+
+
+def skipped_of(imu: Array, verdicts: Array) -> dict[str, Array]:
+    """Return the row of each IMU sample that its front-end did not use, under the reason of its rejection."""
+    if not verdicts.any():
+        return {}
+    by_reason = {reason: imu["row"][verdicts == code] for code, reason in SKIPPED.items()}
+    return {reason: rows for reason, rows in by_reason.items() if len(rows)}
+
+
+def with_rows(by_kind: dict[str, Array], kind: str, rejected: dict[str, Array]) -> dict[str, Array]:
+    """Return `by_kind` with the rows of `rejected`, which are all of one kind."""
+    if not rejected:
+        return by_kind
+    return by_kind | {kind: np.concatenate([*rejected.values(), by_kind.get(kind, np.empty(0, np.int32))])}
 
 
 def modes_of(nodes: Array, beliefs: Array, rows: Array, pool: Array, anchors: Array, workspace: Array) -> Array:

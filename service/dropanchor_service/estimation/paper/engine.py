@@ -26,6 +26,7 @@ from dropanchor_service.estimation.paper.parameters import PaperParameters
 from dropanchor_service.estimation.paper.tag import Tag
 
 IMU, HEADING, RANGE = range(3)  # the order in which samples of the same instant are taken
+KINDS = ("imu", "heading", "range")
 ABSURD = 1e6  # in any unit of a sample
 Event = tuple[int, int, int, tuple[Any, ...]]
 """Row, t_ns, kind, the rest of the sample."""
@@ -59,6 +60,7 @@ class PaperEngine:
         Bearings are not part of the paper and are ignored.
         """
         rejected: dict[str, list[int]] = {}
+        unused: dict[str, list[int]] = {}
         poses: list[PoseValues] = []
         innovations: list[tuple[Any, ...]] = []
         with np.errstate(all="ignore"):  # numbers out of range are a fault of their row, not a warning
@@ -66,6 +68,7 @@ class PaperEngine:
                 reason = self._rejection(event)
                 if reason is not None:
                     rejected.setdefault(reason, []).append(event[0])
+                    unused.setdefault(KINDS[event[2]], []).append(event[0])
                     continue
                 pose = self._take(event)
                 if pose is not None:
@@ -75,6 +78,7 @@ class PaperEngine:
             _poses(poses),
             innovations=np.array(innovations, INNOVATION),
             rejected={reason: np.array(rows, np.int32) for reason, rows in rejected.items()},
+            unused={kind: np.array(rows, np.int32) for kind, rows in unused.items()},
         )
 
     def _innovation(self, event: Event) -> Iterator[tuple[Any, ...]]:

@@ -21,12 +21,12 @@ def _no_rows() -> Array:
 @dataclass(frozen=True)
 class Checked:
     """samples: those that may be used. poses: POSE of the tags whose samples may not. left_out: the row of each sample
-    that may not be used. failed: rows that have just failed, so that their estimate is worth nothing. found: rows of
+    that may not be used, for every kind. failed: rows that have just failed, so that their estimate is worth nothing. found: rows of
     these samples with a fault, and those that have just lost one."""
 
     samples: SampleBatch
     poses: Array = field(default_factory=lambda: np.empty(0, POSE))
-    left_out: Array = field(default_factory=_no_rows)
+    left_out: tuple[Array, ...] = ()
     failed: Array = field(default_factory=_no_rows)
     found: Array = field(default_factory=_no_rows)
 
@@ -81,7 +81,7 @@ class SensorCheck:
         rows = np.unique(np.concatenate([column["row"] for column in samples.columns()]))
         found = rows[faulty[rows] | was_faulty[rows]]
         left = [unusable[column["row"]] for column in samples.columns()]
-        left_out = np.concatenate([column["row"][out] for column, out in zip(samples.columns(), left, strict=True)])
+        left_out = tuple(column["row"][out] for column, out in zip(samples.columns(), left, strict=True))
         kept = SampleBatch(*(column[~out] for column, out in zip(samples.columns(), left, strict=True)))
         failed = rows[unusable[rows] & ~was_unusable[rows]]
         return Checked(self._widened(kept), _poses_of(samples, unusable), left_out, failed, found)

@@ -75,9 +75,19 @@ def _is_long(front: Frontend, platform: Platform, t_ns: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def assemble_nodes(
-    imu: Array, events: Array, order: Array, fronts: Array, platforms: Array, rows: Array, nodes: Nodes
+    imu: Array,
+    events: Array,
+    order: Array,
+    fronts: Array,
+    platforms: Array,
+    rows: Array,
+    nodes: Nodes,
+    verdicts: Array,
 ) -> int:
-    """Fill `nodes` from the samples in `order`, which index IMU and, behind it, EVENT. Return the number of nodes."""
+    """Fill `nodes` from the samples in `order`, which index IMU and, behind it, EVENT. Return the number of nodes.
+
+    verdicts: what became of each IMU sample.
+    """
     n = 0
     for k in range(len(order)):
         index = order[k]
@@ -86,7 +96,7 @@ def assemble_nodes(
             sample = imu[index]
             r, t_ns = sample.row, sample.t_ns
             row, front, platform = rows[r], fronts[r], platforms[r]
-            add_sample(front, t_ns, sample.acc, sample.gyro, sample.mag)
+            verdicts[index] = add_sample(front, t_ns, sample.acc, sample.gyro, sample.mag)
             if not _is_long(front, platform, t_ns):
                 continue
             _close(front, platform, row, t_ns, node)

@@ -23,4 +23,5 @@ Event: TypeAlias = Any  # a record of EVENT
 
 ANCHOR_UNKNOWN, NOT_FINITE, LATE = range(3)
 REASONS: Final = {"anchor_unknown": ANCHOR_UNKNOWN, "not_finite": NOT_FINITE, "late": LATE}
-REJECTION: Final = np.dtype([("row", np.int32), ("reason", np.uint8)])
+REJECTION: Final = np.dtype([("row", np.int32), ("reason", np.uint8), ("kind", np.uint8)])
+KINDS: Final = {IMU_EVENT: "imu", HEADING_EVENT: "heading", RANGE_EVENT: "range", BEARING_EVENT: "bearing"}

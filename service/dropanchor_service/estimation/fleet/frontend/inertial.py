@@ -60,6 +60,7 @@ from dropanchor_service.estimation.fleet.frontend.standstill import (
 from dropanchor_service.estimation.fleet.frontend.state import Frontend, start_at
 
 GAP = 0.5  # s: a longer silence is not integrated over
+USED, REPEATED, STUCK = range(3)  # what became of an IMU sample
 FROZEN = 0.25  # s of samples that are equal to the last bit: no sensor is so quiet, its driver repeats itself
 BIAS_LEFT = 1e-3  # rad/s, sd of the bias in motion after any rest
 BIAS_TAU = 100.0  # s
@@ -106,18 +107,21 @@ def is_frozen(f: Frontend, dt: float, acc: Array, gyro: Array) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> None:
-    """Take one IMU sample (m/s^2, rad/s, any unit of field; acc and mag may be NaN). Skip one that is not newer."""
+def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> int:
+    """Take one IMU sample (m/s^2, rad/s, any unit of field; acc and mag may be NaN). Skip one that is not newer.
+
+    Return whether it was USED, or else why not.
+    """
     if not math.isfinite(gyro[0] + gyro[1] + gyro[2]):
-        return
+        return USED
     if f.running == 0:
         start_at(f, t_ns, acc, gyro)
-        return
+        return USED
     dt = (t_ns - f.t_imu) * 1e-9
     if dt <= 0.0:
-        return
+        return REPEATED
     if is_frozen(f, dt, acc, gyro):
-        return
+        return STUCK
     f.t_imu = t_ns
     a, s, p, c = f.attitude, f.standstill, f.preintegration, f.carrying
     if dt > GAP:
@@ -143,6 +147,7 @@ def add_sample(f: Frontend, t_ns: int, acc: Array, gyro: Array, mag: Array) -> N
             add_carried_sample(c, dt, acc, p.a, a.q, a.gravity, s.quiet == 0.0)
     p.yaw_rate = 0.0 if rest else carried_rate(a) if c.carried == 1 else yaw_rate_of(a)
     update_magnetometer(f.magnetometer, dt, a.q, mag, rest, f.hard_iron, s.bias_var)
+    return USED
 
 
 @njit(cache=True, nogil=True)

@@ -4,8 +4,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import Array, SampleBatch
-from dropanchor_service.estimation.fleet.frontend.event import EVENT, REASONS, REJECTION
+from dropanchor_service.estimation.columns import LAG, Array, SampleBatch
+from dropanchor_service.estimation.fleet.frontend.batching import MAX_LAG_S, REORDER_WINDOW
+from dropanchor_service.estimation.fleet.frontend.event import EVENT, KINDS, REASONS, REJECTION
 from dropanchor_service.estimation.fleet.frontend.pending import (
     NONE,
     ROW_QUEUE,
@@ -14,7 +15,7 @@ from dropanchor_service.estimation.fleet.frontend.pending import (
     append_pending,
     drop_pending,
 )
-from dropanchor_service.estimation.fleet.frontend.sorting import REJECTED, Batch, order_samples
+from dropanchor_service.estimation.fleet.frontend.sorting import REJECTED, TOUCHED, Batch, order_samples
 
 NEVER: Final = np.iinfo(np.int64).min // 2
 FIRST_CAPACITY: Final = 64
@@ -24,18 +25,25 @@ class Due(NamedTuple):
     """Samples that can be fused now. Valid until the next batch.
 
     order: indices into the batch's IMU samples and, behind them, `events` (EVENT); by row, then time, then kind, then
-    arrival. rejected: by reason, the row of each sample of the batch that is not usable.
+    arrival. rejected: by reason, the row of each sample of the batch that is not usable; unused: the same by kind.
+    lags: LAG of the rows of the batch.
     """
 
     events: Array
     order: Array
     rejected: dict[str, Array]
+    unused: dict[str, Array]
+    lags: Array
 
 
 class SampleQueue:
-    """The pending events of all rows, and how far each row has come."""
+    """The pending events of all rows, and how far each row has come.
 
-    def __init__(self) -> None:
+    max_lag_s: how long the measurements of a row wait for its IMU at most, once it has been seen to send in batches.
+    """
+
+    def __init__(self, max_lag_s: float = MAX_LAG_S) -> None:
+        self._max_lag_ns = round(max_lag_s * 1e9) - REORDER_WINDOW
         self._rows = 0
         self._queues = _make_queues(0)
         self._pending = _make_pending(FIRST_CAPACITY)
@@ -61,6 +69,7 @@ class SampleQueue:
             "pending": np.concatenate([np.zeros(0, EVENT), *parts]),
             "imu": self._queues["imu"][: self._rows].copy(),
             "newest": self._queues["newest"][: self._rows].copy(),
+            "batching": self._queues["batching"][: self._rows].copy(),
         }
 
     def restore(self, state: dict[str, Array]) -> None:
@@ -68,7 +77,8 @@ class SampleQueue:
         self._pending, self._batch = _make_pending(FIRST_CAPACITY), _make_batch(FIRST_CAPACITY)
         self._rows = len(state["imu"])
         self._queues = _make_queues(self._rows)
-        self._queues["imu"], self._queues["newest"] = state["imu"], state["newest"]
+        for name in ("imu", "newest", "batching"):
+            self._queues[name] = state[name]
         self._reserve(0, len(state["pending"]))
         for event in state["pending"]:
             append_pending(self._queues[event["row"]], self._pending, event)
@@ -81,15 +91,22 @@ class SampleQueue:
         columns = (samples.imu, samples.headings, samples.ranges, samples.bearings)
         count = sum(map(len, columns))
         self._reserve(count, count - len(samples.imu))
-        ordered = order_samples(*columns, anchors, self._queues[: self._rows], self._pending, self._batch)
+        queues = self._queues[: self._rows]
+        ordered = order_samples(*columns, anchors, queues, self._pending, self._max_lag_ns, self._batch)
         if ordered == NONE:
             raise IndexError("a sample belongs to a row that is not configured: call configure for it first")
-        return Due(self._batch.events, self._batch.order[:ordered], self._rejected())
-
-    def _rejected(self) -> dict[str, Array]:
         rejected = self._batch.rejected[: self._batch.counts[REJECTED]]
-        by_reason = {reason: rejected["row"][rejected["reason"] == code] for reason, code in REASONS.items()}
-        return {reason: rows for reason, rows in by_reason.items() if len(rows)}
+        by_reason = _rows_by(rejected, "reason", {code: reason for reason, code in REASONS.items()})
+        return Due(
+            self._batch.events, self._batch.order[:ordered], by_reason, _rows_by(rejected, "kind", KINDS), self._lags()
+        )
+
+    def _lags(self) -> Array:
+        """Return LAG of the rows of the batch."""
+        rows = self._batch.touched[: self._batch.counts[TOUCHED]]
+        lag_ns, lags = self._queues["batching"]["lag"][rows], np.zeros(len(rows), LAG)
+        lags["row"], lags["lag_ns"] = rows, np.where(lag_ns > 0, lag_ns + REORDER_WINDOW, 0)
+        return lags
 
     def _reserve(self, samples: int, measurements: int) -> None:
         """Make room for this many samples, of which so many measurements may become pending."""
@@ -105,6 +122,14 @@ class SampleQueue:
             slots.append(slot)
             slot = self._pending.following[slot]
         return self._pending.events[slots]
+
+
+def _rows_by(rejected: Array, column: str, names: dict[int, str]) -> dict[str, Array]:
+    """Return the rows of REJECTION by the name that a column has a code of."""
+    if not len(rejected):
+        return {}
+    by_name = {name: rejected["row"][rejected[column] == code] for code, name in names.items()}
+    return {name: rows for name, rows in by_name.items() if len(rows)}
 
 
 def _make_queues(rows: int) -> Array:

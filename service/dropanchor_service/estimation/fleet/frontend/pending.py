@@ -6,6 +6,7 @@ import numpy as np
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.batching import BATCHING
 from dropanchor_service.estimation.fleet.frontend.event import Event
 
 NONE: Final = -1
@@ -17,10 +18,13 @@ ROW_QUEUE: Final = np.dtype(
         ("newest", np.int64),  # ns, newest sample of the row
         ("imu_next", np.int64),  # the same two with the samples of the present batch
         ("newest_next", np.int64),
+        ("imu_oldest", np.int64),  # ns, first IMU sample of the present batch
+        ("batching", BATCHING),
         ("first", np.int32),  # index of the row's first sample in the batch; UNTOUCHED: it has none
         ("last", np.int32),
         ("pending", np.int32),  # first and last slot of the row's pending events
         ("pending_last", np.int32),
+        ("waiting", np.int32),  # number of pending events
     ]
 )
 RowQueue: TypeAlias = Any  # a record of ROW_QUEUE
@@ -58,6 +62,7 @@ def append_pending(queue: RowQueue, pending: Pending, event: Event) -> None:
     pending.following[0] = pending.following[slot]
     pending.counts[0] += 1
     pending.events[slot] = event
+    queue.waiting += 1
     append_slot(queue, pending, slot)
 
 

@@ -11,10 +11,12 @@ from typing import Any, Final, NamedTuple
 
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.estimation.fleet.compiled import njit
+from dropanchor_service.estimation.fleet.frontend.batching import REORDER_WINDOW, learn_lag
 from dropanchor_service.estimation.fleet.frontend.event import (
     ANCHOR_UNKNOWN,
     BEARING_EVENT,
     HEADING_EVENT,
+    IMU_EVENT,
     LATE,
     NOT_FINITE,
     RANGE_EVENT,
@@ -30,9 +32,9 @@ from dropanchor_service.estimation.fleet.frontend.pending import (
     free_slot,
 )
 
-REORDER_WINDOW: Final = 250_000_000  # ns in which late samples are put in order
 TOLERANCE: Final = 40_000_000  # ns by which the IMU may lag behind a measurement
 IMU_TIMEOUT: Final = 1_000_000_000  # ns without an IMU sample after which no measurement waits for one
+MAX_WAITING: Final = 1024  # events of a row: more than 3.5 s of four anchors at 50 Hz
 
 EVENTS, TOUCHED, REJECTED = range(3)  # indices of the counts of a batch
 
@@ -59,11 +61,13 @@ def order_samples(
     anchors: int,
     queues: Array,
     pending: Pending,
+    max_lag: int,
     batch: Batch,
 ) -> int:
     """Fill batch.order and return how many samples are due.
 
-    Return NONE, with nothing changed, where a sample belongs to a row that is not configured.
+    max_lag: ns by which a row's measurements wait longer than REORDER_WINDOW, at most. Return NONE, with nothing
+    changed, where a sample belongs to a row that is not configured.
     """
     rows = len(queues)
     if not (_within(imu, rows) and _within(headings, rows) and _within(ranges, rows) and _within(bearings, rows)):
@@ -75,16 +79,18 @@ def order_samples(
         _add_event(len(imu), sample, sample.heading, HEADING_EVENT, NONE, queues, batch)
     for k in range(len(ranges)):
         sample = ranges[k]
-        if _anchor_known(sample, anchors, batch):
+        if _anchor_known(sample, anchors, RANGE_EVENT, batch):
             _add_event(len(imu), sample, sample.range, RANGE_EVENT, sample.anchor, queues, batch)
     for k in range(len(bearings)):
         sample = bearings[k]
-        if _anchor_known(sample, anchors, batch):
+        if _anchor_known(sample, anchors, BEARING_EVENT, batch):
             value = sample.bearing if sample.std > 0.0 else math.nan
             _add_event(len(imu), sample, value, BEARING_EVENT, sample.anchor, queues, batch)
     due = 0
     for k in range(batch.counts[TOUCHED]):
         start, queue = due, queues[batch.touched[k]]
+        if queue.imu_next > queue.imu:
+            learn_lag(queue.batching, queue.newest, queue.imu_oldest, queue.imu_next, max_lag)
         queue.imu, queue.newest = queue.imu_next, queue.newest_next
         due = _release_pending(len(imu), queue, pending, batch, start)
         due = _release_new(len(imu), queue, pending, batch.events, batch.following, batch.order, due)
@@ -101,17 +107,17 @@ def _within(column: Array, rows: int) -> bool:
 
 
 @njit(nogil=True)
-def _anchor_known(sample: Any, anchors: int, batch: Batch) -> bool:
+def _anchor_known(sample: Any, anchors: int, kind: int, batch: Batch) -> bool:
     known = bool(0 <= sample.anchor < anchors)
     if not known:
-        _reject(sample.row, ANCHOR_UNKNOWN, batch)
+        _reject(sample.row, ANCHOR_UNKNOWN, kind, batch)
     return known
 
 
 @njit(nogil=True)
-def _reject(row: int, reason: int, batch: Batch) -> None:
+def _reject(row: int, reason: int, kind: int, batch: Batch) -> None:
     rejection = batch.rejected[batch.counts[REJECTED]]
-    rejection.row, rejection.reason = row, reason
+    rejection.row, rejection.reason, rejection.kind = row, reason, kind
     batch.counts[REJECTED] += 1
 
 
@@ -122,13 +128,15 @@ def _add_imu(imu: Array, queues: Array, following: Array, times: Array, touched:
     for index in range(len(imu)):
         sample = imu[index]
         if not math.isfinite(sample.gyro[0] + sample.gyro[1] + sample.gyro[2]):
-            _reject(sample.row, NOT_FINITE, batch)
+            _reject(sample.row, NOT_FINITE, IMU_EVENT, batch)
             continue
         queue, t_ns = queues[sample.row], sample.t_ns
         _open_list(queue, sample.row, touched, counts)
         if t_ns < queue.imu:
-            _reject(sample.row, LATE, batch)
+            _reject(sample.row, LATE, IMU_EVENT, batch)
             continue
+        if queue.imu_next == queue.imu:
+            queue.imu_oldest = t_ns
         queue.imu_next = max(queue.imu_next, t_ns)
         _append_sample(queue, t_ns, index, following, times)
 
@@ -138,12 +146,12 @@ def _add_event(imu_count: int, sample: Any, value: float, kind: int, anchor: int
     """Append a heading, range or bearing to its row's list, unless it is not finite or too late."""
     counts = batch.counts
     if not math.isfinite(value):
-        _reject(sample.row, NOT_FINITE, batch)
+        _reject(sample.row, NOT_FINITE, kind, batch)
         return
     queue = queues[sample.row]
     _open_list(queue, sample.row, batch.touched, counts)
-    if sample.t_ns < queue.newest - REORDER_WINDOW:
-        _reject(sample.row, LATE, batch)
+    if sample.t_ns < max(queue.imu, queue.newest - queue.batching.lag) - REORDER_WINDOW:
+        _reject(sample.row, LATE, kind, batch)
         return
     index = counts[EVENTS]
     counts[EVENTS] += 1
@@ -178,9 +186,10 @@ def _append_sample(queue: RowQueue, t_ns: int, index: int, following: Array, tim
 @njit(nogil=True)
 def _is_due(queue: RowQueue, event: Event) -> bool:
     """Return whether an event need not wait: the row's IMU has caught up, or the wait has been long enough."""
-    if queue.imu >= event.t_ns - TOLERANCE:
+    if queue.imu >= event.t_ns - TOLERANCE or queue.waiting >= MAX_WAITING:
         return True
-    return bool(queue.newest - event.t_ns >= REORDER_WINDOW or queue.newest - queue.imu > IMU_TIMEOUT)
+    reached = queue.newest - queue.batching.lag
+    return bool(reached - event.t_ns >= REORDER_WINDOW or reached - queue.imu > IMU_TIMEOUT)
 
 
 @njit(nogil=True)
@@ -197,6 +206,7 @@ def _release_pending(imu_count: int, queue: RowQueue, pending: Pending, batch: B
             batch.times[imu_count + index] = pending.events[slot].t_ns
             batch.order[end] = imu_count + index
             end += 1
+            queue.waiting -= 1
             free_slot(pending, slot)
         else:
             append_slot(queue, pending, slot)
