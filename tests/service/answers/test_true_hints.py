@@ -90,11 +90,10 @@ def in_millimetres(frame: Frame, _: float) -> Frame:
 
 FAULTS = {
     "same times": (same_times, "N of its last N IMU samples were not used: several have the same time"),
-    "IMU ahead": (imu_ahead, "N of its last N ranges were not used: they are older than its IMU samples by N.N s"),
     "all zero": (all_zero, "Its last N ranges are all N: the radio measures no distance"),
     "frozen": (frozen, "N of its last N IMU samples were not used: they are equal to the last bit"),
     "stuck radio": (stuck_radio, "N of its last N ranges were not used: they are equal although the tag moves"),
-    "millimetres": (in_millimetres, "N of its last N ranges were not used: no radio reaches so far"),
+    "millimetres": (in_millimetres, "The ranges look like millimetres: divide them by N"),
 }
 
 
@@ -109,6 +108,14 @@ def test_no_hint_about_samples_that_arrive_and_are_not_used_is_untrue(name: str)
     tag = watched.bench.tags.find(TAG)
     assert tag is not None
     assert re.sub(r"\d+", "N", watched.answers.hint_of(tag)).startswith(hint) or name == "all zero"
+
+
+def test_an_imu_whose_clock_is_ahead_is_used_and_no_hint_is_untrue() -> None:
+    watched = Watched().drive(15.0, imu_ahead)
+    tag = watched.bench.tags.find(TAG)
+    assert tag is not None
+    assert tag.used["range"] == tag.arrived["range"]
+    assert watched.hints(5.0) == {""}
 
 
 def test_a_hint_about_samples_that_were_not_used_goes_away_when_they_are_used_again() -> None:
@@ -143,12 +150,12 @@ def test_a_tag_that_never_had_a_position_is_not_lost_and_its_hint_says_what_it_n
 
 
 def test_what_arrived_and_what_was_used_are_counted_by_kind() -> None:
-    watched = Watched().drive(5.0, imu_ahead)
+    watched = Watched().drive(5.0, same_times)
     tag = watched.bench.tags.find(TAG)
     assert tag is not None
     assert tag.arrived == tag.samples
-    assert tag.used["imu"] == tag.arrived["imu"]
-    assert tag.arrived["range"] - tag.used["range"] == tag.rejected["late"] > 30
+    assert tag.used["range"] == tag.arrived["range"]
+    assert tag.arrived["imu"] - tag.used["imu"] == tag.rejected["time_repeated"] > 30
     absurd = Watched().drive(5.0, in_millimetres)
     tag = absurd.bench.tags.find(TAG)
     assert tag is not None

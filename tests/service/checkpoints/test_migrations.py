@@ -19,7 +19,7 @@ from dropanchor_service.estimation.fleet.belief.standing import QUIET_START
 from support.golden_checkpoint import Drive, golden, halves
 
 EARLIER = f"{layouts.VERSION - 1}-{'0' * 16}"
-LAYOUT = "6-a4c2f4f38573c3e9"
+LAYOUT = "6-237d0b17fd014d18"
 READ = range(layouts.VERSION - layouts.READ_BEFORE, layouts.VERSION)
 
 

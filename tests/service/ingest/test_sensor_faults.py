@@ -49,7 +49,7 @@ def state_of(bench: IngestBench, tag: str = "a") -> tuple[int, int]:
 def hint_of(bench: IngestBench) -> str:
     poses = bench.latest.since()[1]
     texts, index = hints_of(poses, bench.site, bench.tags, int(poses["t_ns"][0]))
-    return texts[index[0]]
+    return str(texts[index[0]])
 
 
 def test_accelerations_in_g_are_named_and_never_reach_the_engine() -> None:

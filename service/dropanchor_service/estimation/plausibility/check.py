@@ -20,9 +20,11 @@ def _no_rows() -> Array:
 
 @dataclass(frozen=True)
 class Checked:
-    """samples: those that may be used. poses: POSE of the tags whose samples may not. left_out: the row of each sample
-    that may not be used, for every kind. failed: rows that have just failed, so that their estimate is worth nothing. found: rows of
-    these samples with a fault, and those that have just lost one."""
+    """samples: those that may be used. poses: POSE of the tags whose samples may not.
+
+    left_out: the row of each sample that may not be used, for every kind. failed: rows that have just failed, so that
+    their estimate is worth nothing. found: rows of these samples with a fault, and those that have just lost one.
+    """
 
     samples: SampleBatch
     poses: Array = field(default_factory=lambda: np.empty(0, POSE))

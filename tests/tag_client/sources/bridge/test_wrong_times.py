@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dropanchor_tag_client.sources.bridge.broker import Received
-from dropanchor_tag_client.sources.bridge.measurement import Drop, Format
+from dropanchor_tag_client.sources.bridge.measurement import Drop, Format, Received
 from dropanchor_tag_client.sources.bridge.pipe import Bridge
 from dropanchor_tag_client.sources.bridge.sensor_logger import SensorLogger
 from dropanchor_tag_client.sources.bridge.template import Template
