@@ -87,7 +87,8 @@ def known_from_start(samples: Samples, sign_told: bool) -> Array | None:
     seen, known = check.columns[0], np.zeros((), CHECK)
     known["sign_known"] = sign_told
     if seen["imu_verdict"] < DOUBTS:
-        known["imu_verdict"], known["imu_detail"] = seen["imu_verdict"], seen["imu_detail"]
+        for name in ("imu_verdict", "imu_detail", "known_s", "norm", "level"):
+            known[name] = seen[name]
     known["range_verdict"], known["range_detail"] = seen["range_verdict"], seen["range_detail"]
     _add_absurd(known, samples)
     return known if known["imu_verdict"] or known["range_verdict"] else None

@@ -9,6 +9,7 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from dropanchor_service.answers.care import REASONS, care_of
+from dropanchor_service.estimation.plausibility.verdicts import SENTENCES
 from dropanchor_service.store import Sites
 from dropanchor_service.store.clock_offsets import ClockOffsets
 
@@ -44,6 +45,15 @@ class HealthGauges(Collector):
         for reason in REASONS:
             needing.add_metric([reason], reasons[reason])
         yield needing
+        faults = GaugeMetricFamily(
+            "dropanchor_tags_with_sensor_fault",
+            "Tags whose sensors fail their check, by fault.",
+            labels=["fault"],
+        )
+        found = Counter(one.name for tag in tags for one in tag.rows.findings.of(tag.row))
+        for name in SENTENCES:
+            faults.add_metric([name], found[name])
+        yield faults
         yield GaugeMetricFamily(
             "dropanchor_clock_offset_seconds_max",
             "Largest offset between the clocks of a tag's motion and its ranges, either way; NaN if none is known.",

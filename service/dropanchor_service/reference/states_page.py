@@ -17,6 +17,7 @@ from dropanchor_service.answers.hints import (
     RELATIVE_HINT,
 )
 from dropanchor_service.answers.unused import BEHIND, NOT_USED, NOUNS, WHY
+from dropanchor_service.estimation.plausibility.verdicts import SENTENCES
 from dropanchor_service.reference.markdown import table
 from dropanchor_service.store.rows import MESSAGE
 from dropanchor_service.store.unknown_anchors import hint_about
@@ -39,6 +40,13 @@ Every pose carries a state, a reason for machines and a hint for people. Whoever
 
 _CAUSES_INTRODUCTION = """\
 Some causes show only in what the tag sends, and not in its state. A hint about one of them replaces that of the reason.
+"""
+
+_SENSORS_INTRODUCTION = """\
+The service checks the sensors of every tag by what it sends
+([how](../how-to/look-after-tags.md#sensors-that-fail-their-check)).
+A tag that fails has no position and the reason `sensor_fault`. With `upside_down`, `…_doubted` and `range_averaged` the
+samples are used, but the tag is `degraded` instead of `tracking`.
 """
 
 
@@ -80,8 +88,10 @@ def page() -> str:
     states = ((f"`{state}`", *_MEANING[state]) for state in TrackingState)
     hints = dict(zip(REASONS, HINTS, strict=True))
     reasons = ((f"`{reason}`", hints[reason] or "(nothing is needed)") for reason in StateReason)
+    found = ((f"`{name}`", sentence.format("…")) for name, sentence in SENTENCES.items())
     return (
         f"{_INTRODUCTION}\n{table(('state', 'meaning', 'position'), states)}\n"
         f"## Reasons\n\n{table(('reason', 'hint'), reasons)}\n"
-        f"## Hints about causes\n\n{_CAUSES_INTRODUCTION}\n{table(('cause', 'hint'), _CAUSES)}"
+        f"## Hints about causes\n\n{_CAUSES_INTRODUCTION}\n{table(('cause', 'hint'), _CAUSES)}\n"
+        f"## Sensors that fail their check\n\n{_SENSORS_INTRODUCTION}\n{table(('found', 'hint'), found)}"
     )

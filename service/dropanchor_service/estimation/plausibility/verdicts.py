@@ -88,6 +88,10 @@ RANGE_SENTENCES = {
     RangeVerdict.IN_CM: "The ranges look like centimetres: divide them by 100, or set `range_unit` to cm.",
     RangeVerdict.AVERAGED: "The module averages about {0} ranges, so that their errors last: switch its filter off.",
 }
+SENTENCES = {verdict.name.lower(): text for verdict, text in IMU_SENTENCES.items()} | {
+    f"range_{verdict.name.lower()}": text for verdict, text in RANGE_SENTENCES.items()
+}
+"""The sentence of every finding, by its name; {0} stands for a number or an axis."""
 
 
 def findings(check: Array) -> list[Finding]:
