@@ -5,6 +5,7 @@ import time
 import pytest
 from playwright.sync_api import Browser, expect
 
+from dropanchor_service.estimation.plausibility.verdicts import SENTENCES, Finding
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset, NoClockOffsets
 from service.dashboard.place import Place
 from support.browser import watched_page
@@ -54,3 +55,23 @@ def test_the_panel_shows_how_far_the_clocks_of_a_tag_are_apart_and_what_to_do(ch
         expect(health).to_contain_text("0.80 s ahead of the ranges ± 0.12 s", timeout=10_000)
         expect(watched.page.locator("[data-part='care']")).to_contain_text("0.8 s ahead of that of its ranges")
         expect(health).to_contain_text("0.10 s behind the ranges ± 0.25 s")
+
+
+def test_a_unit_that_a_tag_gets_wrong_is_accepted_with_one_click_and_may_be_undone(
+    chromium: Browser, place: Place
+) -> None:
+    place.move("cart", x=1.0, y=2.0)
+    tags, site = place.bench.answers.tags, place.bench.answers.site
+    sentence = SENTENCES["acc_in_g"]
+    tags.rows.findings.set(tags.register("cart").row, [Finding("acc_in_g", sentence, ("acc_unit", "g"))])
+    with watched_page(chromium, place.url) as watched:
+        page = watched.page
+        page.locator("tr[data-tag='cart']").click()
+        care = page.locator("[data-part='care']")
+        expect(care).to_contain_text(sentence, timeout=10_000)
+        care.get_by_role("button", name="Set acc_unit = g").click()
+        expect(page.locator("#outcome")).to_contain_text("cart: acc_unit = g set.")
+        assert site.tag_settings("cart").acc_unit == "g"
+        page.keyboard.press("Control+z")
+        expect(page.locator("#outcome")).to_contain_text("Undone")
+        assert site.tag_settings("cart").acc_unit == "m/s2"
