@@ -65,7 +65,7 @@ def _replay_session(arguments: argparse.Namespace, readers: Sequence[RecordingRe
         tags = [service.tags.at(row).name for row in poses["row"].tolist()]
         outcome.add(turn, tags, poses)
         write(_rows(tags, poses))
-    for line in [*outcome.lines(), *_rejections(service, readers)]:
+    for line in [*outcome.lines(), *_findings(service), *_rejections(service, readers)]:
         print(line)
 
 
@@ -141,6 +141,13 @@ class Outcome:
 def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:
     for tag, t_ns, values in zip(tags, poses["t_ns"].tolist(), values_of(poses), strict=True):
         yield [tag, t_ns, *values]
+
+
+def _findings(service: OfflineService) -> Iterator[str]:
+    """Yield what was wrong with the sensors of each tag at the end."""
+    for tag in service.tags.all():
+        for found in tag.rows.findings.of(tag.row):
+            yield f"{tag.name}: {found.sentence}"
 
 
 def _rejections(service: OfflineService, readers: Sequence[RecordingReader]) -> Iterator[str]:
