@@ -28,6 +28,7 @@ from dropanchor_service.estimation.fleet.engine import FleetEngine
 from dropanchor_service.estimation.paper.ekf import PoseFilter
 from dropanchor_service.estimation.paper.engine import PaperEngine
 from dropanchor_service.estimation.paper.parameters import TUNED
+from dropanchor_service.estimation.plausibility.check import SensorCheck
 from dropanchor_tag_client.simulator.sensors import preset
 from dropanchor_tag_client.simulator.simulation import Simulation, simulate
 
@@ -111,6 +112,17 @@ def cost_of_plain_filters(runs: list[Simulation]) -> float:
     return statistics.median(costs)
 
 
+def cost_of_check(runs: list[Simulation], copies: int) -> float:
+    """Return the CPU time per tag and second in µs of the check of the sensors."""
+    check, costs = SensorCheck(), []
+    for k, batch in enumerate(batches(runs, copies)):
+        began = time.process_time()
+        assert check.check(batch).samples is batch
+        if k * MESSAGE_S >= SETTLED_S:
+            costs.append((time.process_time() - began) * 1e6 / (copies * len(runs) * MESSAGE_S))
+    return statistics.median(costs)
+
+
 def bytes_per_tag(engine: FleetEngine, tags: int) -> float:
     return sum(part.nbytes for part in engine.state().values()) / tags
 
@@ -127,7 +139,7 @@ def idle_figures() -> tuple[float, float]:
 def table(costs: dict[str, float]) -> str:
     lines = ["| | µs per tag and second | µs per range | ÷ `fleet` |", "|---|---|---|---|"]
     for name, cost in costs.items():
-        lines.append(f"| {name} | {cost:.0f} | {cost / 10.0:.1f} | {cost / costs['`fleet`']:.1f} |")
+        lines.append(f"| {name} | {cost:.1f} | {cost / 10.0:.2f} | {cost / costs['`fleet`']:.2f} |")
     return "\n".join(lines)
 
 
@@ -135,7 +147,8 @@ def test_the_cost_of_the_engines_is_measured() -> None:
     runs = [simulate("M5", seed, preset("calibrated", imu_hz=100.0)) for seed in range(4000, 4000 + RUNS)]
     fleet = FleetEngine()
     cost, tracking = cost_of(fleet, runs, COPIES)
-    costs = {"`fleet`": cost, "plain filterpy EKF per tag": cost_of_plain_filters(runs)}
+    costs = {"`fleet`": cost, "check of the sensors": cost_of_check(runs, COPIES)}
+    costs |= {"plain filterpy EKF per tag": cost_of_plain_filters(runs)}
     costs["`paper`"], _ = cost_of(PaperEngine(TUNED), runs[:2], 1)
     configuring, idle = idle_figures()
     assert tracking > 0.5

@@ -16,7 +16,7 @@ from support.zenoh_router import free_port, wait_until
 
 SENSORS = {
     "gyroscope": lambda t_ns: (0.0, 0.0, 1e-4 * (t_ns // 10_000_000 % 7)),  # no sensor repeats itself to the last bit
-    "accelerometer": lambda _: (0.0, 0.0, 0.0),
+    "accelerometer": lambda t_ns: (1e-3 * (t_ns // 10_000_000 % 5), 0.0, 0.0),
     "gravity": lambda _: (0.0, 0.0, -G),
     "magnetometer": lambda _: (0.0, 20.0, -40.0),
 }

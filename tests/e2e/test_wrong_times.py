@@ -72,7 +72,11 @@ def test_motion_from_the_future_is_aligned_with_the_ranges_of_its_tag(service: R
     try:
         for number in range(200):
             t_ns = time.time_ns()
-            imu = {"acc": [0, 0, 9.81], "gyro": [0, 0, 0], "t_ns": t_ns + 31 * S // 10}
+            imu = {
+                "acc": [0.01 * (number % 3), 0, 9.81],
+                "gyro": [0, 0, 0.001 * (number % 2)],
+                "t_ns": t_ns + 31 * S // 10,
+            }
             lines = [imu] if number % 5 else [imu, {"anchor": 7, "range_m": 22.36 + 0.001 * (number % 7), "t_ns": t_ns}]
             process.stdin.write("".join(json.dumps(line) + "\n" for line in lines))
             process.stdin.flush()

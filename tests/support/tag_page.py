@@ -16,7 +16,7 @@ SENSORS = """
         report(acceleration, rotation, shake, times) {
             for (let i = 0; i < times; i++) {
                 const [x, y, z] = acceleration.map((value) => value + shake * (2 * Math.random() - 1));
-                const [alpha, beta, gamma] = rotation;
+                const [alpha, beta, gamma] = rotation.map((value) => value + shake * 0.02 * (2 * Math.random() - 1));
                 dispatchEvent(new DeviceMotionEvent("devicemotion", {
                     accelerationIncludingGravity: { x, y, z }, rotationRate: { alpha, beta, gamma }, interval: step_ms,
                 }));

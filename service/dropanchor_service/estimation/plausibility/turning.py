@@ -17,9 +17,10 @@ from dropanchor_service.estimation.plausibility.verdicts import ImuVerdict
 LEAST_SAMPLES: Final = 3  # of a block
 CALM = (9.0, 10.6)  # m/s², norms at which an acceleration is hardly more than gravity
 LONGEST_S, LONGEST_TURN = 5.0, 3.0  # s, rad, between two calm blocks that are compared
+ENOUGH_TURN, SOON_S = 0.4, 1.2  # rad, s: less is not compared yet; the bias of a gyroscope tilts less in this time
 TILT: Final = 0.2  # rad, between two calm blocks
 MOSTLY: Final = 0.7  # of the turn is tilting
-STILL: Final = 0.25  # of what the gyroscope tells, if gravity hardly moves at all
+STILL, STOOD = 0.4, 0.25  # of what the gyroscope tells, if gravity hardly moves at all
 AT_MOST: Final = 0.5  # rad², that one comparison counts for
 ENOUGH: Final = 0.2  # rad²
 CONTRADICTED, AGREED = 0.6, 0.4  # share of the tilting
@@ -98,6 +99,8 @@ def _compare_with_gravity(c: Check, acc: Vector, turn: Vector) -> None:
     up = combined(acc, 1.0 / length, acc, 0.0)
     apart_s = (c.t_ns - c.calm_ns) * 1e-9
     if c.calm_ns > 0 and apart_s < LONGEST_S and c.told_turn < LONGEST_TURN:
+        if c.told_turn < ENOUGH_TURN and apart_s < SOON_S:
+            return  # a slow turn shows over several blocks
         was: Vector = (c.up[0], c.up[1], c.up[2])
         told: Vector = (c.told_up[0], c.told_up[1], c.told_up[2])
         tilt = norm(combined(told, 1.0, was, -1.0))
@@ -111,7 +114,7 @@ def _compare_with_gravity(c: Check, acc: Vector, turn: Vector) -> None:
 @njit(nogil=True)
 def _add_tilt(c: Check, turn: Vector, tilt: float, shown: float, error: float) -> None:
     """Add a comparison. tilt: what the gyroscope told, shown: what gravity showed, error: between both, rad."""
-    if tilt < TILT or tilt < MOSTLY * min(c.told_turn, 1.0):
+    if c.told_turn < ENOUGH_TURN or tilt < max(TILT, MOSTLY * min(c.told_turn, 1.0)):
         if c.told_turn > 0.5 * TILT:
             c.turned += c.told_turn
         return
@@ -122,7 +125,7 @@ def _add_tilt(c: Check, turn: Vector, tilt: float, shown: float, error: float) -
     c.contradicted += counted * min(share, 2.0)
     if share > CONTRADICTED:
         c.turned = 0.0
-        c.doubted_s = DOUBTED_S if still else c.doubted_s
+        c.doubted_s = DOUBTED_S if shown < STOOD * tilt else c.doubted_s
         for i in range(3):
             c.rates[i] += turn[i] * turn[i]
 
