@@ -176,7 +176,7 @@ def _unknown_anchors(poses: Array, site: SiteStore, tags: TagTable, now_ns: int)
     unknown = {row: name for row, number, name in tags.unknown_anchors.fresh(now_ns) if site.lacks(number)}
     if not unknown:
         return []
-    lacking = np.flatnonzero(np.isin(poses["reason"], _NO_RANGES))
+    lacking = np.flatnonzero(np.isin(poses["reason"], (*_NO_RANGES, StateReason.NO_HEADING)))
     places: dict[str, list[int]] = {}
     heard_ns = tags.arrivals.of(poses["row"][lacking])["range_ns"]
     for place, row, range_ns in zip(lacking.tolist(), poses["row"][lacking].tolist(), heard_ns.tolist(), strict=True):

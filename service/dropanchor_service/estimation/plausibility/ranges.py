@@ -21,7 +21,7 @@ MEDIAN_STEP: Final = 1.05  # factor by which a running median moves
 STD_OF_MEDIAN: Final = 1.48
 LEAST_N, LEAST_S = 4, 0.3  # a shorter mean does no harm
 SIGN: Final = -0.4  # of -0.5, which a mean of N shows at lag N
-SMOOTH: Final = -0.25  # at lag 1, where independent errors show -0.5
+SMOOTH: Final = 0.25  # at lag 1, either way: independent errors show -0.5 there, and motion nearly 1
 LEAST_CHANGES: Final = 100
 LEAST_CHANGE: Final = 0.004  # m, median: less is no noise of a radio
 ROUGH: Final = 1.25  # second difference over change, medians: 1.8 for independent errors, 1.4 for a mean, 0 for motion
@@ -160,7 +160,7 @@ def _averaged(c: Check) -> tuple[int, float]:
     """Return the number of ranges that a mean would have, and the correlation at that lag."""
     best, sign = 0, 0.0
     is_noise = c.left_size > LEAST_CHANGE and c.second > ROUGH * c.left_size
-    if is_noise and c.products[1] > SMOOTH * c.products[0]:
+    if is_noise and abs(c.products[1]) < SMOOTH * c.products[0]:
         for lag in range(LEAST_N, LAGS):
             at = c.products[lag] / c.products[0]
             if at < sign:
