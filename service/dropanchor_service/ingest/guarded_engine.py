@@ -244,7 +244,9 @@ class GuardedEngine:
         if row >= len(self._settings):
             self._settings = enlarged(self._settings, max(row + 1, 2 * len(self._settings)))
         self._settings[row] = settings
-        self._has_units = has_units(self._settings)
+        self._has_units = self._has_units or has_units(
+            settings
+        )  # not over all rows: a storm of tags would take minutes
 
     def _current(self, row: int) -> _Configured:
         """Return the settings that its site has now for this row."""
