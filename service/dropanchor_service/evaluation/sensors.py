@@ -14,7 +14,6 @@ from dropanchor_service.evaluation.replay import NS_PER_S, Samples
 
 EARLY_S = 60.0
 MOSTLY = 0.3  # share of samples that no sensor can have measured
-_OF_UNITS = range(int(ImuVerdict.ACC_IN_G), int(ImuVerdict.ACC_STUCK) + 1)
 
 
 class CheckedEngine:

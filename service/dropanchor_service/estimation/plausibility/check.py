@@ -172,15 +172,14 @@ def _is_unusable(checks: Array) -> Array:
 
 def _poses_of(samples: SampleBatch, unusable: Array) -> Array:
     """Return one POSE, without a position, for each row whose samples may not be used."""
-    times: dict[int, int] = {}
-    for column in samples.columns():
-        out = column[unusable[column["row"]]]
-        for row, t_ns in zip(out["row"].tolist(), out["t_ns"].tolist(), strict=True):
-            times[row] = max(times.get(row, t_ns), t_ns)
-    poses = np.zeros(len(times), POSE)
+    out = [column[unusable[column["row"]]] for column in samples.columns()]
+    rows, place = np.unique(np.concatenate([column["row"] for column in out]), return_inverse=True)
+    times = np.zeros(len(rows), np.int64)
+    np.maximum.at(times, place, np.concatenate([column["t_ns"] for column in out]))
+    poses = np.zeros(len(rows), POSE)
     for name in POSE.names or ():
         if poses[name].dtype.kind == "f":
             poses[name] = np.nan
-    poses["row"], poses["t_ns"] = list(times), list(times.values())
+    poses["row"], poses["t_ns"] = rows, times
     poses["anchor"], poses["state"], poses["reason"] = -1, State.INITIALISING, StateReason.SENSOR_FAULT
     return poses
