@@ -7,7 +7,7 @@ from dropanchor_service.estimation.plausibility.layout import GOOD, Check, may_b
 from dropanchor_service.estimation.plausibility.vectors import Vector, combined, cross, dot, norm
 from dropanchor_service.estimation.plausibility.verdicts import ImuVerdict
 
-# Half-second means of 40 recordings, phones and walkers among them, lie within 7.6 and 14.4 m/s², their medians within
+# Half-second means of 36 recordings, phones and walkers among them, lie within 7.6 and 14.4 m/s², their medians within
 # 9.8 and 10.3.
 LEAST, MOST = 5.5, 20.0  # m/s², |mean| of a block
 SLOW_LEAST, SLOW_MOST = 8.0, 12.0  # m/s², slow mean of that
