@@ -134,6 +134,8 @@ def warm_up(engine: Engine, progress: CompilationProgress | None = None) -> None
     with _compiling("the estimator, which takes about a minute", progress or CompilationProgress()):
         _run(engine)
         check = SensorCheck()
+        for row in range(2):
+            check.start(row)
         check.check(_moving_off(2))
         check.note_absurd(np.zeros(1, np.int32), np.zeros(1), np.zeros(1, np.int32))
 

@@ -7,7 +7,7 @@ import numpy as np
 from dropanchor_service.estimation.columns import POSE, Array, SampleBatch, State, StateReason
 from dropanchor_service.estimation.fleet.compiled import njit
 from dropanchor_service.estimation.plausibility.imu import add_absurd, add_imu
-from dropanchor_service.estimation.plausibility.layout import CHECK, DOUBTS, make_checks
+from dropanchor_service.estimation.plausibility.layout import CHECK, DOUBTS, Check, make_checks
 from dropanchor_service.estimation.plausibility.ranges import AVERAGED, add_absurd_range, add_range
 from dropanchor_service.estimation.plausibility.verdicts import Finding, findings
 
@@ -69,18 +69,21 @@ class SensorCheck:
         self._absurd |= note_absurd(self._checks, imu_rows, imu_sizes, range_rows)
 
     def check(self, samples: SampleBatch) -> Checked:
-        """Judge the sensors with these samples, and return those samples that may be used."""
-        self.reserve(1 + max((int(column["row"].max()) for column in samples.columns() if len(column)), default=-1))
+        """Judge the sensors with these samples, and return those samples that may be used.
+
+        Every row must have been started: looking for new ones would cost as much as to judge.
+        """
         changed = judge(self._checks, samples.imu, samples.ranges)
         if not changed and not self._absurd and not self._faulty.any():
             return Checked(samples)
         return self._checked(samples)
 
     def _checked(self, samples: SampleBatch) -> Checked:
+        rows = np.unique(np.concatenate([column["row"] for column in samples.columns()]))
+        self.reserve(1 + int(rows.max(initial=-1)))
         faulty, unusable = _has_fault(self._checks), _is_unusable(self._checks)
         was_faulty, was_unusable = self._faulty, self._unusable
         self._faulty, self._unusable, self._absurd = faulty, unusable, False
-        rows = np.unique(np.concatenate([column["row"] for column in samples.columns()]))
         found = rows[faulty[rows] | was_faulty[rows]]
         left = [unusable[column["row"]] for column in samples.columns()]
         left_out = tuple(column["row"][out] for column, out in zip(samples.columns(), left, strict=True))
@@ -126,18 +129,25 @@ def judge(checks: Array, imu: Array, ranges: Array) -> bool:
         row, end = imu[first].row, first + 1
         while end < len(imu) and imu[end].row == row:
             end += 1
-        check = checks[row]
+        check = _of_row(checks, row)
         before = check.imu_verdict
         add_imu(check, imu, first, end)
         changed = changed or check.imu_verdict != before
         first = end
     for i in range(len(ranges)):
         sample = ranges[i]
-        check = checks[sample.row]
+        check = _of_row(checks, sample.row)
         before = check.range_verdict
         add_range(check, sample.t_ns, sample.anchor, sample.range)
         changed = changed or check.range_verdict != before
     return changed
+
+
+@njit(nogil=True)
+def _of_row(checks: Array, row: int) -> Check:
+    if row >= len(checks):
+        raise IndexError("a row that was not started")
+    return checks[row]
 
 
 @njit(cache=True, nogil=True)

@@ -150,9 +150,10 @@ def _compare(c: Check, change: float) -> None:
     c.left_size = _followed(c.left_size, abs(change))
     c.left_over[0] = min(max(change, -CLIP * c.left_size), CLIP * c.left_size)
     c.products_n = min(c.products_n + 1, KEPT)
+    gain, now = 1.0 / c.products_n, c.left_over[0]
     for k in range(LAGS):
         if math.isfinite(c.left_over[k]):
-            c.products[k] += (c.left_over[0] * c.left_over[k] - c.products[k]) / c.products_n
+            c.products[k] += gain * (now * c.left_over[k] - c.products[k])
 
 
 @njit(nogil=True)

@@ -33,6 +33,14 @@ RECORDINGS = (
 )
 
 
+def started(rows: int = 1) -> SensorCheck:
+    """Return a check of tags that have sent nothing."""
+    check = SensorCheck()
+    for row in range(rows):
+        check.start(row)
+    return check
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("scenario", ["M5", "OU", "forklift"])
 def test_each_fault_is_named(fault: str, scenario: str) -> None:
@@ -80,7 +88,7 @@ def test_a_told_start_is_believed_until_the_first_turns_at_most(fault: str) -> N
 
 def test_the_check_does_not_touch_a_tag_with_good_sensors() -> None:
     imu, ranges = samples_of(run_of("M5", 47_201))
-    check = SensorCheck()
+    check = started()
     assert all(check.check(batch).samples is batch for batch in cut(imu, ranges, 0.2))
 
 
@@ -100,7 +108,7 @@ def test_a_fault_may_begin_and_end_within_a_run(fault: str) -> None:
 def test_verdicts_do_not_depend_on_how_samples_are_cut_into_batches() -> None:
     imu, ranges = samples_of(run_of("forklift", 47_203))
     FAULTS["rates about z, y, x"][0](imu, ranges)
-    checks = [SensorCheck() for _ in range(3)]
+    checks = [started() for _ in range(3)]
     for check, step_s in zip(checks, (0.05, 0.7, 1000.0), strict=True):
         verdicts_of(imu, ranges, step_s, check)
     assert len({check.columns[:1].tobytes() for check in checks}) == 1
@@ -111,7 +119,7 @@ def test_a_neighbour_with_wrong_sensors_changes_nothing() -> None:
     wrong_imu, wrong_ranges = imu.copy(), ranges.copy()
     FAULTS["accelerations in g"][0](wrong_imu, wrong_ranges)
     wrong_imu["row"] = wrong_ranges["row"] = 1
-    check = SensorCheck()
+    check = started(rows=2)
     kept = []
     for own, other in zip(cut(imu, ranges, 0.5), cut(wrong_imu, wrong_ranges, 0.5), strict=True):
         both = SampleBatch(np.concatenate([own.imu, other.imu]), np.concatenate([own.ranges, other.ranges]))
@@ -147,7 +155,7 @@ def test_doubted_sensors_leave_the_pose_but_not_the_state() -> None:
 
 
 def test_values_beyond_all_sensors_look_like_raw_counts() -> None:
-    check = SensorCheck()
+    check = started()
     rows = np.zeros(30, np.int32)
     check.note_absurd(rows, np.full(30, 16384.0), rows[:0])
     (found,) = check.findings(0)
@@ -156,7 +164,7 @@ def test_values_beyond_all_sensors_look_like_raw_counts() -> None:
 
 
 def test_ranges_beyond_all_radios_look_like_millimetres() -> None:
-    check = SensorCheck()
+    check = started()
     check.note_absurd(np.empty(0, np.int32), np.empty(0), np.zeros(20, np.int32))
     assert [found.setting for found in check.findings(0)] == [("range_unit", "mm")]
 
@@ -164,7 +172,7 @@ def test_ranges_beyond_all_radios_look_like_millimetres() -> None:
 def test_a_verdict_that_was_restored_still_holds() -> None:
     imu, ranges = samples_of(run_of("M5", 47_208))
     FAULTS["accelerations in g"][0](imu, ranges)
-    first, second = SensorCheck(), SensorCheck()
+    first, second = started(), started()
     batches = list(cut(imu, ranges, 1.0))
     for batch in batches[:5]:
         first.check(batch)
@@ -173,10 +181,17 @@ def test_a_verdict_that_was_restored_still_holds() -> None:
     assert second.findings(0) == first.findings(0)
 
 
+def test_samples_of_a_row_that_was_not_started_are_an_error() -> None:
+    imu, ranges = samples_of(run_of("M5", 47_210))
+    imu["row"][30:] = 1000
+    with pytest.raises(IndexError, match="not started"):
+        started().check(SampleBatch(imu[:50], ranges[:0]))
+
+
 def test_a_sentence_says_what_to_multiply_by() -> None:
     imu, ranges = samples_of(run_of("M5", 47_209))
     FAULTS["accelerations in g"][0](imu, ranges)
-    check = SensorCheck()
+    check = started()
     verdicts_of(imu, ranges, check=check)
     (found,) = check.findings(0)
     assert str(GRAVITY) in found.sentence

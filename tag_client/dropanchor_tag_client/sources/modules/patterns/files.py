@@ -17,9 +17,9 @@ _TEXTS = ("patterns", "ignore", "start", "poll")
 _KEYS = (*_TEXTS, "repeats", "baud", "hint")
 
 
-def shipped_modules() -> list[Module]:
-    """Return the modules of the files in the package."""
-    return [module_of_file(path) for path in sorted(_SHIPPED.glob(f"*{SUFFIX}"))]
+def shipped_files() -> dict[str, Path]:
+    """Return the files in the package by the name of their module."""
+    return {path.stem: path for path in sorted(_SHIPPED.glob(f"*{SUFFIX}"))}
 
 
 def module_of_file(path: Path) -> Module:
