@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
+from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE, reader_of
@@ -80,7 +81,7 @@ class SecurityFolder:
     def add_site(self, site: str, days: int) -> None:
         """Let the router serve another site, and issue a certificate to a reader of each site. Raises SecurityError."""
         with self._changing():
-            chunk_from_id(site)
+            file_name_of(site)
             if site in self.table.sites:
                 raise SecurityError(f"the site {site!r} is there already")
             taken = [name for name in (reader_of(one) for one in (*self.table.sites, site)) if name in self.table.tags]
@@ -118,8 +119,8 @@ class SecurityFolder:
             name = self.table.common_name(of_site, tag)
             chunk_from_id(tag)
             self._refuse_tag(name, renew)
-            issued = self._authority().client(name, days)
             bundle = self.bundle(name)
+            issued = self._authority().client(name, days)
             bundle.mkdir(parents=True, exist_ok=True, mode=0o700)
             write_atomically(bundle / "ca.pem", [(self.path / "ca.pem").read_bytes()], PUBLIC)
             write_atomically(bundle / "tag.pem", [issued.certificate], PUBLIC)
@@ -152,8 +153,11 @@ class SecurityFolder:
         return site or self.table.site
 
     def bundle(self, name: str) -> Path:
-        """Return the folder with the credentials of the tag whose certificate has this common name."""
-        return self.path / "tags" / chunk_from_id(name)
+        """Return the folder with the credentials of the tag whose certificate has this common name.
+
+        Raises InvalidKeyError if the name cannot be that of a folder.
+        """
+        return self.path / "tags" / file_name_of(name)
 
     def certificate(self, role: str) -> Path:
         return self.path / f"{role}.pem"
@@ -247,7 +251,7 @@ class SecurityFolder:
 
 def _reader_file(site: str) -> str:
     """Return the name of the files of the reader of one site."""
-    return f"{READER}-{chunk_from_id(site)}"
+    return f"{READER}-{file_name_of(site)}"
 
 
 def _json(document: Any) -> bytes:
