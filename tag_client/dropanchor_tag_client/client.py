@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Self, Unpack
 
 import zenoh
 
-from dropanchor_schemas import keys
 from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.health import encode_health
 from dropanchor_schemas.kinds import Sample

@@ -26,7 +26,9 @@ def test_any_text_makes_one_name_below_its_folder_or_is_refused(identifier: str)
     assert not windows.is_reserved()
 
 
-@pytest.mark.parametrize("identifier", [".", "..", "", "a\nb", "a\0", "con", "Nul.yard", "COM1", "lpt9.x.y", "a.", "é" * 64])
+@pytest.mark.parametrize(
+    "identifier", [".", "..", "", "a\nb", "a\0", "con", "Nul.yard", "COM1", "lpt9.x.y", "a.", "é" * 64]
+)
 def test_what_cannot_name_a_file_is_refused(identifier: str) -> None:
     with pytest.raises(InvalidKeyError):
         file_name_of(identifier)
@@ -34,7 +36,14 @@ def test_what_cannot_name_a_file_is_refused(identifier: str) -> None:
 
 @pytest.mark.parametrize(
     ("identifier", "name"),
-    [("cart-1", "cart-1"), ("a/b", "a%2Fb"), ("../x", "..%2Fx"), ("...x", "...x"), ("console", "console"), (" ", "%20")],
+    [
+        ("cart-1", "cart-1"),
+        ("a/b", "a%2Fb"),
+        ("../x", "..%2Fx"),
+        ("...x", "...x"),
+        ("console", "console"),
+        (" ", "%20"),
+    ],
 )
 def test_all_else_has_the_name_that_it_has_in_keys(identifier: str, name: str) -> None:
     assert file_name_of(identifier) == name

@@ -52,7 +52,10 @@ def test_an_invalid_id_is_rejected(identifier: str) -> None:
         keys.chunk_from_id(identifier)
 
 
-@pytest.mark.parametrize("chunk", ["", "%", "%2", "%zz", "%ff", "a b", "%61", "%2f", "*", "**", "@a", "~", "x" * 65, ".", "..", "%2E", "%2E%2E"])
+@pytest.mark.parametrize(
+    "chunk",
+    ["", "%", "%2", "%zz", "%ff", "a b", "%61", "%2f", "*", "**", "@a", "~", "x" * 65, ".", "..", "%2E", "%2E%2E"],
+)
 def test_an_invalid_chunk_is_rejected(chunk: str) -> None:
     with pytest.raises(keys.InvalidKeyError):
         keys.id_from_chunk(chunk)

@@ -76,7 +76,6 @@ BODIES: tuple[tuple[Any, Any], ...] = (
     (Plan, plan_examples.PLAN),
     (ShareRequest, {"name": "Visitors", "valid_s": 3600, "tag": "a", "view": "zoom=2"}),
     (ShareRequest, {"tag": "a", "group": "b"}),
-    (ShareRequest, {"tag": "a,b"}),
 )
 
 

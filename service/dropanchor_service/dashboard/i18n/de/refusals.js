@@ -22,7 +22,6 @@ export default {
   "say.no_access_control": "Ohne Zugriffskontrolle sehen alle alles: Senden Sie die Adresse der Seite. Um weniger zu zeigen, setzen Sie `security.folder` und `data_dir`.",
   "say.share_unknown": "Diesen Freigabelink gibt es nicht. GET /api/v1/shares listet sie auf.",
   "say.shares_full": "Es gibt schon {n} Freigabelinks: Widerrufen Sie einige.",
-  "say.share_comma": "Ein Tag mit einem Komma in der Kennung lässt sich nicht allein freigeben: Nehmen Sie es in eine Gruppe auf",
   "say.share_both": "Geben Sie ein Tag oder eine Gruppe an, nicht beides",
   "say.unreachable": "Der Dienst ist nicht erreichbar.",
   "say.internal": "Ein unerwarteter Fehler ist aufgetreten. Das Protokoll des Dienstes nennt die Einzelheiten.",

@@ -22,7 +22,6 @@ export default {
   "say.no_access_control": "Without access control everybody sees everything: send the address of the page. To share less, set `security.folder` and `data_dir`.",
   "say.share_unknown": "There is no such share link. GET /api/v1/shares lists them.",
   "say.shares_full": "There are {n} share links: revoke some.",
-  "say.share_comma": "a tag whose id has a comma cannot be shared alone: put it into a group",
   "say.share_both": "give a tag or a group, not both",
   "say.unreachable": "The service cannot be reached.",
   "say.internal": "An unexpected error occurred. The log of the service has the details.",
