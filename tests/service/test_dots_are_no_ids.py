@@ -60,14 +60,15 @@ def test_no_zenoh_key_names_such_a_tag(chunk: str) -> None:
 
 @pytest.mark.parametrize("dots", DOTS)
 def test_no_setting_and_no_key_names_such_an_id(dots: str, tmp_path: Any) -> None:
-    for options in (
+    refused: list[dict[str, Any]] = [
         {"tags": {dots: {}}},
         {"sites": {dots: {}}},
         {"site": {"id": dots}},
         {"site": {"anchors": [{"id": dots}]}},
         {"recording": {"tags": [dots]}},
         {"sites": {"con": {}}},
-    ):
+    ]
+    for options in refused:
         with pytest.raises(SettingsError, match=r"cannot be an id|on Windows it is a device"):
             load_settings(options=options, environment={})
     with pytest.raises(ApiKeyError, match="cannot be an id"):
