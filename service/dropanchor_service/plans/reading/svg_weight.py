@@ -1,7 +1,7 @@
 """How much an SVG draws once everything that it repeats is counted. A few lines can stand for a billion shapes.
 
-The unit is a plain shape. An element weighs as many as it repeats: the target of a `use`, the content of patterns, masks,
-clip paths and markers, the steps of filters. Where a style may apply to more elements than it does, it counts for more.
+The unit is a plain shape. An element weighs as many as it repeats: the target of a `use`, the content of patterns,
+masks, clip paths and markers, the steps of filters. Where it is not clear how far a style reaches, it counts for more.
 """
 
 import re
@@ -12,14 +12,15 @@ from typing import NamedTuple
 from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
+from dropanchor_service.plans.reading.file_types import file_type_of
 from dropanchor_service.plans.reading.raster import open_image
 from dropanchor_service.plans.reading.refused import RefusedError
 from dropanchor_service.plans.reading.svg_styles import LAYERS, Declaration, Sheet, declarations_of, matters
 
-MAX_WEIGHT = 300_000
+MAX_WEIGHT = 200_000
 MAX_DEPTH = 100  # of elements in elements, and of references to references
 
-_CHARACTERS = 200  # of the geometry of a path, which weigh as much as a shape
+_CHARACTERS = 400  # of the geometry of a path, which weigh as much as a shape
 _GLYPHS = 10
 _PER_MEGAPIXEL = 500
 _LAYER = 100  # an image of its own, such as a group with an opacity has it
@@ -114,6 +115,8 @@ class Scales:
         """Return what a value of a property refers to, and what a layer or a function of a filter costs."""
         names = ["".join(found) for found in _REFERENCE.findall(value)] if "#" in value else []
         weights = [self._weight(target, depth + 1) for one in names for target in self._targets(one)]
+        if name.startswith("mask") and names:
+            weights.append(_Weight(_LAYER / 4, 1))
         if name in LAYERS and len(element) and value.strip() not in ("1", "normal", "auto"):
             weights.append(_Weight(_LAYER, 1))
         if name.endswith("filter"):
@@ -144,11 +147,13 @@ def _megapixels(element: Element) -> float:
     kind, _, data = element.get("href", "").partition(";base64,")
     if not data:
         return 0.0
+    media_type = kind.strip().removeprefix("data:")
     try:
         content = b64decode(data)
-    except ValueError as error:
-        raise RefusedError("an image in the SVG is damaged. Save it as PNG or PDF") from error
-    width, height = open_image(content, kind.removeprefix("data:")).size
+        file_type_of(content, media_type)
+    except (ValueError, RefusedError) as error:
+        raise RefusedError("an image in the SVG is damaged, or not of its type. Save it as PNG or PDF") from error
+    width, height = open_image(content, media_type).size
     return width * height / 1e6
 
 
