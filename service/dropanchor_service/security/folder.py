@@ -17,6 +17,7 @@ from dropanchor_service.security.authority import Authority, Issued, expiry
 from dropanchor_service.security.files import PRIVATE, PUBLIC, exclusive_lock
 from dropanchor_service.security.issued import IssuedTag, Table
 from dropanchor_service.security.router import router_configuration
+from dropanchor_service.security.router_file import RouterFileError, endpoints_in
 
 TABLE = "issued.json"
 ROUTER_FILE = "router.json5"
@@ -165,11 +166,23 @@ class SecurityFolder:
     def key(self, role: str) -> Path:
         return self.path / f"{role}.key"
 
+    @property
+    def router_file(self) -> Path:
+        return self.path / ROUTER_FILE
+
+    @property
+    def listen(self) -> tuple[str, ...]:
+        """The endpoints of the router: those in its file, which a person may change. Raises SecurityError."""
+        try:
+            return endpoints_in(self.router_file) or self.table.listen
+        except RouterFileError as error:
+            raise SecurityError(str(error)) from error
+
     def router_configuration(self, listen: Sequence[str] | None = None) -> dict[str, Any]:
         """Return the Zenoh configuration of the router, with access control for the tags admitted now."""
         files = {name: str(path.resolve()) for name, path in self._tls_files().items()}
         holders = [self.table.holder(name) for name in self.table.admitted]
-        return router_configuration(self.table.sites, holders, listen or self.table.listen, files)
+        return router_configuration(self.table.sites, holders, listen or self.listen, files)
 
     def _issue_roles(self, authority: Authority, days: int) -> None:
         for role in (ROUTER, SERVICE):
@@ -217,7 +230,7 @@ class SecurityFolder:
 
     def _connection(self, site: str, tag: str) -> dict[str, str]:
         """Return the contents of `tag.json`: who the tag is and where it connects."""
-        port = self.table.listen[0].rpartition(":")[2]
+        port = self.listen[0].rpartition(":")[2]
         host = self.table.hosts[0]
         host = f"[{host}]" if ":" in host else host
         return {"tag": tag, "site": site, "connect": f"tls/{host}:{port}"}
@@ -238,14 +251,16 @@ class SecurityFolder:
 
     def _save(self, table: Table) -> None:
         self.table = table
+        configuration = _json(self.router_configuration())
         write_atomically(self.path / TABLE, [_json(table.document())], PUBLIC)
-        write_atomically(self.path / ROUTER_FILE, [_json(self.router_configuration())], PUBLIC)
+        write_atomically(self.router_file, [configuration], PUBLIC)
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
         """Lock the folder and read its table again, so that concurrent changes are not lost."""
         with exclusive_lock(self.path):
             self.table = type(self).open(self.path).table
+            _ = self.listen  # a file that cannot be read is refused before anything changes
             yield
 
 
