@@ -4,6 +4,7 @@ from urllib.parse import quote, unquote
 
 PREFIX = "dropanchor/@v1"
 MAX_ID_LENGTH = 64
+NOT_IDS = (".", "..")
 
 
 class InvalidKeyError(ValueError):
@@ -14,13 +15,21 @@ def chunk_from_id(identifier: str) -> str:
     """Return the key chunk of a site, tag or anchor id.
 
     `[A-Za-z0-9._-]` stand for themselves; all other characters are percent-escaped as UTF-8. Raises InvalidKeyError
-    if the id is empty, longer than 64 characters, or has characters that are not printable.
+    if the id is empty, longer than 64 characters, `.` or `..`, or has characters that are not printable.
     """
     if not 0 < len(identifier) <= MAX_ID_LENGTH:
         raise InvalidKeyError(f"an id has 1 to {MAX_ID_LENGTH} characters, this one has {len(identifier)}")
     if not identifier.isprintable():
         raise InvalidKeyError("an id holds printable characters only")
+    if identifier in NOT_IDS:
+        raise InvalidKeyError(f"{identifier!r} cannot be an id: in paths and addresses it stands for a folder")
     return quote(identifier, safe="").replace("~", "%7E")
+
+
+def checked_id(identifier: str) -> str:
+    """Return the id. Raises InvalidKeyError if it is none."""
+    chunk_from_id(identifier)
+    return identifier
 
 
 def refuse_pattern(identifier: str) -> None:

@@ -6,14 +6,16 @@ from collections.abc import Sequence
 from operator import attrgetter
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from dropanchor_schemas.keys import checked_id
 from dropanchor_schemas.kinds import IMU, KINDS, SCALARS, Frame, ImuSample, Kind, ScalarKind
 from dropanchor_schemas.wire import MAX_PAYLOAD_BYTES, MAX_T_NS, VERSION, Reason, Rejection, anchor_number
 
 TimeNs = Annotated[int, Field(ge=0, lt=MAX_T_NS, description="Time of measurement, ns, on the clock of the message.")]
 AnchorId = Annotated[
-    Annotated[int, Field(ge=0, lt=2**32)] | Annotated[str, Field(min_length=1, max_length=64)],
+    Annotated[int, Field(ge=0, lt=2**32)]
+    | Annotated[str, Field(min_length=1, max_length=64), AfterValidator(checked_id)],
     Field(description='Anchor id: a number or a text. "7" and 7 name the same anchor.'),
 ]
 Vector = tuple[float, float, float]

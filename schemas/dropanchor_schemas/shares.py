@@ -1,18 +1,12 @@
 """Models of links that let anybody who has them look at the page until they expire."""
 
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from dropanchor_schemas.site import Id, Label
 
 DAY_S = 86_400
-
-
-def _without_comma(tag: str) -> str:
-    if "," in tag:
-        raise ValueError("a tag whose id has a comma cannot be shared alone: put it into a group")
-    return tag
 
 
 class ShareRequest(BaseModel):
@@ -22,9 +16,7 @@ class ShareRequest(BaseModel):
 
     name: Label = Field(default="", description="What the link is for, as the list of links shows it.")
     valid_s: int = Field(default=7 * DAY_S, ge=60, le=366 * DAY_S, description="For how many seconds the link works.")
-    tag: Annotated[Id, AfterValidator(_without_comma)] | None = Field(
-        default=None, description="Show this tag only; null for all."
-    )
+    tag: Id | None = Field(default=None, description="Show this tag only; null for all.")
     group: Label | None = Field(
         default=None, min_length=1, description="Show only tags whose settings name this group; null for all."
     )

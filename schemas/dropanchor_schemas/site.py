@@ -5,20 +5,23 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, FiniteFloat, model_validator
 from pydantic.config import JsonDict
 
-from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_schemas.file_names import file_name_of
+from dropanchor_schemas.keys import checked_id
 from dropanchor_schemas.remote import MAX_BATCH_S, MAX_IMU_HZ, MIN_BATCH_S, MIN_IMU_HZ
 from dropanchor_schemas.wire import anchor_number
 
 
-def _validate_id(identifier: str) -> str:
-    chunk_from_id(identifier)
-    return identifier
+def _names_files(site: str) -> str:
+    file_name_of(site)
+    return site
 
 
 ID_SCHEMA: JsonDict = {"format": "dropanchor-id", "minLength": 1, "maxLength": 64}
 """JSON Schema of an id. No portable pattern can express "printable characters only", hence the format."""
 
-Id = Annotated[str, Field(min_length=1, max_length=64, json_schema_extra=ID_SCHEMA), AfterValidator(_validate_id)]
+Id = Annotated[str, Field(min_length=1, max_length=64, json_schema_extra=ID_SCHEMA), AfterValidator(checked_id)]
+SiteId = Annotated[Id, AfterValidator(_names_files)]
+"""The id of a site, of which files and folders get their names."""
 
 
 def _require_printable(text: str) -> str:
@@ -197,7 +200,7 @@ class RemoteSettings(_Settings):
 class Site(_Settings):
     """One site: its frame and its anchors. Without anchors, the anchor of the first range becomes the origin."""
 
-    id: Id = Field(default="default", description="Id of the site in Zenoh keys.")
+    id: SiteId = Field(default="default", description="Id of the site in Zenoh keys.")
     name: str = Field(default="", description="Display name.")
     declination_rad: Number = Field(default=0.0, description="Magnetic declination, positive east.")
     georeference: Georeference | None = None

@@ -5,7 +5,7 @@ import logging
 from contextlib import suppress
 from pathlib import Path
 
-from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_schemas.file_names import file_name_of
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
@@ -30,7 +30,7 @@ _log = logging.getLogger(__name__)
 
 def folder_of_site(data_dir: Path, site: str) -> Path:
     """Return the folder of one of `[sites]`. An only site has its files in the data folder itself."""
-    return data_dir / "sites" / chunk_from_id(site)
+    return data_dir / "sites" / file_name_of(site)
 
 
 def put_site_files_in_place(settings: Settings) -> None:

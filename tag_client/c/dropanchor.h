@@ -293,10 +293,12 @@ static inline bool dropanchor_stands_for_itself_(uint8_t c) {
     return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
 }
 
-/* Appends an id as one chunk of a key; false when the id is empty, too long or not printable, or there is no room. */
+/* Appends an id as one chunk of a key; false when the id is empty, too long, `.`, `..` or not printable, or there is no
+ * room. */
 static inline bool dropanchor_append_id_(char **at, const char *end, const char *id) {
     static const char digits[] = "0123456789ABCDEF";
     size_t characters = 0;
+    if (strcmp(id, ".") == 0 || strcmp(id, "..") == 0) return false;
     for (; *id != '\0'; id++) {
         const uint8_t byte = (uint8_t)*id;
         characters += (byte & 0xC0u) != 0x80u;

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from dropanchor_schemas.keys import MAX_ID_LENGTH
+from dropanchor_schemas.keys import checked_id
 from dropanchor_schemas.kinds import KIND_OF, Frame, ImuSample, Sample
 from dropanchor_schemas.wire import MAX_T_NS, Reason, Vector, anchor_number
 
@@ -60,9 +60,7 @@ def rejection_reason(sample: Sample) -> Reason | None:
 
 def number_of(anchor: int | str) -> int:
     """Return the number of an anchor in packed payloads. Raises ValueError if the id cannot be one."""
-    if isinstance(anchor, str) and len(anchor) > MAX_ID_LENGTH:
-        raise ValueError(f"an anchor id has at most {MAX_ID_LENGTH} characters")
-    return anchor_number(anchor)
+    return anchor_number(checked_id(anchor) if isinstance(anchor, str) else anchor)
 
 
 def vector(name: str, values: Sequence[float]) -> Vector:

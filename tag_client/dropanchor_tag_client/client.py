@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Self, Unpack
 
 import zenoh
 
-from dropanchor_schemas import keys
+from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.health import encode_health
 from dropanchor_schemas.kinds import Sample
 from dropanchor_schemas.wire import (
@@ -117,7 +117,7 @@ class TagClient(SampleMethods):
         self._cache_messages = cache_messages
         self._wait_when_congested = wait_when_congested
         self._connect_timeout_s = connect_timeout_s
-        self._spool = None if spool is None else Path(spool, keys.chunk_from_id(site), keys.chunk_from_id(tag))
+        self._spool = None if spool is None else Path(spool, file_name_of(site), file_name_of(tag))
         self._spool_limit_bytes = spool_limit_bytes
         self._buffer = SampleBuffer(batch_samples)
         self._condition = threading.Condition()

@@ -11,7 +11,7 @@ def loaded_by(statement: str) -> set[str]:
     return {name.partition(".")[0] for name in done.stdout.split()}
 
 
-@pytest.mark.parametrize("module", ["wire", "keys"])
+@pytest.mark.parametrize("module", ["wire", "keys", "file_names"])
 def test_the_publishing_path_imports_neither_pydantic_nor_numpy(module: str) -> None:
     loaded = loaded_by(f"import dropanchor_schemas.{module}")
     assert "dropanchor_schemas" in loaded

@@ -8,6 +8,7 @@ from fastapi import FastAPI
 from hypothesis import strategies as st
 from schemathesis.specs.openapi.checks import negative_data_rejection, positive_data_acceptance
 
+from dropanchor_schemas.keys import NOT_IDS
 from dropanchor_schemas.site import Anchor, Georeference, Site
 from dropanchor_schemas.wire import ENCODING_PACKED
 from dropanchor_service.basemap.basemap import ServedBasemap
@@ -55,10 +56,11 @@ is the current tag of a resource; edges do not cross; an image is one, and was u
 long; share links need access control. And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
-IDS = IDS.filter(str.isprintable)
+IDS = IDS.filter(lambda one: one.isprintable() and one not in NOT_IDS)
 schemathesis.openapi.format("dropanchor-id", IDS)
 schemathesis.openapi.format(
-    "dropanchor-ids", st.lists(IDS.filter(lambda one: "," not in one), min_size=1).map(",".join)
+    "dropanchor-ids",
+    st.lists(IDS.filter(lambda one: "," not in one), min_size=1).map(",".join).filter(lambda ids: len(ids) <= 64),
 )
 LABELS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), max_size=64)
 schemathesis.openapi.format("dropanchor-label", LABELS.filter(str.isprintable))

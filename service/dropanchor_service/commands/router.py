@@ -8,9 +8,12 @@ from dropanchor_service.commands.options import add_log_option, add_security_opt
 from dropanchor_service.runtime import logs, open_files
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.security.credentials import credentials_of
+from dropanchor_service.security.folder import TABLE, SecurityFolder
+from dropanchor_service.security.router_file import RouterFileError, unused_changes
+from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
-from dropanchor_service.zenoh_io.session import ZenohError, listening_at, open_session
+from dropanchor_service.zenoh_io.session import ZenohError, configuration, listening_at, open_session
 
 DESCRIPTION = "Runs a Zenoh router for tags and services until Ctrl-C or SIGTERM."
 EPILOG = """\
@@ -41,9 +44,36 @@ def run(arguments: argparse.Namespace) -> int:
         credentials = credentials_of(settings)
         refuse_exposure(settings, credentials)
         with interrupts() as interrupt, open_session(settings.zenoh, credentials):
-            _log.info("ready at %s", ", ".join(listening_at(settings.zenoh, credentials)))
+            _say_what_is_used(settings.zenoh, credentials)
             interrupt.wait(lambda: True)
     except (SettingsError, ZenohError) as error:
         sys.stderr.write(f"dropanchor router: {error}\n")
         return 2
     return 0
+
+
+def _say_what_is_used(settings: ZenohSettings, credentials: SecurityFolder | None) -> None:
+    """Log where the router listens, and which files say so."""
+    if settings.config_file is not None:
+        _log.info("ready with the configuration in %s, and no other file", settings.config_file)
+        return
+    endpoints = ", ".join(listening_at(settings, credentials))
+    if credentials is None:
+        _log.info("ready at %s", endpoints)
+        return
+    file = credentials.router_file
+    source = "as given, not as in" if "listen" in settings.model_fields_set else "as in"
+    _log.info("ready at %s (%s %s); access control as in %s", endpoints, source, file, credentials.path / TABLE)
+    try:
+        changes = unused_changes(file, configuration(settings, credentials))
+    except RouterFileError as error:
+        _log.warning("%s", error)
+        return
+    if changes:
+        _log.warning(
+            "%s has other sections than this command uses: %s. Of this file only `listen` counts; all else follows "
+            "from %s and is written anew by the next `dropanchor tag add`",
+            file,
+            ", ".join(changes),
+            TABLE,
+        )

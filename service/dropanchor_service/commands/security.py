@@ -7,7 +7,8 @@ import socket
 import sys
 from pathlib import Path
 
-from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.file_names import file_name_of
+from dropanchor_schemas.keys import InvalidKeyError
 from dropanchor_service.answers.connect_command import reachable_endpoint
 from dropanchor_service.commands.options import positive
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
@@ -95,7 +96,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _init(arguments: argparse.Namespace) -> None:
-    chunk_from_id(arguments.site)
+    file_name_of(arguments.site)
     hosts = _hosts(arguments.host)
     table = Table(site=arguments.site, hosts=hosts, listen=(arguments.listen,))
     SecurityFolder.make(arguments.security, table, arguments.days)

@@ -1,21 +1,19 @@
 """Find the address of a receiver, and refuse addresses of the inside.
 
-The request goes to the address that was checked. A name that resolves to another address a moment later changes
+The connection goes to the address that was checked. A name that resolves to another address a moment later changes
 nothing.
 """
 
+import asyncio
 import ipaddress
 import socket
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
+from dropanchor_service.delivery.public_addresses import Network, address_of, is_public
+
 if TYPE_CHECKING:
     import httpx
-
-Network = ipaddress.IPv4Network | ipaddress.IPv6Network
-Address = ipaddress.IPv4Address | ipaddress.IPv6Address
-
-_NAT64 = ipaddress.ip_network("64:ff9b::/96")
 
 
 class UrlError(ValueError):
@@ -53,8 +51,8 @@ def allowed(addresses: Sequence[str], networks: Iterable[Network]) -> str:
     """Return the first address, if all of them are public or in these networks. Raises RefusedAddressError."""
     listed = tuple(networks)
     for text in addresses:
-        address = ipaddress.ip_address(text.partition("%")[0])
-        if not _is_public(address) and not any(address in network for network in listed):
+        address = address_of(text)
+        if not is_public(address) and not any(address in network for network in listed):
             raise RefusedAddressError(
                 f"the receiver has the address {address}, which is not public: an administrator can allow it with "
                 "`allow_networks` in `[delivery]` of the settings"
@@ -62,14 +60,31 @@ def allowed(addresses: Sequence[str], networks: Iterable[Network]) -> str:
     return addresses[0]
 
 
-def _is_public(address: Address) -> bool:
-    """Return whether the address lies on the public internet, also by what is embedded in it."""
-    if isinstance(address, ipaddress.IPv6Address):
-        embedded = [address.ipv4_mapped, address.sixtofour, *(address.teredo or ())]
-        if address in _NAT64:
-            embedded.append(ipaddress.IPv4Address(int(address) & 0xFFFFFFFF))
-        if any(inner is not None and not _is_public(inner) for inner in embedded):
-            return False
-        if address.ipv4_mapped is not None:
-            return True
-    return address.is_global and not address.is_multicast
+def is_told(server: str) -> bool:
+    """Return whether the settings of a server tell its address itself, which an administrator then means."""
+    try:
+        return server.lower().rstrip(".") == "localhost" or ipaddress.ip_address(server.strip("[]")) is not None
+    except ValueError:
+        return False
+
+
+async def connected(server: str, port: int, networks: Iterable[Network]) -> socket.socket:
+    """Return a socket that is connected to a server. Raises OSError, and RefusedAddressError before it connects."""
+    loop = asyncio.get_running_loop()
+    found = await loop.getaddrinfo(server, port, type=socket.SOCK_STREAM)
+    if not is_told(server):
+        allowed([str(entry[4][0]) for entry in found], networks)
+    problem: OSError | None = None
+    for family, kind, protocol, _, place in found:
+        opened = socket.socket(family, kind, protocol)
+        try:
+            opened.setblocking(False)
+            await loop.sock_connect(opened, place)
+        except BaseException as error:
+            opened.close()
+            if not isinstance(error, OSError):
+                raise
+            problem = error
+        else:
+            return opened
+    raise problem or OSError(f"{server} has no address")

@@ -79,13 +79,13 @@ class Channels:
             case EmailDestination():
                 from dropanchor_service.delivery.mail import open_mail
 
-                page = self._delivery.page
-                return open_mail(destination, self._email, self._shared.email, timeout_s, page, self._name_of)
+                page, networks = self._delivery.page, self._delivery.allow_networks
+                return open_mail(destination, self._email, self._shared.email, timeout_s, networks, page, self._name_of)
             case MqttDestination():
                 from dropanchor_service.delivery.mqtt import open_mqtt  # an extra
 
-                shared = self._shared
-                return open_mqtt(destination, self._mqtt, shared.mqtt, timeout_s, shared.brokers)
+                shared, networks = self._shared, self._delivery.allow_networks
+                return open_mqtt(destination, self._mqtt, shared.mqtt, timeout_s, networks, shared.brokers)
 
     def check(self, destination: Destination) -> None:
         """Raise ChannelError when nothing could be delivered. It may resolve a name, and blocks then."""

@@ -1,5 +1,6 @@
 """Deliver events by e-mail: all events that wait, in one mail."""
 
+import asyncio
 import hashlib
 import ssl
 from collections import Counter
@@ -13,7 +14,9 @@ import aiosmtplib
 
 from dropanchor_schemas.destinations import EmailDestination
 from dropanchor_schemas.events import Event
+from dropanchor_service.delivery.addresses import RefusedAddressError, connected
 from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
+from dropanchor_service.delivery.public_addresses import Network
 from dropanchor_service.delivery.sentences import NameOf, kind, link, place_and_time, sentence, site_of
 from dropanchor_service.delivery.words import WORDS, Words
 from dropanchor_service.settings.events import EmailSettings
@@ -32,6 +35,7 @@ class MailChannel:
     settings: EmailSettings
     tls: ssl.SSLContext
     timeout_s: float
+    allow_networks: Sequence[Network]
     page: str | None
     name_of: NameOf
 
@@ -54,17 +58,20 @@ class MailChannel:
             return _refused_by(max(one.code for one in error.recipients), _reasons(error))
         except aiosmtplib.SMTPResponseException as error:
             return _refused_by(error.code, error.message)
-        except (aiosmtplib.SMTPException, OSError, ChannelError) as error:
+        except (aiosmtplib.SMTPException, OSError, ChannelError, RefusedAddressError) as error:
             return Outcome(Verdict.UNAVAILABLE, f"the mail server cannot be used: {error or type(error).__name__}")
         warning = "; ".join(f"{address} was refused: {one.code} {one.message}" for address, one in refused.items())
         return Outcome(Verdict.ACCEPTED, f"the mail server answered: {answer}", warning or None)
 
     async def _submit(self, mail: EmailMessage) -> tuple[dict[str, aiosmtplib.SMTPResponse], str]:
-        file = self.settings.password_file
+        file, server = self.settings.password_file, self.settings.server or ""
+        port = self.settings.port or _PORTS[self.settings.tls]
+        async with asyncio.timeout(self.timeout_s):
+            sock = await connected(server, port, self.allow_networks)
         return await aiosmtplib.send(
             mail,
-            hostname=self.settings.server,
-            port=self.settings.port or _PORTS[self.settings.tls],
+            hostname=server,
+            sock=sock,
             username=self.settings.user,
             password=None if file is None else password_in(file),
             timeout=self.timeout_s,
@@ -80,11 +87,12 @@ async def open_mail(
     settings: EmailSettings,
     tls: ssl.SSLContext,
     timeout_s: float,
+    allow_networks: Sequence[Network],
     page: str | None,
     name_of: NameOf,
 ) -> AsyncIterator[MailChannel]:
     """Open the way to people. Every mail makes a connection of its own, since mails are rare."""
-    yield MailChannel(destination, settings, tls, timeout_s, page, name_of)
+    yield MailChannel(destination, settings, tls, timeout_s, allow_networks, page, name_of)
 
 
 def mail_of(

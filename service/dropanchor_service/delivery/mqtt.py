@@ -15,7 +15,9 @@ from paho.mqtt.reasoncodes import ReasonCode
 
 from dropanchor_schemas.destinations import MqttDestination
 from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_service.delivery.addresses import RefusedAddressError, allowed, is_told
 from dropanchor_service.delivery.channel import ChannelError, Outcome, Portion, Verdict, password_in
+from dropanchor_service.delivery.public_addresses import Network
 from dropanchor_service.delivery.sentences import SOURCE_PREFIX
 from dropanchor_service.settings.events import MqttSettings
 
@@ -33,9 +35,12 @@ class BrokerGoneError(Exception):
 class Connection:
     """A connection to the broker. The event loop owns it; paho's thread only passes on what comes."""
 
-    def __init__(self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float) -> None:
+    def __init__(
+        self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float, allow_networks: Sequence[Network]
+    ) -> None:
         """Raises ChannelError when the password cannot be read."""
         self._settings = settings
+        self._allow_networks = allow_networks
         self._loop = asyncio.get_running_loop()
         self._connected: asyncio.Future[None] = self._loop.create_future()
         self._answers: dict[int, asyncio.Future[ReasonCode]] = {}
@@ -43,6 +48,7 @@ class Connection:
             CallbackAPIVersion.VERSION2, protocol=MQTTProtocolVersion.MQTTv5, reconnect_on_failure=False
         )
         self._client.connect_timeout = timeout_s
+        self._client.on_socket_open = lambda _client, _data, connection: self._check(connection)
         if settings.user is not None and settings.password_file is not None:
             self._client.username_pw_set(settings.user, password_in(settings.password_file))
         if settings.tls:
@@ -62,6 +68,15 @@ class Connection:
             raise BrokerGoneError(f"the broker {host}:{port} cannot be reached: {error}") from error
         self._client.loop_start()
         await self._connected
+
+    def _check(self, connection: Any) -> None:
+        """Close the connection before anything is sent to a refused address. Raises RefusedAddressError."""
+        try:
+            if not is_told(self._settings.server or ""):
+                allowed([str(connection.getpeername()[0])], self._allow_networks)
+        except RefusedAddressError:
+            connection.close()
+            raise
 
     async def close(self) -> None:
         self._client.disconnect()
@@ -113,9 +128,12 @@ class Broker:
     wait for their answer.
     """
 
-    def __init__(self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float) -> None:
+    def __init__(
+        self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float, allow_networks: Sequence[Network]
+    ) -> None:
         self._settings = settings
         self._tls = tls
+        self._allow_networks = allow_networks
         self._opening: asyncio.Task[Connection] | None = None
         self._connection: Connection | None = None
         self.timeout_s = timeout_s
@@ -138,7 +156,7 @@ class Broker:
             raise
 
     async def _open(self) -> Connection:
-        connection = Connection(self._settings, self._tls, self.timeout_s)
+        connection = Connection(self._settings, self._tls, self.timeout_s, self._allow_networks)
         try:
             async with asyncio.timeout(self.timeout_s):
                 await connection.open()
@@ -169,10 +187,10 @@ class Brokers:
 
     @asynccontextmanager
     async def of_this_loop(
-        self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float
+        self, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float, allow_networks: Sequence[Network]
     ) -> AsyncIterator[Broker]:
         loop = asyncio.get_running_loop()
-        broker = self._of_loops.setdefault(loop, Broker(settings, tls, timeout_s))
+        broker = self._of_loops.setdefault(loop, Broker(settings, tls, timeout_s, allow_networks))
         broker.users += 1
         try:
             yield broker
@@ -223,10 +241,15 @@ class MqttChannel:
 
 @asynccontextmanager
 async def open_mqtt(
-    destination: MqttDestination, settings: MqttSettings, tls: ssl.SSLContext, timeout_s: float, brokers: Brokers
+    destination: MqttDestination,
+    settings: MqttSettings,
+    tls: ssl.SSLContext,
+    timeout_s: float,
+    allow_networks: Sequence[Network],
+    brokers: Brokers,
 ) -> AsyncIterator[MqttChannel]:
     """Open the way to a topic. The connection is made with the first event."""
-    async with brokers.of_this_loop(settings, tls, timeout_s) as broker:
+    async with brokers.of_this_loop(settings, tls, timeout_s, allow_networks) as broker:
         yield MqttChannel(destination, broker)
 
 

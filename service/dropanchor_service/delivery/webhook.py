@@ -12,8 +12,9 @@ import httpx
 import orjson
 
 from dropanchor_schemas.destinations import WebhookDestination
-from dropanchor_service.delivery.addresses import Network, UrlError, allowed, checked_url, resolved
+from dropanchor_service.delivery.addresses import UrlError, allowed, checked_url, resolved
 from dropanchor_service.delivery.channel import Outcome, Portion, Verdict
+from dropanchor_service.delivery.public_addresses import Network
 from dropanchor_service.delivery.signature import headers
 
 CONTENT_TYPE = "application/cloudevents+json; charset=utf-8"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dropanchor_schemas.plans import ImageType, PlanImage
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.open_below import open_below
 
 _ENDINGS: dict[ImageType, str] = {"image/png": ".png", "image/jpeg": ".jpg", "image/svg+xml": ".svg"}
 _DIGEST_CHARACTERS = 32
@@ -35,7 +36,8 @@ class ImageFolder:
         if self._folder is None:
             return self._in_memory.get(image.id)
         try:
-            return self._path(self._folder, image).read_bytes()
+            with open_below(self._folder, self._path(self._folder, image).name) as file:
+                return file.read()
         except FileNotFoundError:
             return None
 

@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import BinaryIO
 
 from mcap.writer import MCAP0_MAGIC
+
+from dropanchor_service.runtime.open_below import open_below
 
 SUFFIX = ".mcap"
 _NAME = re.compile(r"[A-Za-z0-9._%-]{1,250}\.mcap")
@@ -43,10 +46,14 @@ def new_name(prefix: str, t_ns: int) -> str:
     return f"{prefix}-{datetime.fromtimestamp(t_ns // 10**9, UTC):%Y%m%dT%H%M%S}-{t_ns % 10**9 // 10**3:06d}Z{SUFFIX}"
 
 
-def path_of(folder: Path, name: str) -> Path | None:
-    """Return the path of the recording of this name, or None. No name leads out of the folder."""
-    path = folder / name
-    return path if _NAME.fullmatch(name) and path.is_file() else None
+def opened(folder: Path, name: str) -> BinaryIO | None:
+    """Open the recording of this name; None if there is none. No name and no link leads out of the folder."""
+    if not _NAME.fullmatch(name):
+        return None
+    try:
+        return open_below(folder, name)
+    except FileNotFoundError:
+        return None
 
 
 def files_in(folder: Path) -> list[RecordedFile]:
@@ -72,10 +79,10 @@ def _excess_files(files: list[RecordedFile], limits: Limits, open_name: str | No
 
 def _file(path: Path) -> RecordedFile | None:
     try:
-        with path.open("rb") as file:
+        with open_below(path.parent, path.name) as file:
             size = file.seek(0, os.SEEK_END)
             file.seek(-min(size, len(MCAP0_MAGIC)), os.SEEK_END)
             finished = size > 2 * len(MCAP0_MAGIC) and file.read() == MCAP0_MAGIC
             return RecordedFile(path.name, size, os.fstat(file.fileno()).st_mtime_ns, finished)
-    except FileNotFoundError:  # deleted meanwhile
+    except FileNotFoundError:  # deleted meanwhile, or a link
         return None

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
-from dropanchor_schemas.keys import chunk_from_id
+from dropanchor_schemas.file_names import file_name_of
 from dropanchor_service.estimation.columns import Array
 from dropanchor_service.recording import folder as files
 from dropanchor_service.recording.folder import Limits, RecordedFile
@@ -93,9 +94,9 @@ class Recorder:
         """Return the recorded files, the oldest first."""
         return files.files_in(self.folder)
 
-    def path_of(self, name: str) -> Path | None:
-        """Return the path of the file of this name, or None."""
-        return files.path_of(self.folder, name)
+    def opened(self, name: str) -> BinaryIO | None:
+        """Open the file of this name; None if there is none. Raises OSError."""
+        return files.opened(self.folder, name)
 
     def prepare(self) -> None:
         """Create the folder now rather than with the first file. Raises OSError."""
@@ -149,7 +150,7 @@ class Recorder:
 
     def _new_file(self, t_ns: int) -> McapFile:
         self.folder.mkdir(parents=True, exist_ok=True)
-        name = files.new_name(chunk_from_id(self._site.site.id), t_ns)
+        name = files.new_name(file_name_of(self._site.site.id), t_ns)
         return McapFile(self.folder / name, {**self._metadata, SESSION: self._session})
 
     def _prune(self, open_name: str | None) -> None:

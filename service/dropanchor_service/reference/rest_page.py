@@ -21,6 +21,12 @@ are UTC in ns. With credentials, every request but those for health and the docu
 Every path below, but those for lists of sites, health and share links, also exists with the site before it, as
 `/api/v1/sites/{site}/poses` for `/api/v1/poses`. A service with [several
 sites](../how-to/serve-several-sites.md) has these alone, and not for zones, events and destinations.
+
+Ids in a path are percent-escaped, a slash too; `.` and `..` are no ids. `tags` and `zones` list ids: `tags=a,b` or
+`tags=a&tags=b`. A parameter that is repeated has one id in each value, and only then may an id have a comma:
+`tags=a%2Cb&tags=c`. Given once, a comma separates, escaped as `%2C` or not; so a single id with a comma is given twice,
+`tags=a%2Cb&tags=a%2Cb`. The words of `state` and `types` have no commas, and both forms do. Groups may have commas:
+repeat `group`.
 """
 
 _STREAM = """\

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from pydantic import ValidationError
 
+from dropanchor_schemas.file_names import file_name_of
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE, reader_of
@@ -16,6 +17,7 @@ from dropanchor_service.security.authority import Authority, Issued, expiry
 from dropanchor_service.security.files import PRIVATE, PUBLIC, exclusive_lock
 from dropanchor_service.security.issued import IssuedTag, Table
 from dropanchor_service.security.router import router_configuration
+from dropanchor_service.security.router_file import RouterFileError, endpoints_in
 
 TABLE = "issued.json"
 ROUTER_FILE = "router.json5"
@@ -80,7 +82,7 @@ class SecurityFolder:
     def add_site(self, site: str, days: int) -> None:
         """Let the router serve another site, and issue a certificate to a reader of each site. Raises SecurityError."""
         with self._changing():
-            chunk_from_id(site)
+            file_name_of(site)
             if site in self.table.sites:
                 raise SecurityError(f"the site {site!r} is there already")
             taken = [name for name in (reader_of(one) for one in (*self.table.sites, site)) if name in self.table.tags]
@@ -118,8 +120,8 @@ class SecurityFolder:
             name = self.table.common_name(of_site, tag)
             chunk_from_id(tag)
             self._refuse_tag(name, renew)
-            issued = self._authority().client(name, days)
             bundle = self.bundle(name)
+            issued = self._authority().client(name, days)
             bundle.mkdir(parents=True, exist_ok=True, mode=0o700)
             write_atomically(bundle / "ca.pem", [(self.path / "ca.pem").read_bytes()], PUBLIC)
             write_atomically(bundle / "tag.pem", [issued.certificate], PUBLIC)
@@ -152,8 +154,11 @@ class SecurityFolder:
         return site or self.table.site
 
     def bundle(self, name: str) -> Path:
-        """Return the folder with the credentials of the tag whose certificate has this common name."""
-        return self.path / "tags" / chunk_from_id(name)
+        """Return the folder with the credentials of the tag whose certificate has this common name.
+
+        Raises InvalidKeyError if the name cannot be that of a folder.
+        """
+        return self.path / "tags" / file_name_of(name)
 
     def certificate(self, role: str) -> Path:
         return self.path / f"{role}.pem"
@@ -161,11 +166,23 @@ class SecurityFolder:
     def key(self, role: str) -> Path:
         return self.path / f"{role}.key"
 
+    @property
+    def router_file(self) -> Path:
+        return self.path / ROUTER_FILE
+
+    @property
+    def listen(self) -> tuple[str, ...]:
+        """The endpoints of the router: those in its file, which a person may change. Raises SecurityError."""
+        try:
+            return endpoints_in(self.router_file) or self.table.listen
+        except RouterFileError as error:
+            raise SecurityError(str(error)) from error
+
     def router_configuration(self, listen: Sequence[str] | None = None) -> dict[str, Any]:
         """Return the Zenoh configuration of the router, with access control for the tags admitted now."""
         files = {name: str(path.resolve()) for name, path in self._tls_files().items()}
         holders = [self.table.holder(name) for name in self.table.admitted]
-        return router_configuration(self.table.sites, holders, listen or self.table.listen, files)
+        return router_configuration(self.table.sites, holders, listen or self.listen, files)
 
     def _issue_roles(self, authority: Authority, days: int) -> None:
         for role in (ROUTER, SERVICE):
@@ -213,7 +230,7 @@ class SecurityFolder:
 
     def _connection(self, site: str, tag: str) -> dict[str, str]:
         """Return the contents of `tag.json`: who the tag is and where it connects."""
-        port = self.table.listen[0].rpartition(":")[2]
+        port = self.listen[0].rpartition(":")[2]
         host = self.table.hosts[0]
         host = f"[{host}]" if ":" in host else host
         return {"tag": tag, "site": site, "connect": f"tls/{host}:{port}"}
@@ -234,20 +251,22 @@ class SecurityFolder:
 
     def _save(self, table: Table) -> None:
         self.table = table
+        configuration = _json(self.router_configuration())
         write_atomically(self.path / TABLE, [_json(table.document())], PUBLIC)
-        write_atomically(self.path / ROUTER_FILE, [_json(self.router_configuration())], PUBLIC)
+        write_atomically(self.router_file, [configuration], PUBLIC)
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
         """Lock the folder and read its table again, so that concurrent changes are not lost."""
         with exclusive_lock(self.path):
             self.table = type(self).open(self.path).table
+            _ = self.listen  # a file that cannot be read is refused before anything changes
             yield
 
 
 def _reader_file(site: str) -> str:
     """Return the name of the files of the reader of one site."""
-    return f"{READER}-{chunk_from_id(site)}"
+    return f"{READER}-{file_name_of(site)}"
 
 
 def _json(document: Any) -> bytes:

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from dropanchor_schemas.keys import NOT_IDS
 from dropanchor_service.security.access_control import Holder
 
 
@@ -40,8 +41,11 @@ class Table(BaseModel):
 
     @property
     def admitted(self) -> list[str]:
-        """The common names of the tags whose certificates are not revoked."""
-        return [name for name, tag in self.tags.items() if tag.revoked is None]
+        """The common names of the tags whose certificates are not revoked, and which the router can let in.
+
+        Earlier versions issued certificates to `.` and `..`, which cannot be the ids of tags.
+        """
+        return [name for name, tag in self.tags.items() if tag.revoked is None and self.holder(name).tag not in NOT_IDS]
 
     def common_name(self, site: str, tag: str) -> str:
         """Return the common name of the certificate of a tag. A tag of the first site has its id alone."""

@@ -34,8 +34,9 @@ class DeliverySettings(_Section):
 
     allow_networks: Annotated[tuple[IPvAnyNetwork, ...], BeforeValidator(_as_list)] = Field(
         default=(),
-        description='Networks of webhooks inside, such as "10.1.0.0/16". Other addresses must be public, so that '
-        "nobody can reach internal machines through a webhook.",
+        description='Networks of receivers inside, such as "10.1.0.0/16". Other addresses must be public, so that '
+        "nobody can reach internal machines through a webhook, or by what a name stands for. A mail server or broker "
+        "whose address itself is in the settings, or `localhost`, needs none.",
     )
     authorities: Path | None = Field(
         default=None,

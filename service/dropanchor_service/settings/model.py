@@ -17,7 +17,7 @@ from dropanchor_service.settings.buckets import refuse_unfit_buckets
 from dropanchor_service.settings.cluster import ClusterSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 from dropanchor_service.settings.history import HistorySettings, RecordingSettings
-from dropanchor_service.settings.ids import SettingsId
+from dropanchor_service.settings.ids import SettingsId, SiteId
 from dropanchor_service.settings.quota import Quota, UnknownTags
 from dropanchor_service.settings.sites import ScopeName, SiteSettings
 
@@ -240,7 +240,7 @@ class Settings(_Section):
     tag_defaults: TagSettings = Field(
         default=TagSettings(), description="What every tag gets, unless its own table says otherwise."
     )
-    sites: dict[SettingsId, SiteSettings] = Field(
+    sites: dict[SiteId, SiteSettings] = Field(
         default={}, description="A site of several in one process, in place of `[site]` and `[tags]`."
     )
     paper: PaperSettings = PaperSettings()

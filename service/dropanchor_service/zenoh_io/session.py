@@ -7,9 +7,10 @@ from typing import Any
 import zenoh
 
 from dropanchor_service.security.access_control import SERVICE
-from dropanchor_service.security.folder import SecurityFolder
+from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.router import LINK, QUIET, router_transport
 from dropanchor_service.settings.model import ZenohSettings
+from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io import receive_threads
 
 ATTEMPT_S = 1.0
@@ -30,10 +31,13 @@ def open_session(settings: ZenohSettings, credentials: SecurityFolder | None = N
 
 
 def listening_at(settings: ZenohSettings, credentials: SecurityFolder | None) -> tuple[str, ...]:
-    """Return the endpoints where the router of the service listens."""
+    """Return the endpoints where the router of the service listens. Raises SettingsError."""
     if credentials is None or "listen" in settings.model_fields_set:
         return settings.listen
-    return credentials.table.listen
+    try:
+        return credentials.listen
+    except SecurityError as error:
+        raise SettingsError(f"security.folder: {error}") from error
 
 
 def configuration(settings: ZenohSettings, credentials: SecurityFolder | None = None) -> dict[str, Any]:

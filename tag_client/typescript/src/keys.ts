@@ -5,7 +5,7 @@ const CONTROL = /[\p{Cc}\p{Cs}]/u;
 const DECIMAL = /^(0|[1-9][0-9]{0,9})$/;
 const ESCAPED_BY_US_ALONE = /[!'()*~]/g;
 
-/** Return the key of a tag. Throws RangeError for an id that is empty, longer than 64 characters, or not printable. */
+/** Return the key of a tag. Throws RangeError for an id that is empty, longer than 64 characters, `.` or `..`, or not printable. */
 export function tagKey(site: string, tag: string, leaf: "samples" | "alive" | "pose"): string {
   return `dropanchor/@v1/${chunk(site)}/tag/${chunk(tag)}/${leaf}`;
 }
@@ -20,6 +20,7 @@ export function anchorNumber(id: string): number {
 function chunk(id: string): string {
   const length = [...id].length;
   if (length === 0 || length > MAX_ID_LENGTH) throw new RangeError(`an id has 1 to ${MAX_ID_LENGTH} characters`);
+  if (id === "." || id === "..") throw new RangeError(`${id} cannot be an id`);
   if (CONTROL.test(id)) throw new RangeError("an id holds printable characters only");
   return encodeURIComponent(id).replace(ESCAPED_BY_US_ALONE, (c) => `%${c.charCodeAt(0).toString(16).toUpperCase()}`);
 }

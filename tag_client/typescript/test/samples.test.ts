@@ -97,5 +97,5 @@ test("anchors have the numbers of the protocol", () => {
 test("keys are escaped as in the protocol", () => {
   assert.equal(tagKey("default", "tag 1", "samples"), "dropanchor/@v1/default/tag/tag%201/samples");
   assert.equal(tagKey("a/b", "Süd!'()*~-._", "alive"), "dropanchor/@v1/a%2Fb/tag/S%C3%BCd%21%27%28%29%2A%7E-._/alive");
-  for (const id of ["", "x".repeat(65), "a\tb", "\ud800"]) assert.throws(() => tagKey("default", id, "pose"), RangeError);
+  for (const id of ["", ".", "..", "x".repeat(65), "a\tb", "\ud800"]) assert.throws(() => tagKey("default", id, "pose"), RangeError);
 });

@@ -250,6 +250,20 @@ def test_a_page_of_a_pdf_is_chosen(chromium: Browser, place: PlanPlace) -> None:
         assert place.plans.all["hall"].image.width_px == 400
 
 
+def test_a_drawing_that_a_browser_cannot_draw_in_time_is_named_and_the_page_lives_on(
+    chromium: Browser, place: PlanPlace
+) -> None:
+    layers = "<g opacity='.5'><rect width='100' height='100'/><circle r='90'/></g>" * 1800
+    place.put("heavy", svg_file(layers), name="Heavy")
+    place.put("hall", image_file(WIDTH, HEIGHT), name="Hall")
+    with watched_page(chromium, place.url) as page:
+        expect(page.page.locator("#plan-faults")).to_contain_text("Heavy", timeout=60_000)
+        expect(page.page.locator("#plan-faults")).not_to_contain_text("Hall")
+        page.wait_for("dropanchor.plans().some(({ id, isReady }) => id === 'hall' && isReady)")
+        expect(open_panel(page).get_by_role("button", name="Heavy")).to_be_visible()
+        assert page.errors == []
+
+
 def test_a_file_that_is_refused_says_why(chromium: Browser, place: PlanPlace) -> None:
     with watched_page(chromium, place.url) as page:
         panel = open_panel(page)

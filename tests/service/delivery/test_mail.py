@@ -15,8 +15,9 @@ from dropanchor_schemas.events import EventType
 from dropanchor_service.delivery import queue
 from dropanchor_service.delivery.words import WORDS
 from dropanchor_service.settings.events import EmailSettings
+from service.delivery.names import resolve_to_loopback
 from support.certificate import self_signed
-from support.delivery import DeliveryBench
+from support.delivery import LOOPBACK, DeliveryBench
 from support.mail_server import MailServer, running_mail_server
 from support.zenoh_router import wait_until
 
@@ -26,10 +27,10 @@ def _fast(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(queue, "FIRST_RETRY_S", 0.05)
 
 
-def bench_of(server: MailServer, tls: str = "none", **settings: Any) -> DeliveryBench:
+def bench_of(server: MailServer, tls: str = "none", host: str = "127.0.0.1", **settings: Any) -> DeliveryBench:
     login = {name: settings.pop(name) for name in ("user", "password_file") if name in settings}
     email = EmailSettings.model_validate(
-        {"server": "127.0.0.1", "port": server.port, "tls": tls, "sender": "yard@example.com"} | login
+        {"server": host, "port": server.port, "tls": tls, "sender": "yard@example.com"} | login
     )
     return DeliveryBench(email=email, **settings)
 
@@ -145,6 +146,25 @@ def test_events_wait_while_there_is_no_server() -> None:
         with running_mail_server(server):
             wait_until(lambda: bench.counts() == (0, 0))
     assert len(server.mails) == 1
+
+
+def test_a_server_whose_name_stands_for_an_address_inside_gets_nothing_unless_the_settings_allow_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    resolve_to_loopback(monkeypatch, "mail.example.com")
+    server = MailServer()
+    with running_mail_server(server):
+        bench = bench_of(server, host="mail.example.com", allow_networks=())
+        with delivering(bench):
+            bench.happen("a")
+            wait_until(lambda: "127.0.0.1, which is not public" in (bench.thread.problem_of(0, "mes") or ""))
+        assert server.mails == []
+        for host, networks in (("localhost", ()), ("mail.example.com", LOOPBACK)):
+            bench = bench_of(server, host=host, allow_networks=networks)
+            with delivering(bench):
+                bench.happen("a")
+                wait_until(lambda bench=bench: bench.counts() == (0, 0))  # type: ignore[misc]
+    assert len(server.mails) == 2
 
 
 def test_a_mail_that_the_server_refuses_becomes_dead_letters_that_can_be_sent_again() -> None:

@@ -1,6 +1,7 @@
 """Events reach a real MQTT broker over TLS: acknowledged, in order per tag, and through its restart."""
 
 import gc
+import socket
 import subprocess
 import threading
 import time
@@ -18,8 +19,9 @@ from dropanchor_service.delivery import queue
 from dropanchor_service.delivery.queue import Patience
 from dropanchor_service.delivery.thread import DeliveryThread, Outbox
 from dropanchor_service.settings.events import MqttSettings
+from service.delivery.names import resolve_to_loopback
 from support.certificate import self_signed
-from support.delivery import DeliveryBench, in_order
+from support.delivery import LOOPBACK, DeliveryBench, in_order
 from support.mosquitto import PROGRAM, Mosquitto, mosquitto, needs_mosquitto
 from support.zenoh_router import wait_until
 
@@ -54,10 +56,10 @@ def secured_broker(folder: Path, rights: str = "topic readwrite #") -> Iterator[
         yield broker
 
 
-def bench_of(broker: Mosquitto, password: str = "yard", **delivery: Any) -> DeliveryBench:
+def bench_of(broker: Mosquitto, password: str = "yard", server: str = "127.0.0.1", **delivery: Any) -> DeliveryBench:
     file = broker.folder / "password"
     file.write_text(f"{password}\n")
-    settings = MqttSettings(server="127.0.0.1", port=broker.port, user="yard", password_file=file)
+    settings = MqttSettings(server=server, port=broker.port, user="yard", password_file=file)
     return DeliveryBench(mqtt=settings, authorities=broker.folder / "broker.pem", **delivery)
 
 
@@ -173,3 +175,30 @@ def test_the_destinations_of_all_sites_share_one_connection_and_one_thread(tmp_p
             broker.start()
             wait_until(lambda: all(bench.counts() == (0, 0) for bench in benches))
         wait_until(lambda: threading.active_count() <= before)
+
+
+@pytest.mark.usefixtures("sockets_of_paho")
+def test_a_broker_whose_name_stands_for_an_address_inside_gets_nothing_unless_the_settings_allow_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    resolve_to_loopback(monkeypatch, "broker.example.com")
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        mqtt = MqttSettings(server="broker.example.com", port=port, tls=False)
+        bench = DeliveryBench(mqtt=mqtt, allow_networks=())
+        put(bench, topic="t")
+        with bench.thread:
+            bench.happen("a")
+            wait_until(lambda: "127.0.0.1, which is not public" in (bench.thread.problem_of(0, "mes") or ""))
+        connection, _ = listener.accept()
+        with connection:
+            connection.settimeout(10)
+            assert connection.recv(100) == b""
+    with mosquitto(tmp_path) as broker:
+        for server, networks in (("localhost", ()), ("broker.example.com", LOOPBACK)):
+            settings = MqttSettings(server=server, port=broker.port, tls=False)
+            bench = DeliveryBench(mqtt=settings, allow_networks=networks)
+            put(bench, topic="t")
+            with bench.thread:
+                bench.happen("a")
+                wait_until(lambda bench=bench: bench.counts() == (0, 0))  # type: ignore[misc]

@@ -1,5 +1,7 @@
 """The anchors of ranges: the first one of a site, unknown ones, and anchors that move."""
 
+import json
+
 import pytest
 
 from dropanchor_schemas import Anchor
@@ -26,6 +28,16 @@ def test_an_anchor_named_by_text_is_bound_under_its_name() -> None:
     bench.put("a", encode_json(frame), ENCODING_JSON)
     bench.ingest.turn()
     assert [anchor.id for anchor in bench.site.site.anchors] == ["gate"]
+
+
+@pytest.mark.parametrize("name", ["..", ".", "a\nb", "\u200b", "\ud800"])
+def test_an_anchor_that_is_named_by_no_id_is_refused_and_the_ingest_goes_on(name: str) -> None:
+    bench = IngestBench(site={"anchors": [{"id": "7"}]})
+    message = {"range": [{"t_ns": 1_790_000_000_000_000_000, "anchor": name, "range_m": 1.0}]}
+    bench.put("a", json.dumps(message).encode(), ENCODING_JSON)
+    bench.send("a", ranges(2.0, anchor=7))
+    assert sum(bench.rejected().values()) == 1
+    assert bench.x_of("a") == [2.0]
 
 
 def test_a_bad_range_does_not_bind_an_anchor() -> None:

@@ -1,6 +1,7 @@
 """Uploaded files become images that browsers show, or are refused with a sentence."""
 
 import math
+from base64 import b64encode
 from io import BytesIO
 from typing import Any
 
@@ -119,10 +120,11 @@ def test_a_file_that_lies_about_its_type_is_refused() -> None:
 
 
 def test_an_svg_keeps_what_it_draws_and_loses_the_rest() -> None:
+    image = b64encode(image_file()).decode()
     found = read(
         svg_file(
             '<metadata><x/></metadata><i:page/><rect id="a" i:label="x"/><use x:href="#a" style="fill:url(#a)"/>'
-            '<image x:href="data:image/png;base64,AAAA"/><animate attributeName="x"/>',
+            f'<image x:href="data:image/png;base64,{image}"/><animate attributeName="x"/>',
             'xmlns:x="http://www.w3.org/1999/xlink" xmlns:i="http://ink" width="20mm" height="10mm"',
         )
     )

@@ -101,6 +101,11 @@ def test_tags_are_added_listed_and_revoked(tmp_path: Path, capsys: pytest.Captur
         (["tag", "add", "service"], "is a reserved name"),
         (["tag", "add", "x" * 65], "1 to 64 characters"),
         (["tag", "add", "ü" * 33], "a name may have 64 bytes"),
+        (["tag", "add", "--", ".."], "'..' cannot be an id"),
+        (["tag", "add", "."], "'.' cannot be an id"),
+        (["tag", "add", "nul"], "on Windows it is a device"),
+        (["security", "add-site", ".."], "'..' cannot be an id"),
+        (["security", "add-site", "con"], "on Windows it is a device"),
         (["tag", "add", "known"], "replace it with --renew"),
         (["tag", "add", "new", "--renew"], "no certificate to renew"),
         (["tag", "add", "gone"], "would also admit its old certificate"),
@@ -113,7 +118,9 @@ def test_a_request_that_cannot_be_met_is_refused_with_a_reason(
 ) -> None:
     folder = secured_site(tmp_path / "security", "known", "gone").folder
     folder.revoke_tag("gone")
-    assert main([*arguments, "--security", str(folder.path)]) == 2
+    before = sorted(folder.path.rglob("*"))
+    assert main([*arguments[:2], "--security", str(folder.path), *arguments[2:]]) == 2
+    assert sorted(folder.path.rglob("*")) == before
     assert words in capsys.readouterr().err
 
 
@@ -178,3 +185,18 @@ def test_the_service_warns_at_its_start_about_certificates_that_expire_soon(
     credentials_of(Settings(security=SecuritySettings(folder=folder.path)))
     assert "service.pem expires on" in caplog.text
     assert "dropanchor security renew" in caplog.text
+
+
+def test_a_certificate_that_was_issued_to_dots_is_not_admitted_and_can_be_revoked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = secured_site(tmp_path / "security", "a").folder.path
+    table = json.loads((path / "issued.json").read_text())
+    table["tags"][".."] = table["tags"]["a"]
+    (path / "issued.json").write_text(json.dumps(table))
+    folder = ["--security", str(path)]
+    assert main(["tag", "list", *folder]) == 0
+    assert capsys.readouterr().out.startswith("..\tno id of a tag, not admitted")
+    assert main(["tag", "revoke", *folder, ".."]) == 0
+    subjects = json.loads((path / "router.json5").read_text())["access_control"]["subjects"]
+    assert [subject["id"] for subject in subjects] == ["service", "reader", "a"]

@@ -135,7 +135,7 @@ def test_keys_are_escaped_as_python_escapes_them(codec: Path, tag: str) -> None:
     assert run(codec, "key", "default", tag).stdout.decode() == f"{keys.samples_key('default', tag)}\n"
 
 
-@pytest.mark.parametrize("tag", ["", "é" * 65, "a\tb", "a\x7fb"])
+@pytest.mark.parametrize("tag", ["", "é" * 65, "a\tb", "a\x7fb", ".", ".."])
 def test_an_id_that_is_not_allowed_has_no_key(codec: Path, tag: str) -> None:
     with pytest.raises(keys.InvalidKeyError):
         keys.samples_key("default", tag)

@@ -31,14 +31,15 @@ def narrowed(scope: Scope, limit: Limit, members: Members) -> bool:
         return True
     if path not in _BY_TAG:
         return False
-    tags = [limit.tag] if limit.group is None else [tag for tag in members(site, limit.group) if "," not in tag]
+    tags = [str(limit.tag)] if limit.group is None else members(site, limit.group)
     if not tags:
         return False  # an empty list of tags would stand for all of them
-    _set_query(scope, "tags", ",".join(map(str, tags)))
+    _set_query(scope, "tags", *(tags * 2 if len(tags) == 1 else tags))  # repeated, each value is one id
     return True
 
 
-def _set_query(scope: Scope, name: str, value: str) -> None:
+def _set_query(scope: Scope, name: str, *values: str) -> None:
     """Replace whatever the query says about this parameter."""
     query = parse_qsl(scope.get("query_string", b"").decode("latin-1"), keep_blank_values=True)
-    scope["query_string"] = urlencode([pair for pair in query if pair[0] != name] + [(name, value)]).encode()
+    others = [pair for pair in query if pair[0] != name]
+    scope["query_string"] = urlencode(others + [(name, value) for value in values]).encode()

@@ -11,19 +11,21 @@ from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, Depends, Header, Query, Request
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.events import EventList, EventType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.parameters import (
+    COMMA,
     Ids,
     TagFilter,
     TimeNs,
     example_response,
+    ids_of,
     json_response,
-    split_ids,
+    words_of,
 )
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.api.routes.stream import HEARTBEAT_S, MEDIA_TYPE, stopped_within
@@ -42,9 +44,13 @@ stream begins with what comes next. While nothing happens, the service sends a c
 
 
 class EventFilter(TagFilter):
-    types: list[EventType] = Field(default=[], description="Return only events of these types. The default is all.")
-    zones: Annotated[list[Ids], AfterValidator(split_ids)] = Field(
-        default=[], description="Return only events of these zones. Separate ids with commas."
+    types: Annotated[list[EventType], BeforeValidator(words_of)] = Field(
+        default=[],
+        description="Return only events of these types. Separate several with commas, or repeat the parameter. The "
+        "default is all.",
+    )
+    zones: Annotated[list[Ids], AfterValidator(ids_of)] = Field(
+        default=[], description=f"Return only events of these zones. {COMMA} The default is all."
     )
     after: Annotated[str, Field(pattern=SEQUENCE)] | None = Field(
         default=None, description="Return events that follow the one with this `sequence`."

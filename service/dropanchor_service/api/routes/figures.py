@@ -15,7 +15,7 @@ from dropanchor_service.api.formats.figures import figures_csv
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
-from dropanchor_service.api.routes.parameters import Ids, example_response, json_response, split_ids
+from dropanchor_service.api.routes.parameters import COMMA, Ids, example_response, ids_of, json_response
 from dropanchor_service.api.routes.period import TagsInPeriod, history_of, limits_of, selected_tags, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.events.stays import TimeInZone, times_in_zones
@@ -51,8 +51,8 @@ _EXAMPLE = {
 class FiguresQuery(TagsInPeriod):
     """The tags, the zones, the period and the format."""
 
-    zones: Annotated[list[Ids], AfterValidator(split_ids)] = Field(
-        default=[], description="Return only the time in these zones. Separate ids with commas. The default is all."
+    zones: Annotated[list[Ids], AfterValidator(ids_of)] = Field(
+        default=[], description=f"Return only the time in these zones. {COMMA} The default is all."
     )
     format: Literal["json", "csv"] = Field(
         default="json", description="The format. CSV has one line for each tag, with a column for each zone."

@@ -10,7 +10,7 @@ from fastapi import Depends, Path, Request
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from starlette.responses import Response
 
-from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
+from dropanchor_schemas.keys import InvalidKeyError, checked_id
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.site import ID_SCHEMA, Label
 from dropanchor_schemas.times import ns_of_iso
@@ -53,7 +53,7 @@ def id_of(escaped: str) -> str:
     """Return the id in an escaped path segment, which may contain an escaped slash. Raises ProblemError."""
     try:
         identifier = unquote(escaped, errors="strict")
-        chunk_from_id(identifier)
+        checked_id(identifier)
     except UnicodeDecodeError as error:
         raise ProblemError(Kind.INVALID_REQUEST, "The id in the path is not percent-escaped UTF-8.") from error
     except InvalidKeyError as error:
@@ -81,12 +81,24 @@ TagId = Annotated[str, Depends(_tag_id)]
 AnchorId = Annotated[str, Depends(_anchor_id)]
 
 
-def split_ids(values: list[str]) -> list[str]:
-    """Return the ids in these texts, which commas separate. Raises ValueError."""
-    names = [name for value in values for name in value.split(",")]
-    for name in names:
-        chunk_from_id(name)
-    return names
+def ids_of(values: list[str]) -> list[str]:
+    """Return the ids that a parameter names. Given once, commas separate them; repeated, each value is one id.
+
+    Raises ValueError.
+    """
+    names = values[0].split(",") if len(values) == 1 else values
+    return [checked_id(name) for name in dict.fromkeys(names)]
+
+
+def words_of(values: Any) -> Any:
+    """Return the words in these texts, which commas separate. No word has a comma."""
+    return [word for value in values for word in value.split(",")] if isinstance(values, list) else values
+
+
+COMMA = (
+    "Separate ids with commas, or repeat the parameter: then each value is one id, which may have commas (escaped as "
+    "%2C or not). A single id with a comma is given twice."
+)
 
 
 _NUMBER = r"-?[0-9]{1,9}(\.[0-9]{1,9})?"
@@ -98,10 +110,9 @@ class TagFilter(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    tags: Annotated[list[Ids], AfterValidator(split_ids)] = Field(
+    tags: Annotated[list[Ids], AfterValidator(ids_of)] = Field(
         default=[],
-        description="Return only these tags. Separate ids with commas, or repeat the parameter. Unknown tags are left "
-        "out. The default is all tags.",
+        description=f"Return only these tags. {COMMA} Unknown tags are left out. The default is all tags.",
         examples=[["tag-1,tag-2"]],
     )
 
@@ -112,9 +123,9 @@ Box = Annotated[str, Field(pattern=rf"^{_NUMBER}(,{_NUMBER}){{3}}$")]
 class PoseQuery(TagFilter):
     """The query of a route that can return selected poses."""
 
-    state: list[TrackingState] = Field(
+    state: Annotated[list[TrackingState], BeforeValidator(words_of)] = Field(
         default=[],
-        description="Return only tags in this state. Repeat the parameter for several states.",
+        description="Return only tags in this state. Separate several with commas, or repeat the parameter.",
         examples=[["tracking"]],
     )
     box: Box | None = Field(

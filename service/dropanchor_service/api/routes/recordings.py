@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterator
-from contextlib import suppress
 from typing import Annotated, Any, BinaryIO
 
 from fastapi import APIRouter, Body, Path, Request
@@ -107,13 +106,12 @@ def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
 
 def _opened(recorder: Recorder, name: str) -> BinaryIO:
     """Open the recording with this name. Raises ProblemError."""
-    path = recorder.path_of(name)
-    if path is not None:
-        with suppress(FileNotFoundError):  # deleted by the retention limit meanwhile
-            return path.open("rb")
-    raise ProblemError(
-        Kind.UNKNOWN_RECORDING, f"There is no recording {name!r}. GET /api/v1/recordings lists the files."
-    )
+    file = recorder.opened(name)
+    if file is None:
+        raise ProblemError(
+            Kind.UNKNOWN_RECORDING, f"There is no recording {name!r}. GET /api/v1/recordings lists the files."
+        )
+    return file
 
 
 def _download(file: BinaryIO, name: str) -> Response:

@@ -2,7 +2,7 @@
 
 import { api } from "./connection.js";
 import { request } from "./access.js";
-import { nanoseconds } from "./track_reader.js";
+import { nanoseconds, onlyTag } from "./track_reader.js";
 import { t } from "../i18n/language.js";
 
 const TIMEOUT_MS = 30_000;
@@ -100,7 +100,7 @@ export const hottest = ({ cells: { seconds } }) => seconds.reduce((best, value, 
 /** @param {Wanted} wanted */
 function urlOf({ from_ms, to_ms, tag, group }) {
   const url = api("heat-map");
-  const which = tag !== null ? { tags: tag } : group !== "" ? { group } : {};
-  url.search = new URLSearchParams({ from: nanoseconds(from_ms), to: nanoseconds(to_ms), ...which }).toString();
+  const which = tag !== null ? onlyTag(tag) : group !== "" ? [["group", group]] : [];
+  url.search = new URLSearchParams([["from", nanoseconds(from_ms)], ["to", nanoseconds(to_ms)], ...which]).toString();
   return url;
 }

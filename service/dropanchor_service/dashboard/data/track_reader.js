@@ -38,11 +38,14 @@ function theWorker() {
 /** @param {number} from_ms @param {number} to_ms @param {number} points @param {string} [tag] */
 function tracksUrl(from_ms, to_ms, points, tag) {
   const url = api("tracks");
-  url.search = new URLSearchParams({
-    from: nanoseconds(from_ms), to: nanoseconds(to_ms), max_points: String(points), ...(tag === undefined ? {} : { tags: tag }),
-  }).toString();
+  url.search = new URLSearchParams([
+    ["from", nanoseconds(from_ms)], ["to", nanoseconds(to_ms)], ["max_points", String(points)], ...(tag === undefined ? [] : onlyTag(tag)),
+  ]).toString();
   return url;
 }
+
+/** Return the parameters that select one tag. Repeated, a value is one id, also with a comma in it. @param {string} tag */
+export const onlyTag = (tag) => [["tags", tag], ["tags", tag]];
 
 /** @param {number} time_ms */
 export const nanoseconds = (time_ms) => `${Math.max(0, Math.round(time_ms))}000000`;

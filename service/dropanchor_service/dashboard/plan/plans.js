@@ -7,6 +7,7 @@ import { PlanEditor } from "./plan_editor.js";
 import { PlanImages } from "./plan_images.js";
 import { PlanPanel } from "./plan_panel.js";
 import { PlanStore } from "./plan_store.js";
+import { t } from "../i18n/language.js";
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
 const byId = (id) => /** @type {T} */ (document.getElementById(id));
@@ -27,6 +28,7 @@ export class Plans {
     map.isElsewhere = (row) => this.floors.chosen !== null && isElsewhere(this.floors.all, this.floors.chosen, roster.height(map.fleet.names[row]));
     giveTo(map, [this.editor]);
     for (const source of [this.images, this.floors]) source.addEventListener("change", () => map.redraw());
+    this.images.addEventListener("change", () => this.#sayFaults());
     this.store.addEventListener("change", () => this.#takePlans());
     this.editor.addEventListener("change", () => this.#keepApart(setup, choice));
     for (const other of [choice, setup.anchors]) other.addEventListener("change", () => this.#giveWay(setup, choice));
@@ -57,6 +59,18 @@ export class Plans {
     this.images.keep(this.store.plans.map(({ image }) => image));
     this.floors.setPlans(this.store.plans);
     this.map.redraw();
+    this.#sayFaults();
+  }
+
+  /** Say which plans are not shown, or not in full, because a browser takes too long for them. */
+  #sayFaults() {
+    const lines = /** @type {const} */ ([["slow", "plans.slow"], ["coarse", "plans.coarse"]]).map(([fault, message]) => {
+      const plans = this.store.plans.filter(({ image }) => this.images.faultOf(image) === fault);
+      return plans.length === 0 ? "" : t(message, { plans: plans.map(({ id, name }) => name || id).join(", ") });
+    });
+    const notice = byId("plan-faults");
+    notice.textContent = lines.filter(Boolean).join(" ");
+    notice.hidden = notice.textContent === "";
   }
 
   /** While plans are edited, no tag is selected and no anchor is edited.

@@ -9,6 +9,8 @@ from defusedxml.ElementTree import fromstring
 
 from dropanchor_service.plans.reading.refused import RefusedError
 from dropanchor_service.plans.reading.svg_size import size_of
+from dropanchor_service.plans.reading.svg_styles import at_rest
+from dropanchor_service.plans.reading.svg_weight import Scales
 
 MAX_ELEMENTS = 200_000
 NAMESPACE = "http://www.w3.org/2000/svg"
@@ -37,6 +39,7 @@ def sanitised(content: bytes) -> tuple[bytes, int, int]:
     if sum(1 for _ in root.iter()) > MAX_ELEMENTS:
         raise RefusedError(f"the SVG has more than {MAX_ELEMENTS} elements. Save it as PNG or PDF")
     _clean(root)
+    Scales(root, {element: _name(element) for element in root.iter()}).require_bearable()
     width, height = size_of(root)
     ElementTree.register_namespace("", NAMESPACE)
     return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True), width, height
@@ -56,7 +59,9 @@ def _clean(element: ElementTree.Element) -> None:
             )
         found.attrib = dict(_kept_attributes(found))
         if name == "style":
-            _require_local("".join(found.itertext()))
+            text = "".join(found.itertext())
+            _require_local(text)
+            found[:], found.text = [], at_rest(text)
 
 
 def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
@@ -67,7 +72,7 @@ def _kept_attributes(element: ElementTree.Element) -> Iterator[tuple[str, str]]:
             raise RefusedError(f"the SVG contains a script: the attribute {name[:40]}. Save it as plain SVG")
         elif not name.startswith("{"):
             _require_local(value)
-            yield name, value
+            yield name, at_rest(value) if name == "style" else value
 
 
 def _local_href(element: str, value: str) -> str:

@@ -17,6 +17,7 @@ def bench() -> ApiBench:
     bench.move("cart-1", x=1.0, y=1.0)
     bench.move("Cart-2", x=5.0, y=-2.5, state=State.DEGRADED)
     bench.answers.site.set_tag("cart-1", TagSettings(group="carts"))
+    bench.move("a", "b", "a,b", x=50.0, state=State.COASTING)
     bench.move("drone", x=1.5, y=1.5, frame=Frame.RELATIVE)
     return bench
 
@@ -32,8 +33,13 @@ def bench() -> ApiBench:
         ("text=CART", ["cart-1", "Cart-2"]),
         ("text=cart&state=tracking&box=0,0,2,2", ["cart-1"]),
         ("tags=drone,Cart-2&text=rt", ["Cart-2"]),
+        ("state=degraded,lost", ["Cart-2"]),
+        ("tags=a%2Cb&tags=drone", ["a,b", "drone"]),
+        ("tags=a%2Cb&tags=a%2Cb", ["a,b"]),
+        ("tags=a%2Cb", ["a", "b"]),
+        ("tags=a,b,a", ["a", "b"]),
         ("group=carts", ["cart-1"]),
-        ("group=carts&group=", ["cart-1", "Cart-2", "drone"]),
+        ("group=carts&group=", ["cart-1", "Cart-2", "a", "b", "a,b", "drone"]),
         ("group=nobody", []),
     ],
 )
@@ -44,11 +50,23 @@ def test_a_list_holds_the_tags_that_meet_every_condition(bench: ApiBench, query:
 
 def test_a_state_is_that_of_the_answer_and_not_of_the_estimator(bench: ApiBench) -> None:
     bench.now_ns += 60_000_000_000
-    assert len(ask(bench.app(), "GET", "/api/v1/poses?state=lost").json()["poses"]) == 3
+    assert len(ask(bench.app(), "GET", "/api/v1/poses?state=lost").json()["poses"]) == 6
     assert ask(bench.app(), "GET", "/api/v1/poses?state=tracking").json()["poses"] == []
 
 
-@pytest.mark.parametrize("query", ["state=fine", "box=1,2,3", "box=a,b,c,d", "box=1,2,3,nan", "team=a"])
+@pytest.mark.parametrize(
+    "query",
+    [
+        "state=fine",
+        "state=lost,fine",
+        "tags=a,&tags=",
+        "tags=a,,b",
+        "box=1,2,3",
+        "box=a,b,c,d",
+        "box=1,2,3,nan",
+        "team=a",
+    ],
+)
 def test_a_condition_that_cannot_be_understood_is_refused(bench: ApiBench, query: str) -> None:
     assert kind_of(ask(bench.app(), "GET", f"/api/v1/poses?{query}")) == "invalid-request"
 

@@ -99,7 +99,7 @@ def test_what_cannot_be_decoded_is_answered_by_its_name_and_passed_on_to_be_coun
 def test_without_credentials_the_tag_is_named(path: str) -> None:
     bench = make_api_bench()
     assert "add ?tag=NAME" in post(bench, path, BATCH).json()["detail"]
-    for query in ("tag=", f"tag={'x' * 65}", "tag=a%00", "tga=a"):
+    for query in ("tag=", f"tag={'x' * 65}", "tag=a%00", "tag=..", "tag=%2E", "tga=a"):
         assert kind_of(post(bench, f"{path}?{query}", BATCH)) == "invalid-request"
     assert bench.received == []
 

@@ -163,7 +163,8 @@ def test_a_key_opens_only_its_own_tag_and_every_refusal_is_a_sentence(place: Pla
 def test_without_credentials_the_url_names_the_tag_and_pages_of_other_origins_are_refused(place: Place) -> None:
     with place.running(keys=False):
         assert place.refusal() == (4400, "Say which tag this is: add ?tag=NAME to the URL.")
-        assert place.refusal(query=f"?tag={'a' * 100}")[0] == 4400
+        for named in ("a" * 100, "..", "%2E%2E", "."):
+            assert place.refusal(query=f"?tag={named}")[0] == 4400
         assert place.refusal(query="?tag=bert", origin="http://evil.example")[0] == 4403
         own = f"http://127.0.0.1:{place.port}"
         with place.connect(query="?tag=bert", origin=own) as socket:

@@ -1,5 +1,6 @@
 """Recordings over REST."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -48,6 +49,23 @@ def test_a_recording_is_started_stopped_listed_and_downloaded(bench: ApiBench) -
 def test_only_recordings_can_be_downloaded(bench: ApiBench, name: str, tmp_path: Path) -> None:
     (tmp_path / "site.json").write_text("{}")
     assert ask(bench.app(), "GET", f"/api/v1/recordings/{name}").status_code == 404
+
+
+def test_a_link_in_the_folder_is_neither_listed_nor_served(bench: ApiBench, tmp_path: Path) -> None:
+    assert bench.recorder is not None
+    bench.recorder.prepare()
+    folder, secret = bench.recorder.folder, tmp_path / "ca.key"
+    secret.write_text("secret")
+    (folder / "link.mcap").symlink_to(secret)
+    (folder / "dangling.mcap").symlink_to(tmp_path / "nothing")
+    (folder / "folder.mcap").mkdir()
+    os.mkfifo(folder / "pipe.mcap")
+    (folder / "real.mcap").write_text("real")
+    app = bench.app()
+    assert [file["name"] for file in ask(app, "GET", "/api/v1/recordings").json()["files"]] == ["real.mcap"]
+    for name in ("link", "dangling", "folder", "pipe"):
+        assert kind_of(ask(app, "GET", f"/api/v1/recordings/{name}.mcap")) == "unknown-recording"
+    assert ask(app, "GET", "/api/v1/recordings/real.mcap").content == b"real"
 
 
 def test_recording_needs_a_data_folder() -> None:
