@@ -10,8 +10,8 @@ from dropanchor_schemas.answers import Problem, SamplesAcknowledged
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.tag_health import TagHealthMessage
-from dropanchor_service.api.http.access import OPEN_PATHS
 from dropanchor_service.api.http.errors import MEDIA_TYPE, TYPE_PREFIX, Kind, problems
+from dropanchor_service.api.http.permissions import OPEN_PATHS
 
 _KINDS_IN = re.compile(f"`{TYPE_PREFIX}([a-z-]+)`")
 

@@ -49,6 +49,6 @@ def test_a_folder_of_another_user_is_named_and_the_service_goes_on(
 
     monkeypatch.setattr(Path, "chmod", refuse)
     tmp_path.touch()
-    os.chmod(tmp_path, 0o755)  # noqa: PTH101 - that of Path is replaced
+    os.chmod(tmp_path, 0o755)
     keep_private(tmp_path)
     assert f"chmod -R go= {tmp_path}" in caplog.text

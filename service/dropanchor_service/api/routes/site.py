@@ -48,8 +48,7 @@ def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="put_site",
         summary="Replace the site's frame, georeference and anchors",
         response_model=Site,
-        responses=example_response(examples.SITE)
-        | problems(Kind.SITE_ID_FIXED, Kind.CHANGED_MEANWHILE, *_BAD_CHANGE),
+        responses=example_response(examples.SITE) | problems(Kind.SITE_ID_FIXED, Kind.CHANGED_MEANWHILE, *_BAD_CHANGE),
     )
     def put_site(
         body: Annotated[Site, Body(examples=[examples.SITE])], allows: Conditions, request: Request
