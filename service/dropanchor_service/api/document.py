@@ -66,7 +66,13 @@ def _share_refusals(document: dict[str, Any]) -> None:
     document["components"]["responses"] = dict(sorted(shared.items()))
 
 
-_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
+_REFUSALS = (
+    Kind.UNAUTHENTICATED,
+    Kind.FORBIDDEN,
+    Kind.OTHER_ORIGIN,
+    Kind.OTHER_HOST,
+    Kind.TOO_MANY_REQUESTS,
+)
 _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What the tags have sent, and their settings."},
