@@ -43,12 +43,11 @@ def test_pages_of_others_reach_nothing_of_a_service_without_keys_and_its_files_a
 
 def _refuses_a_foreign_feed(service: Running) -> None:
     url = f"{service.url.replace('http', 'ws', 1)}/omlox/v2/ws/socket"
-    for headers in ({"origin": EVIL}, {"origin": "http://evil.example", "host": "evil.example"}):
-        with (
-            connect(url, origin=Origin(headers["origin"]), proxy=None) as page,
-            pytest.raises(ConnectionClosed, match="http.cors_origins"),
-        ):
-            page.recv(timeout=10.0)
+    with (
+        connect(url, origin=Origin(EVIL), proxy=None) as page,
+        pytest.raises(ConnectionClosed, match=r"http\.cors_origins"),
+    ):
+        page.recv(timeout=10.0)
 
 
 def test_a_service_for_the_network_has_its_addresses_its_name_and_those_of_the_settings(tmp_path: Path) -> None:
