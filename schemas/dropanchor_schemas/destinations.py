@@ -59,7 +59,11 @@ class WebhookDestination(_Destination):
     """A receiver of events over HTTP: one signed POST for each event."""
 
     type: Literal["webhook"]
-    url: str = Field(max_length=2000, description="Where events are posted: https:// or http://.")
+    url: str = Field(
+        max_length=2000,
+        description="Where events are posted: https:// or http://. What stands after the host is never returned: "
+        "answers have `…` in its place, and a URL that is sent back so keeps the present one.",
+    )
     secret: str | None = Field(
         default=None,
         max_length=200,
@@ -97,7 +101,7 @@ class DestinationState(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    destination: Destination = Field(description="As it was put, but without its secret.")
+    destination: Destination = Field(description="As it was put, but without its secret and the path of its URL.")
     has_secret: bool = Field(description="Whether the service knows the secret of a webhook.")
     pending: int = Field(description="Events that wait for delivery.")
     oldest_ns: int | None = Field(description="UTC, ns: when the oldest of them happened; null: none waits.")

@@ -278,7 +278,7 @@ class Service:
         def reason() -> str:
             return self._ownership.sentence or self._progress.sentence
 
-        self._app = CurrentApp(create_starting_app(reason, gauges=self._ownership.gauges))
+        self._app = CurrentApp(create_starting_app(reason, gauges=self._ownership.gauges, border=self._serving.border))
         host, port = bound.getsockname()[:2]
         self.url = http_url(host, port, is_encrypted=self._certificate is not None)
         return HttpThread(build_server(self._app, self._stopping, certificate=self._certificate), bound)

@@ -8,6 +8,7 @@ from fastapi import FastAPI
 
 from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.api.app import create_app_of
+from dropanchor_service.api.http.borders import border_of
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.api.routes.site_parts import SiteParts
@@ -40,6 +41,7 @@ class Serving:
         self._settings = settings
         self._credentials = credentials
         self._authenticator = authenticator_of(settings, None if sites.only is None else sites.only.id)
+        self.border = border_of(settings.http, credentials)
         self._sites = sites
         self._metrics = metrics
         self.folders = SiteFolders(settings, sites, now_ns, metrics)
@@ -66,7 +68,7 @@ class Serving:
             self._credentials,
             self._authenticator,
             RateLimiter(http.requests_per_s, http.burst),
-            http.cors_origins,
+            self.border,
             self.folders.basemap,
         )
         parts = [

@@ -9,6 +9,7 @@ from threading import Event
 from fastapi import FastAPI
 from starlette.types import ASGIApp
 
+from dropanchor_service.api.http.borders import Border
 from dropanchor_service.api.http.of_cluster import FromNodes, NamesOwner
 from dropanchor_service.metrics.node import LeaseGauges, NodeMetrics
 from dropanchor_service.node.app import create_node_app
@@ -61,7 +62,7 @@ class BareNode:
             registry=self.metrics.registry,
             lifespan=self._lifespan,
             authenticator=authenticator,
-            cors_origins=cors_origins,
+            border=Border(origins=cors_origins),
         )
 
     @asynccontextmanager

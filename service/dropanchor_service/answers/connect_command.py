@@ -13,8 +13,10 @@ SIMULATED_ANCHOR = "1"
 def reachable_endpoint(endpoint: str, host: str = "localhost") -> str:
     """Return the endpoint to connect to.
 
-    host: name of the machine, used for a router that listens on all of its addresses.
+    host: name of the machine, used for a router that listens on all of its addresses. What Zenoh is told after a `#` is
+    left out: it is for the router, and may be a private key.
     """
+    endpoint = endpoint.partition("#")[0]
     protocol, _, address = endpoint.partition("/")
     name, _, port = address.rpartition(":")
     return f"{protocol}/{host}:{port}" if name in _ALL_ADDRESSES else endpoint

@@ -13,6 +13,7 @@ from starlette.types import Scope
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.document import openapi_of
 from dropanchor_service.api.http.access import Access
+from dropanchor_service.api.http.borders import Border, Borders
 from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
@@ -84,7 +85,8 @@ def create_app(
         max_tags,
         omlox,
     )
-    shared = SharedParts(stopping, endpoints, credentials, authenticator, rate_limiter, cors_origins, basemap)
+    border = Border(origins=cors_origins)
+    shared = SharedParts(stopping, endpoints, credentials, authenticator, rate_limiter, border, basemap)
     return create_app_of([parts], shared, ready=ready, impaired=impaired, registry=registry, dashboard=dashboard)
 
 
@@ -115,7 +117,7 @@ def create_app_of(
         app.include_router(router, prefix=PREFIX)
     app.include_router(metrics_router(registry))
     if all(one.omlox is not None for one in sites):
-        doorkeeper = Doorkeeper(shared.authenticator, shared.rate_limiter, shared.cors_origins)
+        doorkeeper = Doorkeeper(shared.authenticator, shared.rate_limiter)
         add_omlox(app, site_of, doorkeeper, shared.stopping)
     if site_of.only is None:
         _refuse_what_names_no_site(app, len(sites))
@@ -164,8 +166,9 @@ def _app_without_routes(shared: SharedParts, site_of: SiteOfRequest) -> FastAPI:
         members=site_of.members,
         only_site=only_site,
     )
+    app.add_middleware(Borders, border=shared.border)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
-    allow_origins(app, shared.cors_origins)
+    allow_origins(app, shared.border.origins)
     add_error_handlers(app)
     return app

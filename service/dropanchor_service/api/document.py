@@ -10,8 +10,8 @@ from dropanchor_schemas.answers import Problem, SamplesAcknowledged
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.tag_health import TagHealthMessage
-from dropanchor_service.api.http.access import OPEN_PATHS
 from dropanchor_service.api.http.errors import MEDIA_TYPE, TYPE_PREFIX, Kind, problems
+from dropanchor_service.api.http.permissions import OPEN_PATHS
 
 _KINDS_IN = re.compile(f"`{TYPE_PREFIX}([a-z-]+)`")
 
@@ -66,7 +66,13 @@ def _share_refusals(document: dict[str, Any]) -> None:
     document["components"]["responses"] = dict(sorted(shared.items()))
 
 
-_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
+_REFUSALS = (
+    Kind.UNAUTHENTICATED,
+    Kind.FORBIDDEN,
+    Kind.OTHER_ORIGIN,
+    Kind.OTHER_HOST,
+    Kind.TOO_MANY_REQUESTS,
+)
 _TAGS = [
     {"name": "poses", "description": "Where the tags are."},
     {"name": "tags", "description": "What the tags have sent, and their settings."},

@@ -6,6 +6,7 @@ from pathlib import Path
 from threading import Event
 from typing import Any
 
+from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 
 import dropanchor_schemas
@@ -14,16 +15,17 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.app import create_app
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.api.omlox.router import described_routes
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
 FILE = Path(dropanchor_schemas.__file__).parent / "openapi.json"
 
 
-def text() -> str:
-    """Return the document as JSON."""
+def application(omlox: OmloxItems | None = None) -> FastAPI:
+    """Return the application of an only site. omlox: None for no omlox interface."""
     answers = Answers(SiteStore(Site(), {}), TagTable(), LatestPoses())
-    app = create_app(
+    return create_app(
         answers,
         ready=lambda: (True, []),
         registry=CollectorRegistry(),
@@ -31,8 +33,13 @@ def text() -> str:
         receive=lambda _tag, _payload, _encoding: None,
         receive_health=lambda _tag, _payload, _encoding: None,
         dashboard=None,
+        omlox=omlox,
     )
-    return json.dumps(app.openapi(), indent=2, ensure_ascii=False) + "\n"
+
+
+def text() -> str:
+    """Return the document as JSON."""
+    return json.dumps(application().openapi(), indent=2, ensure_ascii=False) + "\n"
 
 
 def omlox_document() -> dict[str, Any]:

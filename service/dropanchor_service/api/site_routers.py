@@ -1,11 +1,11 @@
 """The routes that each site has, below its id, and an only site also without it."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Event
 
 from fastapi import APIRouter
 
+from dropanchor_service.api.http.borders import ANY_HOST, Border
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.access import access_router
 from dropanchor_service.api.routes.basemap import basemap_router
@@ -46,8 +46,8 @@ class SharedParts:
 
     stopping: ends the streams when set. endpoints: those of the Zenoh router, as configured. credentials: those of the
     tags; None when they need none. authenticator: None when every client may do everything. rate_limiter: limits the
-    requests of each client; None for no limit. cors_origins: of other web pages that may use the interface. basemap:
-    None when there is none.
+    requests of each client; None for no limit. border: which hosts and web pages may use the interface. basemap: None
+    when there is none.
     """
 
     stopping: Event
@@ -55,7 +55,7 @@ class SharedParts:
     credentials: SecurityFolder | None = None
     authenticator: Authenticator | None = None
     rate_limiter: RateLimiter | None = None
-    cors_origins: Sequence[str] = ()
+    border: Border = ANY_HOST
     basemap: ServedBasemap | None = None
 
 

@@ -8,6 +8,7 @@ from prometheus_client.registry import Collector, CollectorRegistry
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from dropanchor_service.api.app import ALL_METHODS, DASHBOARD, PREFIX
+from dropanchor_service.api.http.borders import ANY_HOST, Border, Borders
 from dropanchor_service.api.http.errors import Kind, ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders
 from dropanchor_service.api.http.limits import EscapedPath
@@ -39,13 +40,17 @@ class Gate:
 
 
 def create_starting_app(
-    reason: Callable[[], str], dashboard: Path = DASHBOARD, gauges: Collector | None = None
+    reason: Callable[[], str],
+    dashboard: Path = DASHBOARD,
+    gauges: Collector | None = None,
+    border: Border = ANY_HOST,
 ) -> FastAPI:
     """Return the application. It holds no data of the site, so it needs no credentials.
 
-    reason: why the service does not serve yet. gauges: metrics that it has all the same.
+    reason: why the service does not serve yet. gauges: metrics that it has all the same. border: as of the full one.
     """
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, redirect_slashes=False)
+    app.add_middleware(Borders, border=border)
     app.add_middleware(EscapedPath)
     app.add_middleware(SecurityHeaders)
     add_error_handlers(app)

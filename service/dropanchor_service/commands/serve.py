@@ -10,6 +10,7 @@ from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.runtime import logs
 from dropanchor_service.runtime.interpreter import prepare_to_serve
 from dropanchor_service.runtime.memory import HeapTrimmer, give_back_files
+from dropanchor_service.runtime.private_files import keep_private
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.runtime.systemd import Systemd
 from dropanchor_service.service import Service
@@ -57,10 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
         systemd.progress()
 
     try:
-        with (
-            interrupts() as interrupt,
-            Service(served_settings(settings_of(arguments)), interrupt.raising(), standing_by) as service,
-        ):
+        settings = served_settings(settings_of(arguments))
+        keep_private(settings.data_dir)
+        with interrupts() as interrupt, Service(settings, interrupt.raising(), standing_by) as service:
             systemd.ready()
             show_addresses(service.url, sys.stdout)
             give_back_files()

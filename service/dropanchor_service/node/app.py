@@ -2,7 +2,7 @@
 
 import re
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dropanchor_service.api.app import DASHBOARD, MAX_BODY_BYTES, PREFIX
 from dropanchor_service.api.http.access import Access
+from dropanchor_service.api.http.borders import ANY_HOST, Border, Borders
 from dropanchor_service.api.http.errors import ProblemError, add_error_handlers
 from dropanchor_service.api.http.headers import SecurityHeaders, allow_origins
 from dropanchor_service.api.http.limits import BodyLimit, EscapedPath
@@ -42,19 +43,21 @@ def create_node_app(
     lifespan: Lifespan,
     authenticator: Authenticator | None = None,
     rate_limiter: RateLimiter | None = None,
-    cors_origins: Sequence[str] = (),
+    border: Border = ANY_HOST,
     dashboard: Path = DASHBOARD,
 ) -> FastAPI:
     """Return the application. The page, health and metrics are of the node itself; `gateway` has the rest.
 
-    authenticator, rate_limiter: for the metrics; the owners check all else. lifespan: what runs as long as it does.
+    authenticator, rate_limiter: for the metrics; the owners check all else, but not the border. lifespan: what runs as
+    long as it does.
     """
     app = FastAPI(openapi_url=None, docs_url=None, redoc_url=None, redirect_slashes=False, lifespan=lifespan)
     app.add_middleware(BodyLimit, max_bytes=MAX_BODY_BYTES, of_paths={f"{PREFIX}/plan-images": MAX_UPLOAD_BYTES})
+    app.add_middleware(Borders, border=border)
     app.add_middleware(EscapedPath)
     app.add_middleware(RequestId)
     app.add_middleware(SecurityHeaders)
-    allow_origins(app, cors_origins)
+    allow_origins(app, border.origins)
     add_error_handlers(app)
     page = page_mounts(dashboard)
     metrics = Route("/metrics", _metrics_app(registry, authenticator, rate_limiter), methods=["GET"])

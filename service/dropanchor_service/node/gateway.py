@@ -11,9 +11,10 @@ from starlette.requests import HTTPConnection, Request
 from starlette.types import Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from dropanchor_service.api.http.access import INGEST, OF_ALL_SITES, bearer_of, identify, secret_of
+from dropanchor_service.api.http.access import bearer_of, identify, secret_of
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.of_cluster import BUCKET, EPOCH, OF_NODES
+from dropanchor_service.api.http.permissions import INGEST, OF_ALL_SITES
 from dropanchor_service.api.http.site_in_path import divided
 from dropanchor_service.api.routes.ingest_stream import key_among_protocols
 from dropanchor_service.api.routes.poses import PIECE_BYTES

@@ -10,6 +10,7 @@ from typing import Self
 
 from fastapi import FastAPI
 
+from dropanchor_service.api.http.borders import border_of
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.server import build_server, listen
 from dropanchor_service.api.http.thread import HttpThread
@@ -117,7 +118,7 @@ class Node:
             lifespan=self._lifespan,
             authenticator=authenticator,
             rate_limiter=RateLimiter(http.requests_per_s, http.burst),
-            cors_origins=http.cors_origins,
+            border=border_of(http, self._credentials),
         )
 
     @asynccontextmanager

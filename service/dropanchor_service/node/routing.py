@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from enum import Enum, auto
 
-from dropanchor_service.api.http.access import OF_ALL_SITES
+from dropanchor_service.api.http.permissions import OF_ALL_SITES
 from dropanchor_service.settings.buckets import bucket_of
 
 OF_ANY_SITE = ("/api/v1/openapi.json", "/omlox/v1/openapi.json", "/omlox/v2/openapi.json")

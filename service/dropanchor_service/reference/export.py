@@ -10,12 +10,14 @@ from prometheus_client.registry import CollectorRegistry
 
 import dropanchor_service
 from dropanchor_service.api import export as openapi
+from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.health import HealthGauges
 from dropanchor_service.metrics.node import LeaseGauges, NodeMetrics
 from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.reference import (
+    access_page,
     metrics_page,
     omlox_page,
     rejections_page,
@@ -44,6 +46,7 @@ def pages() -> dict[str, str]:
             "pose-states.md": states_page.page(),
             "metrics.md": metrics_page.page(registry, _registry_of_node()),
             "rejections.md": rejections_page.page(),
+            "access.md": access_page.page(openapi.application(OmloxItems.opened(None))),
         }
     return {name: NOTE + text for name, text in texts.items()}
 

@@ -3,12 +3,12 @@
 from typing import Any
 
 from dropanchor_schemas.pose import TrackingState
+from dropanchor_service.api.http.borders import FORBIDDEN
 from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES
 from dropanchor_service.api.omlox.feed.messages import Code, Params
 from dropanchor_service.api.omlox.feed.positions import MAX_OBJECTS
 from dropanchor_service.api.omlox.feed.socket import (
     CONNECTIONS_PER_CLIENT,
-    FORBIDDEN,
     MAX_SUBSCRIPTIONS,
     PERIOD_S,
     RESTART,
@@ -70,8 +70,8 @@ Parameters of a subscription select what is sent; each id may be a list. They ar
 
 Positions are sent up to {rate:.0f} times per second, at most {objects} in a message, and more seldom where that would
 take more than a quarter of a core. A client that reads slowly gets the newest positions when it is ready again, and
-every event. A key stands in the header `Authorization: Bearer KEY` of the handshake, or in `params.token`. Without
-keys, only pages of the service's own origin and of `http.cors_origins` may connect.
+every event. A key stands in the header `Authorization: Bearer KEY` of the handshake, or in `params.token`. Of web
+pages, only those of the service's own origin and of `http.cors_origins` may connect.
 
 An error is `{{"event": "error", "code": CODE, "description": "…"}}`:
 

@@ -48,7 +48,8 @@ checkpoint may lack. A message that arrives twice counts as `duplicate` and is u
 
 **Credentials**: the key of a tag (`dropanchor key add NAME --tag TAG`) in `Authorization: Bearer KEY`. A browser cannot
 set this header: it offers the two protocols `{protocol}` and `{key_protocol}KEY`. The key chooses the tag.
-Without credentials the URL names it: `?tag=NAME`; only pages of the service's own origin are then accepted.
+Without credentials the URL names it: `?tag=NAME`. Of web pages, only those of the service's own origin and of
+`http.cors_origins` are accepted.
 
 **Limits**: {connections} connections for each key. A payload has at most {payload:,} bytes; a message of more than
 {message:,} bytes ends the connection. Messages count as requests: a client that is too fast has to wait for its

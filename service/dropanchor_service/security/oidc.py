@@ -41,38 +41,46 @@ class OidcTokens:
     def identify(self, secret: str) -> Identity:
         """Return the identity in a token. Fetches the provider's keys when needed. Raises UnauthenticatedError."""
         try:
-            header = jwt.get_unverified_header(secret)
-            if header.get("alg") not in ALGORITHMS:
-                raise UnauthenticatedError("the token is not signed with an accepted algorithm")
-            claims = jwt.decode(
-                secret,
-                self._keys.find(header.get("kid")),
-                algorithms=ALGORITHMS,
-                audience=self._settings.audience,
-                issuer=self._settings.issuer,
-                leeway=LEEWAY_S,
-                options={"require": ["exp", "iss", "aud"]},
-            )
+            claims = self._verified(secret)
+            expires_s = float(claims["exp"])
         except jwt.PyJWTError as error:
             raise UnauthenticatedError(f"the token is not valid: {error}") from error
+        except (ValueError, TypeError, OverflowError, RecursionError) as error:  # PyJWT expects numbers where times are
+            raise UnauthenticatedError("the token is not valid: a claim has a value that it cannot have") from error
         name = str(claims.get("sub") or claims.get("client_id") or "a token without a subject")
         granted = self._granted(claims)
         in_sites = ((site, _highest(names, granted)) for site, names in self._of_sites.items())
         of_sites = {site: scope for site, scope in in_sites if scope is not None}
-        return Identity(SOURCE, name, _highest(self._settings.scopes, granted), float(claims["exp"]), of_sites=of_sites)
+        return Identity(SOURCE, name, _highest(self._settings.scopes, granted), expires_s, of_sites=of_sites)
+
+    def _verified(self, secret: str) -> Mapping[str, Any]:
+        """Return the claims of a token. Raises UnauthenticatedError, and what PyJWT raises."""
+        header = jwt.get_unverified_header(secret)
+        if header.get("alg") not in ALGORITHMS:
+            raise UnauthenticatedError("the token is not signed with an accepted algorithm")
+        return jwt.decode(
+            secret,
+            self._keys.find(header.get("kid")),
+            algorithms=ALGORITHMS,
+            audience=self._settings.audience,
+            issuer=self._settings.issuer,
+            leeway=LEEWAY_S,
+            options={"require": ["exp", "iss", "aud"]},
+        )
 
     def is_still_valid(self, identity: Identity) -> bool:
         return identity.expires_s is None or time.time() < identity.expires_s + LEEWAY_S
 
-    def _granted(self, claims: Mapping[str, Any]) -> set[Any]:
-        """Return the provider's names of the scopes that the claims grant."""
+    def _granted(self, claims: Mapping[str, Any]) -> set[str]:
+        """Return the provider's names of the scopes that the claims grant. What is no text grants nothing."""
         value: Any = claims
         for part in self._settings.scope_claim.split("."):
             value = value.get(part) if isinstance(value, Mapping) else None
-        return set(value.split() if isinstance(value, str) else value if isinstance(value, list) else [])
+        listed = value.split() if isinstance(value, str) else value if isinstance(value, list) else []
+        return {name for name in listed if isinstance(name, str)}
 
 
-def _highest(names: Mapping[ScopeName, str], granted: set[Any]) -> Scope | None:
+def _highest(names: Mapping[ScopeName, str], granted: set[str]) -> Scope | None:
     """Return the highest scope that is granted; None when none is. names: those of the provider."""
     return max((Scope.named(name) for name, theirs in names.items() if theirs in granted), default=None)
 
@@ -93,13 +101,20 @@ class SigningKeys:
         self._fetched_s = self._tried_s = -float("inf")
 
     def find(self, kid: str | None) -> jwt.PyJWK:
-        """Return the key with this id. Raises UnauthenticatedError."""
-        if kid not in self._keys or self._clock() - self._fetched_s > REFRESH_S:
+        """Return the key with this id; for a token that names none, the only one. Raises UnauthenticatedError."""
+        if self._key(kid) is None or self._clock() - self._fetched_s > REFRESH_S:
             self._refresh()
-        if kid not in self._keys:
+        key = self._key(kid)
+        if key is None and kid is None and self._keys:
+            raise UnauthenticatedError("the token does not name its key (kid), and its issuer publishes several")
+        if key is None:
             reason = "that its issuer does not publish" if self._keys else "of an issuer that does not answer"
             raise UnauthenticatedError(f"the token is signed with a key {reason}")
-        return self._keys[kid]
+        return key
+
+    def _key(self, kid: str | None) -> jwt.PyJWK | None:
+        keys = self._keys
+        return next(iter(keys.values())) if kid is None and len(keys) == 1 else keys.get(kid)
 
     def _refresh(self) -> None:
         """Fetch the keys, unless another thread does. Wait for that thread only while there are no keys."""

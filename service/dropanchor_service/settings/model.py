@@ -45,6 +45,13 @@ def _is_origin(text: str) -> str:
     return text
 
 
+def _is_host(text: str) -> str:
+    if text != "*" and not re.fullmatch(r"(\*\.)?[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*\.?", text):
+        raise ValueError("a name such as yard.example was expected, without a scheme or port")
+    return text
+
+
+HostNames = Annotated[tuple[Annotated[str, AfterValidator(_is_host)], ...], BeforeValidator(_as_list)]
 Origins = Annotated[tuple[Annotated[str, AfterValidator(_is_origin)], ...], BeforeValidator(_as_list)]
 
 
@@ -73,6 +80,13 @@ class HttpSettings(_Section):
         default=400, description="Requests that it may make at once."
     )
 
+    allowed_hosts: HostNames = Field(
+        default=(),
+        description="Names by which clients may call the service, such as that of a proxy before it: "
+        '`["yard.example"]`, `["*.example"]`. IP addresses, `localhost`, the names in certificates and, beyond the '
+        "loopback, the name of the machine are always allowed. Requests for another name are refused, since a page "
+        'could have turned it to this machine. `["*"]`: all.',
+    )
     cors_origins: Origins = Field(
         default=(),
         description='Origins of other web pages that may use the REST interface, such as `["https://board.example"]`; '

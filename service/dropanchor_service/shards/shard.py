@@ -20,6 +20,7 @@ from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.ownership.in_cluster import digest_of_sites
 from dropanchor_service.runtime.memory import HeapTrimmer
+from dropanchor_service.runtime.private_files import keep_private
 from dropanchor_service.service import Service
 from dropanchor_service.settings.buckets import buckets_in
 from dropanchor_service.settings.model import Settings
@@ -40,6 +41,7 @@ def run_shard(name: str, config: Path, starting: Starting) -> None:
     """Stand by, serve, and end the process. Nothing else may run in it. starting: ends before it stands by."""
     try:
         settings = load_settings(config)
+        keep_private(settings.data_dir)
         standby = _standby(settings, name, starting.version)
         starting.end()
         _serve(settings, standby.wait(), name)

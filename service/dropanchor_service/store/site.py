@@ -144,12 +144,13 @@ class SiteStore:
             self._apply(document)
             return True
 
-    def set_site(self, site: Site) -> None:
-        """Replace the site and save it. Raises OSError.
+    def set_site(self, site: Site, allows: Precondition = always) -> None:
+        """Replace the site and save it. Raises OSError, and ChangedMeanwhileError when `allows` refuses.
 
         Raises ValueError when the id differs: Zenoh keys contain it, so it is fixed while the service runs.
         """
         with self._lock:
+            require(allows, self.site)
             if site.id != self.site.id:
                 raise ValueError(f"the site's id is {self.site.id!r} and cannot change while the service runs")
             self._replace(self._document.model_copy(update={"site": site}))

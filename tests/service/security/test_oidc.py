@@ -11,12 +11,16 @@ from typing import Any
 import jwt
 import pytest
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from fastapi import FastAPI
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from dropanchor_service.security.identity import Scope, UnauthenticatedError
-from dropanchor_service.security.oidc import RETRY_S, OidcTokens, SigningKeys
+from dropanchor_service.security.identity import Authenticator, Scope, UnauthenticatedError
+from dropanchor_service.security.oidc import RETRY_S, SOURCE, OidcTokens, SigningKeys
 from dropanchor_service.settings.model import OidcSettings
 from dropanchor_service.settings.sites import ScopeName
+from support.api import ask, make_api_bench
 
 AUDIENCE = "dropanchor-yard"
 
@@ -40,7 +44,7 @@ class Provider:
         to_jwk = jwt.algorithms.RSAAlgorithm.to_jwk
         return {"keys": [to_jwk(key.public_key(), as_dict=True) | {"kid": kid} for kid, key in self.keys.items()]}
 
-    def token(self, kid: str = "one", key: Any = None, algorithm: str = "RS256", **claims: Any) -> str:
+    def token(self, kid: str | None = "one", key: Any = None, algorithm: str = "RS256", **claims: Any) -> str:
         all_claims = {
             "iss": self.url,
             "aud": AUDIENCE,
@@ -49,7 +53,13 @@ class Provider:
             "scope": "dropanchor:read",
         }
         all_claims = {name: value for name, value in (all_claims | claims).items() if value is not None}
-        return jwt.encode(all_claims, key or self.keys[kid], algorithm=algorithm, headers={"kid": kid})
+        signing = key or self.keys[kid or "one"]
+        return jwt.encode(all_claims, signing, algorithm=algorithm, headers={} if kid is None else {"kid": kid})
+
+    def token_with(self, claims: dict[str, Any]) -> str:
+        """Return a signed token whose claims may be anything that JSON can hold, and more than PyJWT would encode."""
+        body = {"iss": self.url, "aud": AUDIENCE, "sub": "ann", "exp": time.time() + 60} | claims
+        return jwt.api_jws.encode(json.dumps(body).encode(), self.keys["one"], "RS256", {"kid": "one"})
 
     def settings(self, **more: Any) -> OidcSettings:
         return OidcSettings.model_validate({"issuer": self.url, "audience": AUDIENCE} | more)
@@ -80,6 +90,13 @@ def provider() -> Iterator[Provider]:
         yield found
         server.shutdown()
         thread.join()
+
+
+@pytest.fixture
+def guarded(provider: Provider) -> FastAPI:
+    """Return an interface that takes tokens whose roles, in an object, are the scopes."""
+    tokens = OidcTokens(provider.settings(scope_claim="realm_access.roles", scopes={"write": "crew"}))
+    return make_api_bench().app(authenticator=Authenticator({SOURCE: tokens}))
 
 
 def test_a_token_of_the_provider_yields_its_subject_and_scope(provider: Provider) -> None:
@@ -134,6 +151,46 @@ def test_tokens_with_wrong_or_missing_claims_are_refused(
 ) -> None:
     with pytest.raises(UnauthenticatedError, match=words):
         OidcTokens(provider.settings()).identify(provider.token(**claims))
+
+
+_LEAVES = (
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(st.characters(codec=None)) | st.just(10**400)
+)
+ANY_JSON = st.recursive(
+    _LEAVES, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3)
+)
+CLAIMS = ("realm_access", "scope", "sub", "client_id", "exp", "nbf", "iat", "jti", "aud", "iss")
+
+
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(claims=st.dictionaries(st.sampled_from(CLAIMS), ANY_JSON, max_size=3), roles=ANY_JSON)
+@example(claims={}, roles=[["crew"], {"a": 1}, None])
+@example(claims={"exp": float("inf")}, roles="crew")
+@example(claims={"exp": 10**400}, roles="crew")
+@example(claims={"nbf": [1]}, roles="crew")
+@example(claims={"iat": {"a": 1}}, roles="crew")
+@example(claims={"sub": {"a": []}}, roles="crew")
+def test_claims_of_any_shape_are_answered_by_an_identity_or_a_refusal(
+    provider: Provider, guarded: FastAPI, claims: dict[str, Any], roles: Any
+) -> None:
+    bearer = provider.token_with({"realm_access": {"roles": roles}} | claims)
+    response = ask(guarded, "GET", "/api/v1/access", headers={"authorization": f"Bearer {bearer}"})
+    assert response.status_code in (200, 401, 403), response.text
+
+
+def test_a_role_among_values_that_are_no_text_still_counts(provider: Provider) -> None:
+    tokens = OidcTokens(provider.settings())
+    assert tokens.identify(provider.token(scope=[["x"], {}, 7, None, "dropanchor:write"])).scope is Scope.WRITE
+
+
+def test_a_token_that_names_no_key_is_tried_with_the_only_one(provider: Provider) -> None:
+    assert OidcTokens(provider.settings()).identify(provider.token(kid=None)).name == "ann"
+    forged = provider.token(kid=None, key=rsa.generate_private_key(65537, 2048))
+    with pytest.raises(UnauthenticatedError, match="Signature"):
+        OidcTokens(provider.settings()).identify(forged)
+    provider.new_key("two")
+    with pytest.raises(UnauthenticatedError, match="publishes several"):
+        OidcTokens(provider.settings()).identify(provider.token(kid=None))
 
 
 def test_forged_signatures_are_refused(provider: Provider) -> None:

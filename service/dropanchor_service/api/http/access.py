@@ -10,29 +10,17 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dropanchor_service.api.http.errors import Kind, problem_response
+from dropanchor_service.api.http.permissions import INGEST, OF_ALL_SITES, Need, has_in, need_of
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.http.shared_view import Members, narrowed
-from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX, divided, is_omlox
+from dropanchor_service.api.http.site_in_path import divided
 from dropanchor_service.security import share_links
 from dropanchor_service.security.identity import Authenticator, Identity, UnauthenticatedError
-from dropanchor_service.security.identity import Scope as AccessScope
 
-OPEN_PATHS = (
-    "/api/v1/health/live",
-    "/api/v1/health/ready",
-    "/api/v1/openapi.json",
-    f"{OMLOX_PREFIX}v2/openapi.json",
-    f"{OMLOX_PREFIX}v1/openapi.json",
-)
-INGEST = "/api/v1/ingest/"
 KEY_IN_URL = (f"{INGEST}sensor-logger", f"{INGEST}phyphox")
 """Paths for apps of phones that cannot set headers."""
 LOOPBACK = "loopback"
-OF_ALL_SITES = ("/api/v1/sites", "/api/v1/sites/poses")
-"""Paths whose answers hold what the client may read of each site."""
-_SITE = "/api/v1/site"
-_SHARES = "/api/v1/shares"
-_DESTINATIONS = "/api/v1/destinations/"
+_LIMITED = "This share link shows its tags and nothing else."
 _HOW_TO_AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …`. An operator creates a key with "
     "`dropanchor key add NAME --scope read`; for the samples of a tag, with `--tag TAG` instead of `--scope`."
@@ -62,7 +50,7 @@ class Access:
         self._rate_limiter = rate_limiter
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http" or not _is_protected(scope["path"]):
+        if scope["type"] != "http" or need_of(scope["method"], scope["path"]) is Need.NOTHING:
             await self._app(scope, receive, send)
             return
         request = Request(scope)
@@ -75,7 +63,11 @@ class Access:
         else:
             site = self._site_of(request)
             scope.setdefault("state", {}).update(
-                tag=identity.tag, site=identity.site, scope=identity.scope_in(site), scope_in=identity.scope_in
+                tag=identity.tag,
+                site=identity.site,
+                scope=identity.scope_in(site),
+                scope_in=identity.scope_in,
+                has=has_in(identity, site),
             )
             await self._app(scope, receive, self._while_valid(identity, send))
 
@@ -102,13 +94,12 @@ class Access:
         return problem_response(request, Kind.TOO_MANY_REQUESTS, detail, headers={"retry-after": str(seconds)})
 
     def _forbidden(self, request: Request, identity: Identity | None) -> Response | None:
-        if (
-            identity is not None
-            and identity.limit is not None
-            and not narrowed(request.scope, identity.limit, self._members)
-        ):
-            return problem_response(request, Kind.FORBIDDEN, "This share link shows its tags and nothing else.")
-        return _forbidden(request, identity, self._site_of(request), self._only_site is None)
+        refusal = _forbidden(request, identity, self._site_of(request), self._only_site is None)
+        if refusal is not None or identity is None or identity.limit is None:
+            return refusal
+        if narrowed(request.scope, identity.limit, self._members):
+            return None
+        return problem_response(request, Kind.FORBIDDEN, _LIMITED)
 
     def _site_of(self, request: Request) -> str | None:
         """Return the site that a request concerns: the one in its path, or the only one; None for all sites."""
@@ -161,44 +152,31 @@ def secret_of(request: Request) -> str:
     return bearer_of(request) or in_url
 
 
-def _is_protected(path: str) -> bool:
-    """Return whether a path needs credentials. The dashboard's files do not: they hold no data of the site."""
-    if is_omlox(path):
-        return divided(path)[1] not in OPEN_PATHS
-    return (path.startswith("/api/") or path == "/metrics") and path not in OPEN_PATHS
-
-
-def required_scope(method: str, path: str) -> AccessScope:
-    """Return READ for reading, ADMIN for deleting, the site, destinations and share links, WRITE for other changes."""
-    path = divided(path)[1]
-    if path.startswith(_SHARES):
-        return AccessScope.ADMIN
-    if method in ("GET", "HEAD", "OPTIONS"):
-        return AccessScope.READ
-    is_admin = method == "DELETE" or path == _SITE or path.startswith(_DESTINATIONS)
-    return AccessScope.ADMIN if is_admin else AccessScope.WRITE
-
-
 def _forbidden(request: Request, identity: Identity | None, site: str | None, several_sites: bool) -> Response | None:
     """Return a refusal of what the client may not do in a site, or with None in all of them."""
     if identity is None:
         return None
-    path = divided(request.scope["path"])[1]
-    scope = identity.scope_in(site)
+    need, has = need_of(request.method, request.scope["path"]), has_in(identity, site)
     where = "" if not several_sites else f" in site {site!r}" if site else " in every site"
-    if path.startswith(INGEST):
+    if need is Need.TAG:
         allowed = speaks_in(identity, site, several_sites)
         needs = f"a key that was created with {key_command(several_sites)}"
-    elif request.scope["path"] in OF_ALL_SITES and identity.of_sites:
+    elif request.scope["path"] in OF_ALL_SITES and identity.of_sites and identity.limit is None:
         return None  # it learns of its sites alone
     else:
-        required = required_scope(request.method, path)
-        allowed, needs = scope is not None and scope >= required, f"the scope {required.word}{where}"
+        allowed, needs = has >= need, f"the scope {max(need, Need.READ).name.lower()}{where}"
     if allowed:
         return None
-    has = f"no scope{where}" if scope is None else f"the scope {scope.word}{where}"
-    detail = f"The {identity.source} of {identity.name!r} has {has}; this request needs {needs}."
-    return problem_response(request, Kind.FORBIDDEN, detail)
+    return problem_response(request, Kind.FORBIDDEN, _refusal(identity, has, where, needs))
+
+
+def _refusal(identity: Identity, has: Need, where: str, needs: str) -> str:
+    if has is Need.LINK_TO_TAGS:
+        return _LIMITED
+    if has is Need.LINK:
+        return f"A share link shows the page and no more; this request needs {needs}."
+    held = f"the scope {has.name.lower()}{where}" if has else f"no scope{where}"
+    return f"The {identity.source} of {identity.name!r} has {held}; this request needs {needs}."
 
 
 def speaks_in(identity: Identity, site: str | None, several_sites: bool) -> bool:

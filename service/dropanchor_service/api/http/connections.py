@@ -1,11 +1,8 @@
-"""Limits for WebSockets: how many each client may have, and which pages of a browser may open them."""
+"""How many WebSockets each client may have."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from urllib.parse import urlsplit
-
-from starlette.requests import HTTPConnection
 
 
 class TooManyConnectionsError(Exception):
@@ -32,14 +29,3 @@ class OpenConnections:
             self._open[client] -= 1
             if not self._open[client]:
                 del self._open[client]
-
-
-def is_of_another_page(connection: HTTPConnection, allowed: Sequence[str] = ()) -> bool:
-    """Return whether a page of another origin than the service opens this connection. allowed: other origins."""
-    origin = connection.headers.get("origin")
-    return (
-        origin is not None
-        and origin not in allowed
-        and "*" not in allowed
-        and urlsplit(origin).netloc != connection.headers.get("host")
-    )

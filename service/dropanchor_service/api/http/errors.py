@@ -26,6 +26,7 @@ class Kind(Enum):
 
     UNAUTHENTICATED = (401, "The request has no valid credentials")
     FORBIDDEN = (403, "The credentials do not allow this request")
+    OTHER_ORIGIN = (403, "A web page of another origin may not do this")
     NOT_FOUND = (404, "There is no resource at this path")
     UNKNOWN_SITE = (404, "The site is unknown")
     SEVERAL_SITES = (404, "The service has several sites")
@@ -66,6 +67,7 @@ class Kind(Enum):
     IMAGE_NOT_UPLOADED = (409, "The image of the floor plan has not been uploaded")
     CHANGED_MEANWHILE = (412, "The resource is not the expected one")
     BODY_TOO_LARGE = (413, "The request body is too large")
+    OTHER_HOST = (421, "The service does not have this name")
     INVALID_REQUEST = (422, "The request is not valid")
     SHAPE_REFUSED = (422, "The shape cannot be a zone")
     DESTINATION_REFUSED = (422, "The destination cannot be used")

@@ -15,6 +15,7 @@ BUCKET, EPOCH = "dropanchor-bucket", "dropanchor-epoch"
 SECRET, CLIENT, HOST, SCHEME = "dropanchor-node", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto"
 """Headers of every request of a node: its secret, and what it says about the client."""
 OF_NODES = frozenset({SECRET, CLIENT, HOST, SCHEME})
+_NODE = "dropanchor_node"
 _SECURE = {"http": "https", "ws": "wss"}
 
 
@@ -75,6 +76,11 @@ class FromNodes:
         return "The secret of the API node is not that of this service: give both the same cluster.node_secret."
 
 
+def is_of_node(scope: Scope) -> bool:
+    """Return whether a node with the secret has sent a request."""
+    return bool(scope.get("state", {}).get(_NODE))
+
+
 def _of_client(scope: Scope, headers: Headers) -> Scope:
     """Return the scope as if the client had sent the request itself."""
     kept = [(name, value) for name, value in scope["headers"] if name.decode("latin-1") not in {*OF_NODES, "host"}]
@@ -83,4 +89,5 @@ def _of_client(scope: Scope, headers: Headers) -> Scope:
     scheme = "ws" if scope["type"] == "websocket" else "http"
     if headers.get(SCHEME) == "https":
         scheme = _SECURE[scheme]
-    return {**scope, "headers": kept, "client": (headers.get(CLIENT, ""), 0), "scheme": scheme}
+    state = {**scope.get("state", {}), _NODE: True}
+    return {**scope, "headers": kept, "client": (headers.get(CLIENT, ""), 0), "scheme": scheme, "state": state}

@@ -1,4 +1,4 @@
-"""What a share link of one tag or one group may read: requests are narrowed to these tags, or refused."""
+"""Narrow requests of a share link of one tag or one group to these tags. `permissions` says which it may send."""
 
 from collections.abc import Callable
 from urllib.parse import parse_qsl, unquote, urlencode

@@ -1,15 +1,14 @@
 """What the routes of the omlox interface share: query parameters, and how errors are documented."""
 
-from collections.abc import Awaitable, Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Literal
 from uuid import UUID, uuid4
 
-from fastapi import Depends, Path, Request
+from fastapi import Depends, Path
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from starlette.responses import Response
 
 from dropanchor_service.answers.answers import Answer
-from dropanchor_service.api.http.connections import is_of_another_page
 from dropanchor_service.api.http.errors import MEDIA_TYPE, Kind, ProblemError
 from dropanchor_service.api.omlox.geojson import collection
 from dropanchor_service.api.omlox.hub import Hub
@@ -18,9 +17,9 @@ from dropanchor_service.api.omlox.zones import has_zone
 from dropanchor_service.api.routes.parameters import id_of, json_response
 
 LENIENT = False
-"""Read a body without `content-type` as JSON: known clients send none. `refuse_pages` keeps other pages out instead."""
+"""Read a body without `content-type` as JSON: known clients send none. `Borders` keeps other pages out."""
 
-_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.TOO_MANY_REQUESTS)
+_REFUSALS = (Kind.UNAUTHENTICATED, Kind.FORBIDDEN, Kind.OTHER_ORIGIN, Kind.OTHER_HOST, Kind.TOO_MANY_REQUESTS)
 _UNNEEDED = "Accepted: positions and events are always up to date."
 
 
@@ -73,18 +72,6 @@ class ChangeQuery(BaseModel):
 
     force_location_update: Flag = Field(default=False, description=_UNNEEDED)
     subdivide: Flag = Field(default=False, description="Accepted: edges stay as they are, straight in the site frame.")
-
-
-def refuse_pages(origins: Sequence[str]) -> Callable[[Request], Awaitable[None]]:
-    """Return the dependency that refuses changes by web pages of other origins than the service and these."""
-
-    async def refuse(request: Request) -> None:
-        if request.method not in ("GET", "HEAD") and is_of_another_page(request, origins):
-            raise ProblemError(
-                Kind.FORBIDDEN, "A page of another origin may not change this. Add its origin to http.cors_origins."
-            )
-
-    return refuse
 
 
 def require_zone(hub: Hub, name: str | None) -> None:

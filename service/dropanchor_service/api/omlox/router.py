@@ -1,18 +1,16 @@
 """All routes of the omlox interface, on the stores of the service."""
 
-from collections.abc import Sequence
 from functools import cache
 from threading import Event
 from typing import Any
 
-from fastapi import APIRouter, Depends, FastAPI, Request
+from fastapi import APIRouter, FastAPI, Request
 from starlette.responses import Response
 
 from dropanchor_service.api.http.site_in_path import OMLOX_PREFIX
 from dropanchor_service.api.omlox.document import document_of
 from dropanchor_service.api.omlox.feed.socket import Doorkeeper, feed_router
 from dropanchor_service.api.omlox.hub_of_request import hubs_of
-from dropanchor_service.api.omlox.parameters import refuse_pages
 from dropanchor_service.api.omlox.routes.fences import fences_router
 from dropanchor_service.api.omlox.routes.providers import providers_router
 from dropanchor_service.api.omlox.routes.trackables import trackables_router
@@ -30,7 +28,7 @@ def add_omlox(app: FastAPI, site_of: SiteOfRequest, doorkeeper: Doorkeeper, stop
     stopping: ends the WebSockets when set.
     """
     app.state.omlox_hubs = hubs_of(site_of)
-    described, feed = described_routes(doorkeeper.origins), feed_router(doorkeeper, stopping)
+    described, feed = described_routes(), feed_router(doorkeeper, stopping)
     for version in VERSIONS:
         path = f"{OMLOX_PREFIX}{version}"
         for prefix in (SITE_PREFIX + path, *([path] if site_of.only else [])):
@@ -38,9 +36,9 @@ def add_omlox(app: FastAPI, site_of: SiteOfRequest, doorkeeper: Doorkeeper, stop
                 app.include_router(router, prefix=prefix, include_in_schema=False)
 
 
-def described_routes(origins: Sequence[str] = ()) -> APIRouter:
-    """Return the routes that the document describes. origins: of web pages that may change something."""
-    router = APIRouter(dependencies=[Depends(refuse_pages(origins))])
+def described_routes() -> APIRouter:
+    """Return the routes that the document describes."""
+    router = APIRouter()
     for part in (trackables_router(), providers_router(), zones_router(), fences_router()):
         router.include_router(part)
     return router

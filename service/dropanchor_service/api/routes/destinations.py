@@ -23,6 +23,7 @@ from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.items import CHANGE_KINDS, DestinationId, delete, found, item_response, put
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.delivery import write_only
 from dropanchor_service.delivery.channel import ChannelError, Verdict
 from dropanchor_service.events.deliveries import QueueState
 from dropanchor_service.events.drafts import destination_test
@@ -172,15 +173,13 @@ def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
 
 
 def _usable(parts: EventParts, destination: Destination) -> Destination:
-    """Return the destination, a webhook with its secret. Raises ProblemError when nothing could be delivered to it."""
-    present = parts.destinations.all.get(destination.id)
-    if isinstance(destination, WebhookDestination) and isinstance(present, WebhookDestination):
-        destination = destination.model_copy(update={"secret": destination.secret or present.secret})
+    """Return the destination with what it keeps. Raises ProblemError when nothing could be delivered to it."""
     try:
-        parts.channels.check(destination)
-    except ChannelError as error:
+        whole = write_only.completed(destination, parts.destinations.all.get(destination.id))
+        parts.channels.check(whole)
+    except (ChannelError, write_only.NotShownError) as error:
         raise ProblemError(Kind.DESTINATION_REFUSED, f"{error}.") from error
-    return destination
+    return whole
 
 
 def _response(parts: EventParts, destination: Destination) -> Response:
@@ -190,7 +189,6 @@ def _response(parts: EventParts, destination: Destination) -> Response:
 
 
 def _state(parts: EventParts, destination: Destination, queue: QueueState) -> DestinationState:
-    secret = destination.secret if isinstance(destination, WebhookDestination) else None
-    shown = destination.model_copy(update={"secret": None}) if secret else destination
-    problem = parts.problem_of(destination.id)
-    return DestinationState(destination=shown, has_secret=secret is not None, problem=problem, **queue._asdict())
+    has_secret = isinstance(destination, WebhookDestination) and destination.secret is not None
+    shown, problem = write_only.shown(destination), parts.problem_of(destination.id)
+    return DestinationState(destination=shown, has_secret=has_secret, problem=problem, **queue._asdict())

@@ -62,7 +62,7 @@ WEBHOOK: dict[str, Any] = {
     "secret": SECRET,
 }
 DESTINATION_STATE: dict[str, Any] = {
-    "destination": WEBHOOK | {"secret": None},
+    "destination": WEBHOOK | {"url": "https://mes.example.com/…", "secret": None},
     "has_secret": True,
     "pending": 2,
     "oldest_ns": 1_800_000_000_000_000_000,

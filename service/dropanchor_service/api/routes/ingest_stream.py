@@ -17,7 +17,7 @@ from dropanchor_schemas.keys import InvalidKeyError, chunk_from_id
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Rejection
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify, key_command, speaks_in
-from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError, is_of_another_page
+from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError
 from dropanchor_service.api.http.errors import Kind, ProblemError
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.routes.ingest import count_samples
@@ -126,10 +126,6 @@ class _Stream:
 
     async def _identity(self, socket: WebSocket) -> Identity | None:
         if self._authenticator is None:
-            if is_of_another_page(socket):
-                raise _ClosedError(
-                    FORBIDDEN, "A page of another origin may not send samples to a service without keys."
-                )
             return None
         secret = bearer_of(socket) or key_among_protocols(socket)
         if not secret:

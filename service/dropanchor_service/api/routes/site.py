@@ -36,26 +36,29 @@ def _add_site_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         "/site",
         operation_id="get_site",
         summary="Get the site: its frame, georeference and anchors",
+        description="The `ETag` of the answer can go into the `If-Match` of a change.",
         response_model=Site,
         responses=example_response(examples.SITE) | problems(Kind.INVALID_REQUEST),
     )
     async def get_site(request: Request) -> Response:
-        return json_response(site_of(request).site.site.model_dump())
+        return resource_response(site_of(request).site.site)
 
     @router.put(
         "/site",
         operation_id="put_site",
         summary="Replace the site's frame, georeference and anchors",
         response_model=Site,
-        responses=example_response(examples.SITE) | problems(Kind.SITE_ID_FIXED, *_BAD_CHANGE),
+        responses=example_response(examples.SITE) | problems(Kind.SITE_ID_FIXED, Kind.CHANGED_MEANWHILE, *_BAD_CHANGE),
     )
-    def put_site(body: Annotated[Site, Body(examples=[examples.SITE])], request: Request) -> Response:
+    def put_site(
+        body: Annotated[Site, Body(examples=[examples.SITE])], allows: Conditions, request: Request
+    ) -> Response:
         with saving():
             try:
-                site_of(request).site.set_site(body)
+                site_of(request).site.set_site(body, allows)
             except ValueError as error:
                 raise ProblemError(Kind.SITE_ID_FIXED, str(error)) from error
-        return json_response(body.model_dump())
+        return resource_response(body)
 
 
 def _add_anchor_routes(router: APIRouter, site_of: SiteOfRequest) -> None:

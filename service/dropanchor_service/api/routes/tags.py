@@ -25,6 +25,7 @@ from dropanchor_service.api.routes.parameters import (
     resource_response,
     saving,
 )
+from dropanchor_service.api.routes.shown_to_links import shown_to
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.store.clock_offsets import ClockOffset
 from dropanchor_service.store.preconditions import Precondition
@@ -62,7 +63,8 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         offsets = answers.clock_offsets.clock_offsets(now_ns)
         wanted = set(query.tags)
         tags = [tag for tag in answers.tags.listed() if not wanted or tag.name in wanted]
-        return json_response({"t_ns": now_ns, "tags": list(_statuses(answers, tags, offsets, now_ns))})
+        show = shown_to(request)
+        return json_response({"t_ns": now_ns, "tags": list(map(show, _statuses(answers, tags, offsets, now_ns)))})
 
 
 def _add_newcomers_route(router: APIRouter, site_of: SiteOfRequest) -> None:
@@ -93,7 +95,8 @@ def _add_status_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         answers = site_of(request)
         known, now_ns = known_tag(answers, tag), answers.now_ns()
         offset = answers.clock_offsets.clock_offset(known.row, now_ns)
-        return json_response(_timed(next(_statuses(answers, [known], {known.row: offset}, now_ns))))
+        status = next(_statuses(answers, [known], {known.row: offset}, now_ns))
+        return json_response(_timed(shown_to(request)(status)))
 
 
 def _add_settings_routes(router: APIRouter, site_of: SiteOfRequest) -> None:

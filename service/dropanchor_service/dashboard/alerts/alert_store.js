@@ -4,6 +4,7 @@ import { requestChange } from "../data/access.js";
 import { getJson } from "../data/connection.js";
 import { Items } from "../data/items.js";
 import { Refreshed } from "../data/refreshed.js";
+import { shareToken } from "../data/shared.js";
 
 /** @typedef {import("../data/items.js").Item} Item @typedef {import("./words.js").DestinationState} DestinationState */
 
@@ -17,13 +18,13 @@ export class AlertStore extends Refreshed {
   allRules = [];
 
   get paths() {
-    return ["destinations", "event-rules"];
+    return ["event-rules", ...(shareToken === null ? ["destinations"] : [])];
   }
 
-  /** @param {any[]} answers */
-  take([destinations, rules]) {
-    if (destinations) this.states = destinations.destinations;
+  /** @param {any[]} answers without the destinations for a share link, which may not read them */
+  take([rules, destinations]) {
     if (rules) this.allRules = rules.rules;
+    if (destinations) this.states = destinations.destinations;
   }
 
   /** Send a test event. Return what the receiver answered. @param {string} id @returns {Promise<{delivered: boolean, detail: string}>} */

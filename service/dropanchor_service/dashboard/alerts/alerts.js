@@ -2,6 +2,7 @@
 
 import { listLanguages } from "../i18n/document.js";
 import { language, t } from "../i18n/language.js";
+import { shareToken } from "../data/shared.js";
 import { confirmed } from "../setup/confirm.js";
 import { AlertStore } from "./alert_store.js";
 import { DestinationList } from "./destination_list.js";
@@ -96,13 +97,14 @@ export class Alerts {
     const { store } = this;
     const stuck = stuckIn(store.states);
     const summary = this.#part("summary");
+    summary.hidden = this.#part("who").hidden = shareToken !== null;
     summary.textContent = stuck > 0 ? t("alerts.stuck", { n: stuck }) : store.states.length === 0 ? t("alerts.nobody_short") : t("alerts.destination_count", { n: store.states.length });
     summary.classList.toggle("failing", stuck > 0);
     const editing = this.destinationEditor.item !== null || this.ruleEditor.item !== null;
     this.#part("lists").hidden = editing;
     this.#part("new-destination").hidden = !store.isAdmin;
     this.#part("new-rule").hidden = !store.mayWrite;
-    this.#part("no-destination").hidden = store.states.length > 0;
+    this.#part("no-destination").hidden = shareToken !== null || store.states.length > 0;
     this.destinations.update();
     this.rules.update();
   }

@@ -1,6 +1,7 @@
 /** The explanation of the selected tag's pose. The stream does not carry it, so it is requested while the tag is selected. */
 
 import { api, getJson } from "./connection.js";
+import { isLimited } from "./shared.js";
 
 const REQUEST_MS = 500;
 const INNOVATION_COUNT = 150;
@@ -45,7 +46,7 @@ export class Evidence extends EventTarget {
 
   /** Request the explanation of a tag, unless that was done a moment ago. @param {string} tag */
   async request(tag) {
-    if (this.hidden) return;
+    if (this.hidden || isLimited) return; // a link of a tag or a group reads no explanation
     if (tag !== this.#tag) [this.#tag, this.#explanation] = [tag, null];
     else if (this.#isWaiting || performance.now() - this.#requestedAt < REQUEST_MS) return;
     this.#requestedAt = performance.now();

@@ -8,7 +8,7 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from dropanchor_service.api.http.access import OPEN_PATHS
+from dropanchor_service.api.http.permissions import OPEN_PATHS
 from dropanchor_service.api.http.rates import MAX_CLIENTS, RateLimiter
 from dropanchor_service.api.routes import examples
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys

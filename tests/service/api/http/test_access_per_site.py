@@ -15,7 +15,7 @@ from websockets.sync.client import connect
 from dropanchor_schemas.shares import ShareRequest
 from dropanchor_schemas.wire import ENCODING_JSON
 from dropanchor_service.api.export import omlox_document
-from dropanchor_service.api.http.access import OPEN_PATHS
+from dropanchor_service.api.http.permissions import OPEN_PATHS
 from dropanchor_service.api.routes import examples
 from dropanchor_service.estimation.columns import HYPOTHESIS
 from dropanchor_service.security import share_links

@@ -8,10 +8,9 @@ import pytest
 from fastapi import FastAPI
 from pmtiles.tile import Compression, TileType
 
-from dropanchor_service.api.http.access import required_scope
+from dropanchor_service.api.http.permissions import Need, need_of
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.basemap.file import UnreadableTileError
-from dropanchor_service.security.identity import Scope
 from support.api import ask, kind_of, make_api_bench
 from support.basemap_files import basemap_file, image_tile, vector_tile
 
@@ -136,6 +135,6 @@ def test_the_setting_takes_the_place_of_the_attribution_in_the_file(
     assert ("does not say who made the map" in caplog.text) == (setting is None and not texts)
 
 
-def test_readers_see_the_base_map() -> None:
-    assert required_scope("GET", "/api/v1/basemap") is Scope.READ
-    assert required_scope("GET", "/api/v1/basemap/0/0/0") is Scope.READ
+def test_visitors_see_the_base_map() -> None:
+    assert need_of("GET", "/api/v1/basemap") is Need.LINK
+    assert need_of("GET", "/api/v1/basemap/0/0/0") is Need.LINK

@@ -1,7 +1,9 @@
 """Changes of anchors and tags by several clients, and what each client may do."""
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import httpx
 import pytest
 
 from dropanchor_schemas.site import StartPose, TagSettings
@@ -11,6 +13,7 @@ from dropanchor_service.store import SiteStore
 from support.api import ask, kind_of, make_api_bench
 from support.event_stream import serving, streaming
 
+SITE = "/api/v1/site"
 ANCHOR = "/api/v1/anchors/17"
 SETTINGS = "/api/v1/tags/cart/settings"
 
@@ -34,6 +37,25 @@ def test_an_anchor_that_must_be_new_replaces_none() -> None:
     new = {"if-none-match": "*"}
     assert kind_of(ask(app, "PUT", ANCHOR, json={"id": "17"}, headers=new)) == "changed-meanwhile"
     assert ask(app, "PUT", "/api/v1/anchors/18", json={"id": "18"}, headers=new).status_code == 200
+
+
+def test_of_many_changes_of_a_site_that_one_has_read_one_is_made() -> None:
+    app = make_api_bench().app()
+    read = ask(app, "GET", SITE)
+    assert kind_of(ask(app, "PUT", SITE, json=read.json(), headers={"if-match": '"nonsense"'})) == "changed-meanwhile"
+    assert kind_of(ask(app, "PUT", SITE, json=read.json(), headers={"if-none-match": "*"})) == "changed-meanwhile"
+    seen = {"if-match": read.headers["etag"]}
+
+    def change(number: int) -> httpx.Response:
+        return ask(app, "PUT", SITE, json=read.json() | {"name": f"Yard {number}"}, headers=seen)
+
+    with ThreadPoolExecutor(16) as pool:
+        answers = list(pool.map(change, range(16)))
+    (made,) = [answer for answer in answers if answer.status_code == 200]
+    assert {kind_of(answer) for answer in answers if answer is not made} == {"changed-meanwhile"}
+    now = ask(app, "GET", SITE)
+    assert (now.json(), now.headers["etag"]) == (made.json(), made.headers["etag"])
+    assert ask(app, "PUT", SITE, json=read.json()).status_code == 200
 
 
 def test_settings_of_a_tag_are_not_overwritten_unseen() -> None:

@@ -24,6 +24,13 @@ def test_a_browser_on_this_machine_gets_the_path_of_the_program() -> None:
     assert "dropanchor-tag" in done.stdout
 
 
+def test_what_a_router_is_told_after_its_endpoint_is_not_shown() -> None:
+    app = make_api_bench().app(endpoints=("tls/yard.example:7447#listen_private_key_base64=c2VjcmV0",))
+    answer = ask(app, "GET", "/api/v1/connect").json()
+    assert answer["endpoints"] == ["tls/yard.example:7447"]
+    assert "c2VjcmV0" not in answer["simulate"]
+
+
 @pytest.mark.parametrize(
     ("address", "headers"),
     [

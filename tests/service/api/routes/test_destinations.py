@@ -9,12 +9,12 @@ from typing import Any
 import orjson
 import pytest
 
-from dropanchor_service.api.http.access import required_scope
+from dropanchor_service.api.http.permissions import Need, need_of
 from dropanchor_service.api.routes import event_examples as examples
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.delivery.channels import Channels
 from dropanchor_service.delivery.registry import FILE_NAME, WEBHOOKS_FILE_NAME, open_destinations
-from dropanchor_service.security.identity import Scope
+from dropanchor_service.delivery.write_only import shown_url
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, MqttSettings
 from service.api.routes.test_zones_and_events import app_of, happen
 from support.api import ask, kind_of
@@ -46,6 +46,41 @@ def test_a_webhook_never_returns_its_secret_and_keeps_it(tmp_path: Path) -> None
     kept = open_destinations(tmp_path).all["mes"].model_dump()
     assert (kept["secret"], kept["tags"]) == (SECRET, ["a"])
     assert (tmp_path / FILE_NAME).stat().st_mode & 0o077 == 0
+
+
+URL = "http://127.0.0.1:9/services/T0/xoxb-token?key=abc"
+
+
+def test_a_webhook_never_returns_its_url_after_the_host_and_keeps_it(tmp_path: Path) -> None:
+    parts = with_loopback(tmp_path)
+    app = app_of(parts)
+    made = ask(app, "PUT", MES, json=webhook(url=URL))
+    assert made.json()["destination"]["url"] == "http://127.0.0.1:9/…"
+    changed = ask(app, "PUT", MES, json=made.json()["destination"] | {"enabled": False})
+    answers = [made, changed, *(ask(app, "GET", path) for path in ("/api/v1/destinations", MES, f"{MES}/dead-letters"))]
+    assert all(answer.status_code == 200 and "xoxb" not in answer.text for answer in answers)
+    kept = open_destinations(tmp_path).all["mes"].model_dump()
+    assert (kept["url"], kept["enabled"]) == (URL, False)
+    for moved in ("http://127.0.0.9:9/…", "http://127.0.0.1:10/…", "http://127.0.0.1:9/…/events"):
+        response = ask(app, "PUT", MES, json=made.json()["destination"] | {"url": moved})
+        assert "give the whole URL" in response.json()["detail"]
+    assert kind_of(ask(app, "PUT", f"{MES}2", json=webhook(id="mes2", url="http://127.0.0.1:9/…"))) == (
+        "destination-refused"
+    )
+
+
+@pytest.mark.parametrize(
+    ("url", "expected"),
+    [
+        ("https://mes.example", "https://mes.example"),
+        ("https://mes.example:8443/", "https://mes.example:8443/"),
+        ("https://mes.example?token=1", "https://mes.example/…"),
+        ("https://mes.example/#1", "https://mes.example/…"),
+        ("https://me:word@mes.example/", "https://mes.example/…"),
+    ],
+)
+def test_a_url_is_shown_up_to_its_host(url: str, expected: str) -> None:
+    assert shown_url(url) == expected
 
 
 def test_a_change_of_somebody_else_is_not_overwritten() -> None:
@@ -151,12 +186,13 @@ def test_dead_letters_are_listed_sent_again_dropped_and_go_with_their_destinatio
     assert kind_of(ask(app, "POST", f"{MES}/test")) == "unknown-destination"
 
 
-def test_only_an_administrator_changes_a_destination() -> None:
-    assert required_scope("PUT", MES) is Scope.ADMIN
-    assert required_scope("POST", f"{MES}/test") is Scope.ADMIN
-    assert required_scope("POST", f"{MES}/dead-letters/retry") is Scope.ADMIN
-    assert required_scope("GET", "/api/v1/destinations") is Scope.READ
-    assert required_scope("PUT", "/api/v1/zones/dock") is Scope.WRITE
+def test_only_an_administrator_changes_a_destination_and_no_share_link_reads_one() -> None:
+    assert need_of("PUT", MES) is Need.ADMIN
+    assert need_of("POST", f"{MES}/test") is Need.ADMIN
+    assert need_of("POST", f"{MES}/dead-letters/retry") is Need.ADMIN
+    for path in ("/api/v1/destinations", MES, f"{MES}/dead-letters", "/api/v1/sites/yard/destinations"):
+        assert need_of("GET", path) is Need.READ
+    assert need_of("PUT", "/api/v1/zones/dock") is Need.WRITE
 
 
 def test_there_is_a_limit_of_destinations() -> None:

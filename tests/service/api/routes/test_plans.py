@@ -8,11 +8,10 @@ import pytest
 from fastapi import FastAPI
 
 from dropanchor_schemas.site import Georeference, Site
-from dropanchor_service.api.http.access import required_scope
+from dropanchor_service.api.http.permissions import Need, need_of
 from dropanchor_service.api.routes.plan_images import MAX_UPLOAD_BYTES
 from dropanchor_service.api.routes.stream import Changes
 from dropanchor_service.plans.store import PlanStore
-from dropanchor_service.security.identity import Scope
 from support.api import ask, kind_of, make_api_bench
 from support.plan_files import geotiff_file, image_file, svg_file
 
@@ -126,6 +125,6 @@ def test_a_change_of_a_plan_is_in_the_stream() -> None:
 
 
 def test_a_writer_makes_plans_and_an_administrator_deletes_them() -> None:
-    assert required_scope("POST", "/api/v1/plan-images") is Scope.WRITE
-    assert required_scope("PUT", "/api/v1/plans/hall") is Scope.WRITE
-    assert required_scope("DELETE", "/api/v1/plans/hall") is Scope.ADMIN
+    assert need_of("POST", "/api/v1/plan-images") is Need.WRITE
+    assert need_of("PUT", "/api/v1/plans/hall") is Need.WRITE
+    assert need_of("DELETE", "/api/v1/plans/hall") is Need.ADMIN

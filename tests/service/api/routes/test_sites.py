@@ -10,8 +10,7 @@ from websockets.sync.client import connect
 
 from dropanchor_schemas import Anchor
 from dropanchor_schemas.answers import SiteList
-from dropanchor_service.api.http.access import required_scope
-from dropanchor_service.security.identity import Scope
+from dropanchor_service.api.http.permissions import Need, need_of
 from support.api import ask, kind_of, make_api_bench
 from support.delivery import SECRET
 from support.http_server import running_server
@@ -139,10 +138,10 @@ def test_an_only_site_has_both_paths() -> None:
 
 def test_the_same_changes_need_the_same_scope_with_and_without_a_site_in_the_path() -> None:
     for prefix in ("/api/v1", "/api/v1/sites/a"):
-        assert required_scope("PUT", f"{prefix}/site") is Scope.ADMIN
-        assert required_scope("PUT", f"{prefix}/anchors/1") is Scope.WRITE
-        assert required_scope("DELETE", f"{prefix}/tags/a") is Scope.ADMIN
-        assert required_scope("GET", f"{prefix}/poses") is Scope.READ
+        assert need_of("PUT", f"{prefix}/site") is Need.ADMIN
+        assert need_of("PUT", f"{prefix}/anchors/1") is Need.WRITE
+        assert need_of("DELETE", f"{prefix}/tags/a") is Need.ADMIN
+        assert need_of("GET", f"{prefix}/poses") is Need.LINK_TO_TAGS
 
 
 def test_the_stream_of_a_site_holds_its_tags_alone_whatever_it_asks_for() -> None:

@@ -8,7 +8,6 @@ import asyncio
 import itertools
 import sqlite3
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from threading import Event
 from typing import Any
@@ -18,7 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.api.http.access import LOOPBACK, bearer_of, client_of, identify
-from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError, is_of_another_page
+from dropanchor_service.api.http.connections import OpenConnections, TooManyConnectionsError
 from dropanchor_service.api.http.errors import ProblemError
 from dropanchor_service.api.http.rates import RateLimiter
 from dropanchor_service.api.omlox.feed.messages import Code, FeedError, Request, params_of, request_of
@@ -34,7 +33,7 @@ PAUSE_PER_WORK = 3.0  # so a connection takes at most a quarter of a core
 CONNECTIONS_PER_CLIENT = 16
 MAX_SUBSCRIPTIONS = 32  # of one connection
 
-RESTART, FORBIDDEN, UNKNOWN_SITE, TOO_MANY = 1012, 4403, 4404, 4429
+RESTART, UNKNOWN_SITE, TOO_MANY = 1012, 4404, 4429
 _AUTHENTICATE = (
     "Send an API key or a token in the header `Authorization: Bearer …` of the handshake, or as params.token of every "
     "message."
@@ -43,11 +42,10 @@ _AUTHENTICATE = (
 
 @dataclass(frozen=True)
 class Doorkeeper:
-    """Who may connect. authenticator: None when every client may. origins: of web pages that may, too."""
+    """Who may connect. authenticator: None when every client may."""
 
     authenticator: Authenticator | None
     rate_limiter: RateLimiter | None
-    origins: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -68,9 +66,6 @@ def feed_router(doorkeeper: Doorkeeper, stopping: Event) -> APIRouter:
     async def serve(socket: WebSocket) -> None:
         await socket.accept()
         client = client_of(socket, None)
-        if doorkeeper.authenticator is None and is_of_another_page(socket, doorkeeper.origins):
-            await socket.close(FORBIDDEN, "A page of another origin may not read a service without keys.")
-            return
         try:
             with connections.one_more(client):
                 await Connection(socket, hub_of(socket), doorkeeper, numbers).serve(stopping)
