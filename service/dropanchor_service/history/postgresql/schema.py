@@ -25,7 +25,8 @@ _OF_OWN = ", ".join(f"CASE WHEN p.relative THEN p.{name} END AS relative_{name}"
 _VIEW = f"""
 CREATE OR REPLACE VIEW tracks AS
     SELECT sites.name AS site, tags.name AS tag, to_timestamp(p.t_ns / 1e9) AS time, p.t_ns,
-        CASE WHEN p.relative AND p.state IN ({_PLACED}) THEN 'relative' ELSE (ARRAY[{_STATES}])[p.state + 1] END AS state,
+        CASE WHEN p.relative AND p.state IN ({_PLACED}) THEN 'relative'
+            ELSE (ARRAY[{_STATES}])[p.state + 1] END AS state,
         p.relative, {_X}, {_Y}, {_HEADING}, p.speed_mps, {_SIGMA}, {_OF_OWN}
     FROM poses p JOIN tags ON tags.id = p.tag JOIN sites ON sites.id = p.site WHERE NOT {FENCED};
 """
