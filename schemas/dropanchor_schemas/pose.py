@@ -10,6 +10,7 @@ class TrackingState(StrEnum):
 
     INITIALISING = "initialising"
     AMBIGUOUS = "ambiguous"
+    RELATIVE = "relative"
     TRACKING = "tracking"
     COASTING = "coasting"
     DEGRADED = "degraded"
@@ -35,7 +36,7 @@ class StateReason(StrEnum):
 
 
 class Frame(StrEnum):
-    """The frame of x, y, heading and covariance."""
+    """The frame in which the place of a tag is known."""
 
     SITE = "site"
     RELATIVE = "relative"
@@ -64,9 +65,27 @@ class Hypothesis(_Answer):
     ellipse_95: Ellipse | None = None
 
 
+class RelativePose(_Answer):
+    """Where a tag is in a frame of its own, while north is not known: the site frame, turned about the tag's first
+    anchor by an unknown angle. The anchor is at its x and y of the site, and the x axis is the first direction of
+    travel. The shape of the track and the distance from the anchor hold; these numbers are no place of the site."""
+
+    x: float | None
+    y: float | None
+    heading_rad: float | None = Field(description="Counter-clockwise from the x axis of this frame.")
+    covariance: list[list[float]] | None = Field(
+        description="3 × 3, of (x, y, heading_rad), in this frame; null in `tracks`."
+    )
+    ellipse_95: Ellipse | None
+    p_mode: float | None = Field(description="As in a pose; null in `tracks`.")
+    sigma_pos_m: float | None = Field(description="sqrt(Pxx + Pyy), m, in this frame.")
+    hypotheses: list[Hypothesis] = Field(default=[], description="Of an ambiguous tag, in this frame.")
+
+
 class Pose(_Answer):
-    """The pose of one tag at one time, in the site frame (ENU, metres, x east) unless `frame` says otherwise. Lists of
-    poses round `covariance`, `lat` and `lon` to 9 decimals and all other numbers to 6."""
+    """The pose of one tag at one time. x, y, heading, covariance, ellipse, latitude and longitude are in the site frame
+    (ENU, metres, x east) and null while the tag's place in it is unknown. Lists of poses round `covariance`, `lat` and
+    `lon` to 9 decimals and all other numbers to 6."""
 
     tag: str
     t_ns: int = Field(description="UTC, ns: the time for which the pose holds.")
@@ -77,8 +96,11 @@ class Pose(_Answer):
     reason: StateReason = Field(description="Machine-readable reason of the state.")
     hint: str = Field(description="What an operator can do about it; empty if nothing needs to be done.")
     frame: Frame = Field(
-        description="`relative`: turned about the anchor by an unknown angle, because north is not known. The x axis "
-        "is then the first direction of travel; distance from the anchor, speed and the shape of the track hold."
+        description="`relative`: north is not known, so the place is known in a frame of the tag's own only. "
+        "`relative_pose` holds it then, and all that depends on the site frame is null."
+    )
+    relative_pose: RelativePose | None = Field(
+        default=None, description="The place in the tag's own frame; null unless `frame` is `relative`."
     )
     x: float | None = Field(description="East, m; null while unknown.")
     y: float | None = Field(description="North, m; null while unknown.")
@@ -88,7 +110,7 @@ class Pose(_Answer):
     covariance: list[list[float]] | None = Field(description="3 × 3, of (x, y, heading_rad).")
     ellipse_95: Ellipse | None
     p_mode: float | None = Field(description="Probability that the published mode is the right one.")
-    sigma_pos_m: float | None = Field(description="sqrt(Pxx + Pyy), m.")
+    sigma_pos_m: float | None = Field(description="sqrt(Pxx + Pyy) in the site frame, m.")
     sigma_obs_m: float | None = Field(description="Position accuracy that the last 10 s of data alone can reach, m.")
     range_m: float | None = Field(description="Last range that was fused, m.")
     anchor: str | None = Field(description="The anchor of that range.")
@@ -150,6 +172,7 @@ class PoseFrame(_Answer):
     reason: list[StateReason]
     hint: list[str]
     frame: list[Frame]
+    relative_pose: list[RelativePose | None] = Field(description="As in a pose.")
     anchor: list[str | None]
     age_s: list[float]
     x: list[float | None]
@@ -164,6 +187,8 @@ class PoseFrame(_Answer):
     semi_major_m: list[float | None] = Field(description="Semi-major axis of the 95 % ellipse, m.")
     semi_minor_m: list[float | None]
     angle_rad: list[float | None]
-    hypotheses: list[list[Hypothesis] | None] = Field(description="Hypotheses of an ambiguous tag; null otherwise.")
+    hypotheses: list[list[Hypothesis] | None] = Field(
+        description="Hypotheses of an ambiguous tag in the site frame; null otherwise."
+    )
     lat: list[float | None] | None = None
     lon: list[float | None] | None = None

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import Frame, TrackingState
+from dropanchor_schemas.pose import Frame, RelativePose, TrackingState
 
 
 class _Answer(BaseModel):
@@ -16,7 +16,10 @@ class TrackPose(_Answer):
     t_utc: str = Field(description="The same time as ISO 8601.")
     state: TrackingState
     reason: str = Field(description="Machine-readable reason of the state.")
-    frame: Frame = Field(description="`relative`: turned about the anchor by an unknown angle.")
+    frame: Frame = Field(description="`relative`: the place was known in a frame of the tag's own only.")
+    relative_pose: RelativePose | None = Field(
+        description="The place in the tag's own frame; null unless `frame` is `relative`."
+    )
     x: float | None = Field(description="East, m; null if it was unknown.")
     y: float | None = Field(description="North, m.")
     heading_rad: float | None
@@ -30,6 +33,9 @@ class TrackPose(_Answer):
     anchor: str | None
     lat: float | None = Field(default=None, description="Degrees, with the site's current georeference.")
     lon: float | None = None
+    epoch: int = Field(
+        ge=0, description="Of the process that wrote the pose, as in a live pose; 0 where no cluster wrote it."
+    )
 
 
 class Track(_Answer):

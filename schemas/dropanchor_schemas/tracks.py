@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from dropanchor_schemas.pose import Frame, TrackingState
+from dropanchor_schemas.pose import Frame, RelativePose, TrackingState
 
 
 class _Answer(BaseModel):
@@ -24,8 +24,9 @@ class TrackPoints(_Answer):
 
     t_ns: list[int] = Field(description="UTC, ns.")
     state: list[TrackingState]
-    frame: list[Frame] = Field(
-        description="`relative`: turned about the anchor by an unknown angle, no place of the map."
+    frame: list[Frame] = Field(description="`relative`: the place was known in a frame of the tag's own only.")
+    relative_pose: list[RelativePose | None] = Field(
+        description="The place in the tag's own frame; null unless `frame` is `relative`."
     )
     x: list[float | None] = Field(description="East, m.")
     y: list[float | None] = Field(description="North, m.")

@@ -16,7 +16,7 @@ from dropanchor_service.answers.json_template import Filled
 from dropanchor_service.answers.pose_at_time import BeforeMemoryError, pose_at
 from dropanchor_service.answers.pose_fields import FRAME_FIELDS, POSE_FIELDS, ellipse_values
 from dropanchor_service.answers.pose_filter import PoseFilter
-from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json
+from dropanchor_service.answers.pose_json import CHUNK, hypotheses_json, list_json, poses_json, relative_poses_json
 from dropanchor_service.answers.track_pages import pose_in_tracks
 from dropanchor_service.answers.unused import hints_about_unused
 from dropanchor_service.estimation.columns import POSE, Array, State
@@ -168,7 +168,10 @@ class Answers:
         """Return the `Pose` for each of these POSE rows, which are the latest."""
         answers = self._poses(poses, now_ns)
         for answer, row in zip(answers, poses["row"].tolist(), strict=True):
-            answer["hypotheses"] = self._hypotheses_of(row, answer["state"]) or []
+            hypotheses = self._hypotheses_of(row, answer["state"]) or []
+            answer["hypotheses"] = [] if answer["relative_pose"] else hypotheses
+            if answer["relative_pose"]:
+                answer["relative_pose"]["hypotheses"] = hypotheses
         return answers
 
     def _poses(
@@ -186,9 +189,12 @@ class Answers:
         frame = {"t_ns": now_ns, "epoch": columns.epoch} | {
             name: column for name, column in values.items() if column is not None
         }
-        modes = map(orjson.Fragment, self._hypotheses_json(columns.poses))
         ambiguous = columns.poses["state"] == State.AMBIGUOUS
-        frame["hypotheses"] = [next(modes) if is_ambiguous else None for is_ambiguous in ambiguous.tolist()]
+        modes = dict(zip(np.flatnonzero(ambiguous).tolist(), self._hypotheses_json(columns.poses), strict=True))
+        if columns.own is not None:
+            own = np.flatnonzero(ambiguous & columns.own.is_known).tolist()
+            frame["relative_pose"] = relative_poses_json(columns.own, [modes.pop(place) for place in own])
+        frame["hypotheses"] = [orjson.Fragment(modes[i]) if i in modes else None for i in range(len(ambiguous))]
         return frame
 
     def rows(self, tags: Sequence[Tag] | None = None) -> Array:

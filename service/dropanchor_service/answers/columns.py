@@ -5,20 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropanchor_schemas.pose import Frame as FrameName
 from dropanchor_schemas.pose import StateReason as ReasonName
-from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.site import Site
+from dropanchor_service.answers.frames import OwnFrames, in_site_frame, own_frames
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.hints import hints_of, past_hints
 from dropanchor_service.answers.kernels.ageing import STALE_AFTER_S, age_poses, ellipses
-from dropanchor_service.estimation.columns import Array, Frame, State, StateReason
+from dropanchor_service.estimation.columns import Array, StateReason
 from dropanchor_service.store.records import copied
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
 
-STATES = [TrackingState[state.name].value for state in State]
-FRAMES = [FrameName[frame.name].value for frame in Frame]
 REASONS = [ReasonName[reason.name].value for reason in StateReason]
 
 
@@ -26,11 +23,13 @@ REASONS = [ReasonName[reason.name].value for reason in StateReason]
 class PoseColumns:
     """Columns with one entry per pose. An unknown float is NaN.
 
-    poses: POSE; the other columns are derived from it. hint: index into `hint_texts`. anchor_ids: by the index that
-    the poses hold. lat, lon: degrees, None without a georeference. epoch: of the process, see `SiteStore`.
+    poses: POSE in the site frame, with states of `frames.STATES`; the other columns are derived from it. own: those in
+    frames of the tags' own, None if there are none. hint: index into `hint_texts`. anchor_ids: by the index that the
+    poses hold. lat, lon: degrees, None without a georeference. epoch: of the process, see `SiteStore`.
     """
 
     poses: Array
+    own: OwnFrames | None
     tags: list[str]
     online: Array
     hint_texts: Sequence[str]
@@ -64,11 +63,13 @@ def columns_of(
         of_tags, online = tags.names(aged["row"].tolist()), tags.presence.are_online(aged["row"])
     else:
         of_tags, online = list(names), np.array([tags.presence.is_online(name) for name in names])
-    ellipse = ellipse_95(aged["cov"])
+    published = in_site_frame(aged)
+    ellipse = ellipse_95(published["cov"])
     hint_texts, hint = past_hints(aged) if historical else hints_of(aged, site, tags, now_ns)
-    lat, lon = _lat_lon_of(aged, site.site)
+    lat, lon = _lat_lon_of(published, site.site)
     return PoseColumns(
-        poses=aged,
+        poses=published,
+        own=own_frames(aged),
         tags=of_tags,
         online=online,
         hint_texts=hint_texts,
@@ -85,11 +86,8 @@ def columns_of(
 
 
 def _lat_lon_of(poses: Array, site: Site) -> tuple[Array | None, Array | None]:
-    """Return latitude and longitude, NaN for poses in a frame of their own; None without a georeference."""
-    if site.georeference is None:
-        return None, None
-    x, y = np.where(poses["frame"] == Frame.SITE, (poses["x"], poses["y"]), np.nan)
-    return lat_lon(site.georeference, x, y)
+    """Return latitude and longitude, NaN where x and y are; None without a georeference."""
+    return (None, None) if site.georeference is None else lat_lon(site.georeference, poses["x"], poses["y"])
 
 
 def aged_poses(poses: Array, age_s: Array) -> Array:

@@ -1,12 +1,14 @@
 """Answer with the tracks of many tags over a period, from the history on disk."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from dropanchor_schemas.tracks import Between as BetweenName
-from dropanchor_service.answers.columns import FRAMES, STATES, ellipse_95
+from dropanchor_service.answers.columns import ellipse_95
+from dropanchor_service.answers.frames import FRAMES, STATES, published_states
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.summaries import RELATIVE, Between
 from dropanchor_service.history.tracks import Tracks
@@ -47,17 +49,35 @@ def figures_of(summary: Array) -> dict[str, Any]:
 
 def _columns(points: Array, since_previous: Array) -> dict[str, Any]:
     """Return the columns of `TrackPoints`."""
-    relative = np.where(points["state"] & RELATIVE, Frame.RELATIVE, Frame.SITE)
+    own = (points["state"] & RELATIVE) != 0
+    frames = np.where(own, Frame.RELATIVE, Frame.SITE)
     covariances = np.empty((len(points), 2, 2))
     covariances[:, 0, 0], covariances[:, 1, 1] = points["cov_xx"], points["cov_yy"]
     covariances[:, 0, 1] = covariances[:, 1, 0] = points["cov_xy"]
     major, minor, angle = ellipse_95(covariances)
     numbers = {"x": points["x"], "y": points["y"], "heading_rad": points["heading"], "speed_mps": points["speed"]}
     numbers |= {"sigma_pos_m": points["sigma_pos"], "semi_major_m": major, "semi_minor_m": minor, "angle_rad": angle}
+    states = published_states(points["state"] & ~np.uint8(RELATIVE), frames)
+    in_site = {name: np.where(own & (name != "speed_mps"), np.nan, values) for name, values in numbers.items()}
     return {
         "t_ns": np.ascontiguousarray(points["t_ns"]),
-        "state": [STATES[state] for state in (points["state"] & ~np.uint8(RELATIVE)).tolist()],
-        "frame": [FRAMES[frame] for frame in relative.tolist()],
-        **{name: np.ascontiguousarray(values, np.float32) for name, values in numbers.items()},
+        "state": [STATES[state] for state in states.tolist()],
+        "frame": [FRAMES[frame] for frame in frames.tolist()],
+        "relative_pose": _relative(numbers, own & np.isfinite(points["x"])),
+        **{name: np.ascontiguousarray(values, np.float32) for name, values in in_site.items()},
         "since_previous": [_BETWEEN[between] for between in since_previous.tolist()],
     }
+
+
+def _relative(numbers: Mapping[str, Array], is_known: Array) -> list[dict[str, Any] | None]:
+    """Return the `RelativePose` of each point, None where it is not known. Points have no covariance of the heading."""
+    found: list[dict[str, Any] | None] = [None] * len(is_known)
+    of_own = {name: np.round(values[is_known].astype(float), 4).tolist() for name, values in numbers.items()}
+    for i, place in enumerate(np.flatnonzero(is_known).tolist()):
+        pose = {name: values[i] for name, values in of_own.items() if name != "speed_mps"}
+        ellipse = {name: pose.pop(name) for name in ("semi_major_m", "semi_minor_m", "angle_rad")}
+        found[place] = pose | {"ellipse_95": ellipse if math.isfinite(ellipse["semi_major_m"]) else None} | _NOT_STORED
+    return found
+
+
+_NOT_STORED: dict[str, Any] = {"covariance": None, "p_mode": None, "hypotheses": []}

@@ -10,14 +10,20 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from dropanchor_schemas.pose import Pose, PoseFrame
-from dropanchor_service.answers.columns import FRAMES, REASONS, STATES, PoseColumns
+from dropanchor_service.answers.columns import REASONS, PoseColumns, ellipse_95
+from dropanchor_service.answers.frames import FRAMES, STATES, OwnFrames
 from dropanchor_service.answers.json_template import INTEGER, NUMBER, QUOTED, TEXT, null_for
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
 from dropanchor_service.estimation.columns import Array, State
 
-DECIMALS, FINE_DECIMALS = 6, 9  # digits of m, rad and s; of variances and degrees
+DECIMALS, FRAME_DECIMALS, FINE_DECIMALS = (
+    6,
+    4,
+    9,
+)  # digits of m, rad and s; of these in a frame; of variances and degrees
 
 _AMBIGUOUS: Final = int(State.AMBIGUOUS)  # NumPy compares with an int faster than with an enum
+COVARIANCE: Final = [[NUMBER] * 3] * 3
 ELLIPSE: Final = {"semi_major_m": NUMBER, "semi_minor_m": NUMBER, "angle_rad": NUMBER}
 
 
@@ -51,7 +57,7 @@ class PoseField:
 
 
 def number(
-    column: Callable[[PoseColumns], Array | None], decimals: int = DECIMALS, frame_decimals: int = 4
+    column: Callable[[PoseColumns], Array | None], decimals: int = DECIMALS, frame_decimals: int = FRAME_DECIMALS
 ) -> PoseField:
     """Return the field of a float. column: returns the values, NaN where unknown, None if all are unknown."""
 
@@ -93,13 +99,17 @@ def _anchors(columns: PoseColumns) -> tuple[Sequence[str | None], Array]:
 def _covariance_json(columns: PoseColumns) -> JsonPart:
     numbers = columns.poses["cov"].reshape(-1, 9)
     known = (np.abs(numbers) < BEYOND).all(axis=1)
-    return JsonPart([null_for(9), [[NUMBER] * 3] * 3], known, (numbers,), (FINE_DECIMALS,) * 9)
+    return JsonPart([null_for(9), COVARIANCE], known, (numbers,), (FINE_DECIMALS,) * 9)
+
+
+def covariance_values(cov: Array) -> list[list[list[float]] | None]:
+    """Return each matrix (n, 3, 3), None where it is not finite."""
+    known: Any = np.isfinite(cov).all(axis=(1, 2))
+    return [matrix if finite else None for matrix, finite in zip(cov.tolist(), known.tolist(), strict=True)]
 
 
 def _covariances(columns: PoseColumns) -> Sequence[Any]:
-    cov = columns.poses["cov"]
-    known = np.isfinite(cov).all(axis=(1, 2))
-    return [matrix if finite else None for matrix, finite in zip(cov.tolist(), known.tolist(), strict=True)]
+    return covariance_values(columns.poses["cov"])
 
 
 def _ellipse_json(columns: PoseColumns) -> JsonPart:
@@ -120,7 +130,61 @@ def ellipse_values(major: Array, minor: Array, angle: Array) -> list[dict[str, A
 
 
 def _hypotheses_json(columns: PoseColumns) -> JsonPart:
-    return JsonPart([[], TEXT], columns.poses["state"] == _AMBIGUOUS)
+    ambiguous = columns.poses["state"] == _AMBIGUOUS
+    return JsonPart([[], TEXT], ambiguous if columns.own is None else ambiguous & ~columns.own.is_known)
+
+
+def _relative_json(columns: PoseColumns) -> JsonPart:
+    return JsonPart([None]) if columns.own is None else relative_json(columns.own)
+
+
+def relative_json(own: OwnFrames, decimals: int = DECIMALS) -> JsonPart:
+    """Return the field `relative_pose`; the hypotheses of an ambiguous pose stand in it as a text."""
+    poses, axes = own.poses, ellipse_95(own.poses["cov"])
+    cov = poses["cov"].reshape(-1, 9)
+    has_cov, has_ellipse = (np.abs(cov) < BEYOND).all(axis=1), axes[0] < BEYOND
+    form_of = 1 + has_cov + 2 * has_ellipse + 4 * (poses["state"] == _AMBIGUOUS)
+    numbers = (*(poses[name] for name in ("x", "y", "heading")), cov, *axes, poses["p_mode"], poses["sigma_pos"])
+    digits = (*[decimals] * 3, *[FINE_DECIMALS] * 9, *[decimals] * 5)
+    return JsonPart([null_for(len(digits)), *_RELATIVE_FORMS], np.where(own.is_known, form_of, 0), numbers, digits)
+
+
+_HYPOTHESES: Final[tuple[Any, ...]] = ([], TEXT)
+_RELATIVE_FORMS: Final[list[Any]] = [
+    {"x": NUMBER, "y": NUMBER, "heading_rad": NUMBER, "covariance": covariance, "ellipse_95": ellipse}
+    | {"p_mode": NUMBER, "sigma_pos_m": NUMBER, "hypotheses": hypotheses}
+    for hypotheses in _HYPOTHESES
+    for ellipse in (null_for(3), ELLIPSE)
+    for covariance in (null_for(9), COVARIANCE)
+]
+
+
+def _relatives(columns: PoseColumns) -> Sequence[Any]:
+    """Return the `RelativePose` of each pose without hypotheses, None where it has none."""
+    if columns.own is None:
+        return [None] * len(columns.poses)
+    return relative_values(columns.own.poses, columns.own.is_known)
+
+
+def relative_values(poses: Array, is_known: Array) -> list[dict[str, Any] | None]:
+    """Return a `RelativePose` without hypotheses for each POSE, None where it is not known."""
+    found: list[dict[str, Any] | None] = [None] * len(poses)
+    own = poses[is_known]
+    columns = {name: own[field].tolist() for name, field in _RELATIVE_NUMBERS.items()}
+    columns["covariance"] = covariance_values(own["cov"])
+    columns["ellipse_95"] = ellipse_values(*ellipse_95(own["cov"]))
+    for place, values in zip(np.flatnonzero(is_known).tolist(), zip(*columns.values(), strict=True), strict=True):
+        found[place] = dict(zip(columns, values, strict=True)) | {"hypotheses": []}
+    return found
+
+
+_RELATIVE_NUMBERS: Final = {
+    "x": "x",
+    "y": "y",
+    "heading_rad": "heading",
+    "p_mode": "p_mode",
+    "sigma_pos_m": "sigma_pos",
+}
 
 
 def _nulls(columns: PoseColumns) -> Sequence[None]:
@@ -147,6 +211,7 @@ _TABLE: Final = {
     "reason": choice(lambda columns: (REASONS, columns.poses["reason"])),
     "hint": choice(lambda columns: (columns.hint_texts, columns.hint)),
     "frame": choice(lambda columns: (FRAMES, columns.poses["frame"])),
+    "relative_pose": PoseField(_relative_json, _relatives, _nulls),  # in frames, as the hypotheses
     "x": engine_number("x"),
     "y": engine_number("y"),
     "heading_rad": engine_number("heading"),

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dropanchor_service.answers.columns import STATES, aged_poses
+from dropanchor_service.answers.columns import aged_poses
+from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
@@ -33,7 +34,8 @@ class PoseFilter:
         matching = np.ones(len(poses), bool)
         if self.states:
             aged = aged_poses(poses, tags.rows.overdue_s(poses, now_ns))
-            matching &= np.isin(aged["state"], [STATES.index(state) for state in self.states])
+            published = published_states(aged["state"], aged["frame"])
+            matching &= np.isin(published, [STATES.index(state) for state in self.states])
         if self.box is not None:
             x_min, y_min, x_max, y_max = self.box
             x, y = poses["x"], poses["y"]

@@ -10,9 +10,17 @@ import numpy as np
 import orjson
 
 from dropanchor_service.answers.columns import PoseColumns, ellipse_95
+from dropanchor_service.answers.frames import OwnFrames
 from dropanchor_service.answers.json_template import NUMBER, Filled, filled, null_for
 from dropanchor_service.answers.kernels.json_numbers import BEYOND
-from dropanchor_service.answers.pose_fields import DECIMALS, ELLIPSE, POSE_FIELDS, JsonPart
+from dropanchor_service.answers.pose_fields import (
+    DECIMALS,
+    ELLIPSE,
+    FRAME_DECIMALS,
+    POSE_FIELDS,
+    JsonPart,
+    relative_json,
+)
 from dropanchor_service.estimation.columns import Array, State
 
 CHUNK = 2500  # poses
@@ -43,6 +51,22 @@ def hypotheses_json(modes: Array, counts: Array) -> list[bytes]:
     each = filled(forms, (axes[0] < BEYOND).astype(np.int64), numbers, np.full(8, DECIMALS)).each
     ends = np.cumsum(counts).tolist()
     return [b"[%b]" % b",".join(each[begin:end]) for begin, end in zip([0, *ends], ends, strict=False)]
+
+
+def relative_poses_json(own: OwnFrames, hypotheses: Sequence[bytes]) -> list[orjson.Fragment | None]:
+    """Return the JSON of a `RelativePose` for each, as in a frame; None where it is not known.
+
+    hypotheses: JSON of those of each that is ambiguous.
+    """
+    known = own.is_known
+    part = relative_json(OwnFrames(own.poses[known], known[known]), FRAME_DECIMALS)
+    assert part.form_of is not None
+    forms = [orjson.dumps(form) for form in part.forms]
+    each = filled(forms, part.form_of, np.column_stack(part.numbers), np.array(part.decimals), None, hypotheses).each
+    found: list[orjson.Fragment | None] = [None] * len(known)
+    for place, text in zip(np.flatnonzero(known).tolist(), each, strict=True):
+        found[place] = orjson.Fragment(text)
+    return found
 
 
 def _hypothesis(ellipse: Any) -> bytes:

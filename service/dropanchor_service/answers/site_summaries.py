@@ -6,7 +6,8 @@ import numpy as np
 
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.care import care_of
-from dropanchor_service.answers.columns import STATES, aged_poses
+from dropanchor_service.answers.columns import aged_poses
+from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.estimation.columns import Array
 
 
@@ -37,5 +38,5 @@ def _states(sites: Sequence[Answers], now_ns: int) -> Array:
     poses = sites[0].latest.since()[1]
     aged = aged_poses(poses, rows.overdue_s(poses, now_ns))
     counts = np.zeros((len(sites), len(STATES)), np.int64)
-    np.add.at(counts, (rows.sites(aged["row"]), aged["state"]), 1)
+    np.add.at(counts, (rows.sites(aged["row"]), published_states(aged["state"], aged["frame"])), 1)
     return counts

@@ -5,11 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_service.answers.columns import FRAMES, REASONS, STATES
+from dropanchor_service.answers.columns import REASONS
+from dropanchor_service.answers.frames import FRAMES, STATES, in_site_frame, own_frames
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.answers.pose_at_time import FAR_NS, NoPoseThenError, pose_between
+from dropanchor_service.answers.pose_fields import covariance_values, relative_values
 from dropanchor_service.answers.times import isos_utc
-from dropanchor_service.estimation.columns import Array, Frame
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.records import ESTIMATED, StoredPoses
 from dropanchor_service.history.tracks import Tracks
@@ -39,7 +41,7 @@ def track_page(tracks: Tracks, site: SiteStore, tag: str, from_ns: int, to_ns: i
     """Return the first `limit` poses from `from_ns` to `to_ns`, both included. Raises HistoryError."""
     found = tracks.poses(tag, from_ns, to_ns, limit + 1)
     next_ns = int(found.poses["t_ns"][limit]) if len(found.poses) > limit else None
-    return TrackPage(_columns(StoredPoses(found.poses[:limit], found.anchors[:limit]), site), next_ns)
+    return TrackPage(_columns(found.first(limit), site), next_ns)
 
 
 def pose_in_tracks(tracks: Tracks, site: SiteStore, tag: str, memory: Array, t_ns: int) -> Array | None:
@@ -72,25 +74,34 @@ def _indexed(stored: StoredPoses, site: SiteStore) -> Array:
 
 def _columns(stored: StoredPoses, site: SiteStore) -> dict[str, list[Any]]:
     """Return the columns of `TrackPose`, with the digits of a float32, as it was stored."""
-    poses = stored.poses
-    known = np.isfinite(poses["cov"]).all(axis=(1, 2)).tolist()
-    covariances = _short(poses["cov"].reshape(-1)).reshape(-1, 3, 3).tolist()
+    poses = in_site_frame(stored.poses)
     columns: dict[str, list[Any]] = {
         "t_ns": poses["t_ns"].tolist(),
         "t_utc": isos_utc(poses["t_ns"]),
         "state": [STATES[state] for state in poses["state"].tolist()],
         "reason": [REASONS[reason] for reason in poses["reason"].tolist()],
         "frame": [FRAMES[frame] for frame in poses["frame"].tolist()],
+        "relative_pose": _relative(stored.poses),
         **{name: _short(poses[field]).tolist() for name, field in ESTIMATED.items()},
-        "covariance": [cov if finite else None for cov, finite in zip(covariances, known, strict=True)],
+        "covariance": covariance_values(_short(poses["cov"])),
         "anchor": list(stored.anchors),
     }
     origin = site.site.georeference
     if origin is not None:
-        in_site = poses["frame"] == Frame.SITE
-        lat, lon = lat_lon(origin, *(np.where(in_site, poses[axis], np.nan) for axis in ("x", "y")))
+        lat, lon = lat_lon(origin, poses["x"], poses["y"])
         columns["lat"], columns["lon"] = np.round(lat, 9).tolist(), np.round(lon, 9).tolist()
-    return columns
+    return columns | {"epoch": stored.epochs.tolist()}
+
+
+def _relative(poses: Array) -> list[dict[str, Any] | None]:
+    """Return the `RelativePose` of each stored POSE, None where it has none."""
+    own = own_frames(poses)
+    if own is None:
+        return [None] * len(poses)
+    short = poses.copy()
+    for name in ("x", "y", "heading", "p_mode", "sigma_pos", "cov"):
+        short[name] = _short(poses[name])
+    return relative_values(short, own.is_known)
 
 
 def _short(values: Array) -> Array:

@@ -27,7 +27,7 @@ from foxglove.messages import (
     Vector3,
 )
 
-from dropanchor_service.bridges.frames import SITE, anchor_frame_id, frame_id, tag_frame_id
+from dropanchor_service.bridges.frames import SITE, anchor_frame_id, frame_id, in_its_frame, tag_frame_id
 
 Json = Mapping[str, Any]
 
@@ -38,6 +38,7 @@ _WHITE = Color(r=1.0, g=1.0, b=1.0, a=1.0)
 _NO_ROTATION = Quaternion(w=1.0)
 _COLOURS: Final = {
     "tracking": (0.20, 0.75, 0.40),
+    "relative": (0.25, 0.75, 0.75),
     "coasting": (0.30, 0.65, 0.95),
     "degraded": (0.95, 0.70, 0.20),
     "ambiguous": (0.75, 0.50, 0.95),
@@ -73,7 +74,7 @@ def transforms(
             translation=Vector3(x=pose["x"], y=pose["y"], z=heights.get(pose["tag"], 0.0)),
             rotation=_rotation(pose),
         )
-        for pose in poses
+        for pose in map(in_its_frame, poses)
         if is_placed(pose)
     ]
     return FrameTransforms(transforms=of_anchors + of_tags)
@@ -84,7 +85,7 @@ def scene(poses: Iterable[Json], anchors: Iterable[Json], heights: Mapping[str, 
     of_anchors = [_anchor_entity(anchor, t_ns) for anchor in anchors]
     of_tags = [
         _tag_entity(pose, heights.get(pose["tag"], 0.0), t_ns)
-        for pose in poses
+        for pose in map(in_its_frame, poses)
         if is_placed(pose) or pose["hypotheses"]
     ]
     return SceneUpdate(entities=of_anchors + of_tags)

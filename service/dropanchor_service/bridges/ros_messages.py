@@ -12,7 +12,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from dropanchor_schemas.wire import ImuSample, RangeSample, anchor_number
-from dropanchor_service.bridges.frames import frame_id
+from dropanchor_service.bridges.frames import SITE
 from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH, RosType
 
 Json = Mapping[str, Any]
@@ -108,7 +108,7 @@ class RosMessages:
     def _header(self, pose: Json) -> Any:
         sec, nanosec = divmod(pose["t_ns"], 1_000_000_000)
         stamp = self._make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
-        return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id(pose))
+        return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=SITE)
 
     def _type(self, name: str) -> RosType:
         return RosType(name, self._store.hash_rihs01(name))
@@ -130,9 +130,10 @@ class RosMessages:
 
 
 def is_usable(pose: Json) -> bool:
-    """Return whether a robot may act on the pose. ROS messages cannot say that it is lost or ambiguous."""
+    """Return whether a robot may act on the pose. ROS messages cannot say that it is lost, ambiguous or relative."""
     needed = ("x", "y", "heading_rad", "covariance")
-    return pose["state"] in USABLE_STATES and all(pose[name] is not None for name in needed)
+    in_site = pose["frame"] == SITE  # services before the state `relative` say it only here
+    return in_site and pose["state"] in USABLE_STATES and all(pose[name] is not None for name in needed)
 
 
 def _time_ns(message: Any, t_ns: int) -> int:

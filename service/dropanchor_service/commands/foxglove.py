@@ -13,6 +13,7 @@ from foxglove.channels import FrameTransformsChannel, LocationFixesChannel, Pose
 from dropanchor_schemas.epochs import EpochFence
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.bridges.foxglove_scene import is_placed, location_fixes, pose_in_frame, scene, transforms
+from dropanchor_service.bridges.frames import in_its_frame
 from dropanchor_service.commands.options import positive
 from dropanchor_service.commands.rest import KEY_VARIABLE, RefusedError, add_rest_options, asked
 from dropanchor_service.runtime.signals import Interrupt, interrupts
@@ -31,7 +32,8 @@ topics:
   /tag/TAG/pose          the pose of a tag                                                  for the panel 3D
   /tag/TAG/estimate      state, reason, speed, accuracy and the rest of a pose              for Plot and Table
 
-A pose whose frame is `relative` (north is unknown) is in site/TAG: choose that as the display frame to see it.
+While north is unknown, the state is `relative`: the tag is in the frame site/TAG instead of site, and its pose on
+/tag/TAG/relative_pose. Choose site/TAG as the display frame to see it.
 
 examples:
   dropanchor foxglove
@@ -50,12 +52,14 @@ Json = Mapping[str, Any]
 _TEXTS = ("state", "reason", "hint", "frame", "anchor")
 _NUMBERS = ("x", "y", "heading_rad", "speed_mps", "yaw_rate_radps", "age_s")
 _ACCURACIES = ("p_mode", "sigma_pos_m", "sigma_obs_m", "range_m")
-ESTIMATE_SCHEMA = {
+_OF_RELATIVE = ("x", "y", "heading_rad", "p_mode", "sigma_pos_m")
+ESTIMATE_SCHEMA: dict[str, Any] = {
     "type": "object",
     "title": "dropanchor.Estimate",
     "properties": {name: {"type": "string"} for name in _TEXTS}
     | {name: {"type": "number"} for name in (*_NUMBERS, *_ACCURACIES)}
-    | {"t_ns": {"type": "integer"}, "online": {"type": "boolean"}},
+    | {"t_ns": {"type": "integer"}, "online": {"type": "boolean"}}
+    | {"relative_pose": {"type": "object", "properties": {name: {"type": "number"} for name in _OF_RELATIVE}}},
 }
 
 
@@ -189,11 +193,17 @@ class _TagTopics:
     def __init__(self, tag: str, context: foxglove.Context) -> None:
         prefix = f"/tag/{chunk_from_id(tag)}"
         self._pose = PoseInFrameChannel(f"{prefix}/pose", context=context)
+        self._prefix, self._context = prefix, context
+        self._relative_pose: PoseInFrameChannel | None = None
         self._estimate = foxglove.Channel(f"{prefix}/estimate", schema=ESTIMATE_SCHEMA, context=context)
 
     def publish(self, pose: Json, height_m: float, t_ns: int) -> None:
         if is_placed(pose):
             self._pose.log(pose_in_frame(pose, height_m), log_time=t_ns)
+        elif is_placed(own := in_its_frame(pose)):
+            if self._relative_pose is None:
+                self._relative_pose = PoseInFrameChannel(f"{self._prefix}/relative_pose", context=self._context)
+            self._relative_pose.log(pose_in_frame(own, height_m), log_time=t_ns)
         known = {name: pose[name] for name in ESTIMATE_SCHEMA["properties"] if pose.get(name) is not None}
         self._estimate.log(known, log_time=t_ns)
 

@@ -15,8 +15,9 @@ from typing import Any
 from tqdm import tqdm
 
 from dropanchor_schemas.wire import Reason
+from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.commands.replay_output import VALUES, Write, opened, values_of
-from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.evaluation.offline import OfflineService, settings_of
 from dropanchor_service.recording.mcap_file import SESSION
 from dropanchor_service.recording.reading import RecordingReader, Turn
@@ -92,14 +93,16 @@ class Outcome:
 
     def add(self, turn: Turn, tags: Sequence[str], poses: Array) -> None:
         """Add the poses of a turn. A pose may come a turn earlier or later than recorded, so both sides are kept."""
+        states = published_states(poses["state"], poses["frame"]).tolist()
         for tag, t_ns, x, y, state in zip(
-            tags, *(poses[name].tolist() for name in ("t_ns", "x", "y", "state")), strict=True
+            tags, *(poses[name].tolist() for name in ("t_ns", "x", "y")), states, strict=True
         ):
             self.poses[tag] += 1
-            self.states.setdefault(tag, Counter())[State(state).name.lower()] += 1
+            self.states.setdefault(tag, Counter())[STATES[state]] += 1
             self._positions[tag, t_ns] = (x, y)
         for tag, estimate in turn.estimates:
-            x, y = (estimate.get(name, math.nan) for name in ("x", "y"))
+            place = estimate.get("relative_pose", estimate)  # older recordings have no relative_pose
+            x, y = (place.get(name, math.nan) for name in ("x", "y"))
             self._estimates.append((tag, estimate["t_ns"], x, y))
         if len(self._positions) > MAX_PENDING:
             self._compare()

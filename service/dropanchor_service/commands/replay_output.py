@@ -10,8 +10,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
-from dropanchor_service.answers.columns import FRAMES
-from dropanchor_service.estimation.columns import Array, State
+from dropanchor_service.answers.frames import FRAMES, STATES, published_states
+from dropanchor_service.estimation.columns import Array
 from dropanchor_service.settings.sources import SettingsError
 
 Write = Callable[[Iterable[Sequence[Any]]], None]
@@ -21,13 +21,13 @@ _WHOLE, _TEXTS = ("t_ns",), ("tag", "state", "frame")
 
 
 def values_of(poses: Array) -> Iterator[list[Any]]:
-    """Yield VALUES of each POSE row. An unknown number is NaN."""
+    """Yield VALUES of each POSE row. An unknown number is NaN. The numbers are in the frame that `frame` names."""
     cov = poses["cov"]
     columns = [*(poses[name] for name in ("x", "y", "heading", "speed"))]
     columns += [cov[:, 0, 0], cov[:, 0, 1], cov[:, 1, 1], poses["p_mode"]]
-    states, frames = poses["state"].tolist(), poses["frame"].tolist()
+    states, frames = published_states(poses["state"], poses["frame"]).tolist(), poses["frame"].tolist()
     for *numbers, state, frame in zip(*(column.tolist() for column in columns), states, frames, strict=True):
-        yield [*numbers, State(state).name.lower(), FRAMES[frame]]
+        yield [*numbers, STATES[state], FRAMES[frame]]
 
 
 def check(path: Path) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.evaluation.accuracy import Accuracy, Truth, accuracy, share_of_time
 from dropanchor_service.evaluation.replay import Samples, Track
@@ -56,7 +57,7 @@ def report(track: Track, score: Score, samples: Samples, start_is_given: bool) -
             f"RMSE {score.own.rmse_rotated:.3f} m after the best rotation about the anchor over {score.own.compared} "
             "poses in a frame of the tag's own: its angle to the site's frame is not known"
         )
-    shares = share_of_time(track.t, track.poses["state"])
+    shares = share_of_time(track.t, published_states(track.poses["state"], track.poses["frame"]), STATES)
     yield "time: " + ", ".join(f"{name} {share:.1%}" for name, share in shares.items())
     if samples.rejected:
         yield "not used: " + rejections(samples)

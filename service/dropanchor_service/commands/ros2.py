@@ -37,7 +37,7 @@ published topics (with --namespace dropanchor), while the state is tracking, coa
   /dropanchor/odometry   nav_msgs/Odometry                         while speed and yaw rate are known
   /tf                    tf2_msgs/TFMessage                        from site to --child-frame; --no-tf: not
 
-A pose whose frame is `relative` (north is unknown) is in the frame site/TAG.
+While north is unknown, the state is `relative` and no pose is published: it would be no place of the site.
 
 examples:
   dropanchor ros2 --tag cart --imu /imu/data --range /uwb/range=1

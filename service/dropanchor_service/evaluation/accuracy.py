@@ -1,5 +1,6 @@
 """Error of a track against ground truth, and the consistency of its ellipses and states."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from dropanchor_service.answers.kernels.ageing import CHI2_95_OF_2
 from dropanchor_service.estimation.columns import Array, State
 
 MAX_TRUTH_GAP_S = 1.0
+_STATES = [state.name.lower() for state in State]
 
 
 @dataclass(frozen=True)
@@ -80,13 +82,16 @@ def accuracy(t: Array, poses: Array, truth: Truth, anchor: tuple[float, float]) 
     )
 
 
-def share_of_time(t: Array, states: Array) -> dict[str, float]:
-    """Return by state its share of the time between the first and the last pose."""
+def share_of_time(t: Array, states: Array, names: Sequence[str] = _STATES) -> dict[str, float]:
+    """Return by state its share of the time between the first and the last pose. names: of all states, in order.
+
+    Without `names` the states are those of the engine, for which the frame of a pose does not matter.
+    """
     spent = np.diff(t, append=t[-1])
     total = spent.sum()
     return {
-        state.name.lower(): float(spent[states == state].sum() / total) if total > 0 else 1.0
-        for state in State
+        name: float(spent[states == state].sum() / total) if total > 0 else 1.0
+        for state, name in enumerate(names)
         if (states == state).any()
     }
 

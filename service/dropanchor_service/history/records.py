@@ -37,13 +37,20 @@ _UPPER_TRIANGLE = np.triu_indices(3)
 
 @dataclass(frozen=True)
 class StoredPoses:
-    """Poses from the file. poses: POSE with rows and anchor indices of -1; anchors: the anchor id of each pose."""
+    """Poses from the file. poses: POSE with rows and anchor indices of -1; anchors: the anchor id of each pose.
+
+    epochs: of the process that wrote each pose, 0 without a cluster.
+    """
 
     poses: Array
     anchors: list[str | None]
+    epochs: Array
+
+    def first(self, count: int) -> "StoredPoses":
+        return StoredPoses(self.poses[:count], self.anchors[:count], self.epochs[:count])
 
 
-NO_POSES = StoredPoses(np.empty(0, POSE), [])
+NO_POSES = StoredPoses(np.empty(0, POSE), [], np.empty(0, np.int64))
 
 
 def records_of(poses: Array, anchors: Array) -> list[bytes]:
@@ -69,4 +76,5 @@ def stored_poses(rows: Sequence[tuple[int, bytes]], anchor_names: Mapping[int, s
     poses["state"] &= ~np.uint8(RELATIVE)
     poses["cov"][:, *_UPPER_TRIANGLE] = records["cov"]
     poses["cov"][:, *_UPPER_TRIANGLE[::-1]] = records["cov"]
-    return StoredPoses(poses, [anchor_names.get(anchor_id) for anchor_id in records["anchor"].tolist()])
+    anchors = [anchor_names.get(anchor_id) for anchor_id in records["anchor"].tolist()]
+    return StoredPoses(poses, anchors, np.zeros(len(poses), np.int64))  # no cluster writes files

@@ -9,7 +9,8 @@ from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.answers.columns import STATES, aged_poses
+from dropanchor_service.answers.columns import aged_poses
+from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.store.latest_poses import LatestPoses
 from dropanchor_service.store.rows import KINDS
 from dropanchor_service.store.sites import Sites
@@ -96,7 +97,7 @@ class FleetGauges(Collector):
     def collect(self) -> Iterable[Metric]:
         poses = self._latest.since()[1]
         aged = aged_poses(poses, self._sites.rows.overdue_s(poses, self._now_ns()))
-        by_state = np.bincount(aged["state"], minlength=len(STATES))
+        by_state = np.bincount(published_states(aged["state"], aged["frame"]), minlength=len(STATES))
         tags = GaugeMetricFamily("dropanchor_tags", "Tags that have a pose, by tracking state.", labels=["state"])
         for state, count in zip(STATES, by_state, strict=True):
             tags.add_metric([state], count)

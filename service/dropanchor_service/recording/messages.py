@@ -1,13 +1,14 @@
 """Build the messages of a recording from poses and anchors, in schemas that viewers draw."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.answers.answers import to_json
-from dropanchor_service.answers.columns import FRAMES, REASONS, STATES
+from dropanchor_service.answers.columns import REASONS
+from dropanchor_service.answers.frames import FRAMES, STATES, in_site_frame
 from dropanchor_service.answers.geodesy import lat_lon
 from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.history.records import ESTIMATED
@@ -44,7 +45,10 @@ def site_messages(document: SiteDocument, t_ns: int) -> Iterator[Message]:
 
 
 def pose_messages(pose: Array, tag: str, anchor: str | None, document: SiteDocument) -> Iterator[Message]:
-    """Yield the messages of a pose. pose: POSE (0-d). An unknown position gives an estimate only."""
+    """Yield the messages of a pose. pose: POSE (0-d). An unknown position gives an estimate only.
+
+    A place in a frame of the tag's own has a topic and a frame id of its own, so that nobody draws it in the site.
+    """
     stamp = _stamp(int(pose["t_ns"]))
     yield topic_of(tag, ESTIMATE), schemas.ESTIMATE, to_json(_estimate(pose, anchor))
     x, y, heading = (float(pose[name]) for name in ("x", "y", "heading"))
@@ -57,26 +61,32 @@ def pose_messages(pose: Array, tag: str, anchor: str | None, document: SiteDocum
         "orientation": rotation if math.isfinite(heading) else IDENTITY_ROTATION,
     }
     relative = pose["frame"] == Frame.RELATIVE
-    frame_id = f"{FRAME}/{tag}" if relative else FRAME  # viewers must not draw it as a place of the site
-    in_frame = {"timestamp": stamp, "frame_id": frame_id, "pose": placement}
-    yield topic_of(tag, "pose"), schemas.POSE, to_json(in_frame)
+    leaf, frame_id = ("relative_pose", f"{FRAME}/{tag}") if relative else ("pose", FRAME)
+    yield topic_of(tag, leaf), schemas.POSE, to_json({"timestamp": stamp, "frame_id": frame_id, "pose": placement})
     if document.site.georeference is not None and not relative:
         yield topic_of(tag, "location"), schemas.LOCATION, to_json({"timestamp": stamp} | _location(pose, document))
 
 
 def _estimate(pose: Array, anchor: str | None) -> dict[str, object]:
     """Return the fields of an estimate, without those that are unknown."""
+    published = in_site_frame(pose[None])[0]
     fields: dict[str, object] = {
         "t_ns": int(pose["t_ns"]),
-        "state": STATES[pose["state"]],
+        "state": STATES[published["state"]],
         "reason": REASONS[pose["reason"]],
         "frame": FRAMES[pose["frame"]],
+        **_numbers(published, ESTIMATED),
     }
-    numbers = {name: float(pose[field]) for name, field in ESTIMATED.items()}
-    fields |= {name: value for name, value in numbers.items() if math.isfinite(value)}
-    if np.isfinite(pose["cov"]).all():
-        fields["covariance"] = pose["cov"].reshape(-1).tolist()
+    if pose["frame"] == Frame.RELATIVE and math.isfinite(pose["x"]):
+        fields["relative_pose"] = _numbers(pose, schemas.OF_RELATIVE)
     return fields if anchor is None else fields | {"anchor": anchor}
+
+
+def _numbers(pose: Array, names: Iterable[str]) -> dict[str, object]:
+    """Return the known ones of these numbers of a POSE (0-d), and its covariance."""
+    numbers = {name: float(pose[ESTIMATED[name]]) for name in names}
+    known: dict[str, object] = {name: value for name, value in numbers.items() if math.isfinite(value)}
+    return known | ({"covariance": pose["cov"].reshape(-1).tolist()} if np.isfinite(pose["cov"]).all() else {})
 
 
 def _location(pose: Array, document: SiteDocument) -> dict[str, object]:

@@ -18,6 +18,8 @@ ESTIMATE = "dropanchor.Estimate"
 SAMPLES = "dropanchor.Samples"
 PACKED_SAMPLES = "dropanchor.PackedSamples"
 SITE = "dropanchor.Site"
+OF_RELATIVE = ("x", "y", "heading_rad", "p_mode", "sigma_pos_m")
+"""Numbers of a place in a frame of the tag's own."""
 
 Schema = Mapping[str, Any]
 
@@ -48,6 +50,7 @@ def all_schemas() -> dict[str, Schema]:
             covariance=_NINE,
             **dict.fromkeys(("state", "reason", "frame", "anchor"), _TEXT),
             **dict.fromkeys(ESTIMATED, _NUMBER),
+            relative_pose=_object(**dict.fromkeys(OF_RELATIVE, _NUMBER), covariance=_NINE),
         ),
         SAMPLES: _object(
             sequence=_INTEGER,

@@ -26,6 +26,10 @@ from dropanchor_service.store.wrong_times import hint_about_time
 _MEANING = {
     TrackingState.INITIALISING: ("The engine has too little to say anything.", "unknown"),
     TrackingState.AMBIGUOUS: ("Several places explain what was measured.", "one of the hypotheses"),
+    TrackingState.RELATIVE: (
+        "North is not known: the place is known in a frame of the tag's own only.",
+        "none in the site; `relative_pose` has it up to a turn about the anchor",
+    ),
     TrackingState.TRACKING: ("One place is left and its ellipse is small.", "believe it within its ellipse"),
     TrackingState.COASTING: ("No range has come for a while.", "predicted only"),
     TrackingState.DEGRADED: ("Something contradicts the track.", "believe the ellipse, not the dot"),
@@ -77,7 +81,7 @@ _CAUSES = (
     ("ranges to anchors that the site does not have, and to no other", hint_about("9", hears_others=False)),
     ("ranges to such an anchor and to others", hint_about("9", hears_others=True)),
     ("`uncertain`, an IMU alone, and no `mount_angle_rad` in the settings", MOUNT_UNKNOWN),
-    ("`resolved` in the frame `relative`", RELATIVE_HINT),
+    ("`resolved` in the state `relative`", RELATIVE_HINT),
     ("times that look like seconds, milliseconds or microseconds", hint_about_time(1_800_000_000_000)),
     ("other times before 2015, without the flag for a clock that counts from boot", hint_about_time(0)),
 )

@@ -33,7 +33,7 @@ class FirstOfSlot:
 class Decimation:
     """Keeps at most one pose per row and period, and drops poses that add little.
 
-    A pose is kept when it is `distance_m` away from the last kept pose of its row, has another state, or comes
+    A pose is kept when it is `distance_m` away from the last kept pose of its row, has another state or frame, or comes
     `still_ns` after it. Not thread-safe.
     """
 
@@ -41,7 +41,7 @@ class Decimation:
         self._first_of_slot = FirstOfSlot(period_ns)
         self._distance_m = distance_m
         self._still_ns = still_ns
-        self._kept = np.zeros(0, np.dtype([("t_ns", "i8"), ("x", "f8"), ("y", "f8"), ("state", "i2")]))
+        self._kept = np.zeros(0, np.dtype([("t_ns", "i8"), ("x", "f8"), ("y", "f8"), ("state", "i2"), ("frame", "u1")]))
 
     def select(self, poses: Array) -> Array:
         """Return the poses to keep. poses: POSE, in order of time per row."""
@@ -68,11 +68,12 @@ class Decimation:
             near = np.hypot(poses["x"] - before["x"], poses["y"] - before["y"]) < self._distance_m
         both_unknown = np.isnan(poses["x"]) & np.isnan(before["x"])
         soon = np.abs(poses["t_ns"] - before["t_ns"]) < self._still_ns
-        same: Array = (near | both_unknown) & soon & (poses["state"] == before["state"])
+        alike = (poses["state"] == before["state"]) & (poses["frame"] == before["frame"])
+        same: Array = (near | both_unknown) & soon & alike
         return same
 
     def _remember(self, poses: Array) -> None:
-        for name in ("t_ns", "x", "y", "state"):
+        for name in ("t_ns", "x", "y", "state", "frame"):
             self._kept[name][poses["row"]] = poses[name]
 
     def _grow(self, rows: int) -> None:

@@ -136,8 +136,10 @@ def test_a_pose_without_north_says_so_and_has_no_place_on_earth() -> None:
     relative, placed = PoseList.model_validate_json(to_json(answers.pose_list())).poses
     assert (relative.frame, placed.frame) == ("relative", "site")
     assert (relative.hint, placed.hint) == (RELATIVE_HINT, "")
-    assert relative.x == 3.0
-    assert (relative.lat, relative.lon) == (None, None)
+    assert (relative.state, placed.state) == ("relative", "tracking")
+    assert (relative.x, relative.y, relative.lat, relative.lon) == (None, None, None, None)
+    assert relative.relative_pose is not None
+    assert (relative.relative_pose.x, placed.relative_pose) == (3.0, None)
     assert placed.lat is not None
 
 

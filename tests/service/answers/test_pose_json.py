@@ -13,7 +13,7 @@ from dropanchor_service.answers.answers import Answers, to_json
 from dropanchor_service.answers.json_template import NUMBER, filled
 from dropanchor_service.answers.pose_fields import DECIMALS, FINE_DECIMALS
 from dropanchor_service.answers.pose_json import CHUNK
-from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State, StateReason
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Frame, State, StateReason
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 
 T_NS = 1_800_000_000_000_000_000
@@ -33,6 +33,7 @@ def answers_with(count: int, site: Site) -> Answers:
             poses[name][rng.random(poses[name].shape) < 0.1] = math.nan
     poses["row"], poses["t_ns"] = np.arange(count), T_NS - rng.integers(0, 20_000_000_000, count)
     poses["state"], poses["reason"] = rng.integers(0, len(State), count), rng.integers(0, len(StateReason), count)
+    poses["frame"] = rng.integers(0, len(Frame), count)
     poses["anchor"] = rng.integers(-1, 2, count)
     ambiguous = poses["row"][poses["state"] == State.AMBIGUOUS]
     modes = np.zeros(2 * len(ambiguous), HYPOTHESIS)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from dropanchor_service.bridges.foxglove_scene import ellipse_points, pose_in_frame, scene, transforms
-from dropanchor_service.bridges.frames import frame_id
+from dropanchor_service.bridges.frames import frame_id, in_its_frame
 
 ELLIPSE = {"semi_major_m": 2.0, "semi_minor_m": 1.0, "angle_rad": pi / 2}
 
@@ -34,7 +34,9 @@ def test_hypotheses_are_drawn_before_there_is_a_position() -> None:
 
 
 def test_a_pose_in_a_frame_of_its_own_is_never_drawn_in_the_frame_of_the_site() -> None:
-    relative = pose(x=1.0, y=2.0, frame="relative", ellipse_95=ELLIPSE)
+    own = {"x": 1.0, "y": 2.0, "heading_rad": 0.0, "ellipse_95": ELLIPSE, "hypotheses": []}
+    relative = pose(state="relative", frame="relative", relative_pose=own)
     assert (frame_id(relative), frame_id(pose())) == ("site/Süd 1", "site")
-    for message in (scene([relative], [], {}, 0), transforms([relative], [], {}, 0), pose_in_frame(relative, 0.0)):
+    in_frame = pose_in_frame(in_its_frame(relative), 0.0)
+    for message in (scene([relative], [], {}, 0), transforms([relative], [], {}, 0), in_frame):
         assert "site/Süd 1".encode() in message.encode()

@@ -50,17 +50,13 @@ def test_odometry_moves_in_the_frame_of_the_tag() -> None:
     reader.end()
 
 
-def test_a_pose_in_a_frame_of_its_own_is_never_published_in_the_frame_of_the_site() -> None:
-    relative = pose(frame="relative")
-    assert CdrReader(MESSAGES.pose_cdr(relative, 0.0)).stamp_and_frame()[1] == "site/cart"
-    assert CdrReader(MESSAGES.odometry_cdr(relative, 0.0, "base")).stamp_and_frame()[1] == "site/cart"
-    reader = CdrReader(MESSAGES.tf_cdr(relative, 0.0, "base"))
-    assert reader.take("I") == [1]
-    assert reader.stamp_and_frame()[1] == "site/cart"
-
-
 @pytest.mark.parametrize(
-    "fields", [{"state": "lost"}, {"state": "ambiguous"}, {"x": None}, {"heading_rad": None}, {"covariance": None}]
+    "fields",
+    [
+        *({"state": state} for state in ("lost", "ambiguous", "relative")),
+        {"frame": "relative"},  # as a service before the state `relative` says it, which gives x and y
+        *({name: None} for name in ("x", "heading_rad", "covariance")),
+    ],
 )
 def test_a_robot_gets_no_pose_that_it_must_not_act_on(fields: dict[str, Any]) -> None:
     assert is_usable(pose())

@@ -30,6 +30,8 @@ def test_all_formats_hold_the_same_poses(tmp_path: Path) -> None:
         assert call(folder, "--anchor=A", "--out", tmp_path / f"poses.{ending}").status == 0
     rows = read_rows(tmp_path / "poses.csv")
     assert {row["frame"] for row in rows} <= {"site", "relative"}
+    assert {row["state"] for row in rows if row["frame"] == "relative"} <= {"initialising", "ambiguous", "relative"}
+    assert "relative" not in {row["state"] for row in rows if row["frame"] == "site"}
     assert gzip.decompress((tmp_path / "poses.csv.gz").read_bytes()) == (tmp_path / "poses.csv").read_bytes()
     lines = [json.loads(line) for line in (tmp_path / "poses.jsonl").read_text().splitlines()]
     assert gzip.decompress((tmp_path / "poses.jsonl.gz").read_bytes()) == (tmp_path / "poses.jsonl").read_bytes()
@@ -79,6 +81,7 @@ def lines(frames: list[Frame]) -> list[str]:
 
 def test_poses_in_a_frame_of_the_tags_own_are_scored_apart() -> None:
     said = lines([Frame.SITE] * 30 + [Frame.RELATIVE] * 20)
+    assert "time: tracking 61.2%, relative 38.8%" in said
     assert said[0].startswith("RMSE 0.000 m")
     assert said[0].endswith("over 30 poses in the frame of the site")
     assert said[3] == (

@@ -160,7 +160,7 @@ test("a trail holds known positions, breaks at unknown ones, and has a limited l
 test("a track without north is never a full dot, though it says tracking", () => {
   const fleet = new Fleet();
   fleet.apply(frame(["a", "b", "c"], { state: ["tracking", "tracking", "lost"], frame: ["relative", "site", "relative"] }), 0);
-  assert.deepEqual(fleet.names.map((_, row) => fleet.style(row).name), ["turned", "tracking", "lost"]);
+  assert.deepEqual(fleet.names.map((_, row) => fleet.style(row).name), ["relative", "tracking", "lost"]);
   assert.equal(fleet.style(0).placed, false);
 });
 
@@ -170,4 +170,15 @@ test("the hypotheses of a tag without north are no places of the map", () => {
   const both = { state: ["ambiguous", "ambiguous"], frame: ["relative", "site"], hypotheses: [ghost, ghost] };
   fleet.apply(frame(["a", "b"], both), 0);
   assert.deepEqual([0, 1].map((row) => hasGhosts(fleet, row)), [false, true]);
+});
+
+test("a relative tag is drawn where its own frame has it, and has no coordinates of the site", () => {
+  const fleet = new Fleet();
+  const own = { x: 3, y: 4, heading_rad: 0, hypotheses: [] };
+  fleet.apply(frame(["a"], { state: ["relative"], frame: ["relative"], x: [null], y: [null], relative_pose: [own] }), 0);
+  follow(fleet, 16, false);
+  assert.deepEqual([fleet.style(0).name, fleet.number.x[0], fleet.drawnX[0], fleet.drawnY[0]], ["relative", NaN, 3, 4]);
+  fleet.apply(frame(["a"], { state: ["tracking"], frame: ["site"], x: [-3], y: [4], relative_pose: [null] }), 100);
+  follow(fleet, 16, false);
+  assert.deepEqual([fleet.style(0).name, fleet.number.x[0], fleet.drawnX[0], fleet.ownX[0]], ["tracking", -3, -3, NaN]);
 });

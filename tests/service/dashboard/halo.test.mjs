@@ -67,7 +67,7 @@ class NotedCanvas {
 
 /** @param {number} age_s of one tag in each state, the ambiguous ones with a hypothesis, without, and selected */
 function sceneOf(age_s, /** @type {Record<string, string>} */ colours) {
-  const states = [...STATES.map((/** @type {any} */ { name }) => name).filter((/** @type {string} */ name) => name !== "turned"), "ambiguous"];
+  const states = [...STATES.map((/** @type {any} */ { name }) => name).filter((/** @type {string} */ name) => name !== "relative"), "ambiguous"];
   const each = (/** @type {any} */ value) => states.map(() => value);
   const fleet = new Fleet();
   fleet.apply(/** @type {any} */ ({

@@ -83,7 +83,7 @@ def test_a_link_leads_to_a_moment_of_the_past_and_back_to_the_present(
         wait_for_past(page, 3)
         tags = page.tags()
         assert tags["first"]["x"] == pytest.approx(30.5, abs=0.01)
-        assert tags["turned"]["state"] == "turned"
+        assert tags["turned"]["state"] == "relative"
         assert math.isnan(tags["turned"]["x"])  # it is no place of the map
         assert tags["first"]["semiMajor"] == pytest.approx(0.2 * 2.4477, rel=1e-2)
         expect(page.page.locator("[data-part='v-sigma']")).to_have_text("± 0.20 m")

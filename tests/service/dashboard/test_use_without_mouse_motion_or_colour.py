@@ -17,7 +17,7 @@ from support.browser import Scheme, watched_page
 pytestmark = pytest.mark.browser
 
 light_and_dark = pytest.mark.parametrize("scheme", ["light", "dark"])
-NAMES = [*(state.name.lower() for state in State), "turned"]
+NAMES = [*(state.name.lower() for state in State), "relative"]
 CROP = 24
 MOVING = """() => [...document.querySelectorAll("*"), document.documentElement].filter((one) => {
     const { transitionDuration, animationName } = getComputedStyle(one);

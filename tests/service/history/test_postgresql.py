@@ -11,6 +11,7 @@ import pytest
 from prometheus_client import generate_latest
 
 from dropanchor_schemas.site import Site
+from dropanchor_service.estimation.columns import Frame
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.postgresql.database import Database
 from dropanchor_service.history.postgresql.store import PostgresqlStorage
@@ -77,6 +78,42 @@ def test_sites_of_one_database_know_nothing_of_each_other(database: Database, ur
     assert DatabasePlace(database, "nowhere").reader.tags() == []
     rows = postgresql.run(url, "SELECT site, tag, x, state FROM dropanchor_history.tracks ORDER BY x, t_ns")
     assert rows == [("north", "cart", 1.0, "tracking")] * 2 + [("Lager Süd", "cart", 2.0, "tracking")] * 2
+
+
+OLD_VIEW = """
+DROP VIEW dropanchor_history.tracks;
+CREATE VIEW dropanchor_history.tracks AS SELECT sites.name AS site, tags.name AS tag,
+    to_timestamp(p.t_ns / 1e9) AS time, p.t_ns, 'tracking' AS state, p.relative, p.x, p.y, p.heading_rad, p.speed_mps,
+    p.sigma_pos_m FROM dropanchor_history.poses p JOIN dropanchor_history.tags ON tags.id = p.tag
+    JOIN dropanchor_history.sites ON sites.id = p.site
+"""
+
+
+def test_the_view_never_shows_a_place_in_a_frame_of_the_tags_own_as_one_of_the_site(
+    url: str, postgresql: Postgresql
+) -> None:
+    """Not even when the tables are of a version before."""
+    poses = drive(np.array([0.0, 1.0]), x=2.0)
+    poses["frame"] = [Frame.RELATIVE, Frame.SITE]
+    with opened(url, NOW_NS) as database:
+        DatabasePlace(database, "yard").writer().insert(poses, ["a", "a"], [None, None])
+    columns = "state, x, y, heading_rad, sigma_pos_m, relative_x"
+    query = f"SELECT {columns} FROM dropanchor_history.tracks ORDER BY t_ns"
+    (state, *of_site, own), placed = postgresql.run(url, query)
+    assert (state, of_site, own) == ("relative", [None] * 4, 2.0)
+    assert (placed[0], placed[1], placed[5]) == ("tracking", 2.0, None)
+    postgresql.run(url, OLD_VIEW)
+    with opened(url, NOW_NS) as database:
+        DatabasePlace(database, "yard").writer().insert(drive(np.array([2.0])), ["a"], [None])
+    assert postgresql.run(url, query)[:2] == [(state, *of_site, own), placed]
+
+
+def test_a_stored_pose_tells_the_epoch_of_the_process_that_wrote_it(database: Database) -> None:
+    place = DatabasePlace(database)
+    for epoch, seconds in ((4, [0.0, 1.0]), (5, [2.0])):
+        poses = drive(np.array(seconds))
+        place.writer(epoch=epoch).insert(poses, ["a"] * len(poses), [None] * len(poses))
+    assert place.reader.poses("a", 0, 2**62, 9).epochs.tolist() == [4, 4, 5]
 
 
 def test_readers_take_the_later_owner_of_a_tag_from_its_first_pose_on(database: Database) -> None:

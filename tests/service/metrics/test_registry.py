@@ -3,8 +3,9 @@
 import numpy as np
 from prometheus_client import generate_latest
 
-from dropanchor_schemas.wire import Frame, RangeSample, Reason
-from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, State
+from dropanchor_schemas.wire import Frame as Message
+from dropanchor_schemas.wire import RangeSample, Reason
+from dropanchor_service.estimation.columns import HYPOTHESIS, POSE, Frame, State
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.store import LatestPoses
 from support.ingest import IngestBench
@@ -21,7 +22,7 @@ def lines(metrics: Metrics) -> dict[str, float]:
 
 def test_samples_rejections_and_times_are_counted() -> None:
     bench = IngestBench()
-    bench.send("a", Frame(ranges=[RangeSample(T, 7, 1.0), RangeSample(T, 7, -1.0)]))
+    bench.send("a", Message(ranges=[RangeSample(T, 7, 1.0), RangeSample(T, 7, -1.0)]))
     found = lines(bench.metrics)
     assert found['dropanchor_samples_total{kind="range"}'] == 1
     assert found['dropanchor_rejected_total{reason="range_negative"}'] == 1
@@ -37,9 +38,10 @@ def test_every_rejection_reason_is_exported_from_the_start_so_that_rates_work() 
 def test_tags_are_counted_by_their_aged_state_rather_than_the_stored_one() -> None:
     sites, latest, metrics = make_sites(), LatestPoses(), Metrics()
     site = sites[0]
-    poses = np.zeros(3, POSE)
-    poses["row"], poses["state"] = [0, 1, 2], State.TRACKING
-    poses["t_ns"] = [100 * S, 97 * S, 50 * S]
+    poses = np.zeros(4, POSE)
+    poses["row"], poses["state"] = [0, 1, 2, 3], State.TRACKING
+    poses["t_ns"] = [100 * S, 97 * S, 50 * S, 100 * S]
+    poses["frame"][3] = Frame.RELATIVE
     latest.write(poses, np.empty(0, HYPOTHESIS))
     for name in "abcd":
         site.tags.register(name)
@@ -47,8 +49,10 @@ def test_tags_are_counted_by_their_aged_state_rather_than_the_stored_one() -> No
     site.pending_tags.on_message("e", 100 * S)
     metrics.register(FleetGauges(sites, latest, lambda: 100 * S, lambda: 5))
     found = lines(metrics)
-    states = {state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("tracking", "coasting", "lost")}
-    assert states == {"tracking": 1, "coasting": 1, "lost": 1}
+    states = {
+        state: found[f'dropanchor_tags{{state="{state}"}}'] for state in ("relative", "tracking", "coasting", "lost")
+    }
+    assert states == dict.fromkeys(states, 1)
     assert found["dropanchor_tags_registered"] == 4
     assert found["dropanchor_newcomers"] == 1
     assert found["dropanchor_tags_online"] == 1

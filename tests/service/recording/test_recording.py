@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 
 from dropanchor_schemas.site import Anchor, Georeference, Site, TagSettings
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
-from dropanchor_service.estimation.columns import POSE, State
+from dropanchor_service.estimation.columns import POSE, Frame, State
 from dropanchor_service.recording import mcap_file
 from dropanchor_service.recording.folder import Limits, files_in, prune
 from dropanchor_service.recording.reading import RecordingReader, Turn
@@ -128,6 +128,28 @@ def test_poses_are_recorded_in_schemas_that_viewers_know_and_are_valid(tmp_path:
     assert found["dropanchor.Estimate"][0]["anchor"] == "7"
     assert "x" not in found["dropanchor.Estimate"][1]
     assert len(found["dropanchor.PackedSamples"]) == 1
+
+
+def test_a_place_in_a_frame_of_the_tags_own_has_a_topic_of_its_own_and_no_location(tmp_path: Path) -> None:
+    bench = RecorderBench(tmp_path)
+    bench.recorder.start()
+    bench.receive()
+    bench.estimate(x=3.0, y=4.0, frame=Frame.RELATIVE)
+    bench.now_ns += S
+    bench.estimate(x=-4.0, y=3.0)
+    bench.recorder.stop()
+    bench.write()
+    with bench.paths()[0].open("rb") as file:
+        found = [
+            (channel.topic, json.loads(message.data))
+            for schema, channel, message in make_reader(file).iter_messages()
+            if schema is not None and channel.topic.startswith("/tag/a/")
+        ]
+    frames = [(topic, message["frame_id"]) for topic, message in found if "frame_id" in message]
+    assert frames == [("/tag/a/relative_pose", "site/a"), ("/tag/a/pose", "site"), ("/tag/a/location", "site")]
+    own, placed = [message for topic, message in found if topic == "/tag/a/estimate"]
+    assert (own["state"], own["relative_pose"]["x"], "x" in own, "covariance" in own) == ("relative", 3.0, False, False)
+    assert (placed["state"], placed["x"], "relative_pose" in placed) == ("tracking", -4.0, False)
 
 
 def is_supported(schema: Any) -> bool:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dropanchor_service.estimation.columns import POSE, Array, State
+from dropanchor_service.estimation.columns import POSE, Array, Frame, State
 from dropanchor_service.store.decimation import Decimation
 
 SECOND = 1_000_000_000
@@ -34,6 +34,13 @@ def test_few_poses_are_kept_of_a_tag_that_stands_still_until_its_state_changes()
     poses = track(times, np.zeros(120))
     assert seconds_of(Decimation(SECOND, 0.1, 5 * SECOND).select(poses)) == [0, 5, 10]
     poses["state"][71:] = State.COASTING
+    assert seconds_of(Decimation(SECOND, 0.1, 5 * SECOND).select(poses)) == [0, 5, 8]
+
+
+def test_the_first_pose_in_another_frame_is_kept_though_its_numbers_are_alike() -> None:
+    poses = track(np.arange(0, 12, 0.1), np.zeros(120))
+    poses["frame"][71:] = Frame.SITE
+    poses["frame"][:71] = Frame.RELATIVE
     assert seconds_of(Decimation(SECOND, 0.1, 5 * SECOND).select(poses)) == [0, 5, 8]
 
 

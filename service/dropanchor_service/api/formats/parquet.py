@@ -7,17 +7,16 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from dropanchor_schemas.site import Site
 from dropanchor_service.answers.track_pages import TrackPage
-from dropanchor_service.api.formats.track import COVARIANCES
+from dropanchor_service.api.formats.track import COVARIANCES, RELATIVES, covariances_of, relatives_of
 
 GROUP_ROWS = 20_000
 FRAME = (
     "x and y are east and north of the origin of the site in m, turned counter-clockwise by georeference.rotation_rad; "
-    "the heading is counter-clockwise from x in rad; a pose whose frame is `relative` is turned about the anchor by an "
-    "unknown angle"
+    "the heading is counter-clockwise from x in rad; the columns relative_… are in a frame of the tag's own, turned "
+    "about its anchor by an unknown angle"
 )
 _TEXTS = ("state", "reason", "frame", "anchor")
 _UNITS = {
@@ -39,7 +38,9 @@ _UNITS = {
     "var_y": "m²",
     "cov_yh": "m·rad",
     "var_h": "rad²",
+    "epoch": "1",
 }
+_UNITS |= {name: _UNITS[name.removeprefix("relative_")] for name in RELATIVES}
 _DEGREES = ("lat", "lon")  # a float32 would be 2 m wide
 
 
@@ -105,17 +106,16 @@ def _schema(tag: str, site: Site) -> pa.Schema:
 def _type_of(name: str) -> pa.DataType:
     if name == "t_ns":
         return pa.timestamp("ns", tz="UTC")
+    if name == "epoch":
+        return pa.int64()
     return pa.float64() if name in _DEGREES else pa.float32()
 
 
 def _table(pages: Sequence[TrackPage], schema: pa.Schema) -> pa.Table:
     names = pages[0].columns
     columns: dict[str, Any] = {name: [value for page in pages for value in page.columns[name]] for name in names}
-    covariances = np.array([_numbers(cov) for cov in columns.pop("covariance")]).reshape(-1, 3, 3)
-    columns |= {name: covariances[:, i, j] for name, (i, j) in COVARIANCES.items()}
+    variances = np.array([covariances_of(cov) for cov in columns.pop("covariance")])
+    relatives = np.array([relatives_of(pose) for pose in columns.pop("relative_pose")])
+    columns |= dict(zip(COVARIANCES, variances.T, strict=True)) | dict(zip(RELATIVES, relatives.T, strict=True))
     arrays = [pa.array(columns[field.name], field.type, from_pandas=True) for field in schema]  # NaN: null
     return pa.Table.from_arrays(arrays, schema=schema)
-
-
-def _numbers(covariance: Any) -> NDArray[np.float64]:
-    return np.full((3, 3), np.nan) if covariance is None else np.array(covariance)

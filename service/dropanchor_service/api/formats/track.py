@@ -21,7 +21,11 @@ GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX"}
 GAP_NS = 10_000_000_000  # a longer gap starts a new segment of a GPX track
 
 _PLACED = ("tracking", "coasting", "degraded")
+_NESTED = ("covariance", "relative_pose")
 COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
+_OF_RELATIVE = ("x", "y", "heading_rad", "p_mode", "sigma_pos_m")
+RELATIVES = [f"relative_{name}" for name in (*_OF_RELATIVE, *COVARIANCES)]
+"""Columns of a `RelativePose` in a table: never those of the site frame, so that nobody takes one for the other."""
 
 Head = Mapping[str, Any]
 """The members of `Track` except its poses."""
@@ -76,16 +80,28 @@ def _feature(pose: dict[str, Any]) -> dict[str, Any]:
 
 def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: ARG001 - a table has no place for the head
     for number, page in enumerate(pages):
-        names = [name for name in page.columns if name != "covariance"]
+        names = [name for name in page.columns if name not in _NESTED]
         text = io.StringIO(newline="")
         writer = csv.writer(text)
         if number == 0:
-            writer.writerow([*names, *COVARIANCES])
+            writer.writerow([*names, *COVARIANCES, *RELATIVES])
         for pose in page.rows():
-            cov = pose["covariance"]
-            variances = ["" if cov is None else cov[i][j] for i, j in COVARIANCES.values()]
-            writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *variances])
+            numbers = [*covariances_of(pose["covariance"]), *relatives_of(pose["relative_pose"])]
+            values = [*(pose[name] for name in names), *numbers]
+            writer.writerow(["" if value != value else value for value in values])
         yield text.getvalue().encode()
+
+
+def covariances_of(covariance: list[list[float]] | None) -> list[float]:
+    """Return the values of the columns COVARIANCES, NaN where unknown."""
+    return [math.nan if covariance is None else covariance[i][j] for i, j in COVARIANCES.values()]
+
+
+def relatives_of(pose: dict[str, Any] | None) -> list[float]:
+    """Return the values of the columns RELATIVES from a `RelativePose`, NaN where unknown."""
+    if pose is None:
+        return [math.nan] * len(RELATIVES)
+    return [*(pose[name] for name in _OF_RELATIVE), *covariances_of(pose["covariance"])]
 
 
 def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dropanchor_schemas.pose import Frame, TrackingState
+from dropanchor_schemas.pose import TrackingState
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.api.omlox.assets import Assets
 from dropanchor_service.api.omlox.ids import zone_id
@@ -107,12 +107,7 @@ def _rank(location: Answer) -> tuple[int, float]:
 
 
 def _is_placed(pose: Answer) -> bool:
-    return (
-        pose["state"] in SHOWN
-        and pose["frame"] == Frame.SITE.value
-        and math.isfinite(pose["x"])
-        and math.isfinite(pose["y"])
-    )
+    return pose["state"] in SHOWN and math.isfinite(pose["x"]) and math.isfinite(pose["y"])
 
 
 def _measured(pose: Answer, rotation_rad: float) -> Answer:

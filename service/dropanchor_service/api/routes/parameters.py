@@ -130,8 +130,8 @@ class PoseQuery(TagFilter):
     )
     box: Box | None = Field(
         default=None,
-        description="Return only tags in this box of the site: x_min,y_min,x_max,y_max in m. A pose in a frame of its "
-        "own is in no box.",
+        description="Return only tags in this box of the site: x_min,y_min,x_max,y_max in m. A tag whose "
+        "state is `relative` is in no box.",
         examples=["-10,-5,30,20"],
     )
     text: str = Field(

@@ -26,7 +26,8 @@ MEDIA_TYPES = track_formats.MEDIA_TYPES | {PARQUET: "application/vnd.apache.parq
 _DESCRIPTION = """\
 Every stored pose of a tag over a period, in one file. GeoJSON and GPX need a georeferenced site. GPX holds only poses
 in the frame of the site that are `tracking`, `coasting` or `degraded`, and gives the state in `type`. Parquet needs the
-extra `parquet` of the service; its schema holds the units and the frame."""
+extra `parquet` of the service; its schema holds the units and the frame. A pose whose state is `relative` has no place
+in the site: CSV and Parquet have that in the tag's own frame in the columns `relative_…`."""
 
 
 class FileQuery(Period):

@@ -59,6 +59,9 @@ export class Fleet {
   /** Where the dot is drawn: follows x, y smoothly (see motion.js). */
   drawnX = new Float32Array(0);
   drawnY = new Float32Array(0);
+  /** Place in a frame of the tag's own, where it is drawn while its place on the map is not known; NaN: none. */
+  ownX = new Float32Array(0);
+  ownY = new Float32Array(0);
   /** @type {Record<typeof NUMBERS[number], Float32Array>} */
   number = /** @type {any} */ (Object.fromEntries(NUMBERS.map((name) => [name, new Float32Array(0)])));
   /** @type {{reason: (string|null)[], hint: (string|null)[], frame: (string|null)[], anchor: (string|null)[], hypotheses: (Hypothesis[]|null)[]}} */
@@ -87,6 +90,13 @@ export class Fleet {
   /** Return whether a pose is turned about the anchor by an unknown angle, so that it is no place of the map. @param {number} row */
   isTurned(row) {
     return this.value.frame[row] === "relative";
+  }
+
+  /** Return where the dot of a tag belongs: its place on the map, or the one in its own frame. @param {number} row
+   * @returns {[number, number]} */
+  spot(row) {
+    const { x, y } = this.number;
+    return Number.isNaN(x[row]) ? [this.ownX[row], this.ownY[row]] : [x[row], y[row]];
   }
 
   /** @param {number} row */
@@ -118,6 +128,8 @@ export class Fleet {
     for (const name of NUMBERS) if (frame[name]) writeNumbers(this.number[name], rows, frame[name]);
     for (const name of VALUES) if (frame[name]) writeValues(this.value[name], rows, frame[name]);
     if (frame.state) rows.forEach((row, i) => (this.state[row] = stateIn(frame.state[i], frame.frame?.[i])));
+    if (frame.relative_pose) writeNumbers(this.ownX, rows, frame.relative_pose.map((/** @type {any} */ own) => own?.x));
+    if (frame.relative_pose) writeNumbers(this.ownY, rows, frame.relative_pose.map((/** @type {any} */ own) => own?.y));
     if (frame.online) rows.forEach((row, i) => (this.online[row] = frame.online[i] ? 1 : 0));
     if (frame.age_s) rows.forEach((row, i) => (this.poseTime[row] = now_ms - (frame.age_s[i] ?? NaN) * 1000));
   }
@@ -159,7 +171,7 @@ export class Fleet {
     for (const column of Object.values(this.number)) column[row] = NaN;
     for (const column of Object.values(this.value)) column[row] = null;
     this.state[row] = this.online[row] = 0;
-    this.poseTime[row] = this.drawnX[row] = this.drawnY[row] = NaN;
+    this.poseTime[row] = this.drawnX[row] = this.drawnY[row] = this.ownX[row] = this.ownY[row] = NaN;
     return row;
   }
 
@@ -170,6 +182,8 @@ export class Fleet {
     this.poseTime = grown(this.poseTime, new Float64Array(capacity));
     this.drawnX = grown(this.drawnX, new Float32Array(capacity));
     this.drawnY = grown(this.drawnY, new Float32Array(capacity));
+    this.ownX = grown(this.ownX, new Float32Array(capacity));
+    this.ownY = grown(this.ownY, new Float32Array(capacity));
     for (const name of NUMBERS) this.number[name] = grown(this.number[name], new Float32Array(capacity));
   }
 }
@@ -180,7 +194,7 @@ function grown(from, to) {
   return to;
 }
 
-/** @param {Float32Array} column @param {Int32Array} rows @param {(number | null)[]} values */
+/** @param {Float32Array} column @param {Int32Array} rows @param {(number | null | undefined)[]} values */
 function writeNumbers(column, rows, values) {
   for (let i = 0; i < rows.length; i++) column[rows[i]] = values[i] ?? NaN;
 }

@@ -12,20 +12,20 @@ const JUMP_M = 1.5;
  * @param {boolean} smooth false: jump to the poses
  */
 export function follow(fleet, elapsed_ms, smooth) {
-  const { x, y } = fleet.number;
   const share = smooth ? 1 - Math.exp(-elapsed_ms / TIME_CONSTANT_MS) : 1;
   let moving = false;
   for (let row = 0; row < fleet.size; row++) {
-    const dx = x[row] - fleet.drawnX[row];
-    const dy = y[row] - fleet.drawnY[row];
+    const [x, y] = fleet.spot(row);
+    const dx = x - fleet.drawnX[row];
+    const dy = y - fleet.drawnY[row];
     const left = Math.abs(dx) + Math.abs(dy);
     if (share < 1 && left > SETTLED_M && left < JUMP_M) {
       fleet.drawnX[row] += share * dx;
       fleet.drawnY[row] += share * dy;
       moving = true;
     } else {
-      fleet.drawnX[row] = x[row];
-      fleet.drawnY[row] = y[row];
+      fleet.drawnX[row] = x;
+      fleet.drawnY[row] = y;
     }
   }
   return moving;

@@ -1,4 +1,4 @@
-/** The tracking states in the order of the contract, tracking without north, and how far a pose in each can be trusted. */
+/** The tracking states, and how far a pose in each can be trusted. */
 
 import { t } from "../i18n/language.js";
 
@@ -25,7 +25,7 @@ export const STATES = Object.freeze([
   { ...wordsOf("coasting"), shape: "diamond", placed: true, trusted: false },
   { ...wordsOf("degraded"), shape: "square", placed: true, trusted: false },
   { ...wordsOf("lost"), shape: "cross", placed: false, trusted: false },
-  { ...wordsOf("turned"), shape: "triangle", placed: false, trusted: false },
+  { ...wordsOf("relative"), shape: "triangle", placed: false, trusted: false },
 ]);
 
 /** The style of every tag while no newer pose can arrive, since its state may have changed.
@@ -47,16 +47,16 @@ export function stateNumber(name) {
 }
 
 /** The states from the most to the least trusted. */
-export const BEST_FIRST = ["tracking", "turned", "coasting", "degraded", "ambiguous", "initialising", "lost"].map(stateNumber);
+export const BEST_FIRST = ["tracking", "relative", "coasting", "degraded", "ambiguous", "initialising", "lost"].map(stateNumber);
 
 export const AMBIGUOUS = stateNumber("ambiguous");
 
 /**
- * Return the number of the state of a pose. One that can be trusted but for its direction from the anchor is "turned".
+ * Return the number of the state of a pose. Services before the state "relative" name it in `frame` alone.
  * @param {string | null} name
  * @param {string | null | undefined} frame
  */
-export const stateIn = (name, frame) => stateNumber(frame === "relative" && STATES[stateNumber(name)].placed ? "turned" : name);
+export const stateIn = (name, frame) => stateNumber(frame === "relative" && STATES[stateNumber(name)].placed ? "relative" : name);
 
 /** Seconds after which a pose is drawn hollow and fainter, and after which it is even fainter. */
 export const STALE_S = 2;

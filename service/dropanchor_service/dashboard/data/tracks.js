@@ -114,7 +114,7 @@ function columnsAt(all, points, shares, time_ms) {
     frame[at] = all.turned[i] ? "relative" : "site";
     age_s[at] = share > 0 ? 0 : (time_ms - all.time[i]) / 1000;
   }
-  return { ...to, state, frame, age_s };
+  return { ...to, state, frame, age_s, relative_pose: state.map(() => null) };
 }
 
 /** Return how far a time lies between a point and the next, 0 to 1; 0 if the tag was not known all the way.

@@ -125,7 +125,7 @@ export class LiveMap extends EventTarget {
 
   /** Bring a tag into view. @param {number} row */
   reveal(row) {
-    const [x, y] = [this.fleet.number.x[row], this.fleet.number.y[row]];
+    const [x, y] = this.fleet.spot(row);
     const seen = this.view.bounds(-40);
     if (this.autoFit || Number.isNaN(x + y) || (x > seen.left && x < seen.right && y > seen.bottom && y < seen.top)) return;
     this.#goal = { x, y, scale: this.view.scale };
@@ -208,11 +208,10 @@ export class LiveMap extends EventTarget {
    * @returns {Generator<[number, number]>} */
   *#places() {
     for (const anchor of this.anchors) yield [anchor.x, anchor.y];
-    const { x, y } = this.fleet.number;
     for (let row = 0; row < this.fleet.size; row++) {
       if (!this.choice.shows(this.fleet, row)) continue;
       if (hasGhosts(this.fleet, row)) for (const ghost of this.fleet.value.hypotheses[row] ?? []) yield [ghost.x, ghost.y];
-      else yield [x[row], y[row]];
+      else yield this.fleet.spot(row);
     }
   }
 

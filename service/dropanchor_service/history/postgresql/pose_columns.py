@@ -53,7 +53,7 @@ _ROW = np.dtype(
 _HEAD, _END = b"PGCOPY\n\xff\r\n\0" + bytes(8), b"\xff\xff"
 _ARRAY_HEAD = 20  # bytes before the first element of an array of one dimension
 
-STORED = [column.name for column in COLUMNS if column.name not in ("site", "tag", "epoch")]
+STORED = [column.name for column in COLUMNS if column.name not in ("site", "tag")]
 """The columns from which `stored_poses` makes poses."""
 POINTS = ["tag", "t_ns", "state", "relative", "x", "y", "heading_rad", "speed_mps", "sigma_pos_m"]
 POINTS += ["cov_xx", "cov_xy", "cov_yy"]
@@ -95,7 +95,8 @@ def stored_poses(row: Sequence[bytes], anchor_names: dict[int, str]) -> StoredPo
             _field(poses, column.field, column.at)[:] = columns[column.name]
         if column.at is not None:
             _field(poses, "cov", column.at[::-1])[:] = columns[column.name]
-    return StoredPoses(poses, [anchor_names.get(anchor) for anchor in columns["anchor"].tolist()])
+    anchors = [anchor_names.get(anchor) for anchor in columns["anchor"].tolist()]
+    return StoredPoses(poses, anchors, columns["epoch"].astype(np.int64))
 
 
 def summaries(row: Sequence[bytes]) -> Array:

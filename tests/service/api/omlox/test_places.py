@@ -48,7 +48,8 @@ def test_an_unknown_heading_is_negative(heading: float) -> None:
 @pytest.mark.parametrize("state", list(TrackingState))
 def test_only_a_tag_in_one_known_place_has_a_location(state: TrackingState) -> None:
     bench = OmloxBench()
-    bench.poses.move("tag-1", state=State[state.name], reason=StateReason.UNCERTAIN)
+    of_engine = {"frame": Frame.RELATIVE} if state == "relative" else {"state": State[state.name]}
+    bench.poses.move("tag-1", reason=StateReason.UNCERTAIN, **of_engine)
     trackable = bench.id_of("tag-1")
     if state in ("tracking", "coasting", "degraded"):
         assert bench.get("providers/tag-1/location")["properties"]["state"] == state
@@ -60,7 +61,7 @@ def test_only_a_tag_in_one_known_place_has_a_location(state: TrackingState) -> N
 def test_a_tag_in_a_frame_of_its_own_has_no_location() -> None:
     bench = OmloxBench()
     bench.poses.move("tag-1", frame=Frame.RELATIVE)
-    properties = assert_no_place(bench, bench.id_of("tag-1"), "tracking")
+    properties = assert_no_place(bench, bench.id_of("tag-1"), "relative")
     assert properties["frame"] == "relative"
 
 
