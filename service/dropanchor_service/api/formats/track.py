@@ -69,7 +69,7 @@ def _document(head: Head, name: str, parts: Iterable[list[dict[str, Any]]]) -> I
 
 
 def _feature(pose: dict[str, Any]) -> dict[str, Any]:
-    lat, lon = pose.pop("lat"), pose.pop("lon")
+    lat, lon = pose["lat"], pose["lon"]
     geometry = {"type": "Point", "coordinates": [lon, lat]} if math.isfinite(lat) else None
     return {"type": "Feature", "geometry": geometry, "properties": pose}
 
