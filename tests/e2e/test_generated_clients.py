@@ -8,30 +8,18 @@ from typing import Any
 
 import pytest
 
-from dropanchor_schemas.wire import ENCODING_JSON, encode_json
 from support.guides import blocks_of, follow
 from support.node_packages import install
-from support.service import Running, running_service, settings_file, straight_north
-from support.zenoh_router import wait_until
+from support.service import Running
+from support.yard import running_yard
 
 GUIDE, TAG = "generate-a-client.md", "forklift-7"
 
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
-    """Return a georeferenced service with a tag, poses and a history."""
-    folder = tmp_path_factory.mktemp("service")
-    config = settings_file(folder, [TAG], "[site.georeference]\nlat = 52.5\nlon = 13.4")
-    with running_service("--config", str(config), "--data-dir", str(folder)) as running:
-        samples = encode_json(straight_north(100))
-        sent = running.ask("POST", f"/api/v1/ingest/samples?tag={TAG}", content=samples, headers=CONTENT)
-        assert sent.status_code == 202, sent.text
-        wait_until(lambda: running.metric("dropanchor_poses_total") >= 90)
-        wait_until(lambda: bool(running.get(f"/api/v1/tags/{TAG}/track")["poses"]))
+    with running_yard(tmp_path_factory.mktemp("service"), TAG) as running:
         yield running
-
-
-CONTENT = {"content-type": ENCODING_JSON}
 
 
 def assert_answered(said: str, service: Running) -> dict[str, Any]:

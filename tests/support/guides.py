@@ -27,8 +27,9 @@ class Block:
 
 
 def blocks_of(guide: str, heading: str) -> list[Block]:
-    """Return the blocks below a heading, up to the next heading of the same level."""
-    below = (GUIDES / guide).read_text().split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
+    """Return the blocks below a heading, up to the next heading; those above all headings if it is empty."""
+    text = (GUIDES / guide).read_text()
+    below = (text.split(f"\n## {heading}\n", 1)[1] if heading else text).split("\n## ", 1)[0]
     return [
         Block(found["language"], found["text"], name[1] if (name := _FILE.search(found["before"])) else "")
         for found in _BLOCK.finditer(below)

@@ -84,8 +84,13 @@ def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: AR
         for pose in page.rows():
             cov = pose["covariance"]
             variances = ["" if cov is None else cov[i][j] for i, j in COVARIANCES.values()]
-            writer.writerow([*("" if pose[name] != pose[name] else pose[name] for name in names), *variances])
+            writer.writerow([*(_cell(pose[name]) for name in names), *variances])
         yield text.getvalue().encode()
+
+
+def _cell(value: Any) -> Any:
+    """Return a value, and an empty cell for an unknown number, which is null in JSON."""
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:
