@@ -146,6 +146,7 @@ def _corners(box: str) -> tuple[float, float, float, float]:
 
 TimeNs = Annotated[
     int,
+    Field(ge=0, lt=2**62),
     BeforeValidator(ns_of_parameter),
     WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0}, {"type": "string", "format": "date-time"}]}),
 ]
@@ -159,8 +160,6 @@ class AtTime(BaseModel):
 
     at: TimeNs | None = Field(
         default=None,
-        ge=0,
-        lt=2**63,
         description="Return the pose at this time (UTC in ns, or ISO 8601 with a time zone) instead of the latest one. "
         "For the last minute (less in a very large fleet), the pose is interpolated between two poses in memory that "
         "are at most 1 s apart. For earlier times, it is interpolated between two stored poses at most 10 s apart, if "
