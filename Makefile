@@ -21,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 help:
 	@echo 'make demo     start the service and simulated tags around one anchor, print the page address'
 	@echo 'make test     install what the tests need and run them all'
-	@echo 'make check    format, lint, types, import rules, generated files, age of the results'
+	@echo 'make check    format, lint, types, import rules, generated files, breaking changes, age of the results'
 	@echo 'make bench    measure what the service costs, print it and write it into $(RESULTS)/performance.md'
 	@echo 'make test-cluster  let each part of a cluster die, and write the silences into $(RESULTS)/cluster.md'
 	@echo 'make results  measure everything in $(RESULTS) again: hours, on a machine that does nothing else'
@@ -79,6 +79,7 @@ check: install
 	@$(BIN)/lint-imports --no-cache
 	@$(BIN)/python -m dropanchor_schemas.export --check
 	@$(BIN)/python -m dropanchor_service.api.export --check
+	@$(BIN)/python -m dropanchor_service.api.compatibility --check
 	@$(BIN)/python -m dropanchor_service.reference.export --check
 	@$(BIN)/python -m dropanchor_service.evaluation.results --check
 

@@ -177,7 +177,8 @@ class SiteList(_Answer):
 
     sites: list[SiteSummary]
     unavailable: list[str] = Field(
-        default=[], description="Of an API node: the buckets whose sites are missing, because nobody serves them now."
+        default_factory=list,
+        description="Of an API node: the buckets whose sites are missing, because nobody serves them now.",
     )
 
 
@@ -203,7 +204,7 @@ class Health(_Answer):
 
     status: str
     impaired: list[str] = Field(
-        default=[],
+        default_factory=list,
         description="Functions that fail while live poses still work, for example a history that cannot be written.",
     )
 

@@ -101,7 +101,7 @@ def _channels_of_service() -> Channels:
         "pose": (
             _readable(keys.pose_key("{site}", "{tag}")),
             ["pose"],
-            "The latest pose of one tag. A query with `?at=<t_ns>` returns the pose at another time.",
+            "The latest pose of one tag. A query with `?at=<t_ns or ISO 8601>` returns the pose at another time.",
             {"kind": ["queryable", "put"], "put": "on change, at most 20 Hz, while there is a subscriber"},
         ),
         "poses": (

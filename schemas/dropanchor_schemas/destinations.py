@@ -4,10 +4,10 @@ import re
 from enum import StrEnum
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
 
 from dropanchor_schemas.events import Event, EventType
-from dropanchor_schemas.site import Id, Number, StrictBool
+from dropanchor_schemas.site import Id, NumberOnly, StrictBool
 
 SECRET_PREFIX = "whsec_"
 ADDRESS = r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]+@[A-Za-z0-9.-]+$"
@@ -77,7 +77,7 @@ class EmailDestination(_Destination):
 
     type: Literal["email"]
     to: list[Address] = Field(min_length=1, max_length=50, description="Addresses of the recipients.")
-    digest_s: Annotated[Number, Field(ge=0, le=600)] = Field(
+    digest_s: Annotated[FiniteFloat, Field(ge=0, le=600), NumberOnly] = Field(
         default=60.0, description="Least time between two mails. A mail has all events that happened meanwhile."
     )
     language: Language = Field(default=Language.ENGLISH, description="The language of the mails: `en` or `de`.")

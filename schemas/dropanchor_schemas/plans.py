@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
-from dropanchor_schemas.site import Id, Label, Number, StrictBool
+from dropanchor_schemas.site import Id, Label, Number, NumberOnly, StrictBool
 from dropanchor_schemas.zones import Coordinate
 
 MAX_SIDE_PX = 30_000
@@ -14,8 +14,8 @@ MAX_M_PER_PX = 1000.0
 
 ImageType = Literal["image/png", "image/jpeg", "image/svg+xml"]
 Side = Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
-Height = Annotated[Number, Field(ge=-MAX_HEIGHT_M, le=MAX_HEIGHT_M)]
-Pixel = Annotated[Number, Field(ge=-MAX_SIDE_PX, le=2 * MAX_SIDE_PX)]
+Height = Annotated[FiniteFloat, Field(ge=-MAX_HEIGHT_M, le=MAX_HEIGHT_M), NumberOnly]
+Pixel = Annotated[FiniteFloat, Field(ge=-MAX_SIDE_PX, le=2 * MAX_SIDE_PX), NumberOnly]
 
 
 class _Edited(BaseModel):
@@ -39,7 +39,9 @@ class Placement(_Edited):
     rotation_rad: Number = Field(
         default=0.0, description="Direction of the rows of the image, counter-clockwise from the site's x axis."
     )
-    m_per_px: Annotated[Number, Field(gt=0, le=MAX_M_PER_PX)] = Field(description="Length of a pixel on the ground.")
+    m_per_px: Annotated[FiniteFloat, Field(gt=0, le=MAX_M_PER_PX), NumberOnly] = Field(
+        description="Length of a pixel on the ground."
+    )
 
 
 class ControlPoint(_Edited):
@@ -72,7 +74,9 @@ class Plan(_Edited):
     name: Label = Field(default="", description="Name for people.")
     image: PlanImage = Field(description="The image, as the upload answered.")
     placement: Placement
-    opacity: Annotated[Number, Field(ge=0, le=1)] = Field(default=0.7, description="0: invisible; 1: opaque.")
+    opacity: Annotated[FiniteFloat, Field(ge=0, le=1), NumberOnly] = Field(
+        default=0.7, description="0: invisible; 1: opaque."
+    )
     dark_inverted: StrictBool = Field(
         default=True, description="Whether the dark page inverts it: right for line drawings, wrong for photos."
     )

@@ -153,7 +153,8 @@ class SitePosesList(_Answer):
 
     sites: list[SitePoses]
     unavailable: list[str] = Field(
-        default=[], description="Of an API node: the buckets whose sites are missing, because nobody serves them now."
+        default_factory=list,
+        description="Of an API node: the buckets whose sites are missing, because nobody serves them now.",
     )
 
 

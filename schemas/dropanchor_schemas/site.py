@@ -57,11 +57,11 @@ def _require_boolean(value: object) -> object:
 
 
 # It follows the limits in each annotation: a validator before them would hide them from the JSON Schema.
-_NumberOnly = BeforeValidator(_reject_text_and_booleans)
-Number = Annotated[FiniteFloat, _NumberOnly]
+NumberOnly = BeforeValidator(_reject_text_and_booleans)
+Number = Annotated[FiniteFloat, NumberOnly]
 StrictBool = Annotated[bool, BeforeValidator(_require_boolean)]
-Positive = Annotated[FiniteFloat, Field(gt=0), _NumberOnly]
-NotNegative = Annotated[FiniteFloat, Field(ge=0), _NumberOnly]
+Positive = Annotated[FiniteFloat, Field(gt=0), NumberOnly]
+NotNegative = Annotated[FiniteFloat, Field(ge=0), NumberOnly]
 
 
 class _Settings(BaseModel):
@@ -85,8 +85,8 @@ class Anchor(_Settings):
 class Georeference(_Settings):
     """Where the origin of the site frame lies on the Earth (WGS 84)."""
 
-    lat: Annotated[FiniteFloat, Field(ge=-90, le=90, description="Latitude of the origin, degrees."), _NumberOnly]
-    lon: Annotated[FiniteFloat, Field(ge=-180, le=180, description="Longitude of the origin, degrees."), _NumberOnly]
+    lat: Annotated[FiniteFloat, Field(ge=-90, le=90, description="Latitude of the origin, degrees."), NumberOnly]
+    lon: Annotated[FiniteFloat, Field(ge=-180, le=180, description="Longitude of the origin, degrees."), NumberOnly]
     rotation_rad: Number = Field(
         default=0.0, description="Direction of the site's x axis, counter-clockwise from east."
     )
@@ -189,10 +189,10 @@ class TagSettings(_Settings):
 class RemoteSettings(_Settings):
     """What the service sets in the program of a tag, while it runs."""
 
-    batch_s: Annotated[FiniteFloat, Field(ge=MIN_BATCH_S, le=MAX_BATCH_S), _NumberOnly] | None = Field(
+    batch_s: Annotated[FiniteFloat, Field(ge=MIN_BATCH_S, le=MAX_BATCH_S), NumberOnly] | None = Field(
         default=None, description="How long samples wait for others in a message; null: as the program says."
     )
-    imu_hz: Annotated[FiniteFloat, Field(ge=MIN_IMU_HZ, le=MAX_IMU_HZ), _NumberOnly] | None = Field(
+    imu_hz: Annotated[FiniteFloat, Field(ge=MIN_IMU_HZ, le=MAX_IMU_HZ), NumberOnly] | None = Field(
         default=None, description="IMU samples per second at most, by means of more; null: as the IMU gives them."
     )
 

@@ -11,9 +11,11 @@ EARLIEST_UTC_NS = 1_420_070_400_000_000_000
 """2015: no tag has measured anything before. An earlier UTC is in another unit, or counts from another start."""
 
 EXPECTED = "a time in ns, or as ISO 8601 with a time zone, such as 2026-01-31T09:30:00Z, was expected"
+_NUMBER = re.compile(r"([+-]?\d+)(\.\d+)?", re.ASCII)
 _ISO = re.compile(r"(\d{4}-\d\d-\d\dT\d\d:\d\d(?::\d\d)?)(?:[.,](\d{1,9}))?(Z|[+-]\d\d:?\d\d)", re.ASCII)
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _S = 1_000_000_000
+_MAX_DIGITS = 30
 _SECONDS = range(1_000_000_000, 4_000_000_000)  # since 1970, from 2001 to 2096
 
 
@@ -35,6 +37,27 @@ def ns_of_iso(text: str) -> int:
     whole, fraction, zone = found.groups()
     since = datetime.fromisoformat(whole + zone) - _EPOCH
     return since // timedelta(seconds=1) * _S + int((fraction or "").ljust(9, "0"))
+
+
+def ns_of_parameter(text: str) -> int:
+    """Return the time that a parameter asks for, UTC in ns. Raises ValueError, which says what to write instead.
+
+    text: a number of ns, or ISO 8601. In a URL, a plus sign means a space.
+    """
+    number = _NUMBER.fullmatch(text)
+    if number is None:
+        return ns_of_iso(re.sub(r" (?=\d\d:?\d\d$)", "+", text))
+    digits, fraction = number.groups()
+    if len(digits) > _MAX_DIGITS:  # Python refuses to read very many
+        raise ValueError("the time is out of range")
+    t_ns = int(digits)
+    unit = unit_of(t_ns)
+    if unit is not None:
+        meant = _iso(t_ns * unit.ns)
+        raise ValueError(f"{text} looks like {unit.name}: write it in ns, times {unit.ns}, or as {meant}")
+    if fraction:
+        raise ValueError(EXPECTED)
+    return t_ns
 
 
 def unit_of(t_ns: int) -> Unit | None:

@@ -2,15 +2,15 @@
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
-from dropanchor_schemas.site import Id, Label, Number, StrictBool
+from dropanchor_schemas.site import Id, Label, NumberOnly, StrictBool
 
 MAX_POINTS = 200
 MAX_COORDINATE_M = 100_000.0
 MAX_TAGS = 10_000
 
-Coordinate = Annotated[Number, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Coordinate = Annotated[FiniteFloat, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M), NumberOnly]
 Ids = Annotated[list[Id], Field(max_length=MAX_TAGS)]
 
 
@@ -35,7 +35,7 @@ class Circle(_Edited):
     type: Literal["circle"]
     x: Coordinate = Field(description="Centre, m.")
     y: Coordinate = Field(description="Centre, m.")
-    radius_m: Annotated[Number, Field(ge=0.1, le=10_000)]
+    radius_m: Annotated[FiniteFloat, Field(ge=0.1, le=10_000), NumberOnly]
 
 
 class Concerned(_Edited):
@@ -56,13 +56,13 @@ class Zone(Concerned):
     shape: Polygon | Circle = Field(discriminator="type")
     enter: StrictBool = Field(default=True, description="Whether entering makes an event.")
     exit: StrictBool = Field(default=True, description="Whether leaving makes an event.")
-    dwell_s: Annotated[Number, Field(ge=1, le=31_536_000)] | None = Field(
+    dwell_s: Annotated[FiniteFloat, Field(ge=1, le=31_536_000), NumberOnly] | None = Field(
         default=None, description="A tag that stays for so long makes an event, once per stay; null: never."
     )
-    speed_mps: Annotated[Number, Field(ge=0.1, le=100)] | None = Field(
+    speed_mps: Annotated[FiniteFloat, Field(ge=0.1, le=100), NumberOnly] | None = Field(
         default=None, description="A tag inside that moves faster than this makes an event; null: never."
     )
-    delay_s: Annotated[Number, Field(ge=0, le=600)] = Field(
+    delay_s: Annotated[FiniteFloat, Field(ge=0, le=600), NumberOnly] = Field(
         default=1.0,
         description="How long a tag must be inside or outside, or too fast, before the event.",
     )
@@ -96,29 +96,31 @@ class TooCloseRule(_Rule):
     """Two of the tags are closer than `distance_m`. One event per approach, about the tag whose id comes first."""
 
     type: Literal["too_close"]
-    distance_m: Annotated[Number, Field(ge=0.1, le=1000)]
-    delay_s: Annotated[Number, Field(ge=0, le=600)] = Field(default=1.0, description="How long they must be so close.")
+    distance_m: Annotated[FiniteFloat, Field(ge=0.1, le=1000), NumberOnly]
+    delay_s: Annotated[FiniteFloat, Field(ge=0, le=600), NumberOnly] = Field(
+        default=1.0, description="How long they must be so close."
+    )
 
 
 class BatteryLowRule(_Rule):
     """The charge that a tag reports is below `fraction`. The rule is ready again 0.05 above it."""
 
     type: Literal["battery_low"]
-    fraction: Annotated[Number, Field(ge=0.01, le=0.9)] = 0.2
+    fraction: Annotated[FiniteFloat, Field(ge=0.01, le=0.9), NumberOnly] = 0.2
 
 
 class LostRule(_Rule):
     """A tag has been `lost` for `after_s`."""
 
     type: Literal["lost"]
-    after_s: Annotated[Number, Field(ge=0, le=86_400)] = 60.0
+    after_s: Annotated[FiniteFloat, Field(ge=0, le=86_400), NumberOnly] = 60.0
 
 
 class AmbiguousRule(_Rule):
     """A tag has been `ambiguous` for `after_s`."""
 
     type: Literal["ambiguous"]
-    after_s: Annotated[Number, Field(ge=0, le=86_400)] = 120.0
+    after_s: Annotated[FiniteFloat, Field(ge=0, le=86_400), NumberOnly] = 120.0
 
 
 EventRule = Annotated[TooCloseRule | BatteryLowRule | LostRule | AmbiguousRule, Field(discriminator="type")]

@@ -12,6 +12,7 @@ from dropanchor_schemas import Pose, keys
 from dropanchor_schemas.explain import Explanation
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, encode_json, encode_packed
+from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.engines.choose import create_engine
 from dropanchor_service.settings.sources import load_settings
 from dropanchor_tag_client import TagClient
@@ -133,7 +134,9 @@ def test_a_query_without_an_answer_gets_an_error_that_says_why(session: zenoh.Se
     assert ask(session, keys.pose_key("default", "nobody")) == {"error": {"error": "tag 'nobody' is unknown"}}
     assert "anchor '99'" in str(ask(session, keys.anchor_key("default", "99"))["error"])
     assert "parameter 'when'" in str(ask(session, keys.pose_key("default", "a") + "?when=5")["error"])
-    assert "takes one time" in str(ask(session, keys.pose_key("default", "a") + "?at=noon")["error"])
+    assert "parameter 'at': a time in ns" in str(ask(session, keys.pose_key("default", "a") + "?at=noon")["error"])
+    in_seconds = ask(session, keys.pose_key("default", "a") + "?at=1800000000")["error"]
+    assert "1800000000 looks like seconds: write it in ns" in str(in_seconds)
 
 
 def test_the_pose_at_a_time_is_the_same_over_zenoh_and_rest_and_has_an_explanation(
@@ -154,6 +157,7 @@ def test_the_pose_at_a_time_is_the_same_over_zenoh_and_rest_and_has_an_explanati
     assert over_rest.model_copy(update={"age_s": 0.0}) == over_zenoh.model_copy(update={"age_s": 0.0})
     assert "ahead" in str(ask(session, f"{key}?at={newest_ns + 3_000_000_000}")["error"])
     assert ask(session, keys.all_tags("default", "pose") + f"?at={at_ns}")[key]["t_ns"] == at_ns
+    assert ask(session, f"{key}?at={iso_utc(at_ns).lower()}")[key]["t_ns"] == at_ns
 
 
 def test_an_anchor_can_be_queried(session: zenoh.Session) -> None:

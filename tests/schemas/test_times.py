@@ -2,7 +2,7 @@
 
 import pytest
 
-from dropanchor_schemas.times import EARLIEST_UTC_NS, ns_of_iso, unit_of, why_not_utc
+from dropanchor_schemas.times import EARLIEST_UTC_NS, ns_of_iso, ns_of_parameter, unit_of, why_not_utc
 from dropanchor_schemas.wire import MAX_T_NS
 
 S = 1_000_000_000
@@ -25,6 +25,31 @@ T = 1_800_000_000 * S
 )
 def test_an_iso_time_is_read_to_the_nanosecond(text: str, t_ns: int) -> None:
     assert ns_of_iso(text) == t_ns
+
+
+@pytest.mark.parametrize(
+    ("text", "t_ns"),
+    [(str(T), T), ("0", 0), ("2027-01-15t09:00:00+01:00", T), ("2027-01-15T09:00:00 01:00", T)],
+)
+def test_a_parameter_is_a_time_in_ns_or_iso_and_a_plus_sign_may_be_a_space(text: str, t_ns: int) -> None:
+    assert ns_of_parameter(text) == t_ns
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (str(T // S), "looks like seconds: write it in ns, times 1000000000, or as 2027-01-15T08:00:00Z"),
+        (f"{T // S}.25", "looks like seconds"),
+        (str(T // 10**6), "looks like milliseconds: write it in ns, times 1000000"),
+        (str(T // 1000), "looks like microseconds: write it in ns, times 1000"),
+        (f"{T}.5", "a time in ns, or as ISO 8601 with a time zone"),
+        ("", "a time in ns, or as ISO 8601 with a time zone"),
+        ("9" * 5000, "out of range"),
+    ],
+)
+def test_a_parameter_in_another_unit_is_refused_with_what_to_write(text: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        ns_of_parameter(text)
 
 
 @pytest.mark.parametrize(

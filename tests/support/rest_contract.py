@@ -23,9 +23,11 @@ BEYOND_THE_SCHEMA = {
     "delete_anchor": [positive_data_acceptance],
     "delete_tag": [positive_data_acceptance],
     "get_basemap_tile": [positive_data_acceptance],
+    "get_pose": [positive_data_acceptance],
     "get_track": [positive_data_acceptance],
     "get_figures": [positive_data_acceptance],
     "get_heat_map": [positive_data_acceptance],
+    "list_events": [positive_data_acceptance],
     "get_tracks": [positive_data_acceptance],
     "export_track": [positive_data_acceptance],
     "patch_remote_settings": [positive_data_acceptance],
@@ -51,9 +53,9 @@ BEYOND_THE_SCHEMA = {
     "ingest_sensor_logger": [positive_data_acceptance, negative_data_rejection],
 }
 """Rules that a schema cannot express: a tile lies within its zoom level; `from` and `to` are at most 31 days apart;
-each anchor is listed once; without credentials a request names the tag; a message holds a sample or a value; `If-Match`
-is the current tag of a resource; edges do not cross; an image is one, and was uploaded; a URL is public and a secret
-long; share links need access control. And that Sensor Logger's 499 is a refusal."""
+a time is not in seconds; each anchor is listed once; without credentials a request names the tag; a message holds a
+sample or a value; `If-Match` is the current tag of a resource; edges do not cross; an image is one, and was uploaded;
+a URL is public and a secret long; share links need access control. And that Sensor Logger's 499 is a refusal."""
 
 IDS = st.text(st.characters(exclude_categories=["C", "Z"], include_characters=" "), min_size=1, max_size=64)
 IDS = IDS.filter(lambda one: one.isprintable() and one not in NOT_IDS)

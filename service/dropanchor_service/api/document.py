@@ -7,11 +7,13 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from dropanchor_schemas.answers import Problem, SamplesAcknowledged
+from dropanchor_schemas.geojson import PoseFeatureCollection, TimedPoseFeature, TrackFeatureCollection
 from dropanchor_schemas.pose import PoseFrame
 from dropanchor_schemas.samples import SamplesMessage
 from dropanchor_schemas.tag_health import TagHealthMessage
 from dropanchor_service.api.http.errors import MEDIA_TYPE, TYPE_PREFIX, Kind, problems
 from dropanchor_service.api.http.permissions import OPEN_PATHS
+from dropanchor_service.api.request_models import separate_requests
 
 _KINDS_IN = re.compile(f"`{TYPE_PREFIX}([a-z-]+)`")
 
@@ -23,14 +25,18 @@ def openapi_of(app: FastAPI) -> dict[str, Any]:
             title=app.title, version=app.version, description=_description(), routes=app.routes, tags=_TAGS
         )
         for model in (
+            PoseFeatureCollection,
             PoseFrame,
             Problem,
             SamplesAcknowledged,
             SamplesMessage,
             TagHealthMessage,
+            TimedPoseFeature,
+            TrackFeatureCollection,
         ):  # of no route, or not its only model
             schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
             document["components"]["schemas"] |= schema.pop("$defs", {}) | {model.__name__: schema}
+        separate_requests(document)
         _add_access(document)
         _share_refusals(document)
         app.openapi_schema = document

@@ -56,7 +56,7 @@ def _csv(path: Path, columns: Sequence[str]) -> Iterator[Write]:
     with _text_file(path) as file:
         writer = csv.writer(file)
         writer.writerow(columns)
-        yield lambda rows: writer.writerows([_six_decimals(value) for value in row] for row in rows)
+        yield lambda rows: writer.writerows([_cell(value) for value in row] for row in rows)
 
 
 @contextmanager
@@ -89,8 +89,10 @@ def _parquet(path: Path, columns: Sequence[str]) -> Iterator[Write]:
         yield write
 
 
-def _six_decimals(value: Any) -> Any:
-    return f"{value:.6f}" if isinstance(value, float) else value
+def _cell(value: Any) -> Any:
+    """Return a number with six decimals, and an unknown one as an empty cell."""
+    known = _or_null(value)
+    return f"{known:.6f}" if isinstance(known, float) else known
 
 
 def _or_null(value: Any) -> Any:

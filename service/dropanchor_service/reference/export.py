@@ -18,6 +18,7 @@ from dropanchor_service.metrics.operation import OperationGauges
 from dropanchor_service.metrics.registry import FleetGauges, Metrics
 from dropanchor_service.reference import (
     access_page,
+    fields_page,
     metrics_page,
     omlox_page,
     rejections_page,
@@ -44,6 +45,7 @@ def pages() -> dict[str, str]:
             "rest.md": rest_page.page(json.loads(openapi.text())),
             "omlox.md": omlox_page.page(openapi.omlox_document()),
             "pose-states.md": states_page.page(),
+            "fields.md": fields_page.page(),
             "metrics.md": metrics_page.page(registry, _registry_of_node()),
             "rejections.md": rejections_page.page(),
             "access.md": access_page.page(openapi.application(OmloxItems.opened(None))),

@@ -12,6 +12,7 @@ from typing import Any, Self
 import zenoh
 
 from dropanchor_schemas import keys
+from dropanchor_schemas.times import ns_of_parameter
 from dropanchor_service.answers.answers import Answer, Answers, to_json
 from dropanchor_service.answers.of_sites import AnswersOfSites
 from dropanchor_service.answers.pose_at_time import NoPoseThenError
@@ -171,15 +172,20 @@ def _single_tag(key: str) -> str | None:
 
 
 def _time_of(parameters: str) -> int | None:
-    """Return the time in `at=<t_ns>`; None without it. Raises QueryError for any other parameter."""
+    """Return the time in `at=<t_ns or ISO 8601>`; None without it. Raises QueryError for any other parameter."""
     times = [part for part in parameters.split(";") if part.startswith("at=")]
     _refuse_parameters(";".join(part for part in parameters.split(";") if part not in times))
     if not times:
         return None
-    digits = times[0].removeprefix("at=")
-    if len(times) > 1 or not (digits.isascii() and digits.isdigit()) or int(digits) >= 2**63:
-        raise QueryError("parameter 'at' takes one time: UTC, integer nanoseconds")
-    return int(digits)
+    if len(times) > 1:
+        raise QueryError("parameter 'at' takes one time")
+    try:
+        at_ns = ns_of_parameter(times[0].removeprefix("at="))
+    except ValueError as error:
+        raise QueryError(f"parameter 'at': {error}") from error
+    if not 0 <= at_ns < 2**63:
+        raise QueryError("parameter 'at': the time is out of range")
+    return at_ns
 
 
 def _refuse_parameters(parameters: str) -> None:

@@ -46,8 +46,7 @@ def feature_of(pose: Answer) -> Answer:
     geometry: Any = None
     if pose["lat"] is not None and pose["lat"] == pose["lat"]:  # NaN: the position is unknown
         geometry = {"type": "Point", "coordinates": [pose["lon"], pose["lat"]]}
-    properties = {name: value for name, value in pose.items() if name not in ("lat", "lon")}
-    return {"type": "Feature", "id": pose["tag"], "geometry": geometry, "properties": properties}
+    return {"type": "Feature", "id": pose["tag"], "geometry": geometry, "properties": pose}
 
 
 def collection_of(pose_list: Answer) -> Answer:

@@ -21,6 +21,7 @@ FRAME = (
 _TEXTS = ("state", "reason", "frame", "anchor")
 _UNITS = {
     "t_ns": "ns since 1970-01-01 UTC",
+    "t_utc": "UTC",
     "x": "m",
     "y": "m",
     "heading_rad": "rad",
@@ -47,7 +48,7 @@ _DEGREES = ("lat", "lon")  # a float32 would be 2 m wide
 def stream(pages: Iterable[TrackPage], tag: str, site: Site) -> Iterator[bytes]:
     """Yield one Parquet file with all pages. Not more than a row group is in memory."""
     sink = _Sink()
-    schema = _schema(tag, site)
+    schema = schema_of(tag, site)
     with pq.ParquetWriter(sink, schema, compression="zstd") as writer:
         for group in _groups(pages):
             writer.write_table(_table(group, schema))
@@ -91,20 +92,23 @@ def _groups(pages: Iterable[TrackPage]) -> Iterator[list[TrackPage]]:
         yield group
 
 
-def _schema(tag: str, site: Site) -> pa.Schema:
+def schema_of(tag: str, site: Site) -> pa.Schema:
+    """Return the columns, their types and units, and what the numbers mean."""
     names = [name for name in _UNITS if name not in _DEGREES or site.georeference is not None]
     numbers = [pa.field(name, _type_of(name), metadata={"unit": _UNITS[name]}) for name in names]
     texts = [pa.field(name, pa.dictionary(pa.int32(), pa.string())) for name in _TEXTS]
     origin = "null" if site.georeference is None else site.georeference.model_dump_json()
     metadata = {"tag": tag, "site": site.id, "frame": FRAME, "georeference": origin}
     return pa.schema(
-        [numbers[0], *texts, *numbers[1:]],
+        [*numbers[:2], *texts, *numbers[2:]],
         metadata={f"dropanchor.{name}": text for name, text in metadata.items()},
     )
 
 
 def _type_of(name: str) -> pa.DataType:
     if name == "t_ns":
+        return pa.int64()
+    if name == "t_utc":
         return pa.timestamp("ns", tz="UTC")
     if name == "epoch":
         return pa.int64()
@@ -114,8 +118,17 @@ def _type_of(name: str) -> pa.DataType:
 def _table(pages: Sequence[TrackPage], schema: pa.Schema) -> pa.Table:
     names = pages[0].columns
     columns: dict[str, Any] = {name: [value for page in pages for value in page.columns[name]] for name in names}
-    variances = np.array([covariances_of(cov) for cov in columns.pop("covariance")])
-    relatives = np.array([relatives_of(pose) for pose in columns.pop("relative_pose")])
+    variances = np.array([covariances_of(cov) for cov in columns.pop("covariance")]).reshape(-1, len(COVARIANCES))
+    relatives = np.array([relatives_of(pose) for pose in columns.pop("relative_pose")]).reshape(-1, len(RELATIVES))
     columns |= dict(zip(COVARIANCES, variances.T, strict=True)) | dict(zip(RELATIVES, relatives.T, strict=True))
-    arrays = [pa.array(columns[field.name], field.type, from_pandas=True) for field in schema]  # NaN: null
+    columns["t_utc"] = columns["t_ns"]
+    arrays = [pa.array(_known(columns[field.name], field.type), field.type, from_pandas=True) for field in schema]
     return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _known(values: Any, kind: pa.DataType) -> Any:
+    """Return the values with NaN, which becomes null, for every unknown number, as JSON has null for it."""
+    if not pa.types.is_floating(kind):
+        return values
+    numbers = np.array(values, float)
+    return np.where(np.isfinite(numbers), numbers, np.nan)

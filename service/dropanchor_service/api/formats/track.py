@@ -73,7 +73,7 @@ def _document(head: Head, name: str, parts: Iterable[list[dict[str, Any]]]) -> I
 
 
 def _feature(pose: dict[str, Any]) -> dict[str, Any]:
-    lat, lon = pose.pop("lat"), pose.pop("lon")
+    lat, lon = pose["lat"], pose["lon"]
     geometry = {"type": "Point", "coordinates": [lon, lat]} if math.isfinite(lat) else None
     return {"type": "Feature", "geometry": geometry, "properties": pose}
 
@@ -87,8 +87,7 @@ def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: AR
             writer.writerow([*names, *COVARIANCES, *RELATIVES])
         for pose in page.rows():
             numbers = [*covariances_of(pose["covariance"]), *relatives_of(pose["relative_pose"])]
-            values = [*(pose[name] for name in names), *numbers]
-            writer.writerow(["" if value != value else value for value in values])
+            writer.writerow([_cell(value) for value in (*(pose[name] for name in names), *numbers)])
         yield text.getvalue().encode()
 
 
@@ -102,6 +101,11 @@ def relatives_of(pose: dict[str, Any] | None) -> list[float]:
     if pose is None:
         return [math.nan] * len(RELATIVES)
     return [*(pose[name] for name in _OF_RELATIVE), *covariances_of(pose["covariance"])]
+
+
+def _cell(value: Any) -> Any:
+    """Return a value, and an empty cell for an unknown number, which is null in JSON."""
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _gpx(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from uuid import UUID
 
 import orjson
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat
 
-from dropanchor_schemas.site import Number
+from dropanchor_schemas.site import Number, NumberOnly
 from dropanchor_schemas.zones import MAX_POINTS
 
 MAX_NAME = 100
@@ -43,8 +43,10 @@ Properties = dict[str, Any]
 StoredProperties = Annotated[Properties, AfterValidator(_storable)]
 Position = Annotated[list[Number], Field(min_length=2, max_length=3)]
 ProviderType = Literal["uwb", "gps", "wifi", "rfid", "ibeacon", "virtual", "unknown"]
-Milliseconds = Annotated[Number, Field(ge=-1, description="Milliseconds; -1: without end. Stored, not used.")]
-Metres = Annotated[Number, Field(ge=0)]
+Milliseconds = Annotated[
+    FiniteFloat, Field(ge=-1, description="Milliseconds; -1: without end. Stored, not used."), NumberOnly
+]
+Metres = Annotated[FiniteFloat, Field(ge=0), NumberOnly]
 Name = Annotated[str, Field(max_length=MAX_NAME)]
 
 

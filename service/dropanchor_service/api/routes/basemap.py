@@ -7,6 +7,7 @@ from starlette.responses import Response
 
 from dropanchor_schemas.basemap import Basemap, TileMediaType
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.basemap.file import UnreadableTileError
@@ -29,7 +30,7 @@ _EXAMPLE = {
     }
 }
 _TILE: dict[int | str, dict[str, Any]] = {
-    200: {"content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in get_args(TileMediaType)}},
+    200: {"content": dict.fromkeys(get_args(TileMediaType), BYTES)},
     204: {"description": "The base map has no such tile."},
     304: {"description": "The tile is the one that `If-None-Match` names."},
 }

@@ -66,8 +66,6 @@ class EventFilter(TagFilter):
 class EventQuery(EventFilter):
     since: TimeNs | None = Field(
         default=None,
-        ge=0,
-        lt=2**63,
         description="Return events from this time on, UTC in ns, or ISO 8601 with a time zone; the oldest first.",
     )
     limit: int = Field(default=100, ge=1, le=MAX_EVENTS, description="How many events to return.")

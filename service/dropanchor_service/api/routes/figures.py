@@ -13,6 +13,7 @@ from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.many_tracks import NO_FIGURES, figures_of
 from dropanchor_service.api.formats.figures import figures_csv
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.event_parts import EventParts
 from dropanchor_service.api.routes.events import reading
 from dropanchor_service.api.routes.parameters import COMMA, Ids, example_response, ids_of, json_response
@@ -128,5 +129,5 @@ def _name_of(events: EventParts, zone: str) -> str | None:
 
 def _offers() -> dict[int | str, dict[str, Any]]:
     offers = example_response(_EXAMPLE)
-    offers[200]["content"]["text/csv"] = {"schema": {"type": "string"}}
+    offers[200]["content"]["text/csv"] = TEXT
     return offers

@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from dropanchor_schemas.answers import Health
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.parameters import NO_QUERY, json_response
 
 Ready = Callable[[], tuple[bool, Sequence[str]]]
@@ -52,7 +53,7 @@ def metrics_router(registry: CollectorRegistry) -> APIRouter:
         operation_id="get_metrics",
         summary="Get metrics for Prometheus",
         response_class=Response,
-        responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+        responses={200: {"content": {"text/plain": TEXT}}},
     )
     def get_metrics(request: Request) -> Response:
         encode, content_type = choose_encoder(request.headers.get("accept", ""))

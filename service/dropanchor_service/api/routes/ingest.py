@@ -18,6 +18,7 @@ from dropanchor_schemas.times import why_not_utc
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Reason, Rejection, read_header
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.contents import BYTES, TEXT
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
 from dropanchor_service.phones.intake import PhoneIntake
@@ -41,7 +42,7 @@ _SENSOR_LOGGER_BODY = {
 }
 _SAMPLES_BODY = {
     ENCODING_JSON: {"schema": {"$ref": "#/components/schemas/SamplesMessage"}, "example": examples.SAMPLES},
-    ENCODING_PACKED: {"schema": {"type": "string", "format": "binary"}},
+    ENCODING_PACKED: BYTES,
 }
 
 
@@ -140,7 +141,7 @@ def _add_sensor_logger_route(router: APIRouter, phones_of: ForEachSite[PhoneInta
 
 
 def _phone_error() -> dict[str, Any]:
-    return {"description": "A sentence that the app shows.", "content": {"text/plain": {"schema": {"type": "string"}}}}
+    return {"description": "A sentence that the app shows.", "content": {"text/plain": TEXT}}
 
 
 def tag_of(request: Request, query: OfTag) -> str:

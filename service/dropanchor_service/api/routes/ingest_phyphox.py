@@ -16,6 +16,7 @@ from dropanchor_schemas.wire import Reason, Rejection
 from dropanchor_service.api.http.access import secret_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.contents import TEXT
 from dropanchor_service.api.routes.ingest import OfApp, OfTag, tag_of
 from dropanchor_service.api.routes.parameters import example_response, json_response
 from dropanchor_service.api.routes.site_of_request import ForEachSite, SiteOfRequest
@@ -86,7 +87,7 @@ def _address(request: Request) -> str:
 
 
 def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:
-    return {200: {"content": {media_type: {}}, "description": description}}
+    return {200: {"content": {media_type: TEXT}, "description": description}}
 
 
 def _add_readings_route(router: APIRouter, phones_of: ForEachSite[PhoneIntake[Message]]) -> None:

@@ -1,6 +1,5 @@
 """What the routes share: ids in paths, query parameters, and JSON responses."""
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -13,7 +12,7 @@ from starlette.responses import Response
 from dropanchor_schemas.keys import InvalidKeyError, checked_id
 from dropanchor_schemas.pose import TrackingState
 from dropanchor_schemas.site import ID_SCHEMA, Label
-from dropanchor_schemas.times import ns_of_iso
+from dropanchor_schemas.times import ns_of_parameter
 from dropanchor_service.answers.answers import to_json
 from dropanchor_service.answers.pose_filter import PoseFilter
 from dropanchor_service.api.http.errors import Kind, ProblemError
@@ -156,19 +155,13 @@ def _corners(box: str) -> tuple[float, float, float, float]:
     return x_min, y_min, x_max, y_max
 
 
-def _ns(value: Any) -> Any:
-    """Return the time of an ISO 8601 text in ns, and anything else as it is."""
-    if not isinstance(value, str) or re.fullmatch(r"[+-]?[0-9]+", value):
-        return value
-    return ns_of_iso(re.sub(r" (?=\d\d:?\d\d$)", "+", value))  # a plus sign in a URL means a space
-
-
 TimeNs = Annotated[
     int,
-    BeforeValidator(_ns),
+    Field(ge=0, lt=2**62),
+    BeforeValidator(ns_of_parameter),
     WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0}, {"type": "string", "format": "date-time"}]}),
 ]
-"""A time as UTC in ns, or as ISO 8601 with a time zone."""
+"""A time as UTC in ns, or as ISO 8601 with a time zone. Seconds, milliseconds and microseconds are refused."""
 
 
 class AtTime(BaseModel):
@@ -178,8 +171,6 @@ class AtTime(BaseModel):
 
     at: TimeNs | None = Field(
         default=None,
-        ge=0,
-        lt=2**63,
         description="Return the pose at this time (UTC in ns, or ISO 8601 with a time zone) instead of the latest one. "
         "For the last minute (less in a very large fleet), the pose is interpolated between two poses in memory that "
         "are at most 1 s apart. For earlier times, it is interpolated between two stored poses at most 10 s apart, if "

@@ -22,16 +22,12 @@ class Period(BaseModel):
     from_ns: TimeNs | None = Field(
         default=None,
         alias="from",
-        ge=0,
-        lt=2**62,
         description="Start of the period, UTC in ns, or ISO 8601 with a time zone. "
         "The default is one hour before `to`.",
     )
     to_ns: TimeNs | None = Field(
         default=None,
         alias="to",
-        ge=0,
-        lt=2**62,
         description="End of the period, UTC in ns, or ISO 8601 with a time zone, "
         "at most 31 days after `from`. The default is now.",
     )

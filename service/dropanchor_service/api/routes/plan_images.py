@@ -10,6 +10,7 @@ from starlette.responses import Response
 from dropanchor_schemas.plans import PlanImage, UploadedPlanImage
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import plan_examples as examples
+from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.plans.reading.file_types import file_type_of
@@ -134,4 +135,4 @@ def _content(store: PlanStore, image: PlanImage) -> bytes | None:
 
 
 def _binary(*media_types: str) -> dict[str, Any]:
-    return {media_type: {"schema": {"type": "string", "format": "binary"}} for media_type in media_types}
+    return dict.fromkeys(media_types, BYTES)

@@ -7,9 +7,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.routing import APIRoute
+from pydantic import BaseModel
 from starlette.responses import Response, StreamingResponse
 
 from dropanchor_schemas.explain import Explanation
+from dropanchor_schemas.geojson import PoseFeatureCollection, TimedPoseFeature
 from dropanchor_schemas.pose import PoseList, TimedPose
 from dropanchor_service.answers.answers import Answer, Answers
 from dropanchor_service.answers.explain import explanation_of
@@ -18,6 +20,7 @@ from dropanchor_service.answers.times import iso_utc
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.contents import schema_of
 from dropanchor_service.api.routes.known_tag import known_tag
 from dropanchor_service.api.routes.parameters import (
     AtTime,
@@ -62,10 +65,7 @@ def _add_pose_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="get_pose",
         summary="Get the latest pose of a tag, or its pose at a time",
         response_model=TimedPose,
-        responses=_offers(
-            examples.POSE | {"t_utc": iso_utc(examples.POSE["t_ns"])},
-            "A GeoJSON Feature (RFC 7946); `geometry` is null while the position is unknown.",
-        )
+        responses=_offers(examples.POSE | {"t_utc": iso_utc(examples.POSE["t_ns"])}, TimedPoseFeature)
         | problems(Kind.UNKNOWN_TAG, Kind.NO_POSE_YET, Kind.NO_POSE_THEN, Kind.TOO_FAR_AHEAD, *_NEGOTIATION),
     )
 
@@ -93,7 +93,7 @@ def _add_list_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="list_poses",
         summary="List the latest poses of all or selected tags",
         response_model=PoseList,
-        responses=_offers(examples.POSE_LIST, "A GeoJSON FeatureCollection (RFC 7946).") | problems(*_NEGOTIATION),
+        responses=_offers(examples.POSE_LIST, PoseFeatureCollection) | problems(*_NEGOTIATION),
     )
     async def list_poses(query: Annotated[PoseQuery, Query()], request: Request) -> Response:
         answers = site_of(request)
@@ -167,6 +167,6 @@ def _response(answer: Answer, media_type: str) -> Response:
     return response
 
 
-def _offers(example: Answer, as_geojson: str) -> dict[int | str, dict[str, Any]]:
-    schema = {"schema": {"type": "object", "description": as_geojson}}
-    return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: schema}}}
+def _offers(example: Answer, as_geojson: type[BaseModel]) -> dict[int | str, dict[str, Any]]:
+    features = {"schema": schema_of(as_geojson)}
+    return {200: {"content": {geojson.JSON: {"example": example}, geojson.MEDIA_TYPE: features}}}

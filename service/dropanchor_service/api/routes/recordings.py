@@ -10,6 +10,7 @@ from starlette.responses import Response, StreamingResponse
 from dropanchor_schemas.recordings import RecordingList, RecordingRequest, RecordingState
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.recording.recorder import Recorder
@@ -148,4 +149,4 @@ def _state(recorder: Recorder) -> dict[str, Any]:
 
 
 def _file() -> dict[int | str, dict[str, Any]]:
-    return {200: {"content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}}}
+    return {200: {"content": {MEDIA_TYPE: BYTES}}}

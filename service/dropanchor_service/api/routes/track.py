@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Request
 from pydantic import Field
 from starlette.responses import Response
 
+from dropanchor_schemas.geojson import TrackFeatureCollection
 from dropanchor_schemas.track import Track
 from dropanchor_service.answers.answers import Answers
 from dropanchor_service.answers.track_pages import TrackPage, track_page
@@ -14,6 +15,7 @@ from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, problems
 from dropanchor_service.api.routes import examples
+from dropanchor_service.api.routes.contents import TEXT, schema_of
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
@@ -36,6 +38,15 @@ class TrackQuery(Period):
     format: Literal["json", "geojson", "csv", "gpx"] | None = Field(
         default=None, description="The format of the response. The default depends on the header `Accept`."
     )
+
+
+CONTENT: dict[str, Any] = {
+    track_formats.MEDIA_TYPES[track_formats.JSON]: {"schema": schema_of(Track)},
+    track_formats.MEDIA_TYPES[track_formats.GEOJSON]: {"schema": schema_of(TrackFeatureCollection)},
+    track_formats.MEDIA_TYPES[track_formats.CSV]: TEXT,
+    track_formats.MEDIA_TYPES[track_formats.GPX]: TEXT,
+}
+"""The media types of a track in the OpenAPI document."""
 
 
 def track_router(site_of: SiteOfRequest) -> APIRouter:
@@ -84,9 +95,4 @@ def _link(query: dict[str, Any], form: str) -> str:
 
 
 def _offers() -> dict[int | str, dict[str, Any]]:
-    content: dict[str, Any] = {
-        media_type: {"schema": {"type": "string"}} for media_type in track_formats.MEDIA_TYPES.values()
-    }
-    content["application/json"] = {"example": examples.TRACK}
-    content["application/geo+json"] = {"schema": {"type": "object", "description": "A FeatureCollection (RFC 7946)."}}
-    return {200: {"content": content}}
+    return {200: {"content": CONTENT | {"application/json": {"example": examples.TRACK}}}}

@@ -14,9 +14,11 @@ from dropanchor_service.answers.track_pages import TrackPage, track_page
 from dropanchor_service.api.formats import geojson
 from dropanchor_service.api.formats import track as track_formats
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
+from dropanchor_service.api.routes.contents import BYTES
 from dropanchor_service.api.routes.parameters import TagId
 from dropanchor_service.api.routes.period import Period, history_of, limits_of, require_known, unreadable
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
+from dropanchor_service.api.routes.track import CONTENT
 from dropanchor_service.history.errors import HistoryError
 
 PAGE = 5000
@@ -108,4 +110,6 @@ def _attachment(name: str) -> str:
 
 
 def _offers() -> dict[int | str, dict[str, Any]]:
-    return {200: {"content": {media_type: {"schema": {"type": "string"}} for media_type in MEDIA_TYPES.values()}}}
+    """Return the response in the OpenAPI document. Clients are generated for the first media type: the default."""
+    default = MEDIA_TYPES[track_formats.CSV]
+    return {200: {"content": {default: CONTENT[default]} | CONTENT | {MEDIA_TYPES[PARQUET]: BYTES}}}

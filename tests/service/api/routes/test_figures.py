@@ -11,6 +11,7 @@ from fastapi import FastAPI
 from dropanchor_schemas.figures import Figures
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.routes.event_parts import EventParts
+from dropanchor_service.estimation.columns import State
 from dropanchor_service.events.drafts import StateKey, States, StateValue, Stay
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
@@ -109,6 +110,14 @@ def test_a_table_has_a_line_for_each_tag_and_a_column_for_each_zone(bench: ApiBe
         ["b", "13", "60.0", "0.0", "0.0", "0.0", "30.0", "0"],
         ["c", "0", "0.0", "0.0", "", "", "0", "20.0"],
     ]
+
+
+def test_speeds_of_a_tag_that_was_never_tracked_are_empty_cells(bench: ApiBench, parts: EventParts) -> None:
+    bench.move("d", x=0.0, state=State.AMBIGUOUS)
+    bench.write_history()
+    response = ask(bench.app(events=parts), "GET", f"/api/v1/figures?from={START_NS}&to={T_NS}&format=csv")
+    (line,) = [line for line in csv.DictReader(response.text.splitlines()) if line["tag"] == "d"]
+    assert (line["poses"], line["mean_speed_mps"], line["max_speed_mps"]) == ("1", "", "")
 
 
 @pytest.mark.parametrize("query", ["from=2&to=1", "from=0", "tags=", "format=gpx", "points=3", "zones="])

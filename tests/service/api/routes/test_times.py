@@ -54,6 +54,39 @@ def test_events_are_asked_for_from_an_iso_time_on(since: str) -> None:
     assert "query.since" in ask(app, "GET", "/api/v1/events?since=yesterday").text
 
 
+TIME_PARAMETERS = [
+    f"{path}?{name}="
+    for path in ("tags/a/track", "tags/a/track/file", "tracks", "heat-map", "figures")
+    for name in ("from", "to")
+] + ["tags/a/pose?at=", "events?since="]
+
+
+@pytest.mark.parametrize("parameter", TIME_PARAMETERS)
+def test_every_time_parameter_takes_iso_and_refuses_other_units(parameter: str, tmp_path: Path) -> None:
+    bench = make_api_bench(folder=tmp_path, retention=Retention(1, 0.0, 0, 10**18, 2**40))
+    bench.move("a")
+    app = bench.app()
+    name = parameter.split("?")[1].rstrip("=")
+    assert ask(app, "GET", f"/api/v1/{parameter}2027-01-15t08:00:00z").status_code == 200
+    for unit_ns, unit in ((10**9, "seconds"), (10**6, "milliseconds"), (10**3, "microseconds")):
+        answer = ask(app, "GET", f"/api/v1/{parameter}{T_NS // unit_ns}")
+        assert kind_of(answer) == "invalid-request"
+        assert f"query.{name}: {T_NS // unit_ns} looks like {unit}" in answer.json()["detail"]
+        assert f"times {unit_ns}, or as 2027-01-15T08:00:00Z" in answer.json()["detail"]
+
+
+def test_every_parameter_that_takes_a_time_is_tested_here() -> None:
+    document = make_api_bench().app().openapi()
+    found = {
+        f"{path.removeprefix('/api/v1/').replace('{tag}', 'a')}?{parameter['name']}="
+        for path, item in document["paths"].items()
+        for operation in item.values()
+        for parameter in operation.get("parameters", [])
+        if "date-time" in str(parameter["schema"])
+    }
+    assert {name for name in found if not name.startswith("sites/")} == set(TIME_PARAMETERS)
+
+
 def test_a_tag_was_heard_at_times_that_people_can_read() -> None:
     bench = make_api_bench()
     bench.answers.tags.register("a")

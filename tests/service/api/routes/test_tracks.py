@@ -125,11 +125,10 @@ def test_a_parquet_file_holds_every_pose_in_row_groups_with_units_and_frame(
     rows = file.read().to_pylist()
     csv_rows = list(csv.DictReader(io.StringIO(exported(bench, "csv"))))
     assert [file.metadata.row_group(group).num_rows for group in range(file.num_row_groups)] == [300, 300, 1]
-    assert [file.schema_arrow.field("t_ns").type, file.schema_arrow.field("lat").type] == [
-        pa.timestamp("ns", "UTC"),
-        pa.float64(),
-    ]
-    assert [value.value for value in file.read(["t_ns"])["t_ns"]] == [int(row["t_ns"]) for row in csv_rows]
+    types = [file.schema_arrow.field(name).type for name in ("t_ns", "t_utc", "lat")]
+    assert types == [pa.int64(), pa.timestamp("ns", "UTC"), pa.float64()]
+    assert [row["t_ns"] for row in rows] == [int(row["t_ns"]) for row in csv_rows]
+    assert [value.value for value in file.read(["t_utc"])["t_utc"]] == [row["t_ns"] for row in rows]
     for name in set(csv_rows[0]) - {"t_ns", "t_utc"}:
         texts = [row[name] for row in csv_rows]
         numbers = isinstance(rows[0][name], float)
