@@ -171,7 +171,7 @@ def test_invalid_calls_raise_errors(router_endpoint: str) -> None:
 def test_a_tag_whose_id_cannot_name_a_folder_has_no_spool(tmp_path: Path) -> None:
     TagClient("con")
     for name in ("con", "a.", "é" * 64):
-        with pytest.raises(keys.InvalidKeyError, match="the name of a file|cannot name a file"):
+        with pytest.raises(keys.InvalidKeyError, match=r"the name of a file|cannot name a file"):
             TagClient(name, spool=tmp_path)
     assert list(tmp_path.iterdir()) == []
 
