@@ -151,10 +151,9 @@ def test_invalid_calls_raise_errors(router_endpoint: str) -> None:
     with TagClient("a", connect=router_endpoint) as tag:
         with pytest.raises(ValueError, match="acc has three components, not 2"):
             tag.publish_imu((0.0, 0.0), (0.0, 0.0, 0.0))
-        with pytest.raises(ValueError, match="not empty"):
-            tag.publish_range("", 1.0)
-        with pytest.raises(ValueError, match="at most 64 characters"):
-            tag.publish_range("x" * 65, 1.0)
+        for anchor in ("", "x" * 65, "..", "a\nb"):
+            with pytest.raises(keys.InvalidKeyError):
+                tag.publish_range(anchor, 1.0)
         with pytest.raises(ValueError, match="between 0"):
             tag.publish_range(-1, 1.0)
         with pytest.raises(RuntimeError, match="is already open"):
@@ -164,8 +163,17 @@ def test_invalid_calls_raise_errors(router_endpoint: str) -> None:
     tag.close()
     with pytest.raises(ValueError, match="batch_samples is 0"):
         TagClient("a", batch_samples=0)
-    with pytest.raises(keys.InvalidKeyError):
-        TagClient("")
+    for name in ("", ".", ".."):
+        with pytest.raises(keys.InvalidKeyError):
+            TagClient(name)
+
+
+def test_a_tag_whose_id_cannot_name_a_folder_has_no_spool(tmp_path: Path) -> None:
+    TagClient("con")
+    for name in ("con", "a.", "é" * 64):
+        with pytest.raises(keys.InvalidKeyError, match=r"the name of a file|cannot name a file"):
+            TagClient(name, spool=tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_missing_router_is_a_clear_error_within_the_timeout() -> None:

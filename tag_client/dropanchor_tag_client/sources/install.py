@@ -12,6 +12,7 @@ from dropanchor_tag_client.cli import parser
 _COMMANDS = ("serial", "imu", "mqtt")
 _GROUPS = {"serial": "dialout", "imu": "i2c"}
 _SAFE = re.compile(r"[\w@%+=:,./-]+", re.ASCII)
+_UNIT_NAME = re.compile(r"[\w:.@\\-]{1,255}", re.ASCII)  # systemd.unit(5)
 _UNIT = """[Unit]
 Description=Dropanchor: {description}
 Wants=network-online.target
@@ -45,6 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ValueError(f"no command was given: add one of {', '.join(_COMMANDS)} with its options")
     given = parser(words[0]).parse_args(words)
     name = f"{arguments.unit or _name(given)}.service"
+    if not _UNIT_NAME.fullmatch(name):
+        raise ValueError(f"--unit {arguments.unit!r} cannot name a unit: use letters, digits and : - _ . \\ @")
     if not arguments.user:
         sys.stdout.write(unit(words, for_user=False))
         _say(f"Save this as /etc/systemd/system/{name}, then: systemctl enable --now {name}")

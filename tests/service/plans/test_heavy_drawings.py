@@ -49,6 +49,14 @@ HEAVY = {
     "filter of CSS": "<g style='filter: blur(5px)'><rect/></g>" * 300,
     "noise": "<filter id='f'><feTurbulence numOctaves='100000'/></filter><rect filter='url(#f)'/>",
     "endless number": "<filter id='f'><feMorphology radius='1e999'/></filter><rect filter='url(#f)'/>",
+    "dashes": f"<path stroke-dasharray='1' d='M0 0{'L900 0L0 10' * 1000}'/>" * 20,
+    "dashes that are inherited": f"<path id='p' d='M0 0{'L900 0L0 10' * 1000}'/>"
+    + "<g style='stroke-dasharray:.1'>"
+    + "<use href='#p'/>" * 20
+    + "</g>",
+    "dashes of a class": "<style>.a{stroke-dasharray:1e-3 1e-3}</style>" + "<line class='a' x2='1000'/>" * 20,
+    "dashes of a rule": "<style>line{stroke-dasharray:.001%}</style>" + "<line x2='1000'/>" * 20,
+    "dashes of a length that is told": "<circle r='1' pathLength='1e6' stroke-dasharray='1'/>" * 20,
     "layers": "<g opacity='.5'><rect/><rect/></g>" * 3000,
 }
 
@@ -83,6 +91,8 @@ def test_a_drawing_that_cannot_be_weighed_is_refused(inside: str, words: str) ->
         "<symbol id='chair'><path d='M0 0h1v1z'/><path d='M0 0h1v1z'/></symbol>" + "<use href='#chair'/>" * 5000,
         "<pattern id='hatch'><path d='M0 0h1'/></pattern>" + "<rect fill='url(#hatch)'/>" * 5000,
         "<linearGradient id='g'><stop/><stop/></linearGradient>" + "<g fill='url(#g)'>" * 9 + RECTS + "</g>" * 9,
+        "<g stroke-dasharray='5,2'>" + f"<polyline points='{'10 20 500 300 ' * 10}'/>" * 1000 + "</g>",
+        "<rect width='100%' height='100%' stroke-dasharray='4'/><path stroke-dasharray='none' d='M0 0h9'/>",
         "<style>.a{opacity:.4;fill:rgb(1,2,3)}</style>" + "<rect class='a'/>" * 20_000,
         "<clipPath id='c'><rect/></clipPath>" + "<g clip-path='url(#c)'><path d='M0 0h1'/></g>" * 20_000,
     ],

@@ -80,6 +80,16 @@ def test_only_commands_that_run_for_ever_are_installed(words: list[str], capsys:
     assert "no command was given" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["../../.profile", "a/b", "a b", "a\nb", "x" * 300])
+def test_the_name_of_a_unit_is_no_path(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert main(["install", "--user", "--unit", name, *SERIAL]) == 2
+    assert "cannot name a unit" in capsys.readouterr().err
+    assert list(tmp_path.rglob("*")) == []
+
+
 def test_a_command_that_is_wrong_is_not_installed(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(["install", "serial", "/dev/ttyACM0", "--module", "nonsense"])

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from xml.etree.ElementTree import Element
 
 from dropanchor_service.plans.reading.refused import RefusedError
+from dropanchor_service.plans.reading.svg_dashes import DASHES
 
 Declaration = tuple[str, str]
 """A property and its value."""
@@ -13,7 +14,7 @@ Declaration = tuple[str, str]
 LAYERS = ("opacity", "mix-blend-mode", "isolation")
 """Properties with which what an element contains is drawn into an image of its own."""
 
-_HEAVY = ("filter", *LAYERS)
+_HEAVY = ("filter", DASHES, *LAYERS)
 _MATTERS = re.compile("|".join((*_HEAVY, r"url\(")), re.IGNORECASE)
 _COMMENT = re.compile(r"/\*.*?(?:\*/|$)", re.DOTALL)
 _RULE = re.compile(r"([^{};]*)\{([^{}]*)\}")

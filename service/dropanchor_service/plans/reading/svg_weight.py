@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 from dropanchor_service.plans.reading.file_types import file_type_of
 from dropanchor_service.plans.reading.raster import open_image
 from dropanchor_service.plans.reading.refused import RefusedError
+from dropanchor_service.plans.reading.svg_dashes import DASHES, MOST_DASHES, dashes_of, length_of
 from dropanchor_service.plans.reading.svg_styles import LAYERS, Declaration, Sheet, declarations_of, matters
 
 MAX_WEIGHT = 200_000
@@ -22,6 +23,7 @@ MAX_DEPTH = 100  # of elements in elements, and of references to references
 
 _CHARACTERS = 400  # of the geometry of a path, which weigh as much as a shape
 _GLYPHS = 10
+_DASHES = 50
 _PER_MEGAPIXEL = 500
 _LAYER = 100  # an image of its own, such as a group with an opacity has it
 _FILTER_STEP = 1000
@@ -34,10 +36,11 @@ _INHERITED = ("fill", "stroke", "marker", "marker-start", "marker-mid", "marker-
 
 
 class _Weight(NamedTuple):
-    """What an element draws, and how deep elements and references are nested in it."""
+    """What an element draws, how deep elements and references are nested in it, and how long the outlines are."""
 
     shapes: float
     depth: int
+    length: float = 0.0
 
 
 class Scales:
@@ -50,6 +53,7 @@ class Scales:
         for element in names:
             self._by_id[element.get("id", "")].append(element)
         self._sheet = Sheet("".join(element.itertext()) for element in names if names[element] == "style")
+        self._has_dashes = any(DASHES in text for element in names for text in _styles_of(element))
         self._has_markers = any(name == "marker" for name in names.values())
         self._known: dict[Element, _Weight | None] = {}
         self._root = root
@@ -74,9 +78,18 @@ class Scales:
         depth_within = max((weight.depth for weight in (*within, *inherited, *added)), default=0)
         if depth_within >= MAX_DEPTH:
             raise _too_deep()
-        shapes = (self._own(element) + _sum(within)) * (1 + _sum(inherited)) + _sum(added)
-        found = self._known[element] = _Weight(min(shapes, _MOST), 1 + depth_within)
+        drawn = self._own(element) + _sum(within)
+        length = length_of(element) + sum(weight.length for weight in within) if self._has_dashes else 0.0
+        shapes = drawn * (1 + _sum(inherited)) + _sum(added) + self._dashes(element, length, drawn)
+        found = self._known[element] = _Weight(min(shapes, _MOST), 1 + depth_within, min(length, _MOST))
         return found
+
+    def _dashes(self, element: Element, length: float, drawn: float) -> float:
+        """Return what the dashes of outlines of this length weigh, on so many shapes."""
+        if not length:
+            return 0.0
+        styles = [value for name, value in (*self._declarations(element), *self._sheet.of_all) if name == DASHES]
+        return sum(min(dashes_of(value, length), drawn * MOST_DASHES) for value in styles) / _DASHES
 
     def _own(self, element: Element) -> float:
         """Return what an element weighs without all that it contains and repeats."""
@@ -127,6 +140,11 @@ class Scales:
         """Return the elements with an id. Of several, a browser takes the first; here all count."""
         names = {name, unquote(name)} - {""}
         return [element for one in names for element in self._by_id.get(one, ())]
+
+
+def _styles_of(element: Element) -> tuple[str, ...]:
+    """Return where an element may hold a style, of itself or of others."""
+    return (*element.attrib, element.get("style", ""), element.text or "")
 
 
 def _sum(weights: list[_Weight]) -> float:
