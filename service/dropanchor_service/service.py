@@ -46,7 +46,7 @@ from dropanchor_service.serving import Serving
 from dropanchor_service.settings.http_url import http_url
 from dropanchor_service.settings.many_sites import refuse_too_many_sites
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.site_files import put_site_files_in_place
+from dropanchor_service.site_files import own_data_folder, put_site_files_in_place
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.caches import ZenohCaches
@@ -95,6 +95,8 @@ class Service:
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.latest = LatestPoses()
+        if (lock := own_data_folder(settings, shared=claimed is not None)) is not None:
+            self._opened.enter_context(lock)
         put_site_files_in_place(settings)
         self.sites = open_sites(settings)
         self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by, claimed)

@@ -9,6 +9,7 @@ from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
+from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
 
 OWNER_FILE = "site"  # names the site whose files lie in the data folder itself
 _OF_SITE = (
@@ -26,6 +27,24 @@ _OF_SITE = (
 )
 
 _log = logging.getLogger(__name__)
+
+
+def own_data_folder(settings: Settings, shared: bool) -> FolderLock | None:
+    """Return the lock of the data folder, which only this process may write; None without one. Raises SettingsError.
+
+    shared: with the other shards of a node, whose leases tell them what each may write.
+    """
+    folder = settings.data_dir
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return FolderLock(folder, shared=shared)
+    except FolderInUseError as error:
+        raise SettingsError(f"data_dir: {error}: stop it, or give this process a folder of its own") from error
+    except OSError as error:
+        _log.error("data_dir: %s cannot be used (%s): nothing survives a restart", folder, error.strerror)
+        return None
 
 
 def folder_of_site(data_dir: Path, site: str) -> Path:
