@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.decimation import Decimation
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
+from dropanchor_tag_client.folder_lock import FolderLock
 
 FOLDER = "recordings"
 WRITE_S = 1.0  # so much of a recording a kill can lose
@@ -60,6 +62,8 @@ class Recorder:
         self._running: RunningRecording | None = None
         self._site_version = 0
         self._session = ""
+        self._preparing = Lock()
+        self._owned: FolderLock | None = None
         self._decimation = Decimation(pose_period_ns)
         self._output = Output(self._new_file, self._prune, limits, tags, site)
         self.writer: BackgroundWriter[Item] = BackgroundWriter(
@@ -73,6 +77,8 @@ class Recorder:
         self.stop()
         if self.writer.is_alive:
             self.writer.stop()
+        if self._owned is not None:
+            self._owned.close()
 
     @property
     def running(self) -> RunningRecording | None:
@@ -98,8 +104,11 @@ class Recorder:
         return files.path_of(self.folder, name)
 
     def prepare(self) -> None:
-        """Create the folder now rather than with the first file. Raises OSError."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        """Create and lock the folder now rather than with the first file. Raises OSError."""
+        with self._preparing:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if self._owned is None:
+                self._owned = FolderLock(self.folder)
 
     def start(self, tags: Sequence[str] | None = None) -> bool:
         """Start recording these tags, or all. Return False when a recording is already running."""
