@@ -40,6 +40,7 @@ from dropanchor_service.ownership.choose import ownership_of
 from dropanchor_service.ownership.processed import Processed
 from dropanchor_service.persistence import open_sites
 from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.serving import Serving
@@ -98,9 +99,12 @@ class Service:
         if (lock := own_data_folder(settings, shared=claimed is not None)) is not None:
             self._opened.enter_context(lock)
         put_site_files_in_place(settings)
-        self.sites = open_sites(settings)
+        self._recovery = Recovery(settings.data_dir)
+        self.sites = open_sites(settings, self._recovery)
         self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by, claimed)
-        self._serving = Serving(settings, self._credentials, self.sites, self.latest, self.clock.now_ns, self.metrics)
+        self._serving = Serving(
+            settings, self._credentials, self.sites, self.latest, self.clock.now_ns, self.metrics, self._recovery
+        )
         self._publishers = Publishers()
         tracks = [one.tracks for one in self._serving.folders.all]
         self.answers = answers_of_sites(self.sites, self.latest, self.clock.now_ns, tracks, self._publishers)
@@ -208,7 +212,9 @@ class Service:
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
         of_cluster = self._ownership.impairments()
-        found = [*of_cluster, *self._serving.problems(), self._checkpoints.problem if self._checkpoints else None]
+        damaged = self._recovery.problems()
+        of_checkpoints = self._checkpoints.problem if self._checkpoints else None
+        found = [*of_cluster, *self._serving.problems(), *damaged, of_checkpoints]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -237,7 +243,7 @@ class Service:
         if not engine.keeps_state:
             return None
         state = ServiceState(self.sites, self.latest, engine, self._publishers)
-        kept = self._ownership.checkpoints(state)
+        kept = self._ownership.checkpoints(state, self._recovery)
         return None if kept is None else CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:

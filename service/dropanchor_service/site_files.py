@@ -7,23 +7,24 @@ from pathlib import Path
 
 from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
+from dropanchor_service.runtime.recovery import copy_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
 
 OWNER_FILE = "site"  # names the site whose files lie in the data folder itself
 _OF_SITE = (
-    "site.json",
+    "site.json*",
     "plans",
-    "plans.json",
+    "plans.json*",
     "history.sqlite*",
     "recordings",
     "events.sqlite*",
-    "zones.json",
-    "event_rules.json",
-    "destinations.json",
-    "webhooks.json",
-    "omlox_*.json",
+    "zones.json*",
+    "event_rules.json*",
+    "destinations.json*",
+    "webhooks.json*",
+    "omlox_*.json*",
 )
 
 _log = logging.getLogger(__name__)
@@ -119,8 +120,9 @@ def _move(source: Path, target: Path, site: str, folder: Path) -> None:
 
 def _owner_of(folder: Path) -> str | None:
     """Return the site whose files lie in the data folder, None if nothing says so."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return str(json.loads((folder / "site.json").read_bytes())["site"]["id"])
+    for path in (folder / "site.json", copy_of(folder / "site.json")):
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            return str(json.loads(path.read_bytes())["site"]["id"])
     with suppress(OSError, ValueError):
         return (folder / OWNER_FILE).read_text(encoding="utf-8").strip() or None
     return None

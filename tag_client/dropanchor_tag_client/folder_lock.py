@@ -8,6 +8,7 @@ import socket
 import sys
 import time
 import weakref
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -54,7 +55,7 @@ class FolderLock:
 
         shared: others may share the folder, but nobody may have it alone. wait_s: how long to wait for the holder.
         """
-        self._close = lambda: None
+        self._close: Callable[[], object] = _nothing
         descriptor = _opened(folder / file)
         if descriptor is None:
             return
@@ -84,6 +85,10 @@ class FolderLock:
             finally:
                 os.close(descriptor)
         return None
+
+
+def _nothing() -> None:
+    return
 
 
 def _opened(path: Path) -> int | None:
