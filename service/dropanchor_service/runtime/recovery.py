@@ -68,12 +68,16 @@ class Recovery:
         return found
 
     def read_alone(self, path: Path, parse: Parse[Content], instead: str) -> Content | None:
-        """Return what is in a file without a copy; None if there is none, or no good one, and then say `instead`."""
+        """Return what is in a file without a copy; None if there is none, or no good one, and then say `instead`.
+
+        Raises NewerFileError.
+        """
         try:
             return parse(path.read_bytes())
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
+            _refuse_newer(path, error)
             self.set_aside(path, _why(error), instead)
             return None
 
@@ -101,7 +105,9 @@ class Recovery:
     def problems(self) -> Sequence[str]:
         """Return what was damaged. What was set aside is named until somebody moves it away."""
         return [
-            found.sentence if found.aside is None else f"{found.sentence}: look at {found.aside}, then move it away"
+            found.sentence
+            if found.aside is None
+            else f"{found.sentence}: look at {self._name(found.aside)}, then move it away"
             for found in self._found
             if found.aside is None or found.aside.exists()
         ]
@@ -114,11 +120,7 @@ class Recovery:
             with suppress(ValueError):
                 good = parse(whole)
         if whole is None or good is None:
-            if (unknown := _unknown_in(error)) is not None:
-                raise NewerFileError(
-                    f"{path} holds {unknown}, which this version does not know: install the version that wrote it, or "
-                    "move the file away"
-                ) from error
+            _refuse_newer(path, error)
             self.set_aside(path, _why(error), "there was no good copy, so it begins empty")
             return None
         self._replace(path, whole, mode, _why(error))
@@ -143,8 +145,8 @@ class Recovery:
     def _report(self, path: Path, aside: Path | None, why: str, instead: str) -> None:
         sentence = f"{self._name(path)} {why}; {instead}"
         if aside is None:
-            sentence += f". It is not set aside: look at {path.parent}, its permissions, and what earlier starts left"
-        _log.error("%s%s", sentence, "" if aside is None else f"; it is kept as {aside}")
+            sentence += ". It is not set aside: look at the permissions of its folder, and at what earlier starts left"
+        _log.error("%s (%s)", sentence, f"in {path.parent}" if aside is None else f"kept as {aside}")
         self._found.append(_Found(aside, sentence))
 
     def _name(self, path: Path) -> str:
@@ -196,11 +198,12 @@ def _why(error: Exception) -> str:
     return "is damaged"
 
 
-def _unknown_in(error: Exception) -> str | None:
-    """Return what only a later version can have written, None if something else is wrong."""
-    if not isinstance(error, ValidationError):
-        return None
-    found = error.errors(include_url=False, include_input=False)
-    if any(each["type"] not in _UNKNOWN for each in found):
-        return None
-    return ".".join(str(part) for part in found[0]["loc"])
+def _refuse_newer(path: Path, error: Exception) -> None:
+    """Raise NewerFileError if nothing is wrong but what only a later version can have written."""
+    found = error.errors(include_url=False, include_input=False) if isinstance(error, ValidationError) else []
+    if found and all(each["type"] in _UNKNOWN for each in found):
+        unknown = ".".join(str(part) for part in found[0]["loc"])
+        raise NewerFileError(
+            f"{path} holds {unknown}, which this version does not know: install the version that wrote it, or move the "
+            "file away"
+        ) from error

@@ -4,7 +4,7 @@ import logging
 from contextlib import suppress
 from datetime import datetime, timedelta
 
-from dropanchor_service.runtime.recovery import Recovery
+from dropanchor_service.runtime.recovery import NewerFileError, Recovery
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
@@ -81,7 +81,10 @@ def authenticator_of(
         return None
     if folder is None:
         return Authenticator(providers)
-    links = ShareLinks(folder, only_site=only_site, recovery=recovery)
+    try:
+        links = ShareLinks(folder, only_site=only_site, recovery=recovery)
+    except NewerFileError as error:
+        raise SettingsError(f"share links: {error}") from error
     return Authenticator({share_links.SOURCE: links, **providers})
 
 

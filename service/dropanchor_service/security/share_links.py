@@ -51,6 +51,8 @@ class ShareLinks:
     ) -> None:
         """Read the key and the list, or create the key. What is damaged ends all links, and `recovery` reports it.
 
+        Raises NewerFileError.
+
         clock: Unix time. only_site: that of links which do not say of which they are, as earlier versions made them.
         """
         self._recovery = recovery or Recovery()
@@ -150,7 +152,7 @@ class ShareLinks:
         try:
             write_atomically(path, [key], PRIVATE)
         except OSError as error:
-            self._recovery.note(f"{path} cannot be written ({error.strerror}): share links end with this process")
+            self._recovery.note(f"{path.name} cannot be written ({error.strerror}): share links end with this process")
         return key
 
     def _with_site(self, link: Share) -> Share:
