@@ -157,12 +157,13 @@ class Recorder:
             self.writer.put(Poses(self._now_ns(), kept), kept.nbytes, len(kept))
 
     def _new_file(self, t_ns: int) -> McapFile:
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self.prepare()
         name = files.new_name(chunk_from_id(self._site.site.id), t_ns)
         return McapFile(self.folder / name, {**self._metadata, SESSION: self._session})
 
     def _prune(self, open_name: str | None) -> None:
-        files.prune(self.folder, self._limits, open_name)
+        if self._owned is not None:
+            files.prune(self.folder, self._limits, open_name)
 
     def _queue_site_change(self, now_ns: int) -> None:
         version = self._site.version

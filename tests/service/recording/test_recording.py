@@ -281,3 +281,13 @@ def test_a_file_that_is_not_a_recording_is_refused(tmp_path: Path) -> None:
         (tmp_path / "x.mcap").write_bytes(content)
         with pytest.raises(RecordingError, match="not a recording"):
             list(RecordingReader(tmp_path / "x.mcap").turns())
+
+
+def test_a_second_recorder_with_the_folder_waits_and_says_who_has_it(tmp_path: Path) -> None:
+    first, second = Bench(tmp_path), Bench(tmp_path)
+    first.recorder.prepare()
+    with pytest.raises(FolderInUseError, match=rf"recordings is in use by process {os.getpid()} on "):
+        second.recorder.prepare()
+    with first.recorder:
+        pass
+    second.recorder.prepare()
