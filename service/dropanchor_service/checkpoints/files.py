@@ -9,7 +9,7 @@ from dropanchor_service.runtime.recovery import Recovery
 
 KEPT = 2
 _PREFIX = "checkpoint-"
-_INSTEAD = "the one before is used, or else all tags start afresh"
+INSTEAD = "the one before is used, or else all tags start afresh"
 _ASIDE = f"unread-{_PREFIX}"
 
 
@@ -48,7 +48,7 @@ class CheckpointFolder:
                 complaints.append(f"{path.name} is not used: {error}; {_put_aside(path)}")
             except (OSError, CheckpointError) as error:
                 complaints.append(f"{path.name} is not used: {error}")
-                self._recovery.set_aside(path, "is damaged", _INSTEAD, f"{_PREFIX}*")
+                self._recovery.set_aside(path, "is damaged", INSTEAD, f"{_PREFIX}*")
         return None, complaints
 
     def _files(self, prefix: str = _PREFIX) -> list[Path]:

@@ -83,7 +83,7 @@ class Database:
             try:
                 self._connection()
             except sqlite3.OperationalError as error:
-                self._recovery.note(f"{path.name} could not be opened at the start ({error}): start again when it can be")
+                self._recovery.note(f"{path.name} cannot be opened ({error}): start the service again when it can be")
 
     @property
     def is_made(self) -> bool:

@@ -13,6 +13,7 @@ from dropanchor_service.runtime.recovery import Recovery
 
 _ENDINGS: dict[ImageType, str] = {"image/png": ".png", "image/jpeg": ".jpg", "image/svg+xml": ".svg"}
 _DIGEST_CHARACTERS = 32
+INSTEAD = "upload the image of the floor plan again"
 _NAME = re.compile(r"[0-9a-f]{32}\.(png|jpg|svg)(\.part)?")
 
 
@@ -58,7 +59,7 @@ class ImageFolder:
                 with suppress(OSError):  # a disk that is read-only: the next start tries again
                     path.unlink()
         for path, digest in kept.items():
-            recovery.read_alone(path, partial(_require, digest), "upload the image of the floor plan again")
+            recovery.read_alone(path, partial(_require, digest), INSTEAD)
 
     def _path(self, folder: Path, image: PlanImage) -> Path:
         return folder / f"{image.id}{_ENDINGS[image.media_type]}"

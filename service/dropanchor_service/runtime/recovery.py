@@ -19,6 +19,8 @@ from dropanchor_service.runtime.atomic_file import UP_TO_UMASK, sync_folder, wri
 
 COPY = ".last-good"
 MARK = ".damaged-"
+COPY_USED = "its last good copy is used"
+BEGINS_EMPTY = "there was no good copy, so it begins empty"
 MAX_ASIDE = 3  # of a file: a disk that keeps damaging files must not fill up with them
 _WHERE = ("*", "checkpoints/*", "plans/*", "sites/*/*", "sites/*/plans/*")  # what one service may have set aside
 _UNKNOWN = ("extra_forbidden", "union_tag_invalid", "literal_error", "enum")  # what a later version may have written
@@ -121,7 +123,7 @@ class Recovery:
                 good = parse(whole)
         if whole is None or good is None:
             _refuse_newer(path, error)
-            self.set_aside(path, _why(error), "there was no good copy, so it begins empty")
+            self.set_aside(path, _why(error), BEGINS_EMPTY)
             return None
         self._replace(path, whole, mode, _why(error))
         return good
@@ -140,7 +142,7 @@ class Recovery:
             aside = None
         with suppress(OSError):  # a full disk: the next start or the next change tries again
             write_atomically(path, [whole], mode)
-        self._report(path, aside, why, "its last good copy is used")
+        self._report(path, aside, why, COPY_USED)
 
     def _report(self, path: Path, aside: Path | None, why: str, instead: str) -> None:
         sentence = f"{self._name(path)} {why}; {instead}"

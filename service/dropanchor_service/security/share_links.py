@@ -27,7 +27,7 @@ NS = 1_000_000_000
 _ALGORITHM = "HS256"
 _AUDIENCE = "dropanchor-share"
 _TABLE = TypeAdapter(dict[str, Share])
-_ENDED = "all share links have ended"
+ENDED = "all share links have ended"
 
 
 class TooManyLinksError(Exception):
@@ -140,12 +140,12 @@ class ShareLinks:
 
     def _read(self) -> Mapping[str, Share]:
         """Return the list. There is no copy of it: that could have a link which was revoked since."""
-        found = self._recovery.read_alone(self._file, _TABLE.validate_json, _ENDED) or {}
+        found = self._recovery.read_alone(self._file, _TABLE.validate_json, ENDED) or {}
         return {name: self._with_site(link) for name, link in found.items()}
 
     def _key_in(self, path: Path) -> bytes:
         """Return the key in a file, which is created if it is missing."""
-        found = self._recovery.read_alone(path, _checked_key, _ENDED)
+        found = self._recovery.read_alone(path, _checked_key, ENDED)
         if found is not None:
             return found
         key = secrets.token_bytes(KEY_BYTES)
