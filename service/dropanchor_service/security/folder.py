@@ -56,18 +56,23 @@ class SecurityFolder:
         folder = cls(path, table)
         try:
             path.mkdir(parents=True, exist_ok=True, mode=0o700)
+            folder._refuse_full()
             with exclusive_lock(path):
+                folder._refuse_full()
                 folder._fill(days)
         except OSError as error:
             raise SecurityError(f"{path} cannot be written: {error.strerror}") from error
         return folder
 
-    def _fill(self, days: int) -> None:
-        """Create everything. Raises OSError, and SecurityError when the folder is not empty."""
+    def _refuse_full(self) -> None:
+        """Raise SecurityError when the folder is not empty."""
         if any(found.name != LOCK for found in self.path.iterdir()):
             raise SecurityError(
                 f"{self.path} is not empty, and existing files are never overwritten; choose another folder"
             )
+
+    def _fill(self, days: int) -> None:
+        """Create everything. Raises OSError."""
         authority = Authority.make("Dropanchor site authority")
         self._write_pair("ca", authority.issued)
         self._issue_roles(authority, days)
