@@ -165,8 +165,6 @@ def _open_plans(folder: Path | None, recovery: Recovery) -> PlanStore:
         return PlanStore(folder, recovery)
     except NewerFileError as error:
         raise SettingsError(f"data_dir: {error}") from error
-    except OSError as error:
-        raise SettingsError(f"data_dir: the floor plans in {folder} cannot be read: {error}") from error
 
 
 def open_site(settings: Settings, recovery: Recovery | None = None) -> SiteStore:

@@ -43,6 +43,8 @@ def own_data_folder(settings: Settings, shared: bool) -> FolderLock | None:
         return FolderLock(folder, shared=shared)
     except FolderInUseError as error:
         raise SettingsError(f"data_dir: {error}: stop it, or give this process a folder of its own") from error
+    except (FileExistsError, NotADirectoryError) as error:
+        raise SettingsError(f"data_dir: {folder} is no folder: choose another one") from error
     except OSError as error:
         _log.error("data_dir: %s cannot be used (%s): nothing survives a restart", folder, error.strerror)
         return None

@@ -1,6 +1,9 @@
 """The spool keeps messages on disk in their order, whatever a crash or a power cut leaves of its files."""
 
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -143,6 +146,16 @@ def test_two_programs_do_not_share_a_spool(tmp_path: Path) -> None:
         Spool(tmp_path, LIMIT)
     first.close()
     Spool(tmp_path, LIMIT).close()
+
+
+def test_a_second_program_with_the_spool_ends_and_says_who_has_it(tmp_path: Path) -> None:
+    spool = Spool(folder := tmp_path / "default" / "a", LIMIT)
+    program = [sys.executable, "-m", "dropanchor_tag_client", "publish", "--tag", "a", "--spool", str(tmp_path)]
+    ended = subprocess.run(program, input="", capture_output=True, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith(f"dropanchor-tag: the spool {folder} is in use by process {os.getpid()} on ")
+    spool.close()
 
 
 def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:

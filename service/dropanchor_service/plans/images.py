@@ -50,11 +50,11 @@ class ImageFolder:
             self._path(self._folder, image).unlink(missing_ok=True)
 
     def keep_only(self, images: Collection[PlanImage], recovery: Recovery) -> None:
-        """Delete all other images, and what a killed writer has left. Set damaged ones aside. Raises OSError."""
-        if self._folder is None or not self._folder.is_dir():
+        """Delete all other images, and what a killed writer has left. Set damaged ones aside."""
+        if self._folder is None:
             return
         kept = {self._path(self._folder, image): image.id for image in images}
-        for path in self._folder.iterdir():
+        for path in self._folder.glob("*"):
             if path not in kept and _NAME.fullmatch(path.name):
                 with suppress(OSError):  # a disk that is read-only: the next start tries again
                     path.unlink()

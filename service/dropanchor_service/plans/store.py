@@ -26,7 +26,7 @@ class PlanStore(NamedItems[Plan]):
     def __init__(self, folder: Path | None, recovery: Recovery | None = None) -> None:
         """Load what is in the data folder. None: keep everything in memory. recovery: reports what is damaged.
 
-        Raises NewerFileError, and OSError when the folder of the images cannot be read.
+        Raises NewerFileError.
         """
         recovery = recovery or Recovery()
         path = None if folder is None else folder / "plans.json"

@@ -96,6 +96,8 @@ class Recovery:
                     companion.rename(f"{aside}{suffix}")
         except OSError:
             aside = None
+        if aside is not None and not aside.exists():  # what it lies in is no folder, or may not be read
+            aside = None
         self._report(path, aside, why, instead)
         return aside
 
