@@ -5,12 +5,12 @@ import fcntl
 import logging
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from dropanchor_tag_client.folder_lock import FILE, FolderInUseError, FolderLock, Owner
+from support.commands import start_python
 
 HOLD = """
 import sys
@@ -23,9 +23,7 @@ sys.stdin.read()
 
 
 def holding(folder: Path, *shared: str) -> subprocess.Popen[str]:
-    process = subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(folder), *shared], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    process = start_python("-c", HOLD, str(folder), *shared)
     assert process.stdout is not None
     assert process.stdout.readline() == "held\n"
     return process

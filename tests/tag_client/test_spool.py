@@ -2,13 +2,12 @@
 
 import os
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from dropanchor_tag_client.spool import MIN_LIMIT_BYTES, SEGMENT_BYTES, Spool, SpoolError
+from support.commands import python
 
 LIMIT = 10_000_000
 
@@ -150,8 +149,7 @@ def test_two_programs_do_not_share_a_spool(tmp_path: Path) -> None:
 
 def test_a_second_program_with_the_spool_ends_and_says_who_has_it(tmp_path: Path) -> None:
     spool = Spool(folder := tmp_path / "default" / "a", LIMIT)
-    program = [sys.executable, "-m", "dropanchor_tag_client", "publish", "--tag", "a", "--spool", str(tmp_path)]
-    ended = subprocess.run(program, input="", capture_output=True, text=True, timeout=60, check=False)
+    ended = python("-m", "dropanchor_tag_client", "publish", "--tag", "a", "--spool", str(tmp_path))
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
     assert line.startswith(f"dropanchor-tag: the spool {folder} is in use by process {os.getpid()} on ")
