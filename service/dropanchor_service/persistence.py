@@ -6,8 +6,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from pydantic import ValidationError
-
 from dropanchor_service.api.omlox.items import OmloxItems
 from dropanchor_service.basemap.basemap import ServedBasemap
 from dropanchor_service.basemap.file import UnusableFileError
@@ -20,6 +18,7 @@ from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
 from dropanchor_service.plans.store import PlanStore
 from dropanchor_service.recording.folder import Limits
 from dropanchor_service.recording.recorder import Recorder
+from dropanchor_service.runtime.recovery import NewerFileError, Recovery
 from dropanchor_service.settings.history import HistorySettings, RecordingSettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
@@ -36,7 +35,7 @@ class Persistence:
     """Floor plans, what omlox clients have stored, and the history (`tracks`) and the recorder.
 
     The last two are None when disabled. They write while this context is open. Creating it raises SettingsError when a
-    file that people have filled cannot be read.
+    file is of a later version.
     """
 
     def __init__(
@@ -46,15 +45,20 @@ class Persistence:
         site: SiteStore,
         now_ns: Callable[[], int],
         database: "Database | None" = None,
+        recovery: Recovery | None = None,
     ) -> None:
-        """settings: as of an only site; see `settings_of`. database: of the history; None where it is in a file."""
+        """settings: as of an only site; see `settings_of`. database: of the history; None where it is in a file.
+
+        recovery: reports files that are damaged.
+        """
+        recovery = recovery or Recovery()
         self._settings = settings
         self._opened = ExitStack()
-        self.plans = _open_plans(settings.data_dir)
+        self.plans = _open_plans(settings.data_dir, recovery)
         self.tracks: Tracks | None = None
         self.recorder: Recorder | None = None
-        self.omlox = _open_omlox(settings)
-        storage = _open_storage(settings, site, now_ns, database)
+        self.omlox = _open_omlox(settings, recovery)
+        storage = _open_storage(settings, site, now_ns, database, recovery)
         if storage is not None:
             self.tracks = Tracks(storage, retention_of(settings.history), tags, site)
         folder = settings.data_dir
@@ -95,7 +99,7 @@ class Persistence:
         return Observers(NO_OBSERVERS.messages if recorder is None else recorder.record_messages, on_poses)
 
     def problems(self) -> Sequence[str]:
-        """Return the problems of the history and the recorder: failing writes and damaged files."""
+        """Return why the history and the recorder cannot write."""
         of_tracks = [] if self.tracks is None else self.tracks.problems
         of_recorder = None if self.recorder is None else self.recorder.writer.problem
         return [*of_tracks, *([] if of_recorder is None else [of_recorder])]
@@ -118,7 +122,11 @@ def open_database(settings: Settings, now_ns: Callable[[], int]) -> "Database | 
 
 
 def _open_storage(
-    settings: Settings, site: SiteStore, now_ns: Callable[[], int], database: "Database | None"
+    settings: Settings,
+    site: SiteStore,
+    now_ns: Callable[[], int],
+    database: "Database | None",
+    recovery: Recovery,
 ) -> Storage | None:
     retention = retention_of(settings.history)
     if not settings.history.enabled:
@@ -127,7 +135,7 @@ def _open_storage(
         from dropanchor_service.history.postgresql.store import PostgresqlStorage
 
         return PostgresqlStorage(database, site.site.id, retention, now_ns, lambda: site.epoch)
-    return None if settings.data_dir is None else SqliteStorage(settings.data_dir, retention, now_ns)
+    return None if settings.data_dir is None else SqliteStorage(settings.data_dir, retention, now_ns, recovery)
 
 
 def retention_of(settings: HistorySettings) -> Retention:
@@ -152,26 +160,29 @@ def file_limits_of(settings: RecordingSettings) -> Limits:
     )
 
 
-def _open_plans(folder: Path | None) -> PlanStore:
+def _open_plans(folder: Path | None, recovery: Recovery) -> PlanStore:
     try:
-        return PlanStore(folder)
-    except (OSError, ValidationError) as error:
-        raise SettingsError(f"data_dir: the floor plans in {folder} cannot be read: {error}") from error
+        return PlanStore(folder, recovery)
+    except NewerFileError as error:
+        raise SettingsError(f"data_dir: {error}") from error
 
 
-def open_site(settings: Settings) -> SiteStore:
-    """Return the site, as the settings and the data folder have it. Raises SettingsError."""
+def open_site(settings: Settings, recovery: Recovery | None = None) -> SiteStore:
+    """Return the site, as the settings and the data folder have it. Raises SettingsError.
+
+    recovery: reports a file that is damaged.
+    """
     try:
-        return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults)
-    except (OSError, ValidationError) as error:
-        raise SettingsError(f"data_dir: the site stored in {settings.data_dir} cannot be read: {error}") from error
+        return SiteStore(settings.site, settings.listed_tags, settings.data_dir, settings.tag_defaults, recovery)
+    except NewerFileError as error:
+        raise SettingsError(f"data_dir: {error}") from error
 
 
-def open_sites(settings: Settings) -> Sites:
-    """Return the sites, as the settings and the data folder have them. Raises SettingsError."""
+def open_sites(settings: Settings, recovery: Recovery | None = None) -> Sites:
+    """Return the sites, as the settings and the data folder have them; see `open_site`. Raises SettingsError."""
     if not settings.sites:
-        return Sites([(open_site(settings), settings.quota)])
-    stores = [open_site(settings_of(settings, name)) for name in settings.sites]
+        return Sites([(open_site(settings, recovery), settings.quota)])
+    stores = [open_site(settings_of(settings, name), recovery) for name in settings.sites]
     for name, store in zip(settings.sites, stores, strict=True):
         if store.site.id != name:
             raise SettingsError(f"data_dir: the folder of the site {name!r} holds the files of {store.site.id!r}")
@@ -193,14 +204,12 @@ def settings_of(settings: Settings, name: str) -> Settings:
     return settings.model_copy(update=own)
 
 
-def _open_omlox(settings: Settings) -> OmloxItems:
+def _open_omlox(settings: Settings, recovery: Recovery) -> OmloxItems:
     """Return what omlox clients have stored. Raises SettingsError."""
     try:
-        return OmloxItems.opened(settings.data_dir)
-    except (OSError, ValidationError) as error:
-        raise SettingsError(
-            f"data_dir: the objects of omlox clients in {settings.data_dir} cannot be read: {error}"
-        ) from error
+        return OmloxItems.opened(settings.data_dir, recovery)
+    except NewerFileError as error:
+        raise SettingsError(f"data_dir: {error}") from error
 
 
 def open_basemap(settings: Settings, sites: Sequence[SiteStore]) -> ServedBasemap | None:

@@ -40,13 +40,14 @@ from dropanchor_service.ownership.choose import ownership_of
 from dropanchor_service.ownership.processed import Processed
 from dropanchor_service.persistence import open_sites
 from dropanchor_service.runtime.clock import UtcClock
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.runtime.supervision import Supervision
 from dropanchor_service.security.credentials import certificate_of, credentials_of, expiries_of
 from dropanchor_service.serving import Serving
 from dropanchor_service.settings.http_url import http_url
 from dropanchor_service.settings.many_sites import refuse_too_many_sites
 from dropanchor_service.settings.model import Settings
-from dropanchor_service.site_files import put_site_files_in_place
+from dropanchor_service.site_files import own_data_folder, put_site_files_in_place
 from dropanchor_service.store import LatestPoses
 from dropanchor_service.store.shared import Shared
 from dropanchor_service.zenoh_io.caches import ZenohCaches
@@ -95,10 +96,15 @@ class Service:
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.latest = LatestPoses()
+        if (lock := own_data_folder(settings, shared=claimed is not None)) is not None:
+            self._opened.enter_context(lock)
         put_site_files_in_place(settings)
-        self.sites = open_sites(settings)
+        self._recovery = Recovery(settings.data_dir)
+        self.sites = open_sites(settings, self._recovery)
         self._ownership = ownership_of(settings, self.sites, self.metrics, standing_by, claimed)
-        self._serving = Serving(settings, self._credentials, self.sites, self.latest, self.clock.now_ns, self.metrics)
+        self._serving = Serving(
+            settings, self._credentials, self.sites, self.latest, self.clock.now_ns, self.metrics, self._recovery
+        )
         self._publishers = Publishers()
         tracks = [one.tracks for one in self._serving.folders.all]
         self.answers = answers_of_sites(self.sites, self.latest, self.clock.now_ns, tracks, self._publishers)
@@ -206,7 +212,9 @@ class Service:
     def impairments(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""
         of_cluster = self._ownership.impairments()
-        found = [*of_cluster, *self._serving.problems(), self._checkpoints.problem if self._checkpoints else None]
+        damaged = self._recovery.problems()
+        of_checkpoints = self._checkpoints.problem if self._checkpoints else None
+        found = [*of_cluster, *self._serving.problems(), *damaged, of_checkpoints]
         return [problem for problem in found if problem is not None]
 
     @property
@@ -235,7 +243,7 @@ class Service:
         if not engine.keeps_state:
             return None
         state = ServiceState(self.sites, self.latest, engine, self._publishers)
-        kept = self._ownership.checkpoints(state)
+        kept = self._ownership.checkpoints(state, self._recovery)
         return None if kept is None else CheckpointThread(state, kept, self.metrics, self._settings.checkpoint_s)
 
     def _write_last_checkpoint(self, checkpoints: CheckpointThread) -> None:

@@ -14,6 +14,7 @@ from dropanchor_service.api.routes.health import Ready
 from dropanchor_service.api.routes.site_parts import SiteParts
 from dropanchor_service.api.site_routers import SharedParts
 from dropanchor_service.metrics.registry import Metrics
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security.credentials import authenticator_of
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.settings.model import Settings
@@ -37,15 +38,16 @@ class Serving:
         latest: LatestPoses,
         now_ns: Callable[[], int],
         metrics: Metrics,
+        recovery: Recovery,
     ) -> None:
         self._settings = settings
         self._credentials = credentials
-        self._authenticator = authenticator_of(settings, None if sites.only is None else sites.only.id)
+        self._authenticator = authenticator_of(settings, None if sites.only is None else sites.only.id, recovery)
         self.border = border_of(settings.http, credentials)
         self._sites = sites
         self._metrics = metrics
-        self.folders = SiteFolders(settings, sites, now_ns, metrics)
-        self.zone_events = ZoneEvents(settings, sites, latest, now_ns, metrics)
+        self.folders = SiteFolders(settings, sites, now_ns, metrics, recovery)
+        self.zone_events = ZoneEvents(settings, sites, latest, now_ns, metrics, recovery)
 
     def problems(self) -> Sequence[str]:
         """Return what does not work although the service can do its main work."""

@@ -7,25 +7,47 @@ from pathlib import Path
 
 from dropanchor_schemas.file_names import file_name_of
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
+from dropanchor_service.runtime.recovery import copy_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
+from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
 
 OWNER_FILE = "site"  # names the site whose files lie in the data folder itself
 _OF_SITE = (
-    "site.json",
+    "site.json*",
     "plans",
-    "plans.json",
+    "plans.json*",
     "history.sqlite*",
     "recordings",
     "events.sqlite*",
-    "zones.json",
-    "event_rules.json",
-    "destinations.json",
-    "webhooks.json",
-    "omlox_*.json",
+    "zones.json*",
+    "event_rules.json*",
+    "destinations.json*",
+    "webhooks.json*",
+    "omlox_*.json*",
 )
 
 _log = logging.getLogger(__name__)
+
+
+def own_data_folder(settings: Settings, shared: bool) -> FolderLock | None:
+    """Return the lock of the data folder, which only this process may write; None without one. Raises SettingsError.
+
+    shared: with the other shards of a node, whose leases tell them what each may write.
+    """
+    folder = settings.data_dir
+    if folder is None:
+        return None
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return FolderLock(folder, shared=shared)
+    except FolderInUseError as error:
+        raise SettingsError(f"data_dir: {error}: stop it, or give this process a folder of its own") from error
+    except (FileExistsError, NotADirectoryError) as error:
+        raise SettingsError(f"data_dir: {folder} is no folder: choose another one") from error
+    except OSError as error:
+        _log.error("data_dir: %s cannot be used (%s): nothing survives a restart", folder, error.strerror)
+        return None
 
 
 def folder_of_site(data_dir: Path, site: str) -> Path:
@@ -100,8 +122,9 @@ def _move(source: Path, target: Path, site: str, folder: Path) -> None:
 
 def _owner_of(folder: Path) -> str | None:
     """Return the site whose files lie in the data folder, None if nothing says so."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        return str(json.loads((folder / "site.json").read_bytes())["site"]["id"])
+    for path in (folder / "site.json", copy_of(folder / "site.json")):
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            return str(json.loads(path.read_bytes())["site"]["id"])
     with suppress(OSError, ValueError):
         return (folder / OWNER_FILE).read_text(encoding="utf-8").strip() or None
     return None

@@ -9,6 +9,7 @@ from dropanchor_service.ingest.observers import Observers
 from dropanchor_service.metrics.persistence import HistoryMetrics, RecordingMetrics
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence import Persistence, open_basemap, open_database, retention_of, settings_of
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store import Sites
 
@@ -21,12 +22,20 @@ class SiteFolders:
     Creating it raises SettingsError.
     """
 
-    def __init__(self, settings: Settings, sites: Sites, now_ns: Callable[[], int], metrics: Metrics) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        sites: Sites,
+        now_ns: Callable[[], int],
+        metrics: Metrics,
+        recovery: Recovery | None = None,
+    ) -> None:
         self._sites = sites
         self._opened = ExitStack()
         database = open_database(settings, now_ns)
         self.all = [
-            Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns, database) for site in sites
+            Persistence(settings_of(settings, site.id), site.tags, site.store, now_ns, database, recovery)
+            for site in sites
         ]
         self._has_history = any(one.tracks is not None for one in self.all)
         self._decimation = retention_of(settings.history).decimation()

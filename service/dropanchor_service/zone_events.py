@@ -21,6 +21,7 @@ from dropanchor_service.events.watcher import Watcher
 from dropanchor_service.metrics.events import EventMetrics
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.persistence import settings_of
+from dropanchor_service.runtime.recovery import NewerFileError, Recovery
 from dropanchor_service.settings.events import DeliverySettings
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
@@ -44,9 +45,16 @@ class ZoneEvents:
     """
 
     def __init__(
-        self, settings: Settings, sites: Sites, latest: LatestPoses, now_ns: Callable[[], int], metrics: Metrics
+        self,
+        settings: Settings,
+        sites: Sites,
+        latest: LatestPoses,
+        now_ns: Callable[[], int],
+        metrics: Metrics,
+        recovery: Recovery | None = None,
     ) -> None:
-        """Raises SettingsError when a file in the data folder cannot be read."""
+        """recovery: reports files that are damaged. Raises SettingsError when one is of a later version."""
+        self._recovery = recovery or Recovery()
         self._closing = ExitStack()
         self._sites = sites
         shared = _shared_ways(settings)
@@ -78,11 +86,13 @@ class ZoneEvents:
     def _open(self, settings: Settings, site: ServedSite, shared: SharedWays, several: bool) -> _Opened:
         folder = settings_of(settings, site.id).data_dir
         try:
-            items, destinations = ZoneItems.opened(folder), open_destinations(folder)
-            database = Database(folder)
+            items, destinations = ZoneItems.opened(folder, self._recovery), open_destinations(folder, self._recovery)
+            database = Database(folder, self._recovery)
             self._closing.callback(database.close)
             store = EventStore(database, site.id, partial(addressees, destinations))
             watched = WatchedSite(site.store, site.tags, site.health, items, store.states())
+        except NewerFileError as error:
+            raise SettingsError(f"data_dir: {error}") from error
         except (OSError, ValueError, sqlite3.Error) as error:
             raise SettingsError(f"data_dir: zones or events in {folder} cannot be read: {error}") from error
         delivery = _with_page_of(settings.delivery, site.id) if several else settings.delivery

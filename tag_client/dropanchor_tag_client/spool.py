@@ -8,8 +8,7 @@ import zlib
 from collections import deque
 from pathlib import Path
 
-if sys.platform != "win32":
-    import fcntl
+from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
 
 MIN_LIMIT_BYTES = 1_000_000
 SEGMENT_BYTES = 262_144
@@ -46,9 +45,11 @@ class Spool:
         self._loaded: deque[tuple[int, bytes]] = deque()  # of the oldest segment: where the next record begins, message
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(folder / "lock")
+            self._lock = FolderLock(folder, "lock")
             self._positions = _Positions(folder / "position")
             self._sizes = _segments(folder)
+        except FolderInUseError as error:
+            raise SpoolError(f"the spool {error}: stop it, or give each program a folder of its own") from None
         except OSError as error:
             raise SpoolError(f"the spool {folder} cannot be used: {error.strerror}") from error
         self._next_number = max([*self._sizes, self._positions.segment], default=0) + 1
@@ -115,7 +116,7 @@ class Spool:
     def close(self) -> None:
         self._close_segment()
         self._positions.close()
-        os.close(self._lock)
+        self._lock.close()
 
     def _path(self, number: int) -> Path:
         return self._folder / f"{number:016d}.spool"
@@ -231,17 +232,3 @@ def _message(data: bytes, at: int) -> bytes | None:
 def _segments(folder: Path) -> dict[int, int]:
     """Return the sizes of the segments that an earlier process left, by number."""
     return {int(path.stem): path.stat().st_size for path in folder.glob("*.spool") if path.stem.isdecimal()}
-
-
-def _locked(path: Path) -> int:
-    """Open a file that only one process may hold."""
-    lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-    if sys.platform != "win32":
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(lock)
-            raise SpoolError(
-                f"another program uses the spool {path.parent}: give each program a folder of its own"
-            ) from None
-    return lock

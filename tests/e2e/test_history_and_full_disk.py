@@ -65,7 +65,7 @@ def test_on_a_full_disk_the_service_reports_it_and_writes_again_once_there_is_sp
         for what in ("history", "recording"):
             assert service.metric(f"dropanchor_{what}_dropped_total") == 0
         assert service.stop() == 0
-    (recorded,) = (tmp_path / "recordings").iterdir()
+    (recorded,) = (tmp_path / "recordings").glob("*.mcap")
     payloads = [message[1] for turn in RecordingReader(recorded).turns() for message in turn.messages]
     assert payloads == [encode_packed(straight_north(100, full_ns))]
 

@@ -3,10 +3,8 @@
 import signal
 from pathlib import Path
 
-from support.commands import python
 from support.plan_files import image_file
 from support.service import running_service, settings_file
-from support.zenoh_router import free_endpoint
 
 
 def test_an_acknowledged_plan_and_its_image_survive_a_kill(tmp_path: Path) -> None:
@@ -23,11 +21,3 @@ def test_an_acknowledged_plan_and_its_image_survive_a_kill(tmp_path: Path) -> No
         assert [found["id"] for found in service.get("/api/v1/plans")["plans"]] == ["hall"]
         assert service.ask("GET", f"/api/v1/plan-images/{image['id']}").content == shown
         assert service.stop() == 0
-
-
-def test_plans_that_cannot_be_read_stop_the_start_with_a_sentence(tmp_path: Path) -> None:
-    (tmp_path / "plans.json").write_text("{")
-    serve = ("-m", "dropanchor_service", "serve", "--data-dir", str(tmp_path), "--port", "0")
-    ended = python(*serve, "--zenoh-listen", free_endpoint())
-    assert ended.returncode == 2
-    assert f"the floor plans in {tmp_path} cannot be read" in ended.stderr

@@ -65,13 +65,6 @@ def test_bad_settings_are_reported_with_file_and_key(tmp_path: Path) -> None:
     assert "the environment: max_tags" in result.stderr
 
 
-def test_a_stored_site_that_cannot_be_read_is_reported(tmp_path: Path) -> None:
-    (tmp_path / "site.json").write_text("{")
-    result = run("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(tmp_path))
-    assert result.returncode == 2
-    assert f"the site stored in {tmp_path} cannot be read" in result.stderr
-
-
 def test_a_change_over_rest_survives_a_restart(tmp_path: Path) -> None:
     for _ in range(2):
         with running_service("--data-dir", str(tmp_path)) as service:

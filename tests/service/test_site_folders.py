@@ -48,7 +48,7 @@ def test_poses_and_messages_reach_the_files_of_their_site_alone(tmp_path: Path) 
             found.append({tag: one.tracks.poses(tag, 0, 2 * T, 9).poses["x"].tolist() for tag in one.tracks.tags()})
         assert found == [{"cart": [1.0], "lift": [3.0]}, {"cart": [2.0]}]
     assert [one.recorder.files() != [] for one in folders.all if one.recorder] == [False, True]
-    (file,) = (tmp_path / "sites" / "Lager%20S%C3%BCd" / "recordings").iterdir()
+    (file,) = (tmp_path / "sites" / "Lager%20S%C3%BCd" / "recordings").glob("*.mcap")
     turns = list(RecordingReader(file).turns())
     assert [message[0] for turn in turns for message in turn.messages] == ["cart"]
     assert [tag for turn in turns for tag, _ in turn.estimates] == ["cart"]

@@ -1,11 +1,13 @@
 """The spool keeps messages on disk in their order, whatever a crash or a power cut leaves of its files."""
 
+import os
 import shutil
 from pathlib import Path
 
 import pytest
 
 from dropanchor_tag_client.spool import MIN_LIMIT_BYTES, SEGMENT_BYTES, Spool, SpoolError
+from support.commands import python
 
 LIMIT = 10_000_000
 
@@ -143,6 +145,15 @@ def test_two_programs_do_not_share_a_spool(tmp_path: Path) -> None:
         Spool(tmp_path, LIMIT)
     first.close()
     Spool(tmp_path, LIMIT).close()
+
+
+def test_a_second_program_with_the_spool_ends_and_says_who_has_it(tmp_path: Path) -> None:
+    spool = Spool(folder := tmp_path / "default" / "a", LIMIT)
+    ended = python("-m", "dropanchor_tag_client", "publish", "--tag", "a", "--spool", str(tmp_path))
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith(f"dropanchor-tag: the spool {folder} is in use by process {os.getpid()} on ")
+    spool.close()
 
 
 def test_a_folder_that_cannot_be_used_is_named(tmp_path: Path) -> None:

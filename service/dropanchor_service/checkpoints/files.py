@@ -5,22 +5,26 @@ from pathlib import Path
 
 from dropanchor_service.checkpoints.format import CheckpointError, Decode, Snapshot, UnreadableLayoutError, encoded
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.recovery import Recovery
 
 KEPT = 2
 _PREFIX = "checkpoint-"
+INSTEAD = "the one before is used, or else all tags start afresh"
 _ASIDE = f"unread-{_PREFIX}"
 
 
 class CheckpointFolder:
     """Checkpoints in a folder, written in one layout. Not thread-safe.
 
-    A checkpoint whose layout `decode` cannot read is kept under another name.
+    A checkpoint whose layout `decode` cannot read is kept under another name, and so is one that is damaged, which
+    `recovery` reports.
     """
 
-    def __init__(self, folder: Path, layout: str, decode: Decode) -> None:
+    def __init__(self, folder: Path, layout: str, decode: Decode, recovery: Recovery | None = None) -> None:
         self._folder = folder
         self._layout = layout
         self._decode = decode
+        self._recovery = recovery or Recovery()
         self._next = max((_number(path) for path in [*self._files(), *self._files(_ASIDE)]), default=0) + 1
 
     def write(self, snapshot: Snapshot) -> int:
@@ -44,6 +48,7 @@ class CheckpointFolder:
                 complaints.append(f"{path.name} is not used: {error}; {_put_aside(path)}")
             except (OSError, CheckpointError) as error:
                 complaints.append(f"{path.name} is not used: {error}")
+                self._recovery.set_aside(path, "is damaged", INSTEAD, f"{_PREFIX}*")
         return None, complaints
 
     def _files(self, prefix: str = _PREFIX) -> list[Path]:

@@ -17,7 +17,7 @@ from dropanchor_service.runtime import logs
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_service.shards.actor import CONFIG
-from dropanchor_service.shards.node_lock import NodeLock
+from dropanchor_service.shards.node_lock import node_lock, running_node
 from dropanchor_service.shards.ray_node import LONGEST_FOLDER, RayNode, ray_settings, require_ray
 from dropanchor_service.shards.token_file import made_or_read
 
@@ -50,7 +50,7 @@ def _start(arguments: argparse.Namespace) -> int:
     logs.configure(arguments.log_level)
     require_ray()
     settings, folder = _settings_of(arguments), _folder_of(arguments)
-    with NodeLock(folder):
+    with node_lock(folder):
         token = made_or_read(arguments.token or folder / "token", may_make=arguments.head)
         _set_up_ray(token, arguments.config)
         from dropanchor_service.shards.node_process import run_node
@@ -81,17 +81,19 @@ def _supervise(arguments: argparse.Namespace) -> int:
 
 def _stop(arguments: argparse.Namespace) -> int:
     folder = _folder_of(arguments)
-    number = NodeLock.holder(folder)
-    if number is None:
+    owner = running_node(folder)
+    if owner is None:
         return refuse(f"no node runs with the folder {folder}")
-    os.kill(number, 15)
+    if owner.host not in ("", socket.gethostname()):
+        return refuse(f"the node of {folder} is {owner}: stop it there")
+    os.kill(owner.pid, 15)
     end_s = time.monotonic() + STOP_S
     while time.monotonic() < end_s:
-        if NodeLock.holder(folder) != number:
+        if running_node(folder) != owner:
             print("The node has stopped.")
             return 0
         time.sleep(0.1)
-    return refuse(f"the node (process {number}) has not stopped within {STOP_S:.0f} s")
+    return refuse(f"the node ({owner}) has not stopped within {STOP_S:.0f} s")
 
 
 def _set_up_ray(token: Path, config: Path) -> None:

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import orjson
 
 from dropanchor_schemas.destinations import Destination
 from dropanchor_service.events.drafts import Draft
 from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.store.items import PRIVATE, NamedItems, adapter_of
 
 MAX_DESTINATIONS = 20
@@ -15,15 +17,16 @@ FILE_NAME = "destinations.json"
 WEBHOOKS_FILE_NAME = "webhooks.json"  # of services that knew no other destinations
 
 
-def open_destinations(folder: Path | None) -> NamedItems[Destination]:
+def open_destinations(folder: Path | None, recovery: Recovery | None = None) -> NamedItems[Destination]:
     """Load the file, which only the service's user may read: it holds the secrets.
 
-    Raises OSError or ValueError.
+    recovery: reports a file that is damaged. Raises OSError and NewerFileError.
     """
+    recovery = recovery or Recovery()
     path = None if folder is None else folder / FILE_NAME
     if path is not None and not path.exists():
-        _take_over(path.with_name(WEBHOOKS_FILE_NAME), path)
-    return NamedItems(adapter_of(Destination), path, MAX_DESTINATIONS, PRIVATE)
+        _take_over(path.with_name(WEBHOOKS_FILE_NAME), path, recovery)
+    return NamedItems(adapter_of(Destination), path, MAX_DESTINATIONS, PRIVATE, recovery)
 
 
 def addressees(destinations: NamedItems[Destination], draft: Draft) -> Sequence[str]:
@@ -31,11 +34,12 @@ def addressees(destinations: NamedItems[Destination], draft: Draft) -> Sequence[
     return [destination.id for destination in destinations.all.values() if _wants(destination, draft)]
 
 
-def _take_over(webhooks: Path, path: Path) -> None:
+def _take_over(webhooks: Path, path: Path, recovery: Recovery) -> None:
     """Make destinations of the webhooks in an older file, if there is one."""
-    if webhooks.exists():
-        found = {name: {**webhook, "type": "webhook"} for name, webhook in orjson.loads(webhooks.read_bytes()).items()}
-        write_atomically(path, [orjson.dumps(found)], PRIVATE)
+    found = recovery.read_alone(webhooks, adapter_of(dict[str, Any]).validate_json, "there are no destinations")
+    if found:
+        destinations = {name: {**webhook, "type": "webhook"} for name, webhook in found.items()}
+        write_atomically(path, [orjson.dumps(destinations)], PRIVATE)
 
 
 def _wants(destination: Destination, draft: Draft) -> bool:

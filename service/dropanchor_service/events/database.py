@@ -4,9 +4,7 @@ One connection serves all threads, under a lock: every statement takes well unde
 storm of events.
 """
 
-import logging
 import sqlite3
-import time
 import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -14,11 +12,14 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from dropanchor_service.history.sqlite.damaged_file import is_damage, move_aside
+from dropanchor_service.history.sqlite.damaged_file import damage_in, is_damage
+from dropanchor_service.runtime.recovery import Recovery
 
 FILE_NAME = "events.sqlite"
 VERSION = 3
 BUSY_S = 5.0
+CHECK_S = 1.0  # at a start: a large file is checked in part
+INSTEAD = "new events start, and what waited for its destinations is lost"
 
 _STAYS = """
 CREATE TABLE stays (tag TEXT NOT NULL, zone TEXT NOT NULL, entered_ns INTEGER NOT NULL, left_ns INTEGER NOT NULL);
@@ -51,8 +52,6 @@ CREATE TABLE deliveries (
 PRAGMA user_version = {VERSION};
 """
 
-_log = logging.getLogger(__name__)
-
 
 class EventFileError(sqlite3.Error):
     """The file has another schema version or is another kind of database."""
@@ -64,13 +63,27 @@ class Database:
     It is made when it is first used: many sites have no events, and an open file takes memory and three descriptors.
     """
 
-    def __init__(self, folder: Path | None) -> None:
-        """Open the file if there is one. A damaged one is moved aside. Raises sqlite3.Error or OSError."""
+    def __init__(self, folder: Path | None, recovery: Recovery | None = None) -> None:
+        """Open the file if there is one. A damaged one is set aside, and `recovery` reports it.
+
+        Raises EventFileError.
+        """
+        self._recovery = recovery or Recovery()
         self._lock = RLock()
         self._path = None if folder is None else folder / FILE_NAME
         self._open: sqlite3.Connection | None = None
-        if self._path is not None and self._path.exists():
-            self._connection()
+        if self._path is not None:
+            self._open_checked(self._path)
+
+    def _open_checked(self, path: Path) -> None:
+        """Open the file if there is one. Where it cannot be, the first event tries again."""
+        if (why := damage_in(path, CHECK_S)) is not None:
+            self._recovery.set_aside(path, why, INSTEAD)
+        if path.exists():
+            try:
+                self._connection()
+            except sqlite3.OperationalError as error:
+                self._recovery.note(f"{path.name} cannot be opened ({error}): start the service again when it can be")
 
     @property
     def is_made(self) -> bool:
@@ -121,8 +134,7 @@ class Database:
             except sqlite3.DatabaseError as error:
                 if self._path is None or not is_damage(error):
                     raise
-                name = move_aside(self._path, time.strftime("%Y%m%dT%H%M%SZ", time.gmtime()))
-                _log.error("%s is damaged (%s): it was renamed to %s and new events start", self._path, error, name)
+                self._recovery.set_aside(self._path, f"is damaged ({error})", INSTEAD)
                 self._open = self._opened()
             weakref.finalize(self, self._open.close).atexit = False  # a thread may still be in a statement then
         return self._open

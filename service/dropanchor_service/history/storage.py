@@ -42,7 +42,7 @@ class Storage(Protocol):
 
     @property
     def damaged(self) -> Sequence[str]:
-        """Names of damaged files that were moved aside."""
+        """Names of damaged files that were set aside."""
 
     def write(self, poses: Array, tags: Sequence[str], anchors: Sequence[str | None]) -> None:
         """Store poses, delete what is too old, and write some summaries.

@@ -86,16 +86,13 @@ class Tracks:
 
     @property
     def damaged(self) -> Sequence[str]:
-        """Names of damaged files that were moved aside."""
+        """Names of damaged files that were set aside."""
         return self._storage.damaged
 
     @property
     def problems(self) -> Sequence[str]:
-        """Problems for the operator: the history cannot be written, or a file was damaged."""
-        damaged = [
-            f"the history was damaged and a new one was started; the old file is {name}" for name in self.damaged
-        ]
-        return damaged if self.writer.problem is None else [self.writer.problem, *damaged]
+        """Return why the history cannot be written."""
+        return [] if self.writer.problem is None else [self.writer.problem]
 
     def _write(self, batches: Sequence[Array]) -> None:
         poses = np.concatenate([np.empty(0, POSE), *batches])

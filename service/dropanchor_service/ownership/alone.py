@@ -11,6 +11,7 @@ from starlette.types import ASGIApp
 from dropanchor_service.checkpoints.files import CheckpointFolder
 from dropanchor_service.checkpoints.format import Checkpoints
 from dropanchor_service.checkpoints.snapshot import ServiceState
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.store.shared import Shared
 
@@ -47,11 +48,11 @@ class Ownership:
         """What a standby shows of its metrics."""
         return None
 
-    def checkpoints(self, state: ServiceState) -> Checkpoints | None:
-        """Return the place for checkpoints, None if there is none."""
+    def checkpoints(self, state: ServiceState, recovery: Recovery) -> Checkpoints | None:
+        """Return the place for checkpoints, None if there is none. recovery: reports those that are damaged."""
         if self._folder is None:
             return None
-        return CheckpointFolder(self._folder / "checkpoints", state.layout, state.decoded)
+        return CheckpointFolder(self._folder / "checkpoints", state.layout, state.decoded, recovery)
 
     def stand_by(self, page: str, shared: Mapping[str, Shared], hears_others: Callable[[], bool]) -> None:
         """Return when this process serves the sites.

@@ -29,6 +29,7 @@ from dropanchor_service.metrics.cluster import ClusterGauges
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.ownership.address import address_of
 from dropanchor_service.ownership.alone import Ownership, ZenohParts
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security.node_secret import node_secret_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
@@ -84,7 +85,11 @@ class ClusterOwnership(Ownership):
     def gauges(self) -> ClusterGauges:
         return ClusterGauges(self._bucket, self._state)
 
-    def checkpoints(self, state: ServiceState) -> CheckpointRow | CheckpointObjects:
+    def checkpoints(
+        self,
+        state: ServiceState,
+        recovery: Recovery,  # noqa: ARG002 - the database and the store keep no damaged ones
+    ) -> CheckpointRow | CheckpointObjects:
         if self._objects is None:
             self._kept = CheckpointRow(self._connect, self._bucket, state.layout, state.decoded)
         else:

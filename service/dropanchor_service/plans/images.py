@@ -3,14 +3,18 @@
 import hashlib
 import re
 from collections.abc import Collection
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from dropanchor_schemas.plans import ImageType, PlanImage
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.runtime.open_below import open_below
+from dropanchor_service.runtime.recovery import Recovery
 
 _ENDINGS: dict[ImageType, str] = {"image/png": ".png", "image/jpeg": ".jpg", "image/svg+xml": ".svg"}
 _DIGEST_CHARACTERS = 32
+INSTEAD = "upload the image of the floor plan again"
 _NAME = re.compile(r"[0-9a-f]{32}\.(png|jpg|svg)(\.part)?")
 
 
@@ -23,7 +27,7 @@ class ImageFolder:
 
     def write(self, content: bytes, media_type: ImageType, width_px: int, height_px: int) -> PlanImage:
         """Store an image and describe it. Raises OSError."""
-        digest = hashlib.sha256(content).hexdigest()[:_DIGEST_CHARACTERS]
+        digest = _digest(content)
         image = PlanImage(id=digest, media_type=media_type, width_px=width_px, height_px=height_px)
         if self._folder is None:
             self._in_memory[digest] = content
@@ -47,14 +51,27 @@ class ImageFolder:
         if self._folder is not None:
             self._path(self._folder, image).unlink(missing_ok=True)
 
-    def keep_only(self, images: Collection[PlanImage]) -> None:
-        """Delete all other images, and what a killed writer has left. Raises OSError."""
-        if self._folder is None or not self._folder.is_dir():
+    def keep_only(self, images: Collection[PlanImage], recovery: Recovery) -> None:
+        """Delete all other images, and what a killed writer has left. Set damaged ones aside."""
+        if self._folder is None:
             return
-        kept = {self._path(self._folder, image) for image in images}
-        for path in self._folder.iterdir():
+        kept = {self._path(self._folder, image): image.id for image in images}
+        for path in self._folder.glob("*"):
             if path not in kept and _NAME.fullmatch(path.name):
-                path.unlink()
+                with suppress(OSError):  # a disk that is read-only: the next start tries again
+                    path.unlink()
+        for path, digest in kept.items():
+            recovery.read_alone(path, partial(_require, digest), INSTEAD)
 
     def _path(self, folder: Path, image: PlanImage) -> Path:
         return folder / f"{image.id}{_ENDINGS[image.media_type]}"
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:_DIGEST_CHARACTERS]
+
+
+def _require(digest: str, content: bytes) -> None:
+    """Raise ValueError unless this is the digest of the content."""
+    if _digest(content) != digest:
+        raise ValueError

@@ -7,6 +7,7 @@ from threading import Lock
 from dropanchor_schemas.plans import Plan, PlanImage
 from dropanchor_service.plans.images import ImageFolder
 from dropanchor_service.plans.reading.messages import ReadPlan
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.store.items import NamedItems, adapter_of
 from dropanchor_service.store.preconditions import Precondition, always
 
@@ -22,16 +23,18 @@ class ImageMissingError(Exception):
 class PlanStore(NamedItems[Plan]):
     """Any thread may use it. A plan is valid once `plans.json` is written; its image is on the disk before."""
 
-    def __init__(self, folder: Path | None) -> None:
-        """Load what is in the data folder. None: keep everything in memory.
+    def __init__(self, folder: Path | None, recovery: Recovery | None = None) -> None:
+        """Load what is in the data folder. None: keep everything in memory. recovery: reports what is damaged.
 
-        Raises OSError or pydantic's ValidationError when a file cannot be read.
+        Raises NewerFileError.
         """
-        super().__init__(adapter_of(Plan), None if folder is None else folder / "plans.json", MAX_PLANS)
+        recovery = recovery or Recovery()
+        path = None if folder is None else folder / "plans.json"
+        super().__init__(adapter_of(Plan), path, MAX_PLANS, recovery=recovery)
         self._images_lock = Lock()
         self._folder = ImageFolder(None if folder is None else folder / "plans")
         self._images: dict[str, PlanImage] = {plan.image.id: plan.image for plan in self.all.values()}
-        self._folder.keep_only(self._images.values())
+        self._folder.keep_only(self._images.values(), recovery)
 
     def image(self, image: str) -> PlanImage | None:
         """Return the image with this id; None if it was not uploaded or is no longer kept."""

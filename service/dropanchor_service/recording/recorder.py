@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import BinaryIO
 
 import numpy as np
@@ -17,6 +18,7 @@ from dropanchor_service.runtime.background_writer import BackgroundWriter
 from dropanchor_service.store.decimation import Decimation
 from dropanchor_service.store.site import SiteStore
 from dropanchor_service.store.tags import TagTable
+from dropanchor_tag_client.folder_lock import FolderLock
 
 FOLDER = "recordings"
 WRITE_S = 1.0  # so much of a recording a kill can lose
@@ -61,6 +63,8 @@ class Recorder:
         self._running: RunningRecording | None = None
         self._site_version = 0
         self._session = ""
+        self._preparing = Lock()
+        self._owned: FolderLock | None = None
         self._decimation = Decimation(pose_period_ns)
         self._output = Output(self._new_file, self._prune, limits, tags, site)
         self.writer: BackgroundWriter[Item] = BackgroundWriter(
@@ -74,6 +78,8 @@ class Recorder:
         self.stop()
         if self.writer.is_alive:
             self.writer.stop()
+        if self._owned is not None:
+            self._owned.close()
 
     @property
     def running(self) -> RunningRecording | None:
@@ -99,8 +105,11 @@ class Recorder:
         return files.opened(self.folder, name)
 
     def prepare(self) -> None:
-        """Create the folder now rather than with the first file. Raises OSError."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        """Create and lock the folder now rather than with the first file. Raises OSError."""
+        with self._preparing:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if self._owned is None:
+                self._owned = FolderLock(self.folder)
 
     def start(self, tags: Sequence[str] | None = None) -> bool:
         """Start recording these tags, or all. Return False when a recording is already running."""
@@ -149,12 +158,13 @@ class Recorder:
             self.writer.put(Poses(self._now_ns(), kept), kept.nbytes, len(kept))
 
     def _new_file(self, t_ns: int) -> McapFile:
-        self.folder.mkdir(parents=True, exist_ok=True)
+        self.prepare()
         name = files.new_name(file_name_of(self._site.site.id), t_ns)
         return McapFile(self.folder / name, {**self._metadata, SESSION: self._session})
 
     def _prune(self, open_name: str | None) -> None:
-        files.prune(self.folder, self._limits, open_name)
+        if self._owned is not None:
+            files.prune(self.folder, self._limits, open_name)
 
     def _queue_site_change(self, now_ns: int) -> None:
         version = self._site.version

@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-_UP_TO_UMASK = 0o666
+UP_TO_UMASK = 0o666
 
 
-def write_atomically(path: Path, parts: Iterable[bytes | memoryview], mode: int = _UP_TO_UMASK) -> None:
+def write_atomically(path: Path, parts: Iterable[bytes | memoryview], mode: int = UP_TO_UMASK) -> None:
     """Replace the file, so that readers find the old or the new content, never a mixture.
 
     mode: the permissions, less the umask; the file never has wider ones. Raises OSError, and then the old file is

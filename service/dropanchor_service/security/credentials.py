@@ -4,6 +4,7 @@ import logging
 from contextlib import suppress
 from datetime import datetime, timedelta
 
+from dropanchor_service.runtime.recovery import NewerFileError, Recovery
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.api_keys import ApiKeyError, ApiKeys
@@ -11,7 +12,7 @@ from dropanchor_service.security.authority import expiry
 from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import Authenticator, IdentityProvider
-from dropanchor_service.security.share_links import ShareLinkError, ShareLinks
+from dropanchor_service.security.share_links import ShareLinks
 from dropanchor_service.settings.model import HttpSettings, Settings
 from dropanchor_service.settings.sources import SettingsError
 
@@ -67,10 +68,12 @@ def certificate_of(settings: HttpSettings, credentials: SecurityFolder | None) -
     return None if credentials is None else Certificate(credentials.certificate(SERVICE), credentials.key(SERVICE))
 
 
-def authenticator_of(settings: Settings, only_site: str | None = None) -> Authenticator | None:
+def authenticator_of(
+    settings: Settings, only_site: str | None = None, recovery: Recovery | None = None
+) -> Authenticator | None:
     """Return what authenticates REST requests; None when anonymous access is allowed. Raises SettingsError.
 
-    only_site: its id; None: there are several.
+    only_site: its id; None: there are several. recovery: reports damaged files of share links.
     """
     providers = _providers_of(settings)
     folder = settings.data_dir or settings.security.folder
@@ -79,9 +82,10 @@ def authenticator_of(settings: Settings, only_site: str | None = None) -> Authen
     if folder is None:
         return Authenticator(providers)
     try:
-        return Authenticator({share_links.SOURCE: ShareLinks(folder, only_site=only_site), **providers})
-    except (OSError, ShareLinkError) as error:
+        links = ShareLinks(folder, only_site=only_site, recovery=recovery)
+    except NewerFileError as error:
         raise SettingsError(f"share links: {error}") from error
+    return Authenticator({share_links.SOURCE: links, **providers})
 
 
 def keys_and_tokens_of(settings: Settings) -> Authenticator | None:

@@ -1,16 +1,18 @@
 """Permissions of credential files, and a lock that lets only one process change them at a time."""
 
-import fcntl
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from dropanchor_tag_client.folder_lock import FolderLock
+
 PRIVATE, PUBLIC = 0o600, 0o644
+LOCK = ".lock"
+WAIT_S = 10.0  # a change takes milliseconds
 
 
 @contextmanager
 def exclusive_lock(folder: Path) -> Iterator[None]:
-    """Hold the lock of this folder; wait while another process has it."""
-    with (folder / ".lock").open("ab") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+    """Hold the lock of this folder; wait while another process has it. Raises FolderInUseError and OSError."""
+    with FolderLock(folder, LOCK, wait_s=WAIT_S):
         yield

@@ -14,7 +14,7 @@ from dropanchor_schemas.keys import chunk_from_id
 from dropanchor_service.runtime.atomic_file import write_atomically
 from dropanchor_service.security.access_control import READER, ROLES, ROUTER, SERVICE, reader_of
 from dropanchor_service.security.authority import Authority, Issued, expiry
-from dropanchor_service.security.files import PRIVATE, PUBLIC, exclusive_lock
+from dropanchor_service.security.files import LOCK, PRIVATE, PUBLIC, exclusive_lock
 from dropanchor_service.security.issued import IssuedTag, Table
 from dropanchor_service.security.router import router_configuration
 from dropanchor_service.security.router_file import RouterFileError, endpoints_in
@@ -55,18 +55,30 @@ class SecurityFolder:
 
         days: the lifetime of the certificates. Raises SecurityError when the folder is not empty or not writable.
         """
-        if path.exists() and any(path.iterdir()):
-            raise SecurityError(f"{path} is not empty, and existing files are never overwritten; choose another folder")
+        folder = cls(path, table)
         try:
             path.mkdir(parents=True, exist_ok=True, mode=0o700)
-            authority = Authority.make("Dropanchor site authority")
-            folder = cls(path, table)
-            folder._write_pair("ca", authority.issued)
-            folder._issue_roles(authority, days)
-            folder._save(table)
+            folder._refuse_full()
+            with exclusive_lock(path):
+                folder._refuse_full()
+                folder._fill(days)
         except OSError as error:
             raise SecurityError(f"{path} cannot be written: {error.strerror}") from error
         return folder
+
+    def _refuse_full(self) -> None:
+        """Raise SecurityError when the folder is not empty."""
+        if any(found.name != LOCK for found in self.path.iterdir()):
+            raise SecurityError(
+                f"{self.path} is not empty, and existing files are never overwritten; choose another folder"
+            )
+
+    def _fill(self, days: int) -> None:
+        """Create everything. Raises OSError."""
+        authority = Authority.make("Dropanchor site authority")
+        self._write_pair("ca", authority.issued)
+        self._issue_roles(authority, days)
+        self._save(self.table)
 
     def renew(self, hosts: Sequence[str], days: int) -> None:
         """Issue new certificates to router, service and reader. Raises SecurityError.

@@ -3,15 +3,17 @@
 import json
 import secrets
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from dropanchor_schemas.shares import Share, ShareRequest
 from dropanchor_service.runtime.atomic_file import write_atomically
-from dropanchor_service.security.files import PRIVATE
+from dropanchor_service.runtime.recovery import Recovery
+from dropanchor_service.security.files import PRIVATE, exclusive_lock
 from dropanchor_service.security.identity import Authenticator, Identity, Limit, Scope, UnauthenticatedError
 
 SOURCE = "share link"
@@ -25,10 +27,7 @@ NS = 1_000_000_000
 _ALGORITHM = "HS256"
 _AUDIENCE = "dropanchor-share"
 _TABLE = TypeAdapter(dict[str, Share])
-
-
-class ShareLinkError(ValueError):
-    """The links cannot be read; the message says why."""
+ENDED = "all share links have ended"
 
 
 class TooManyLinksError(Exception):
@@ -43,15 +42,24 @@ class ShareLinks:
 
     may_block = False
 
-    def __init__(self, folder: Path, clock: Callable[[], float] = time.time, only_site: str | None = None) -> None:
-        """Read the key and the list, or create the key. Raises ShareLinkError and OSError.
+    def __init__(
+        self,
+        folder: Path,
+        clock: Callable[[], float] = time.time,
+        only_site: str | None = None,
+        recovery: Recovery | None = None,
+    ) -> None:
+        """Read the key and the list, or create the key. What is damaged ends all links, and `recovery` reports it.
+
+        Raises NewerFileError.
 
         clock: Unix time. only_site: that of links which do not say of which they are, as earlier versions made them.
         """
+        self._recovery = recovery or Recovery()
         self._clock = clock
         self._only_site = only_site
         self._file = folder / TABLE_FILE
-        self._key = _key_in(folder / KEY_FILE)
+        self._key = self._key_in(folder / KEY_FILE)
         self._lock = Lock()
         self._links = self._read()
 
@@ -71,7 +79,7 @@ class ShareLinks:
             group=request.group,
             site=site,
         )
-        with self._lock:
+        with self._changing():
             listed = {key: old for key, old in self._links.items() if old.expires_ns / NS > now_s - LISTED_S}
             if sum(other.site == site for other in listed.values()) >= MAX_LINKS:
                 raise TooManyLinksError
@@ -83,7 +91,7 @@ class ShareLinks:
 
     def revoke(self, site: str, identifier: str) -> bool:
         """Remove a link of a site, which ends its streams. Return whether there was one. Raises OSError."""
-        with self._lock:
+        with self._changing():
             if identifier not in self._links or self._links[identifier].site != site:
                 return False
             self._write({key: link for key, link in self._links.items() if key != identifier})
@@ -119,14 +127,33 @@ class ShareLinks:
     def is_still_valid(self, identity: Identity) -> bool:
         return identity.name in self._links and self._clock() < (identity.expires_s or 0.0)
 
+    @contextmanager
+    def _changing(self) -> Iterator[None]:
+        """Lock the folder and read the list again, so that no change of another thread or process is lost.
+
+        Raises OSError.
+        """
+        self._file.parent.mkdir(parents=True, exist_ok=True)
+        with self._lock, exclusive_lock(self._file.parent):
+            self._links = self._read()
+            yield
+
     def _read(self) -> Mapping[str, Share]:
+        """Return the list. There is no copy of it: that could have a link which was revoked since."""
+        found = self._recovery.read_alone(self._file, _TABLE.validate_json, ENDED) or {}
+        return {name: self._with_site(link) for name, link in found.items()}
+
+    def _key_in(self, path: Path) -> bytes:
+        """Return the key in a file, which is created if it is missing."""
+        found = self._recovery.read_alone(path, _checked_key, ENDED)
+        if found is not None:
+            return found
+        key = secrets.token_bytes(KEY_BYTES)
         try:
-            found = _TABLE.validate_json(self._file.read_bytes())
-            return {name: self._with_site(link) for name, link in found.items()}
-        except FileNotFoundError:
-            return {}
-        except ValidationError as error:
-            raise ShareLinkError(f"{self._file} is damaged: delete it, which ends all share links") from error
+            write_atomically(path, [key], PRIVATE)
+        except OSError as error:
+            self._recovery.note(f"{path.name} cannot be written ({error.strerror}): share links end with this process")
+        return key
 
     def _with_site(self, link: Share) -> Share:
         return link if link.site is not None else link.model_copy(update={"site": self._only_site})
@@ -143,13 +170,7 @@ def share_links_of(authenticator: Authenticator | None) -> ShareLinks | None:
     return links if isinstance(links, ShareLinks) else None
 
 
-def _key_in(path: Path) -> bytes:
-    """Return the key in a file, which is created if it is missing."""
-    try:
-        key = path.read_bytes()
-    except FileNotFoundError:
-        key = secrets.token_bytes(KEY_BYTES)
-        write_atomically(path, [key], PRIVATE)
-    if len(key) != KEY_BYTES:
-        raise ShareLinkError(f"{path} is damaged: delete it, which ends all share links")
-    return key
+def _checked_key(content: bytes) -> bytes:
+    if len(content) != KEY_BYTES:
+        raise ValueError
+    return content

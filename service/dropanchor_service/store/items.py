@@ -7,13 +7,13 @@ from typing import Any, Generic, TypeVar
 
 from pydantic import BaseModel, TypeAdapter
 
-from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.atomic_file import UP_TO_UMASK
+from dropanchor_service.runtime.recovery import Recovery, write_with_copy
 from dropanchor_service.store.preconditions import Precondition, always, require
 from dropanchor_service.store.shared import Save
 
 Item = TypeVar("Item", bound=BaseModel)
 
-_UP_TO_UMASK = 0o666
 PRIVATE = 0o600
 
 
@@ -25,22 +25,27 @@ class NamedItems(Generic[Item]):
     """Items by id. Any thread may use it. `version` grows with every change."""
 
     def __init__(
-        self, adapter: TypeAdapter[dict[str, Item]], path: Path | None, limit: int, mode: int = _UP_TO_UMASK
+        self,
+        adapter: TypeAdapter[dict[str, Item]],
+        path: Path | None,
+        limit: int,
+        mode: int = UP_TO_UMASK,
+        recovery: Recovery | None = None,
     ) -> None:
         """Load the file if it exists.
 
-        path: where changes are saved; None: nowhere. limit: most items. mode: the permissions of the file.
-        Raises OSError or pydantic's ValidationError when the file cannot be read.
+        path: where changes are saved; None: nowhere. limit: most items. mode: the permissions of the file. recovery:
+        reports a file that is damaged. Raises NewerFileError.
         """
         self._adapter = adapter
         self._save: Save | None = None
         if path is not None:
-            self._save = lambda content: write_atomically(path, [content], mode)
+            self._save = lambda content: write_with_copy(path, content, mode)
         self._limit = limit
         self._lock = Lock()
         self._items: dict[str, Item] = {}
-        if path is not None and path.exists():
-            self._items = adapter.validate_json(path.read_bytes())
+        if path is not None:
+            self._items = (recovery or Recovery()).read(path, adapter.validate_json, mode) or {}
         self._told: list[Callable[[], None]] = []
         self.version = 1
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from dropanchor_schemas.site import Anchor, RemoteSettings, Site, TagSettings
 from dropanchor_schemas.wire import anchor_number
-from dropanchor_service.runtime.atomic_file import write_atomically
+from dropanchor_service.runtime.recovery import Recovery, write_with_copy
 from dropanchor_service.store.groups import Groups, groups_of
 from dropanchor_service.store.preconditions import Precondition, always, require
 from dropanchor_service.store.shared import Save
@@ -46,12 +46,13 @@ class SiteStore:
         tags: dict[str, TagSettings],
         folder: Path | None = None,
         tag_defaults: TagSettings | None = None,
+        recovery: Recovery | None = None,
     ) -> None:
         """Load the file in `folder` if there is one, else use `site` and `tags`.
 
         folder: where changes are saved; with None they are lost at a restart. tag_defaults: what a tag gets where its
-        own settings say nothing.
-        Raises OSError or pydantic's ValidationError when the file cannot be read.
+        own settings say nothing. recovery: reports a file that is damaged.
+        Raises NewerFileError.
         """
         self._lock = Lock()
         self.default_settings = tag_defaults or TagSettings()
@@ -59,17 +60,18 @@ class SiteStore:
         self._save_bytes: Save | None = None
         self._has_file = False
         if folder is not None:
-            self._open_file(folder / FILE_NAME)
+            self._open_file(folder / FILE_NAME, recovery or Recovery())
         self._anchors: dict[int, tuple[int, Anchor]] = {}  # number → (index for the engine, anchor)
         self._index_anchors()
         self._groups = groups_of(self._document.tags, self.default_settings)
         self._told: list[Callable[[], None]] = []
         self.version = 1
 
-    def _open_file(self, path: Path) -> None:
-        self._save_bytes = lambda content: write_atomically(path, [content])
-        if path.exists():
-            self._document = SiteDocument.model_validate_json(path.read_bytes())
+    def _open_file(self, path: Path, recovery: Recovery) -> None:
+        self._save_bytes = lambda content: write_with_copy(path, content)
+        found = recovery.read(path, SiteDocument.model_validate_json)
+        if found is not None:
+            self._document = found
             self._has_file = True
 
     def share(self, saved: bytes | None, save: Save) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Self
 
 from dropanchor_schemas.zones import EventRule, Zone
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.store.items import NamedItems, adapter_of
 
 MAX_ZONES = 256
@@ -18,15 +19,15 @@ class ZoneItems:
     rules: NamedItems[EventRule]
 
     @classmethod
-    def opened(cls, folder: Path | None) -> Self:
-        """Load the files in the folder. Raises OSError or pydantic's ValidationError."""
+    def opened(cls, folder: Path | None, recovery: Recovery | None = None) -> Self:
+        """Load the files in the folder. recovery: reports those that are damaged. Raises NewerFileError."""
 
         def path(name: str) -> Path | None:
             return None if folder is None else folder / name
 
         return cls(
-            NamedItems(adapter_of(Zone), path("zones.json"), MAX_ZONES),
-            NamedItems(adapter_of(EventRule), path("event_rules.json"), MAX_RULES),
+            NamedItems(adapter_of(Zone), path("zones.json"), MAX_ZONES, recovery=recovery),
+            NamedItems(adapter_of(EventRule), path("event_rules.json"), MAX_RULES, recovery=recovery),
         )
 
     @property

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -15,12 +16,18 @@ from dropanchor_service.answers import hints, unused
 from dropanchor_service.answers.care import care_of
 from dropanchor_service.answers.columns import REASONS
 from dropanchor_service.api.app import DASHBOARD
+from dropanchor_service.checkpoints import files as of_checkpoints
 from dropanchor_service.checkpoints.layouts import VERSION
 from dropanchor_service.cluster import sentences as of_cluster
 from dropanchor_service.cluster.watch import Lease, obstacle
 from dropanchor_service.engines.warm_up import CompilationProgress
+from dropanchor_service.events import database as of_events
+from dropanchor_service.history.sqlite import store as of_history
 from dropanchor_service.node import sentences as of_node
 from dropanchor_service.node.owners import Owner
+from dropanchor_service.plans import images as of_images
+from dropanchor_service.runtime.recovery import BEGINS_EMPTY, COPY_USED, Recovery
+from dropanchor_service.security import share_links as of_links
 from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 from dropanchor_service.store.tags import KINDS
@@ -107,6 +114,20 @@ def sentences_of_a_node() -> Iterator[str]:
         yield say(owner)
 
 
+def damage(folder: Path) -> Iterator[str]:
+    recovery = Recovery(folder)
+    for instead in (
+        *(BEGINS_EMPTY, COPY_USED, of_history.INSTEAD, of_events.INSTEAD, of_checkpoints.INSTEAD),
+        *(of_images.INSTEAD, of_links.ENDED),
+    ):
+        for why in ("is damaged", "is damaged (file is not a database)", "is empty", "cannot be read (Is a directory)"):
+            path = folder / f"{len(list(folder.iterdir()))}.json"
+            path.touch()
+            recovery.set_aside(path, why, instead)
+    yield from recovery.problems()
+    yield from Recovery(folder).problems()
+
+
 def progress() -> Iterator[str]:
     compilation = CompilationProgress()
     yield compilation.sentence
@@ -131,8 +152,8 @@ def in_german(**texts: list[str]) -> list[str]:
     return translations
 
 
-def test_every_sentence_and_every_code_has_a_german_translation() -> None:
-    of_processes = {*sentences_of_a_cluster(), *sentences_of_a_node(), *progress()}
+def test_every_sentence_and_every_code_has_a_german_translation(tmp_path: Path) -> None:
+    of_processes = {*sentences_of_a_cluster(), *sentences_of_a_node(), *progress(), *damage(tmp_path)}
     sentences = sorted({*hints_of_poses(), *hints_of_care(), *refused_shapes(), *of_processes})
     codes = [*REASONS, *Reason, *KINDS]
     same = {"imu"}

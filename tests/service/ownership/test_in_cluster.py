@@ -20,6 +20,7 @@ from dropanchor_service.cluster.standby import Standby
 from dropanchor_service.metrics.registry import Metrics
 from dropanchor_service.ownership.choose import ownership_of
 from dropanchor_service.ownership.in_cluster import digest_of_sites
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError, load_settings
 from dropanchor_service.store import Sites, SiteStore
@@ -129,7 +130,7 @@ def test_a_new_owner_publishes_nothing_while_its_predecessor_does(moves: bool, t
             assert claim is not None
         settings = in_cluster(cluster={"url": database.url(), "bucket": "yard"}, zenoh={"connect": ["tcp/r:7447"]})
         owner = ownership_of(settings, make_sites(), Metrics(), lambda: None, Claimed(claim, boot_s()))
-        owner.checkpoints(Drive(tmp_path).state)
+        owner.checkpoints(Drive(tmp_path).state, Recovery())
         owner.stand_by("http://127.0.0.1:8080", {}, lambda: True)
         before = owner.may_serve(), owner.may_publish()
         while_processing: list[bool] = []

@@ -22,6 +22,7 @@ from dropanchor_service.recording.reading import RecordingReader, Turn
 from dropanchor_service.recording.recorder import Recorder
 from dropanchor_service.recording.schemas import all_schemas
 from dropanchor_service.store import SiteStore, TagTable
+from dropanchor_tag_client.folder_lock import FolderInUseError
 from dropanchor_tag_client.recording import RecordingError
 
 S = 1_000_000_000
@@ -281,6 +282,7 @@ def test_a_write_that_fails_halfway_is_undone_and_repeated(
         write(fd, data[: len(data) // 2])
         raise OSError(5, "Input/output error")
 
+    bench.recorder.prepare()
     bench.recorder.start()
     with monkeypatch.context() as patched:
         patched.setattr(os, "write", failing)
@@ -303,3 +305,13 @@ def test_a_file_that_is_not_a_recording_is_refused(tmp_path: Path) -> None:
         (tmp_path / "x.mcap").write_bytes(content)
         with pytest.raises(RecordingError, match="not a recording"):
             list(RecordingReader(tmp_path / "x.mcap").turns())
+
+
+def test_a_second_recorder_with_the_folder_waits_and_says_who_has_it(tmp_path: Path) -> None:
+    first, second = RecorderBench(tmp_path), RecorderBench(tmp_path)
+    first.recorder.prepare()
+    with pytest.raises(FolderInUseError, match=rf"recordings is in use by process {os.getpid()} on "):
+        second.recorder.prepare()
+    with first.recorder:
+        pass
+    second.recorder.prepare()

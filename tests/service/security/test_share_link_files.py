@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-import pytest
-
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security.credentials import authenticator_of
-from dropanchor_service.security.share_links import KEY_FILE, share_links_of
+from dropanchor_service.security.share_links import KEY_BYTES, KEY_FILE, share_links_of
 from dropanchor_service.settings.model import SecuritySettings, Settings
-from dropanchor_service.settings.sources import SettingsError
 
 
 def settings_of(security: Path | None, data: Path | None) -> Settings:
@@ -28,7 +26,11 @@ def test_a_service_without_access_control_has_no_share_links_and_makes_no_key(tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_damaged_key_stops_the_start_with_a_sentence(tmp_path: Path) -> None:
+def test_a_damaged_key_ends_all_links_and_is_reported(tmp_path: Path) -> None:
     (tmp_path / KEY_FILE).write_bytes(b"short")
-    with pytest.raises(SettingsError, match=r"share links: .*delete it, which ends all share links"):
-        authenticator_of(settings_of(tmp_path, None))
+    recovery = Recovery()
+    links = share_links_of(authenticator_of(settings_of(tmp_path / "security", tmp_path), recovery=recovery))
+    assert links is not None
+    assert len((tmp_path / KEY_FILE).read_bytes()) == KEY_BYTES
+    (problem,) = recovery.problems()
+    assert problem.startswith(f"{KEY_FILE} is damaged; all share links have ended: look at ")

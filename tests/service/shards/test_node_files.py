@@ -1,5 +1,6 @@
 """What a node refuses before it starts Ray, and what it starts Ray with."""
 
+import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -7,7 +8,7 @@ import pytest
 
 from dropanchor_service.cli import main
 from dropanchor_service.commands import cluster_start
-from dropanchor_service.shards.node_lock import NodeLock
+from dropanchor_service.shards.node_lock import node_lock, running_node
 from dropanchor_service.shards.ray_node import RayNode, ray_settings
 from dropanchor_service.shards.token_file import TokenError, made_or_read
 from support.cluster import needs_ray
@@ -34,12 +35,14 @@ def test_the_head_makes_a_token_that_nobody_else_reads_and_others_need_it(tmp_pa
 
 
 def test_a_folder_is_of_one_node_and_knows_its_process(tmp_path: Path) -> None:
-    assert NodeLock.holder(tmp_path) is None
-    with NodeLock(tmp_path):
-        assert NodeLock.holder(tmp_path) is not None
-        with pytest.raises(ValueError, match="a node runs already with the folder"), NodeLock(tmp_path):
-            pass
-    assert NodeLock.holder(tmp_path) is None
+    assert running_node(tmp_path) is None
+    with node_lock(tmp_path):
+        owner = running_node(tmp_path)
+        assert owner is not None
+        assert owner.pid == os.getpid()
+        with pytest.raises(ValueError, match=f"a node runs already: {tmp_path} is in use by process {os.getpid()} on "):
+            node_lock(tmp_path)
+    assert running_node(tmp_path) is None
 
 
 def test_ray_gets_a_token_no_dashboard_and_no_statistics(tmp_path: Path) -> None:

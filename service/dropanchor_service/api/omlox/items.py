@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from dropanchor_service.api.omlox.models import Fence, LocationProvider, Trackable
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.store.items import NamedItems, adapter_of
 
 MAX_TRACKABLES = 10_000
@@ -22,15 +23,16 @@ class OmloxItems:
     fences: NamedItems[Fence]
 
     @classmethod
-    def opened(cls, folder: Path | None) -> Self:
-        """Load the files in the folder. Raises OSError or pydantic's ValidationError."""
+    def opened(cls, folder: Path | None, recovery: Recovery | None = None) -> Self:
+        """Load the files in the folder. recovery: reports those that are damaged. Raises NewerFileError."""
 
-        def path(name: str) -> Path | None:
-            return None if folder is None else folder / name
+        def items(model: Any, name: str, limit: int) -> NamedItems[Any]:
+            path = None if folder is None else folder / name
+            return NamedItems(adapter_of(model), path, limit, recovery=recovery)
 
         return cls(
-            NamedItems(adapter_of(Trackable), path("omlox_trackables.json"), MAX_TRACKABLES),
-            NamedItems(adapter_of(Trackable), path("omlox_tag_trackables.json"), MAX_PROVIDERS),
-            NamedItems(adapter_of(LocationProvider), path("omlox_providers.json"), MAX_PROVIDERS),
-            NamedItems(adapter_of(Fence), path("omlox_fences.json"), MAX_FENCES),
+            items(Trackable, "omlox_trackables.json", MAX_TRACKABLES),
+            items(Trackable, "omlox_tag_trackables.json", MAX_PROVIDERS),
+            items(LocationProvider, "omlox_providers.json", MAX_PROVIDERS),
+            items(Fence, "omlox_fences.json", MAX_FENCES),
         )

@@ -14,6 +14,7 @@ import { t } from "../i18n/language.js";
 import { translate } from "../i18n/document.js";
 import { listen } from "../map/gestures.js";
 import { installKeyboard } from "./keyboard.js";
+import { Impaired } from "../panel/impaired.js";
 import { Kiosk, kioskAddress } from "./kiosk.js";
 import { LiveMap } from "../map/map.js";
 import { Measure } from "../map/measure.js";
@@ -184,6 +185,7 @@ if (chosenSite !== null) import("./site_chooser.js").then(({ installSites }) => 
 setInterval(updatePanels, PANELS_MS);
 connection.start();
 roster.start();
+new Impaired(byId("impaired")).start();
 connection.addEventListener("snapshot", () => past.start(), { once: true });
 
 /** Read-only access for tests and for the console. */

@@ -1,31 +1,37 @@
-"""Move a damaged SQLite file aside, complete, so that somebody can repair it."""
+"""Find out whether a SQLite file is damaged."""
 
 import sqlite3
+import time
+from contextlib import closing
 from pathlib import Path
 
 _DAMAGE = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
-_MARK = "damaged-"
-_COMPANIONS = ("-wal", "-shm", "")  # the file itself last: a kill before that loses no part of it
+_STEPS = 10_000  # of SQLite between two looks at the clock, some ms
 
 
-def is_damage(error: sqlite3.DatabaseError) -> bool:
+def is_damage(error: sqlite3.Error) -> bool:
     """Return whether the content of the file is wrong, rather than the disk or the statement."""
     return getattr(error, "sqlite_errorcode", 0) & 0xFF in _DAMAGE
 
 
-def move_aside(path: Path, when: str) -> str:
-    """Rename the file and its companions, and return the new name, which contains `when`.
+def damage_in(path: Path, most_s: float) -> str | None:
+    """Return what is wrong with a file; None if there is none, or if nothing was found in this time."""
+    try:
+        with path.open("rb") as file:
+            if not file.read(1):
+                return "is empty"
+        return _damage_in_structure(path, time.monotonic() + most_s)
+    except FileNotFoundError:
+        return None
+    except sqlite3.Error as error:  # not checked to its end, or locked: whoever uses it will tell
+        return f"is damaged ({error})" if is_damage(error) else None
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
 
-    No connection may have the file open. Raises OSError.
-    """
-    to = path.with_name(f"{path.name}.{_MARK}{when}")
-    for suffix in _COMPANIONS:
-        companion = Path(f"{path}{suffix}")
-        if companion.exists():
-            companion.rename(f"{to}{suffix}")
-    return to.name
 
-
-def damaged_files(path: Path) -> list[Path]:
-    """Return the damaged files that were moved aside and still exist."""
-    return [found for found in path.parent.glob(f"{path.name}.{_MARK}*") if not found.name.endswith(("-wal", "-shm"))]
+def _damage_in_structure(path: Path, end_s: float) -> str | None:
+    """Raises sqlite3.Error."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.set_progress_handler(lambda: time.monotonic() > end_s, _STEPS)
+        found = connection.execute("PRAGMA quick_check(1)").fetchone()[0]
+    return None if found == "ok" else f"is damaged ({' '.join(found.split())})"

@@ -1,28 +1,31 @@
-"""Keep the tracks of a site in a SQLite file: pruned by age and size, and moved aside when it is damaged."""
+"""Keep the tracks of a site in a SQLite file: pruned by age and size, and set aside when it is damaged."""
 
-import logging
 import sqlite3
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from dropanchor_service.estimation.columns import Array
-from dropanchor_service.history.sqlite.damaged_file import damaged_files, is_damage, move_aside
+from dropanchor_service.history.sqlite.damaged_file import damage_in, is_damage
 from dropanchor_service.history.sqlite.track_file import FileReader, TrackWriter
 from dropanchor_service.history.storage import Retention, Usage
+from dropanchor_service.runtime.recovery import Recovery
 
 FILE_NAME = "history.sqlite"
 MAX_PRUNE_S = 0.5  # per write
 MAX_SUMMARISE_S = 0.2  # per write
-MAX_DAMAGED_FILES = 3  # that are moved aside: a disk that keeps damaging files must not fill up with them
-
-_log = logging.getLogger(__name__)
+CHECK_S = 1.0  # at a start: a large file is checked in part
+FULL_CHECK_S = 60.0  # once a reader has found damage
+INSTEAD = "a new history was started"
 
 
 class SqliteStorage:
     """The `Storage` in a file of a folder. `write` raises sqlite3.Error and OSError."""
 
-    def __init__(self, folder: Path, retention: Retention, now_ns: Callable[[], int]) -> None:
+    def __init__(
+        self, folder: Path, retention: Retention, now_ns: Callable[[], int], recovery: Recovery | None = None
+    ) -> None:
+        """Check the file that is there. recovery: reports it if it is damaged."""
         self._path = folder / FILE_NAME
         self._retention = retention
         self._now_ns = now_ns
@@ -30,18 +33,24 @@ class SqliteStorage:
         self.reader = FileReader(self._path)
         self.usage = Usage()
         self.damaged: list[str] = []
+        self._recovery = recovery or Recovery()
+        self._check(CHECK_S)
 
     def close(self) -> None:
         if self._file is not None:
             self._file.close()
+            self._file = None
 
     def write(self, poses: Array, tags: Sequence[str], anchors: Sequence[str | None]) -> None:
+        if self.reader.has_found_damage:
+            self.reader.has_found_damage = False
+            self.close()
+            self._check(FULL_CHECK_S)
         try:
             self._write(poses, tags, anchors)
         except sqlite3.DatabaseError as error:
-            if not is_damage(error) or len(damaged_files(self._path)) >= MAX_DAMAGED_FILES:
+            if not is_damage(error) or not self._set_aside(f"is damaged ({error})"):
                 raise
-            self._move_damaged_file_aside(error)
             self._write(poses, tags, anchors)
 
     def _write(self, poses: Array, tags: Sequence[str], anchors: Sequence[str | None]) -> None:
@@ -53,15 +62,20 @@ class SqliteStorage:
             self._prune(self._file)
             _summarise(self._file)
         except sqlite3.Error:
-            self._file.close()  # the next attempt opens the file again, which may be repaired by then
-            self._file = None
+            self.close()  # the next attempt opens the file again, which may be repaired by then
             raise
 
-    def _move_damaged_file_aside(self, error: sqlite3.Error) -> None:
-        when = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime(self._now_ns() * 1e-9))
-        name = move_aside(self._path, when)
-        self.damaged.append(name)
-        _log.error("%s is damaged (%s): it was renamed to %s and a new history was started", self._path, error, name)
+    def _check(self, most_s: float) -> None:
+        why = damage_in(self._path, most_s)
+        if why is not None:
+            self._set_aside(why)
+
+    def _set_aside(self, why: str) -> bool:
+        """Return whether the damaged file is out of the way."""
+        aside = self._recovery.set_aside(self._path, why, INSTEAD)
+        if aside is not None:
+            self.damaged.append(aside.name)
+        return aside is not None
 
     def _prune(self, file: TrackWriter) -> None:
         end_s = time.monotonic() + MAX_PRUNE_S

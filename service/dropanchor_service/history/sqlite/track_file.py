@@ -15,6 +15,7 @@ from dropanchor_service.estimation.columns import Array
 from dropanchor_service.history.errors import HistoryError
 from dropanchor_service.history.reader import TrackReader
 from dropanchor_service.history.records import SLOT_NS, records_of
+from dropanchor_service.history.sqlite.damaged_file import is_damage
 from dropanchor_service.history.sqlite.rows import SqliteRows
 from dropanchor_service.history.summary_table import SLOTS, SummaryTable
 
@@ -172,6 +173,7 @@ class FileReader(TrackReader):
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        self.has_found_damage = False
 
     @contextmanager
     def snapshot(self) -> Iterator[SqliteRows | None]:
@@ -185,6 +187,7 @@ class FileReader(TrackReader):
                 connection.execute("BEGIN")  # one state of the file for all statements
                 yield SqliteRows(connection)
         except sqlite3.Error as error:
+            self.has_found_damage |= is_damage(error)
             raise HistoryError(str(error)) from error
 
 

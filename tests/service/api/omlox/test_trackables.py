@@ -7,14 +7,10 @@ from uuid import uuid4
 import pytest
 
 from dropanchor_service.api.omlox.items import OmloxItems
-from dropanchor_service.persistence import Persistence
 from dropanchor_service.security.api_keys import SOURCE, ApiKeys
 from dropanchor_service.security.identity import Authenticator, Scope
-from dropanchor_service.settings.model import Settings
-from dropanchor_service.settings.sources import SettingsError
-from dropanchor_service.store import SiteStore, TagTable
 from support.api import ask, kind_of
-from support.omlox import YARD, OmloxBench
+from support.omlox import OmloxBench
 
 NIL = "00000000-0000-0000-0000-000000000000"
 
@@ -179,13 +175,6 @@ def test_a_body_without_content_type_is_read_as_json_but_not_from_another_page()
     assert created(origin="https://map.example") == 201
     assert created(origin="http://test") == 201
     assert len(bench.get("trackables")) == 3
-
-
-def test_a_damaged_file_ends_the_start_with_a_sentence(tmp_path: Path) -> None:
-    (tmp_path / "omlox_trackables.json").write_text("{")
-    site = SiteStore(YARD, {})
-    with pytest.raises(SettingsError, match="omlox"):
-        Persistence(Settings(data_dir=tmp_path), TagTable(), site, lambda: 0)
 
 
 def nested(levels: int) -> str:

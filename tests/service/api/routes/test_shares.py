@@ -10,12 +10,14 @@ import jwt
 import pytest
 from websockets.sync.client import connect
 
+from dropanchor_schemas.shares import ShareRequest
 from dropanchor_schemas.site import TagSettings
 from dropanchor_service.api.omlox.items import OmloxItems
+from dropanchor_service.runtime.recovery import Recovery
 from dropanchor_service.security import api_keys, share_links
 from dropanchor_service.security.api_keys import ApiKeys
-from dropanchor_service.security.identity import Authenticator, Scope
-from dropanchor_service.security.share_links import KEY_FILE, PREFIX, TABLE_FILE, ShareLinkError, ShareLinks
+from dropanchor_service.security.identity import Authenticator, Scope, UnauthenticatedError
+from dropanchor_service.security.share_links import KEY_FILE, PREFIX, TABLE_FILE, ShareLinks
 from support.api import ask, kind_of, make_api_bench
 from support.http_server import running_server
 
@@ -176,12 +178,24 @@ def test_links_survive_a_restart_and_damage_is_reported(shared: Shared, tmp_path
     secret = shared.create()["secret"]
     again = ShareLinks(tmp_path, lambda: shared.now_s)
     assert again.identify(secret).of_sites == {"default": Scope.READ}
-    (tmp_path / TABLE_FILE).write_text("{")
-    with pytest.raises(ShareLinkError, match="delete it"):
-        ShareLinks(tmp_path)
     (tmp_path / KEY_FILE).write_bytes(b"short")
-    with pytest.raises(ShareLinkError, match="delete it"):
-        ShareLinks(tmp_path)
+    recovery = Recovery(tmp_path)
+    other = ShareLinks(tmp_path, lambda: shared.now_s, recovery=recovery)
+    assert [link.site for link in other.of_site("default")] == ["default"]
+    with pytest.raises(UnauthenticatedError, match="another service made it"):  # the key is another one
+        other.identify(secret)
+    (tmp_path / TABLE_FILE).write_text("{")
+    assert ShareLinks(tmp_path, recovery=recovery).of_site("default") == []
+    assert [sentence.partition(":")[0] for sentence in recovery.problems()] == [
+        f"{name} is damaged; all share links have ended" for name in (KEY_FILE, TABLE_FILE)
+    ]
+
+
+def test_two_processes_with_one_list_lose_no_link(tmp_path: Path) -> None:
+    one, other = ShareLinks(tmp_path), ShareLinks(tmp_path)
+    one.add("yard", ShareRequest(name="a", valid_s=3600))
+    other.add("yard", ShareRequest(name="b", valid_s=3600))
+    assert {link.name for link in ShareLinks(tmp_path).of_site("yard")} == {"a", "b"}
 
 
 @pytest.mark.parametrize(

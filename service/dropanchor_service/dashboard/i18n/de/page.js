@@ -29,6 +29,7 @@ export default {
   "theme.light": "Zu hellen Farben wechseln",
   "lost.text": "Verbindung vor {age} unterbrochen. Diese Posen sind veraltet; die Seite versucht, sich neu zu verbinden.",
   "lost.retry": "Jetzt versuchen",
+  "impaired.text": "Der Dienst braucht Pflege: {what}",
   "starting.title": "Der Dienst ist noch nicht bereit",
   "starting.what": "Die Tags dürfen schon eingeschaltet sein. Die Karte erscheint von selbst.",
   "locked.title": "Dieser Dienst verlangt einen Schlüssel",

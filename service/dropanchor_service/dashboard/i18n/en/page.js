@@ -29,6 +29,7 @@ export default {
   "theme.light": "Switch to light colours",
   "lost.text": "Connection lost {age} ago. These poses are out of date; trying to reconnect.",
   "lost.retry": "Try now",
+  "impaired.text": "The service needs care: {what}",
   "starting.title": "The service is not ready yet",
   "starting.what": "The tags may be on already. The map appears by itself.",
   "locked.title": "This service requires a key",

@@ -1,0 +1,31 @@
+"""A folder has one process that writes it. The second one ends with a sentence that says who has it."""
+
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+from support.service import command, environment, running_service
+from support.zenoh_router import free_endpoint
+
+
+def second(folder: Path) -> subprocess.CompletedProcess[str]:
+    arguments = ("serve", "--port", "0", "--zenoh-listen", free_endpoint(), "--data-dir", str(folder))
+    return subprocess.run(
+        command(*arguments), capture_output=True, text=True, env=environment(), timeout=60, check=False
+    )
+
+
+def test_a_second_service_with_the_data_folder_ends_and_says_who_has_it(tmp_path: Path) -> None:
+    with running_service("--data-dir", str(tmp_path)) as service:
+        service.put("/api/v1/anchors/gate", {"id": "gate", "x": 1.5, "y": 2.0, "z": 0.0})
+        ended = second(tmp_path)
+        assert ended.returncode == 2
+        (line,) = ended.stderr.splitlines()
+        owner = f"process {service.process.pid} on {socket.gethostname()} since 20"
+        assert line.startswith(f"dropanchor serve: data_dir: {tmp_path} is in use by {owner}")
+        assert line.endswith("stop it, or give this process a folder of its own")
+        service.stop(signal.SIGKILL)
+    with running_service("--data-dir", str(tmp_path)) as service:  # the kernel has released the lock
+        assert [anchor["id"] for anchor in service.get("/api/v1/anchors")["anchors"]] == ["gate"]
+        assert service.stop() == 0
