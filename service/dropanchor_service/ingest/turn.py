@@ -99,7 +99,7 @@ class Ingest:
         messages = [*kept, *of_known, *self._admitted([*of_deleted, *unregistered])]
         if messages or self.has_pending:
             now_ns = self._clock.now_ns()
-            ordered = self._reader.put_in_order(messages, now_ns)
+            ordered = self._reader.put_in_order(messages, now_ns, self._buffer.behind)
             self._note(ordered.taken)
             self._fuse(ordered, now_ns)
         return len(fresh)
