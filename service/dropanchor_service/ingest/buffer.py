@@ -18,7 +18,7 @@ UnregisteredMessage = tuple[str, bytes, str, int]
 
 UNREGISTERED_BYTES = 8 * 2**20  # capacity for messages of tags without a row
 UNREGISTERED_PER_TURN = 250  # each costs many times as much as a message of a registered tag
-PER_TURN_OF_TAG = 32  # messages of a tag in a turn: each is a batch of its own, and all tags wait for the last batch
+PER_TURN_OF_TAG = 16  # messages of a tag in a turn: each is a batch of its own, and all tags wait for the last batch
 MAX_WAIT_NS = 500_000_000
 BURST_WAITS = 8  # times MAX_WAIT_NS: a backlog of single tags that still grows after this is shed
 _KEPT_SHARE = 0.75  # of the capacity, kept when the buffer is full, so that shedding is rare

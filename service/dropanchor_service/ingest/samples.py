@@ -24,7 +24,7 @@ from dropanchor_service.store.rings import rank_in_row
 from dropanchor_service.store.rows import MESSAGE
 
 REORDER_BYTES = 2**26
-PENDING_OF_TAG = 64  # messages; a tag with more gives up on what is missing, since all tags wait for its next batches
+PENDING_OF_TAG = 32  # messages; a tag with more gives up on what is missing, since all tags wait for its next batches
 _DTYPES = [column.dtype for column in SampleBatch().columns()]
 
 OnGap = Callable[[str, list[Message]], bool]

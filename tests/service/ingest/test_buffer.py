@@ -9,6 +9,7 @@ import numpy as np
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, HeadingSample, RangeSample, encode_packed
 from dropanchor_service.ingest.buffer import (
     MESSAGE_OVERHEAD,
+    PER_TURN_OF_TAG,
     UNREGISTERED_BYTES,
     UNREGISTERED_PER_TURN,
     Message,
@@ -141,6 +142,28 @@ def test_a_tag_that_floods_loses_only_its_own_messages() -> None:
     taken = overload(buffer, 5.0, keys, 300)
     assert set(buffer.take_shed().by_row) == {0}
     assert Counter(message[0] for message in taken)[50] >= 45
+
+
+def test_a_message_behind_the_burst_of_another_tag_is_taken_by_the_next_drain() -> None:
+    buffer = MessageBuffer(10**9)
+    admit(buffer, ["burst", "other"])
+    for number in range(20_000):
+        put(buffer, "burst", number)
+    put(buffer, "other", 20_000)
+    taken, _ = buffer.drain(2000)
+    assert Counter(message[0] for message in taken) == {0: PER_TURN_OF_TAG, 1: 1}
+    assert buffer.behind == {0}
+
+
+def test_a_burst_of_one_tag_is_worked_off_and_not_shed() -> None:
+    buffer = MessageBuffer(10**9)
+    admit(buffer, ["burst", "other"])
+    for number in range(20_000):
+        put(buffer, "burst", number)
+    taken = overload(buffer, 15.0, ["other"], 1)
+    assert not buffer.take_shed().by_row
+    assert [message[3] for message in taken if message[0] == 0 and message[3]] == list(range(1, 20_000))
+    assert buffer.depth == 0
 
 
 def test_an_old_backlog_is_no_overload_while_it_shrinks() -> None:
