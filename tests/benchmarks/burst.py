@@ -1,4 +1,4 @@
-"""Send a burst of frames of one tag over Zenoh, from a process of its own: `python -m benchmarks.burst ENDPOINT KEY FRAMES BOOTS`.
+"""Send a burst of frames of one tag over Zenoh: `python -m benchmarks.burst ENDPOINT KEY FRAMES BOOTS`.
 
 It waits for a line on its standard input before it sends. FRAMES: how many. BOOTS: `one` boot id, or a `new` one for
 each frame.
@@ -30,12 +30,12 @@ def payloads(count: int, boots: str, end_ns: int) -> list[bytes]:
 def main(endpoint: str, key: str, frames: int, boots: str) -> None:
     with connected_session(endpoint) as session:
         ready = payloads(frames, boots, time.time_ns())
-        print("ready", flush=True)  # noqa: T201
+        print("ready", flush=True)
         sys.stdin.readline()
         begun = time.monotonic()
         for payload in ready:
             session.put(key, payload, encoding=ENCODING_PACKED)
-        print(f"{time.monotonic() - begun:.2f}", flush=True)  # noqa: T201
+        print(f"{time.monotonic() - begun:.2f}", flush=True)
         sys.stdin.readline()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from dropanchor_schemas.kinds import KINDS, SCALARS, Kind
 from dropanchor_schemas.wire import MAX_T_NS, Reason
 from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
-from dropanchor_service.ingest.buffer import Message
+from dropanchor_service.ingest.backlog import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.kernels.values import time_spans

@@ -7,12 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, HeadingSample, RangeSample, encode_packed
+from dropanchor_service.ingest.backlog import MESSAGE_OVERHEAD, Message
 from dropanchor_service.ingest.buffer import (
-    MESSAGE_OVERHEAD,
     PER_TURN_OF_TAG,
     UNREGISTERED_BYTES,
     UNREGISTERED_PER_TURN,
-    Message,
     MessageBuffer,
 )
 

@@ -207,6 +207,9 @@ def release(
                 forced = end
         for k in range(begin, end):
             i = ordered[k]
+            if forms[i].boot_id != publisher.boot_id:
+                slots[i], verdicts[i] = -1, PASS  # newer publishers have taken the place of this one
+                continue
             verdicts[i] = _verdict(publisher, forms[i].sequence, arrivals[i])
             if verdicts[i] == PENDING and k < forced:
                 absent = _force(publisher, forms[i].sequence)
