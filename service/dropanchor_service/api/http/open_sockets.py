@@ -25,8 +25,6 @@ class OpenSockets:
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
-        self.closed = 0  # silent connections that were closed for new ones
-        self.refused = 0  # new connections that were closed, since none was silent
         self._open: dict[int, socket.socket] = {}
         self._silent: dict[int, socket.socket] = {}  # the one that has been silent for longest is the first
         self._ending: set[int] = set()
@@ -61,13 +59,11 @@ class OpenSockets:
         if len(self._open) - len(self._ending) < self.limit:
             return True
         if not self._silent:
-            self.refused += 1
             _log.warning("a connection is refused: all %d are busy", self.limit)
             return False
         number, opened = next(iter(self._silent.items()))
         self.note_busy(number)
         self._ending.add(number)
-        self.closed += 1
         _log.warning("there are %d connections, so the silent ones are closed for new ones", self.limit)
         with suppress(OSError):  # the client has closed it already
             opened.shutdown(socket.SHUT_RDWR)
