@@ -45,20 +45,20 @@ def clients(address: str, text: bytes = b"") -> Iterator[None]:
         yield
 
 
-def is_served(service: Running, session: zenoh.Session) -> None:
-    """Fail unless health checks are answered, checkpoints of a tag are written, and the log stays short."""
-    written = service.metric(WRITTEN)
-    lines = len(service.log)
+def check_beside(service: Running, session: zenoh.Session, address: str, text: bytes = b"") -> None:
+    """Check health checks, checkpoints and the length of the log while clients hold connections to the address."""
+    written, lines = service.metric(WRITTEN), len(service.log)
 
     def is_written() -> bool:
         frame = Frame(ranges=[RangeSample(time.time_ns(), 7, 5.0)])
         session.put(samples_key("default", "a"), encode_packed(frame), encoding=ENCODING_PACKED)
         return service.metric(WRITTEN) > written + 2
 
-    for _ in range(20):
-        assert httpx.get(f"{service.url}/api/v1/health/ready", timeout=10.0, trust_env=False).status_code == 200
-        time.sleep(0.05)
-    wait_until(is_written)
+    with clients(address, text):
+        for _ in range(20):
+            assert httpx.get(f"{service.url}/api/v1/health/ready", timeout=5.0, trust_env=False).status_code == 200
+            time.sleep(0.05)
+        wait_until(is_written)
     assert service.metric('dropanchor_checkpoints_total{outcome="failed"}') == 0
     assert len(service.log) <= lines + 20
 
@@ -72,8 +72,7 @@ def test_clients_that_hold_connections_stop_neither_health_checks_nor_checkpoint
         running_service("--config", str(config), "--data-dir", str(tmp_path / "data")) as service,
         connected_session(service.zenoh) as session,
     ):
-        with clients(service.url, text):
-            is_served(service, session)
+        check_beside(service, session, service.url, text)
         wait_until(lambda: service.ask("GET", "/api/v1/poses").status_code == 200)
 
 
@@ -85,7 +84,6 @@ def test_silent_zenoh_connections_stop_neither_health_checks_nor_checkpoints(tmp
         running_service("--config", str(config), "--data-dir", str(tmp_path / "data")) as service,
         connected_session(service.zenoh) as session,
     ):
-        with clients(service.zenoh):
-            is_served(service, session)
+        check_beside(service, session, service.zenoh)
         with connected_session(service.zenoh) as another:
             assert another.info.routers_zid()
