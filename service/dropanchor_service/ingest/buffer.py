@@ -2,8 +2,6 @@
 
 from collections import Counter, deque
 from collections.abc import Iterable
-from itertools import compress
-from operator import itemgetter
 from threading import Event, Lock
 from typing import NamedTuple
 
@@ -11,22 +9,20 @@ import numpy as np
 
 from dropanchor_schemas.wire import COUNTS_AT, ENCODING_PACKED, HEADER
 from dropanchor_service.estimation.columns import Array
+from dropanchor_service.ingest.backlog import MESSAGE_OVERHEAD, PAYLOAD, ROW, Backlog, Message, most_of_a_row
 from dropanchor_service.ingest.fair_share import fair_cap, sizes_from_newest
-from dropanchor_service.store.rings import rank_in_row
+from dropanchor_service.ingest.overload import Overload
 
-Message = tuple[int, bytes, str, int]
-"""Row of the tag, payload, encoding, arrival (UTC, ns)."""
 UnregisteredMessage = tuple[str, bytes, str, int]
 """Key of a tag that has no row yet, payload, encoding, arrival (UTC, ns)."""
 
-MESSAGE_OVERHEAD = 200  # bytes that a buffered message takes beside its payload
 UNREGISTERED_BYTES = 8 * 2**20  # capacity for messages of tags without a row
 UNREGISTERED_PER_TURN = 250  # each costs many times as much as a message of a registered tag
+PER_TURN_OF_TAG = 16  # messages of a tag in a turn: each is a batch of its own, and all tags wait for the last batch
 MAX_WAIT_NS = 500_000_000
-CALM_NS = 2_000_000_000  # an overload ends after this time without shedding
+BURST_WAITS = 8  # times MAX_WAIT_NS: a backlog of single tags that still grows after this is shed
 _KEPT_SHARE = 0.75  # of the capacity, kept when the buffer is full, so that shedding is rare
 _COUNT_WORDS = [at // 2 for at in COUNTS_AT]
-_ROW, _PAYLOAD = itemgetter(0), itemgetter(1)
 
 
 class Shed(NamedTuple):
@@ -41,22 +37,18 @@ class Shed(NamedTuple):
     unregistered: int
 
 
-class _Behind(NamedTuple):
-    """When `drain` first left messages behind, and how long the oldest one had waited by then."""
-
-    since_ns: int
-    waited_ns: int
-
-
 class MessageBuffer:
     """A queue in order of arrival, bounded in bytes and in waiting time.
 
-    When it is full, the tags that fill it most lose their oldest messages.
+    A turn takes up to PER_TURN_OF_TAG messages of a tag. What it leaves behind waits in the `Backlog`, of which the
+    tags take turns, so that the burst of one tag delays no other.
+
+    When the buffer is full, the tags that fill it most lose their oldest messages.
 
     An overload begins when `drain` has been behind for `max_wait_ns` and messages wait longer and longer. It ends when
     `drain` has kept up for a while. During an overload the buffer keeps only what `drain` can take in half of
-    `max_wait_ns`, but at least the newest message of each tag, and the tags take turns. A backlog from caches, or from
-    a time without draining, is no overload: its messages and those behind them are all kept.
+    `max_wait_ns`, but at least the newest message of each tag. A backlog from caches, or from a time without draining,
+    is no overload: its messages and those behind them are all kept. So is a burst of single tags, unless it goes on.
 
     Messages of tags without a row have a queue of their own, so a flood of them harms no registered tag.
     """
@@ -68,7 +60,8 @@ class MessageBuffer:
         self._filled = Event()
         self._woken = False
         self._rows: dict[str, int] = {}
-        self._messages: list[Message] = []
+        self._messages: list[Message] = []  # since the last drain
+        self._backlog = Backlog()
         self._bytes = 0
         self._unregistered: deque[UnregisteredMessage] = deque()
         self._unregistered_bytes = 0
@@ -76,15 +69,8 @@ class MessageBuffer:
         self._shed_samples = 0
         self._unregistered_shed = 0
         self._cached = 0  # messages up to the last one from a cache
-        self._behind: _Behind | None = None
-        self._drained_bytes = 0  # since it fell behind
-        self._bytes_per_ns = 0.0  # drained while it was behind
-        self._overloaded = False
-        self._shed_ns = 0  # UTC of the last shedding due to an overload
-        self._drains = 0
-        self._served = np.zeros(
-            0, np.int64
-        )  # by row: number of the last drain in an overload that took one of its messages
+        self._overload = Overload(max_wait_ns)
+        self._of_single_tags = Overload(BURST_WAITS * max_wait_ns, may_shrink=True)
 
     def append(self, key: str, payload: bytes, encoding: str, arrival_ns: int, cached: bool = False) -> None:
         """Add a message. Thread-safe; blocks for no longer than shedding takes.
@@ -97,7 +83,7 @@ class MessageBuffer:
                 self._messages.append((row, payload, encoding, arrival_ns))
                 self._bytes += len(payload) + MESSAGE_OVERHEAD
                 if cached:
-                    self._cached = len(self._messages)
+                    self._cached = len(self._messages) + len(self._backlog)
                 if self._bytes > self._capacity_bytes:
                     self._make_room(_KEPT_SHARE * self._capacity_bytes)
             else:
@@ -136,12 +122,11 @@ class MessageBuffer:
         with self._lock:
             taken = self._next(limit, now_ns)
             self._cached = max(0, self._cached - len(taken))
-            self._drained_bytes += _size_of_all(taken) if self._behind else 0
             unregistered = [
                 self._unregistered.popleft() for _ in range(min(UNREGISTERED_PER_TURN, len(self._unregistered)))
             ]
             self._unregistered_bytes -= sum(map(_size, unregistered))
-            if not self._messages and not self._unregistered and not self._woken:
+            if not self._backlog and not self._unregistered and not self._woken:
                 self._filled.clear()
             return taken, unregistered
 
@@ -155,12 +140,17 @@ class MessageBuffer:
     @property
     def depth(self) -> int:
         """Number of messages in the buffer."""
-        return len(self._messages) + len(self._unregistered)
+        return len(self._messages) + len(self._backlog) + len(self._unregistered)
+
+    @property
+    def behind(self) -> frozenset[int]:
+        """Rows of which the last drain left messages behind."""
+        return self._backlog.rows
 
     @property
     def is_overloaded(self) -> bool:
         """Whether messages come faster than `drain` takes them, for a while now."""
-        return self._overloaded
+        return self._overload.is_on
 
     def _append_unregistered(self, message: UnregisteredMessage) -> None:
         self._unregistered.append(message)
@@ -171,84 +161,72 @@ class MessageBuffer:
 
     def _next(self, limit: int, now_ns: int) -> list[Message]:
         """Take out the messages for `drain`. In an overload, shed others."""
-        if len(self._messages) > limit and self._is_overload(now_ns):
-            rows, sizes = self._keep_newest(self._bytes_per_ns * self._max_wait_ns / 2, now_ns)
-            if len(rows) > limit:
-                return self._take(self._next_in_turn(limit, rows), sizes)
-        if len(self._messages) > limit:
-            taken, self._messages = self._messages[:limit], self._messages[limit:]
-            self._bytes -= _size_of_all(taken)
-            return taken
-        taken, self._messages, self._bytes = self._messages, [], 0
-        self._behind, self._overloaded = None, self._overloaded and now_ns - self._shed_ns < CALM_NS
+        fresh, self._messages = self._messages, []
+        if not self._backlog and len(fresh) <= limit and _is_fair(fresh):
+            taken, self._bytes = fresh, 0
+        else:
+            self._backlog.add(fresh)
+            self._shed_overload(limit, now_ns)
+            taken = self._backlog.take(limit, PER_TURN_OF_TAG)
+            size = _size_of_all(taken)
+            self._bytes -= size
+            self._overload.note_drained(size)
+            self._of_single_tags.note_drained(size)
+        if not self._backlog:
+            self._overload.caught_up(now_ns)
+            self._of_single_tags.caught_up(now_ns)
         return taken
 
-    def _is_overload(self, now_ns: int) -> bool:
-        """Update how far behind `drain` is, and return whether that is an overload."""
-        waited_ns = now_ns - self._messages[0][3]
+    def _shed_overload(self, limit: int, now_ns: int) -> None:
+        """Shed what this turn leaves behind, if turns have been behind for too long."""
+        of_turn = self._backlog.of_a_turn(PER_TURN_OF_TAG)
         if self._cached:
-            self._behind, self._overloaded = None, False
-        if self._behind is None:
-            self._behind, self._drained_bytes = _Behind(now_ns, waited_ns), 0
-        behind_ns = now_ns - self._behind.since_ns
-        if min(behind_ns, waited_ns - max(0, self._behind.waited_ns)) > self._max_wait_ns:
-            self._overloaded = True
-        if self._drained_bytes and behind_ns > 0:
-            self._bytes_per_ns = self._drained_bytes / behind_ns
-        return self._overloaded
+            self._overload.end()
+            self._of_single_tags.end()
+        if of_turn > limit:
+            waited_ns = now_ns - self._backlog.oldest_ns(PER_TURN_OF_TAG)
+            if self._overload.judge(now_ns, waited_ns, len(self._backlog)):
+                self._keep_newest(self._overload, now_ns, 0)
+        elif of_turn < len(self._backlog):
+            self._overload.caught_up(now_ns)
+            waited_ns = now_ns - self._backlog.oldest_ns(0)
+            if self._of_single_tags.judge(now_ns, waited_ns, len(self._backlog)):
+                self._keep_newest(self._of_single_tags, now_ns, PER_TURN_OF_TAG)
 
-    def _keep_newest(self, target_bytes: float, now_ns: int) -> tuple[Array, Array]:
-        """Keep the newest message of every tag, and as many more as fit into `target_bytes`. Shed the others.
+    def _keep_newest(self, overload: Overload, now_ns: int, share: int) -> None:
+        """Keep the newest message of every tag, and as many more as fit into half of `max_wait_ns`. Shed the others.
 
-        Returns the row and the size of each message that is kept.
+        share: tags with no more messages keep all.
         """
-        rows, sizes = self._columns()
-        kept = _newest(rows, sizes, target_bytes)
+        rows, sizes = self._backlog.columns()
+        kept = _newest(rows, sizes, overload.bytes_per_ns * self._max_wait_ns / 2)
+        kept |= np.bincount(rows)[rows] <= share
         if not kept.all():
-            self._shed_all_but(kept, sizes)
-            self._shed_ns = now_ns
-        return rows[kept], sizes[kept]
+            self._shed_oldest(rows[~kept])
+            overload.note_shed(now_ns)
 
     def _make_room(self, target_bytes: float) -> None:
-        rows, sizes = self._columns()
+        self._backlog.add(self._messages)
+        self._messages = []
+        rows, sizes = self._backlog.columns()
         kept = _newest(rows, sizes, target_bytes)
-        total = np.cumsum(np.where(kept, sizes, 0)[::-1])[::-1]
-        self._shed_all_but(kept & (total <= target_bytes), sizes)
+        by_age = np.argsort(self._backlog.arrivals(), kind="stable")[::-1]
+        fits = np.empty(len(rows), bool)
+        fits[by_age] = np.cumsum(np.where(kept, sizes, 0)[by_age]) <= target_bytes
+        self._shed_oldest(rows[~(kept & fits)])
 
-    def _shed_all_but(self, kept: Array, sizes: Array) -> None:
-        self._cached = int(kept[: self._cached].sum())
-        lost = self._take(np.flatnonzero(~kept), sizes)
-        self._shed.update(map(_ROW, lost))
+    def _shed_oldest(self, rows: Array) -> None:
+        """Shed the oldest message of a tag for each time that its row is in `rows`."""
+        lost = self._backlog.drop(rows)
+        self._cached = max(0, self._cached - len(lost))
+        self._bytes -= _size_of_all(lost)
+        self._shed.update(map(ROW, lost))
         self._shed_samples += _samples_of(lost)
 
-    def _next_in_turn(self, limit: int, rows: Array) -> Array:
-        """Return the indices of up to `limit` messages, of the tags that have waited longest for their turn.
 
-        rows: row of each buffered message.
-        """
-        self._drains += 1
-        missing = int(rows.max()) + 1 - len(self._served)
-        if missing > 0:
-            self._served = np.concatenate([self._served, np.zeros(missing, np.int64)])
-        turns = self._served[rows] + rank_in_row(rows)
-        chosen = np.sort(np.argsort(turns, kind="stable")[:limit])
-        self._served[rows[chosen]] = self._drains
-        return chosen
-
-    def _take(self, chosen: Array, sizes: Array) -> list[Message]:
-        """Take out the messages with the indices `chosen`, in their order. sizes: of all buffered messages."""
-        stays = np.ones(len(self._messages), bool)
-        stays[chosen] = False
-        taken = list(compress(self._messages, (~stays).tolist()))
-        self._messages = list(compress(self._messages, stays.tolist()))
-        self._bytes -= int(sizes[chosen].sum())
-        return taken
-
-    def _columns(self) -> tuple[Array, Array]:
-        """Return the row and the size of each message."""
-        count = len(self._messages)
-        sizes = np.fromiter(map(len, map(_PAYLOAD, self._messages)), np.int64, count)
-        return np.fromiter(map(_ROW, self._messages), np.int64, count), sizes + MESSAGE_OVERHEAD
+def _is_fair(messages: list[Message]) -> bool:
+    """Return whether none of these messages is beyond its tag's share of a turn."""
+    return len(messages) <= PER_TURN_OF_TAG or most_of_a_row(messages) <= PER_TURN_OF_TAG
 
 
 def _size(message: Message | UnregisteredMessage) -> int:
@@ -256,7 +234,7 @@ def _size(message: Message | UnregisteredMessage) -> int:
 
 
 def _size_of_all(messages: list[Message]) -> int:
-    return sum(map(len, map(_PAYLOAD, messages))) + MESSAGE_OVERHEAD * len(messages)
+    return sum(map(len, map(PAYLOAD, messages))) + MESSAGE_OVERHEAD * len(messages)
 
 
 def _newest(rows: Array, sizes: Array, target_bytes: float) -> Array:

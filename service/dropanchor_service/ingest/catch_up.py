@@ -10,7 +10,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from threading import Lock
 
-from dropanchor_service.ingest.buffer import Message, MessageBuffer
+from dropanchor_service.ingest.backlog import Message
+from dropanchor_service.ingest.buffer import MessageBuffer
 from dropanchor_service.ingest.gaps import Gaps
 from dropanchor_service.ingest.sequence_states import StatesOf
 from dropanchor_service.ingest.suspended import Number, Suspended, distances, in_order, missing, number_of, size_of

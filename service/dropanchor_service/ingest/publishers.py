@@ -25,13 +25,15 @@ class Sequenced:
     """The result of `Publishers.sequence`, as indices of messages.
 
     due: to fuse now, in this order. pending: to pass in again, before newer messages, until they are due. duplicates:
-    arrived before. missing: number of messages that are given up. slots: publisher of each message, -1 for none.
+    arrived before. missing: number of messages that are given up. restarts: number of times that a publisher began to
+    count from another number. slots: publisher of each message, -1 for none.
     """
 
     due: Array
     pending: Array
     duplicates: Array
     missing: int
+    restarts: int
     slots: Array
 
 
@@ -95,27 +97,31 @@ class Publishers:
     def times(self, times: Array) -> None:
         self._times = times.copy()
 
-    def sequence(self, forms: Array, rows: Array, arrivals: Array, due_ns: int, fresh: int | None = None) -> Sequenced:
+    def sequence(
+        self, forms: Array, rows: Array, arrivals: Array, due_ns: int | Array, fresh: int | None = None
+    ) -> Sequenced:
         """Put messages into the order of their publishers.
 
-        forms: FORM. rows: of their tags. arrivals: ns, ascending. due_ns: give up on messages that are missing before
-        one that arrived by then. fresh: those from this index on are new; what is missing before them is not given up,
-        since the caches may have it (None: there are none).
+        forms: FORM. rows: of their tags. arrivals: ns, ascending. due_ns: of all or of each: give up on messages that
+        are missing before one that arrived by then. fresh: those from this index on are new; what is missing before
+        them is not given up, since the caches may have it (None: there are none).
         """
         self._grow(rows)
         n = len(rows)
         slots, distances, verdicts = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.uint8)
         pending = sequences.pass_in_order(forms, rows, arrivals, self._columns, slots, distances, verdicts)
+        restarts = np.count_nonzero((abs(distances) > WINDOW) & (verdicts == sequences.PASS))
         due = np.flatnonzero(verdicts == sequences.PASS)
         missing = 0
         if pending:
             behind = np.flatnonzero(verdicts == sequences.PENDING)
             ordered = behind[np.lexsort((distances[behind], slots[behind]))]
             first = n if fresh is None else fresh
-            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_ns, first, verdicts)
+            due_of = np.full(n, due_ns, np.int64)
+            missing = sequences.release(ordered, slots, forms, arrivals, self._columns, due_of, first, verdicts)
             due = np.concatenate([due, ordered[verdicts[ordered] == sequences.PASS]])
         again, waiting = (np.flatnonzero(verdicts == which) for which in (sequences.DUPLICATE, sequences.PENDING))
-        return Sequenced(due, waiting, again, missing, slots)
+        return Sequenced(due, waiting, again, missing, int(restarts), slots)
 
     def sequence_states(self, row: int) -> dict[int, SequenceState]:
         """Return the state of each publisher of this tag, by boot id."""

@@ -48,6 +48,11 @@ class Rejections:
         if messages:
             self._metrics.given_up.inc(messages)
 
+    def count_restarts(self, times: int) -> None:
+        """Count publishers that went on with a number that cannot follow their last one."""
+        if times:
+            self._metrics.sequence_restarts.inc(times)
+
     def count_clock_jumps(self, times: int) -> None:
         """Count jumps of tags' clocks, which are removed from the times of the samples."""
         if times:

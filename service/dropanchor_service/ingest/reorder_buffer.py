@@ -1,6 +1,6 @@
 """Keep messages that wait for one numbered before them."""
 
-from dropanchor_service.ingest.buffer import Message
+from dropanchor_service.ingest.backlog import Message
 
 
 class ReorderBuffer:

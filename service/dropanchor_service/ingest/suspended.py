@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, Rejection, read_header
-from dropanchor_service.ingest.buffer import MESSAGE_OVERHEAD
+from dropanchor_service.ingest.backlog import MESSAGE_OVERHEAD
 from dropanchor_service.ingest.publishers import SequenceState
 
 

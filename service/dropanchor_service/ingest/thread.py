@@ -60,7 +60,7 @@ class IngestThread(Worker):
     def _run(self) -> None:
         self._turn()  # admits the listed tags before the first message
         while not self._stop.is_set():
-            if self._buffer.depth < BACKLOG:
+            if self._buffer.depth < BACKLOG and not self._buffer.behind:
                 # Gather messages, so that one call fuses many of them. What arrives meanwhile wakes nobody.
                 self._stop.wait(self._turned_s + self._period.current_s - time.monotonic())
             if self._buffer.wait(self._longest_wait_s()):

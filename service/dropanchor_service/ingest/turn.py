@@ -12,7 +12,8 @@ from dropanchor_schemas.kinds import KINDS
 from dropanchor_schemas.wire import Reason
 from dropanchor_service.estimation.columns import Array, PoseBatch, SampleBatch
 from dropanchor_service.ingest.admission import Admission
-from dropanchor_service.ingest.buffer import Message, MessageBuffer, UnregisteredMessage
+from dropanchor_service.ingest.backlog import Message
+from dropanchor_service.ingest.buffer import MessageBuffer, UnregisteredMessage
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.health import HealthIntake
 from dropanchor_service.ingest.observers import NO_OBSERVERS, Observers
@@ -99,7 +100,7 @@ class Ingest:
         messages = [*kept, *of_known, *self._admitted([*of_deleted, *unregistered])]
         if messages or self.has_pending:
             now_ns = self._clock.now_ns()
-            ordered = self._reader.put_in_order(messages, now_ns)
+            ordered = self._reader.put_in_order(messages, now_ns, self._buffer.behind)
             self._note(ordered.taken)
             self._fuse(ordered, now_ns)
         return len(fresh)

@@ -42,6 +42,10 @@ class Metrics:
             "dropanchor_given_up_messages",
             "Messages missing from a publisher's sequence that neither arrived in time nor were in its cache.",
         )
+        self.sequence_restarts = counter(
+            "dropanchor_sequence_restarts",
+            "Publishers that went on with a number that is too far from their last one for missing messages.",
+        )
         self.faults = counter("dropanchor_faults", "Internal errors, by place.", ["where"])
         self.estimator_seconds = duration("dropanchor_estimator_seconds", "Time to fuse one batch of samples.")
         self.delay_seconds = duration(

@@ -5,12 +5,14 @@ import sys
 import time
 from collections.abc import Callable
 
+from dropanchor_service.runtime.repeats import CountingHandler
+
 REPEAT_S = 10.0
 
 
 def configure(level: str = "INFO") -> None:
-    """Log to standard error, with UTC times."""
-    handler = logging.StreamHandler(sys.stderr)
+    """Log to standard error, with UTC times. A line that repeats is counted."""
+    handler = CountingHandler(sys.stderr)
     formatter = logging.Formatter("%(asctime)s.%(msecs)03dZ %(levelname)s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)

@@ -6,6 +6,7 @@ from typing import Any
 
 import zenoh
 
+from dropanchor_service.runtime import open_files
 from dropanchor_service.security.access_control import SERVICE
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.router import LINK, QUIET, router_transport
@@ -46,8 +47,17 @@ def configuration(settings: ZenohSettings, credentials: SecurityFolder | None = 
         return _client(settings, credentials) | QUIET
     listen = listening_at(settings, credentials)
     if credentials is not None:
-        return credentials.router_configuration(listen)
-    return {"mode": "router", "listen": {"endpoints": list(listen)}, "transport": router_transport()} | QUIET
+        return _within_open_files(credentials.router_configuration(listen))
+    transport = router_transport()
+    return _within_open_files({"mode": "router", "listen": {"endpoints": list(listen)}, "transport": transport}) | QUIET
+
+
+def _within_open_files(router: dict[str, Any]) -> dict[str, Any]:
+    """Return the configuration of a router with no more sessions than files that it may open."""
+    most = open_files.shares().zenoh
+    unicast = router["transport"]["unicast"]
+    fewer = {name: min(unicast[name], most) for name in ("max_sessions", "accept_pending")}
+    return router | {"transport": router["transport"] | {"unicast": unicast | fewer}}
 
 
 def _client(settings: ZenohSettings, credentials: SecurityFolder | None) -> dict[str, Any]:

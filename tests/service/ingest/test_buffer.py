@@ -7,11 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED, Frame, HeadingSample, RangeSample, encode_packed
+from dropanchor_service.ingest.backlog import MESSAGE_OVERHEAD, Message
 from dropanchor_service.ingest.buffer import (
-    MESSAGE_OVERHEAD,
+    PER_TURN_OF_TAG,
     UNREGISTERED_BYTES,
     UNREGISTERED_PER_TURN,
-    Message,
     MessageBuffer,
 )
 
@@ -21,6 +21,14 @@ PAYLOAD = b"x" * (1000 - MESSAGE_OVERHEAD)  # a message counts 1,000 bytes
 
 def put(buffer: MessageBuffer, key: str, number: int) -> None:
     buffer.append(key, PAYLOAD, "e", number)
+
+
+def drain_all(buffer: MessageBuffer, now_ns: int = 0) -> list[Message]:
+    """Drain until nothing of registered tags is left."""
+    taken: list[Message] = []
+    while more := buffer.drain(10**9, now_ns)[0]:
+        taken += more
+    return taken
 
 
 def admit(buffer: MessageBuffer, keys: Iterable[str]) -> None:
@@ -48,7 +56,7 @@ def test_a_full_buffer_sheds_the_oldest_messages_of_the_busiest_tag_only() -> No
     for number in range(1000):
         put(buffer, "busy", number)
     shed, _, unregistered = buffer.take_shed()
-    messages, _ = buffer.drain(10**9)
+    messages = drain_all(buffer)
     busy = [message[3] for message in messages if message[0] == 0]
     assert busy == list(range(1000 - len(busy), 1000))
     assert 60 <= len(busy) <= 90
@@ -65,7 +73,7 @@ def test_equally_busy_tags_lose_equally() -> None:
         for key in keys:
             put(buffer, key, number)
     shed = buffer.take_shed().by_row
-    kept = Counter(message[0] for message in buffer.drain(10**9)[0])
+    kept = Counter(message[0] for message in drain_all(buffer))
     assert sum(shed.values()) + sum(kept.values()) == 5000
     assert max(kept.values()) - min(kept.values()) <= 1
 
@@ -102,12 +110,12 @@ def test_an_overload_is_recognised_at_once_when_it_continues_after_a_pause() -> 
     keys = [str(i) for i in range(10)]
     admit(buffer, keys)
     overload(buffer, 2.0, keys, 300)
-    buffer.drain(10**9, 2 * S)
+    drain_all(buffer, 2 * S)
     overload(buffer, 0.45, keys, 300, since_s=2.1)
     assert buffer.depth <= 0.3 * 100 * 100
-    buffer.drain(10**9, 3 * S)
+    drain_all(buffer, 3 * S)
     buffer.take_shed()
-    buffer.drain(10**9, 5 * S)
+    drain_all(buffer, 5 * S)
     overload(buffer, 0.45, keys, 300, since_s=5.1)
     assert not buffer.take_shed().by_row
 
@@ -133,6 +141,28 @@ def test_a_tag_that_floods_loses_only_its_own_messages() -> None:
     taken = overload(buffer, 5.0, keys, 300)
     assert set(buffer.take_shed().by_row) == {0}
     assert Counter(message[0] for message in taken)[50] >= 45
+
+
+def test_a_message_behind_the_burst_of_another_tag_is_taken_by_the_next_drain() -> None:
+    buffer = MessageBuffer(10**9)
+    admit(buffer, ["burst", "other"])
+    for number in range(20_000):
+        put(buffer, "burst", number)
+    put(buffer, "other", 20_000)
+    taken, _ = buffer.drain(2000)
+    assert Counter(message[0] for message in taken) == {0: PER_TURN_OF_TAG, 1: 1}
+    assert buffer.behind == {0}
+
+
+def test_a_burst_of_one_tag_is_worked_off_and_not_shed() -> None:
+    buffer = MessageBuffer(10**9)
+    admit(buffer, ["burst", "other"])
+    for number in range(20_000):
+        put(buffer, "burst", number)
+    taken = overload(buffer, 15.0, ["other"], 1)
+    assert not buffer.take_shed().by_row
+    assert [message[3] for message in taken if message[0] == 0 and message[3]] == list(range(1, 20_000))
+    assert buffer.depth == 0
 
 
 def test_an_old_backlog_is_no_overload_while_it_shrinks() -> None:

@@ -81,6 +81,7 @@ class Kind(Enum):
     BASEMAP_UNREADABLE = (503, "The tile of the base map cannot be read")
     HISTORY_UNREADABLE = (503, "The history cannot be read")
     NOT_READY = (503, "The service is not ready")
+    BUSY = (503, "The service has too many open requests")
     OTHER = (400, "The request failed")
 
     def __init__(self, status: int, title: str) -> None:
@@ -113,7 +114,7 @@ def problem_response(
     """Return a problem of this kind. status: overrides the status of the kind. members: extension members."""
     status = kind.status if status is None else status
     path = _path(request)
-    if kind is Kind.NOT_READY:
+    if kind in (Kind.NOT_READY, Kind.BUSY):
         headers = {"retry-after": "1", **(headers or {})}
     if is_omlox(path):
         status = 400 if status == 422 else status  # the standard knows no 422

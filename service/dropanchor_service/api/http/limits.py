@@ -11,6 +11,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from dropanchor_service.api.http.errors import Kind, ProblemError, problem_response
+from dropanchor_service.api.http.open_sockets import OpenSockets
 from dropanchor_service.api.http.site_in_path import divided, is_omlox
 
 
@@ -82,6 +83,8 @@ class GuardedProtocol(H11Protocol):
     _deadline: asyncio.TimerHandle | None = None
     _stall: asyncio.TimerHandle | None = None
     _is_web_socket = False
+    _number = -1  # file descriptor
+    _sockets: OpenSockets | None = None
     _received = 0  # bytes, since the deadline was set
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -90,6 +93,8 @@ class GuardedProtocol(H11Protocol):
         # limit is 1 because asyncio's TLS transport treats even an empty buffer as full with 0.
         transport.set_write_buffer_limits(high=1)
         self._deadline = self.loop.call_later(self.request_s, self._cut_if_slow)
+        self._number = transport.get_extra_info("socket").fileno()
+        self._sockets = getattr(self.server_state, "sockets", None)
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
@@ -97,13 +102,20 @@ class GuardedProtocol(H11Protocol):
         incomplete = not self._is_web_socket and self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
         if not incomplete:
             self._deadline = _cancelled(self._deadline)
+            self._note_busy()
         elif self._deadline is None:
             self._received = 0
             self._deadline = self.loop.call_later(self.request_s, self._cut_if_slow)
 
+    def on_response_complete(self) -> None:
+        if self._sockets is not None and not self.transport.is_closing():
+            self._sockets.note_silent(self._number)
+        super().on_response_complete()
+
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         super().handle_websocket_upgrade(event)
         self._is_web_socket = True  # another protocol has the connection now
+        self._note_busy()
 
     def pause_writing(self) -> None:
         super().pause_writing()
@@ -127,6 +139,10 @@ class GuardedProtocol(H11Protocol):
         self._deadline = _cancelled(self._deadline)
         self._stall = _cancelled(self._stall)
         super().connection_lost(exc)
+
+    def _note_busy(self) -> None:
+        if self._sockets is not None:
+            self._sockets.note_busy(self._number)
 
     def _watch_stall(self) -> None:
         waiting = self._waiting()

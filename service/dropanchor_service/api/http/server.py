@@ -11,9 +11,13 @@ from threading import Event
 
 import uvicorn
 from starlette.types import ASGIApp
+from uvicorn.server import ServerState
 
+from dropanchor_service.api.http.busy_limit import BusyLimit
 from dropanchor_service.api.http.limits import GuardedProtocol
+from dropanchor_service.api.http.open_sockets import Listener, OpenSockets
 from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES, GuardedWebSocket
+from dropanchor_service.runtime import open_files
 from dropanchor_service.security.certificate import Certificate
 
 GRACE_S = 1  # for open requests at shutdown; stuck clients use all of it
@@ -27,11 +31,18 @@ class ListenError(OSError):
     """The server cannot listen on the address. The message says why and what to do."""
 
 
+class State(ServerState):
+    """What the connections of a server share. sockets: those of its listener."""
+
+    sockets: OpenSockets | None = None
+
+
 class Server(uvicorn.Server):
     """Sets `stopping` before it waits for open requests, so that streams end, and then aborts what is left."""
 
     def __init__(self, config: uvicorn.Config, stopping: Event) -> None:
         super().__init__(config)
+        self.server_state = self._state = State()
         self._stopping = stopping
         self._wake: Callable[[], object] = lambda: None
 
@@ -40,6 +51,11 @@ class Server(uvicorn.Server):
         self.should_exit = True
         with suppress(RuntimeError):  # the loop has ended already
             self._wake()
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        listeners = [bound for bound in sockets or () if isinstance(bound, Listener)]
+        self._state.sockets = listeners[0].connections if listeners else None
+        await super().startup(sockets)
 
     async def main_loop(self) -> None:
         """Wait until the server should stop. uvicorn looks ten times a second, for a fifth of an idle service."""
@@ -68,7 +84,7 @@ def build_server(
     stopping: the event that `app` was created with. Raises ListenError when the certificate cannot be used.
     """
     config = uvicorn.Config(
-        app,
+        BusyLimit(app, open_files.shares().http),
         http=protocol,
         ws=GuardedWebSocket,
         ws_max_size=MAX_MESSAGE_BYTES,
@@ -90,13 +106,16 @@ def build_server(
     return Server(config, stopping)
 
 
-def listen(host: str, port: int) -> socket.socket:
-    """Return a socket bound to this address; port 0 selects a free port. Raises ListenError."""
+def listen(host: str, port: int, connections: int | None = None) -> Listener:
+    """Return a socket bound to this address; port 0 selects a free port. Raises ListenError.
+
+    connections: how many may be open at a time, None: the share of HTTP in what the system allows.
+    """
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except socket.gaierror as error:
         raise ListenError(f"cannot listen on {host}: {error.strerror}") from error
-    bound = socket.socket(family, kind, protocol)
+    bound = Listener(family, kind, protocol, open_files.shares().http if connections is None else connections)
     try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)

@@ -1,7 +1,8 @@
 """Put numbered messages into the order of their publisher: find those that are due, duplicates and pending ones.
 
 The messages of a publisher that counts without a gap pass as they arrive (`pass_in_order`). Those behind a gap are
-pending until the missing message arrives or the window is over (`release`).
+pending until the missing message arrives or the window is over (`release`). A gap that is larger than what a publisher
+can have sent is none: the publisher counts from another number now, and nothing is missing.
 """
 
 from typing import Any, Final
@@ -12,6 +13,7 @@ from numba import njit
 PER_TAG: Final = 4  # publishers of a tag whose state is kept
 WINDOW: Final = 1024  # messages behind the newest in which a duplicate is recognised
 _LANES: Final = WINDOW // 64
+MESSAGES_PER_S: Final = 1000  # no publisher sends as many
 
 UNUSED: Final = 0
 STARTING: Final = 1  # no message has passed yet
@@ -96,20 +98,29 @@ def _advance(publisher: Any, sequence: int) -> int:
 
 
 @njit(nogil=True)
-def _verdict(publisher: Any, sequence: int) -> int:
+def _has_restarted(publisher: Any, ahead: int, arrival_ns: int) -> bool:
+    """Return whether more messages are missing than the publisher can have sent since its last one passed."""
+    if publisher.gap_allowed:
+        return False
+    silent_ns = max(arrival_ns - publisher.arrival_ns, 0) if publisher.arrival_ns != 0 else 0
+    return bool(ahead > WINDOW + silent_ns // (1_000_000_000 // MESSAGES_PER_S))
+
+
+@njit(nogil=True)
+def _verdict(publisher: Any, sequence: int, arrival_ns: int) -> int:
     if publisher.status != RUNNING:
         if sequence != 0:
             return PENDING  # the publisher started earlier: older messages may follow
         _begin(publisher, sequence)
         return PASS
     ahead = _ahead(sequence, publisher.next)
+    if -ahead > WINDOW or _has_restarted(publisher, ahead, arrival_ns):
+        _begin(publisher, sequence)  # the publisher started counting again
+        return PASS
     if ahead > 0:
         return PENDING
     if ahead == 0:
         _advance(publisher, sequence)
-        return PASS
-    if -ahead > WINDOW:
-        _begin(publisher, sequence)  # the publisher started counting again
         return PASS
     if _was_seen(publisher, sequence):
         return DUPLICATE
@@ -158,7 +169,7 @@ def pass_in_order(
             continue
         publisher = publishers[slots[i]]
         distances[i] = _ahead(form.sequence, publisher.next)
-        verdicts[i] = _verdict(publisher, form.sequence)
+        verdicts[i] = _verdict(publisher, form.sequence, arrivals[i])
         pending += verdicts[i] == PENDING
     return pending
 
@@ -174,14 +185,14 @@ def _force(publisher: Any, sequence: int) -> int:
 
 @njit(cache=True, nogil=True)
 def release(
-    ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any, due_ns: int, fresh: int, verdicts: Any
+    ordered: Any, slots: Any, forms: Any, arrivals: Any, publishers: Any, due_ns: Any, fresh: int, verdicts: Any
 ) -> int:
     """Judge the pending messages again, in the order of their numbers. Return how many missing ones are given up.
 
     All messages up to one that has waited long enough pass, and so do those that follow without a gap.
 
-    ordered: the pending messages by publisher, then number. due_ns: messages that arrived by then have waited long
-    enough, unless they come from a publisher that is RUNNING and are among those from index `fresh` on.
+    ordered: the pending messages by publisher, then number. due_ns: of each message: if it arrived by then, it has
+    waited long enough, unless it comes from a publisher that is RUNNING and is among those from index `fresh` on.
     """
     missing = 0
     begin = 0
@@ -192,11 +203,14 @@ def release(
             newest = ordered[end]
             end += 1
             may_be_asked_for = newest >= fresh and publisher.status == RUNNING
-            if publisher.gap_allowed or (arrivals[newest] <= due_ns and not may_be_asked_for):
+            if publisher.gap_allowed or (arrivals[newest] <= due_ns[newest] and not may_be_asked_for):
                 forced = end
         for k in range(begin, end):
             i = ordered[k]
-            verdicts[i] = _verdict(publisher, forms[i].sequence)
+            if forms[i].boot_id != publisher.boot_id:
+                slots[i], verdicts[i] = -1, PASS  # newer publishers have taken the place of this one
+                continue
+            verdicts[i] = _verdict(publisher, forms[i].sequence, arrivals[i])
             if verdicts[i] == PENDING and k < forced:
                 absent = _force(publisher, forms[i].sequence)
                 missing += 0 if publisher.gap_allowed else absent
