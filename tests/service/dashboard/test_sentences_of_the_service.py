@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
+from unittest.mock import patch
 
 import pytest
 
@@ -21,6 +22,7 @@ from dropanchor_service.cluster.watch import Lease, obstacle
 from dropanchor_service.engines.warm_up import CompilationProgress
 from dropanchor_service.node import sentences as of_node
 from dropanchor_service.node.owners import Owner
+from dropanchor_service.runtime.kernel_cache import VARIABLE
 from dropanchor_service.store import HealthTable, TagTable
 from dropanchor_service.store.clock_offsets import ClockOffset, MotionOffset
 from dropanchor_service.store.tags import KINDS
@@ -117,7 +119,9 @@ def progress() -> Iterator[str]:
         "the zones",
     ):
         compilation.begin(what)
-        yield compilation.sentence
+        for folder in ("/home/.cache/dropanchor/kernels-1", "/tmp/dropanchor-kernels-1"):
+            with patch.dict("os.environ", {VARIABLE: folder}):
+                yield compilation.sentence
 
 
 def in_german(**texts: list[str]) -> list[str]:
