@@ -60,7 +60,10 @@ class NewShare(Share):
     """A new link. Its secret cannot be read again."""
 
     secret: str = Field(description="Works as a bearer token with the scope `read`, as far as the link reaches.")
-    path: str = Field(description="The path of the page with the secret: the link, after the address of the service.")
+    path: str = Field(
+        description="The path of the page with the secret: the link, after the host. Behind a proxy that has the service "
+        "below a path, it begins with that path."
+    )
 
 
 class ShareList(BaseModel):

@@ -4,10 +4,11 @@ import difflib
 import re
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, IPvAnyNetwork, model_validator
 
 from dropanchor_schemas.site import Site, TagSettings
 from dropanchor_service.estimation.paper.attitude import AttitudeParameters
@@ -45,6 +46,7 @@ def _is_origin(text: str) -> str:
     return text
 
 
+Networks = Annotated[tuple[IPvAnyNetwork, ...], BeforeValidator(_as_list)]
 Origins = Annotated[tuple[Annotated[str, AfterValidator(_is_origin)], ...], BeforeValidator(_as_list)]
 
 
@@ -64,6 +66,11 @@ class HttpSettings(_Section):
         default=None, description="PEM file with its chain; without it, the certificate of `security.folder`."
     )
     key: Path | None = Field(default=None, description="PEM file with the private key of the certificate.")
+    trusted_proxies: Networks = Field(
+        default=(ip_network("127.0.0.1"), ip_network("::1")),
+        description="Networks of reverse proxies. The service believes the headers `X-Forwarded-For`, `-Proto` and "
+        "`-Prefix` of these and of nobody else.",
+    )
     requests_per_s: Annotated[float, Field(ge=0.1, le=1e6)] = Field(
         default=200.0,
         description="Requests that one key, token or address may make per second, on average. There is no limit on the "

@@ -21,6 +21,7 @@ OPEN_PATHS = (
     "/api/v1/health/live",
     "/api/v1/health/ready",
     "/api/v1/openapi.json",
+    "/api/v1/docs",
     f"{OMLOX_PREFIX}v2/openapi.json",
     f"{OMLOX_PREFIX}v1/openapi.json",
 )

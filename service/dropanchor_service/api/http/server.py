@@ -4,7 +4,7 @@ import asyncio
 import errno
 import socket
 import ssl
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from threading import Event
@@ -12,6 +12,7 @@ from threading import Event
 import uvicorn
 from starlette.types import ASGIApp
 
+from dropanchor_service.api.http.behind_proxy import ON_THIS_MACHINE, BehindProxy
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.web_sockets import MAX_MESSAGE_BYTES, GuardedWebSocket
 from dropanchor_service.security.certificate import Certificate
@@ -62,13 +63,16 @@ def build_server(
     stopping: Event,
     protocol: type[GuardedProtocol] = GuardedProtocol,
     certificate: Certificate | None = None,
+    trusted_proxies: Sequence[str] = ON_THIS_MACHINE,
 ) -> Server:
     """Return a server, to run with `await server.serve(sockets=[listen(host, port)])`.
 
-    stopping: the event that `app` was created with. Raises ListenError when the certificate cannot be used.
+    stopping: the event that `app` was created with. trusted_proxies: addresses and networks of proxies that say who
+    the client is. Raises ListenError when the certificate cannot be used.
     """
     config = uvicorn.Config(
-        app,
+        BehindProxy(app, trusted_proxies),
+        proxy_headers=False,
         http=protocol,
         ws=GuardedWebSocket,
         ws_max_size=MAX_MESSAGE_BYTES,
