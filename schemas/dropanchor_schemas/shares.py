@@ -61,8 +61,8 @@ class NewShare(Share):
 
     secret: str = Field(description="Works as a bearer token with the scope `read`, as far as the link reaches.")
     path: str = Field(
-        description="The path of the page with the secret: the link, after the host. Behind a proxy that has the service "
-        "below a path, it begins with that path."
+        description="The path of the page with the secret: the link, after the host. It begins with the path "
+        "below which a proxy has the service, if there is one."
     )
 
 
