@@ -13,7 +13,7 @@ from starlette.types import Receive, Scope, Send
 from dropanchor_service.api.http.behind_proxy import BehindProxy, prefix_of
 from dropanchor_service.api.http.of_cluster import FromNodes
 from dropanchor_service.node.request import headers_for_owner
-from support.api import ask, make_api_bench
+from support.api import make_api_bench
 from support.http_server import running_server
 
 ABOUT = {"x-forwarded-for": "10.9.8.7", "x-forwarded-proto": "https", "x-forwarded-prefix": "/rtls"}
@@ -96,10 +96,3 @@ def test_redirects_are_relative_and_lead_to_the_right_place(path: str, location:
         assert (answer.status_code, answer.headers["location"]) == (307, location)
         followed = httpx.get(f"http://127.0.0.1:{port}{path}", trust_env=False, follow_redirects=True)
         assert followed.status_code == 200
-
-
-def test_a_page_that_wants_parquet_page_by_page_is_told_where_it_is() -> None:
-    refused = ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track?format=parquet")
-    assert refused.status_code == 422
-    assert "/track/file?format=parquet" in refused.json()["detail"]
-    assert "pip install 'dropanchor-service[parquet]'" in refused.json()["detail"]
