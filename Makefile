@@ -12,7 +12,7 @@ PYPROJECTS := pyproject.toml constraints.txt schemas/pyproject.toml tag_client/p
 
 RESULTS := service/docs/results
 
-.PHONY: help demo test test-cluster check bench results install kernels chromium mosquitto postgresql clean
+.PHONY: help demo test test-cluster check bench results install kernels chromium mosquitto proxies postgresql clean
 .DEFAULT_GOAL := help
 
 # Without compiled modules each of the hundreds of programs that the tests start would compile all of them again.
@@ -59,6 +59,16 @@ mosquitto:
 		apt-get update -qq && apt-get install -y -qq mosquitto >/dev/null; } || \
 		echo 'The MQTT tests need the package mosquitto: without it they are skipped.' >&2
 
+# Their own services, which the packages would start, are not needed.
+proxies:
+	@for program in nginx caddy; do \
+		command -v $$program >/dev/null || test -x /usr/sbin/$$program || { \
+		package=$$(echo $$program | sed s/nginx/nginx-light/); \
+		echo "== installing $$package for the tests behind a proxy"; \
+		apt-get update -qq && apt-get install -y -qq $$package >/dev/null && \
+		{ ! command -v systemctl >/dev/null || systemctl disable --quiet --now $$program || true; }; } || \
+		echo "The tests behind a proxy need $$program: without it they are skipped." >&2; done
+
 # A cluster of Debian's own, which the package would make and start, is not needed.
 postgresql:
 	@ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || command -v initdb >/dev/null || { \
@@ -68,7 +78,7 @@ postgresql:
 		apt-get update -qq && apt-get install -y -qq postgresql >/dev/null; } || \
 		echo 'The tests with a database need the package postgresql: without it they are skipped.' >&2
 
-test: install chromium mosquitto postgresql
+test: install chromium mosquitto proxies postgresql
 	@echo '== running all tests'
 	@$(BIN)/python -m pytest $(PARALLEL) $(PYTEST)
 

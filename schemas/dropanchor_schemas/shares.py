@@ -52,7 +52,10 @@ class NewShare(Share):
     """A new link. Its secret cannot be read again."""
 
     secret: str = Field(description="Works as a bearer token with the scope `read`, as far as the link reaches.")
-    path: str = Field(description="The path of the page with the secret: the link, after the address of the service.")
+    path: str = Field(
+        description="The path of the page with the secret: the link, after the host. It begins with the path "
+        "below which a proxy has the service, if there is one."
+    )
 
 
 class ShareList(BaseModel):

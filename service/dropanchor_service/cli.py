@@ -5,11 +5,13 @@ import gc
 import re
 import sys
 from collections.abc import Container, Sequence
+from functools import partial
 from importlib import import_module
 from keyword import iskeyword
 from types import ModuleType
 from typing import Any
 
+from dropanchor_service.commands.early import data_dir_of
 from dropanchor_service.runtime.kernel_cache import use_kernel_cache
 from dropanchor_tag_client.command_line import COMPLETION, Parser, add_completion_arguments, completion_script
 
@@ -73,22 +75,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     words = _with_negative_values(sys.argv[1:] if arguments is None else arguments)
-    chosen = _parser(words[:1]).parse_args(words)
+    chosen = _parser(words[:1], words).parse_args(words)
     if chosen.command == "completion":
         print(completion_script(_parser([name for name in _COMMANDS if _is_installed(name)]), chosen.shell))
         return 0
     return int(chosen.run(chosen))
 
 
-def _parser(chosen: Container[str]) -> Parser:
-    """Return the parser of the whole command line. Only the chosen commands get their options and are imported."""
+def _parser(chosen: Container[str], words: Sequence[str] = ()) -> Parser:
+    """Return the parser of the whole command line. Only the chosen commands get their options and are imported.
+
+    words: the command line.
+    """
     parser = Parser("dropanchor", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--version", action=_Version, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, brief in _COMMANDS.items():
         one = commands.add_parser(name, help=brief)
         if name in chosen:
-            use_kernel_cache()  # before a command imports compiled kernels
+            use_kernel_cache(partial(data_dir_of, words))  # before a command imports compiled kernels
             command = _imported(_module(name))
             one.description, one.epilog = command.DESCRIPTION, command.EPILOG
             command.add_arguments(one)

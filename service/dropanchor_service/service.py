@@ -289,7 +289,9 @@ class Service:
         self._app = CurrentApp(create_starting_app(reason, gauges=self._ownership.gauges, border=self._serving.border))
         host, port = bound.getsockname()[:2]
         self.url = http_url(host, port, is_encrypted=self._certificate is not None)
-        return HttpThread(build_server(self._app, self._stopping, certificate=self._certificate), bound)
+        proxies = [str(network) for network in self._settings.http.trusted_proxies]
+        server = build_server(self._app, self._stopping, certificate=self._certificate, trusted_proxies=proxies)
+        return HttpThread(server, bound)
 
     def _full_app(self) -> FastAPI:
         def ready() -> tuple[bool, Sequence[str]]:

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,23 @@ def test_every_documented_way_to_start_a_tag_uses_the_same_anchor(tmp_path: Path
         assert {"forklift-7", "cart-1", "sim-1"} <= set(found)
         assert [tag["rejected"] for tag in found.values()] == [{}] * len(found)
         assert [anchor["id"] for anchor in service.get("/api/v1/site")["anchors"]] == ["1"]
+
+
+def test_the_tag_of_the_readme_is_told_what_a_position_needs_and_is_never_lost() -> None:
+    with running_service() as service:
+        program = snippet(README, service.zenoh)
+        subprocess.run([sys.executable, "-c", program], check=True, timeout=120, env=environment())
+        wait_until(lambda: "hint" in service.ask("GET", "/api/v1/tags/forklift-7/pose").json())
+        pose = service.get("/api/v1/tags/forklift-7/pose")
+        needs = "A position needs about 20 s of ranges and of motion samples: 1 and 1 have arrived."
+        assert (pose["state"], pose["hint"]) == ("initialising", needs)
+        with TagClient("long-ago", connect=service.zenoh) as tag:
+            a_minute_ago_ns = time.time_ns() - 60 * 10**9
+            tag.publish_range(1, 12.34, t_ns=a_minute_ago_ns)
+            tag.publish_imu((0.0, 0.0, 9.81), (0.0, 0.0, 0.1), t_ns=a_minute_ago_ns)
+        wait_until(lambda: "hint" in service.ask("GET", "/api/v1/tags/long-ago/pose").json())
+        pose = service.get("/api/v1/tags/long-ago/pose")
+        assert (pose["state"], pose["age_s"] > 59) == ("initialising", True)
 
 
 def test_the_command_on_the_page_names_the_site_and_the_anchor_of_the_service(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ class DeliveryBench:
     def __init__(
         self,
         give_up_s: float = 3600.0,
+        second_chance_s: float = 3600.0,
         email: EmailSettings | None = None,
         mqtt: MqttSettings | None = None,
         folder: Path | None = None,
@@ -42,7 +43,9 @@ class DeliveryBench:
         self.deliveries = Deliveries(database)
         settings = DeliverySettings.model_validate({"allow_networks": LOOPBACK, "timeout_s": 2.0} | delivery)
         self.channels = Channels(settings, email or EmailSettings(), mqtt or MqttSettings(), name_of)
-        patience = Patience(retry_s=0.2, give_up_ns=round(give_up_s * 1e9))
+        patience = Patience(
+            retry_s=0.2, give_up_ns=round(give_up_s * 1e9), second_chance_ns=round(second_chance_s * 1e9)
+        )
         outbox = Outbox(self.destinations, self.store, self.deliveries, self.channels)
         self.thread = DeliveryThread([outbox], patience, time.time_ns)
 

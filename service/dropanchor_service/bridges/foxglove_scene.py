@@ -104,6 +104,7 @@ def location_fixes(poses: Iterable[Json]) -> LocationFixes:
             frame_id=tag_frame_id(pose["tag"]),
             latitude=pose["lat"],
             longitude=pose["lon"],
+            altitude=math.nan,  # not estimated
             color=_colour(pose["state"], 1.0),
         )
         for pose in poses

@@ -17,8 +17,9 @@ from dropanchor_service.bridges.rmw_zenoh import NO_TYPE_HASH, RosType
 
 Json = Mapping[str, Any]
 
-UNKNOWN_VARIANCE = 1e6  # of z, roll and pitch, which are not estimated
+UNKNOWN_VARIANCE = 1e6  # of z, roll and pitch, which are not estimated, and of the twist
 USABLE_STATES = ("tracking", "coasting", "degraded")
+TWIST_COVARIANCE = np.diag([UNKNOWN_VARIANCE] * 6).reshape(-1)
 _X, _Y, _YAW = 0, 1, 5  # rows of the 6 × 6 covariances of ROS
 
 
@@ -68,7 +69,7 @@ class RosMessages:
         return self._write(self.pose, header=self._header(pose), pose=self._pose_with_covariance(pose, height_m))
 
     def odometry_cdr(self, pose: Json, height_m: float, child_frame: str) -> bytes:
-        """Return the nav_msgs/Odometry of a usable pose with a speed. The covariance of the twist is 0: unknown."""
+        """Return the nav_msgs/Odometry of a usable pose with a speed. How sure its twist is, is not known."""
         twist = self._make(
             "geometry_msgs/msg/Twist",
             linear=self._make("geometry_msgs/msg/Vector3", x=pose["speed_mps"], y=0.0, z=0.0),
@@ -79,7 +80,7 @@ class RosMessages:
             header=self._header(pose),
             child_frame_id=child_frame,
             pose=self._pose_with_covariance(pose, height_m),
-            twist=self._make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=np.zeros(36)),
+            twist=self._make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=TWIST_COVARIANCE),
         )
 
     def tf_cdr(self, pose: Json, height_m: float, child_frame: str) -> bytes:

@@ -11,7 +11,8 @@ from dropanchor_service.settings.model import Settings
 
 DESCRIPTION = """\
 Compiles the estimator and caches the result, so that the first start of `dropanchor serve` is as fast as any other.
-The cache is in $XDG_CACHE_HOME/dropanchor (~/.cache/dropanchor), or in $NUMBA_CACHE_DIR if that is set. It is valid for
+The cache is in $XDG_CACHE_HOME/dropanchor (~/.cache/dropanchor), or in $NUMBA_CACHE_DIR if that is set; of a
+user without a writable home, in the data folder of the service. It is valid for
 this version on this type of processor; otherwise the service compiles again.
 """
 EPILOG = """\

@@ -13,15 +13,22 @@ from dropanchor_service.events.deliveries import Deliveries, Delivery
 WINDOW = 1024  # oldest events of a queue that are searched for one of each tag
 MAX_REFUSALS = 5
 FIRST_RETRY_S = 0.5
+FIRST_REFUSED_S = 15.0  # so that five refusals take longer than a receiver that is replaced answers nonsense
+SECOND_CHANCE_NS = 3600 * 10**9
 REREAD_S = 1.0  # after a failed read or write
 
 
 @dataclass(frozen=True)
 class Patience:
-    """How long a queue waits. retry_s: the longest time between two attempts. give_up_ns: the age of a dead letter."""
+    """How long a queue waits.
+
+    retry_s: the longest time between two attempts. give_up_ns: the age of a dead letter. second_chance_ns: how long a
+    dead letter rests before it goes back into the queue, once.
+    """
 
     retry_s: float
     give_up_ns: int
+    second_chance_ns: int = SECOND_CHANCE_NS
 
 
 @dataclass
@@ -46,6 +53,7 @@ class Queue:
     due_s: float = 0.0
     problem: str | None = None
     waiting: dict[str, float] = field(default_factory=dict)  # tags whose event was refused → when it is tried again
+    next_chance_ns: int | None = None  # when the next dead letter goes back into the queue
     news: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def run_once(self, channel: Channel) -> bool:
@@ -56,11 +64,12 @@ class Queue:
         now_s = time.monotonic()
         if now_s < self.due_s or not self.deliveries.may_wait:
             return False
+        self._give_second_chance()
         self.waiting = {tag: due_s for tag, due_s in self.waiting.items() if due_s > now_s}
         batch = self._batch(channel)
         if not batch:
             return False
-        if batch[0].t_ns < self.now_ns() - self.patience.give_up_ns:
+        if min(entry.since_ns for entry in batch) < self.now_ns() - self.patience.give_up_ns:
             self._bury_old()
             return True
         self._note(batch, await channel.send([entry.body for entry in batch]), channel.portion.pause_s)
@@ -70,7 +79,7 @@ class Queue:
         """Wait after a run that found nothing to send: for news, or until a pause is over."""
         self.news.clear()
         now_s = time.monotonic()
-        pauses = [self.due_s] if self.due_s > now_s else list(self.waiting.values())
+        pauses = [self.due_s] if self.due_s > now_s else [*self.waiting.values(), *self._next_chance_s(now_s)]
         with suppress(TimeoutError):
             async with asyncio.timeout(max(min(pauses) - now_s, 0.0) if pauses else None):
                 await self.news.wait()
@@ -97,26 +106,38 @@ class Queue:
         self.counts.failed_attempts += len(unavailable) + len(refused)
         if unavailable:
             self.problem = unavailable[0][1].detail
-            self.due_s = time.monotonic() + self._back_off(self.failures)
+            self.due_s = time.monotonic() + self._back_off(FIRST_RETRY_S, self.failures)
             self.failures += 1
 
     def _on_refusal(self, refused: list[tuple[Delivery, Outcome]]) -> None:
         self.problem, self.failures = refused[0][1].detail, 0
         dead = [entry.sequence for entry, _ in refused if entry.refusals + 1 >= MAX_REFUSALS]
         again = [entry for entry, _ in refused if entry.refusals + 1 < MAX_REFUSALS]
-        self.deliveries.bury(self.destination, dead, self.problem)
-        self.counts.dead += len(dead)
+        self._bury(dead, self.problem)
         self.deliveries.refuse(self.destination, [entry.sequence for entry in again])
         now_s = time.monotonic()
-        self.waiting |= {entry.tag: now_s + self._back_off(entry.refusals) for entry in again}
+        self.waiting |= {entry.tag: now_s + self._back_off(FIRST_REFUSED_S, entry.refusals) for entry in again}
+
+    def _next_chance_s(self, now_s: float) -> list[float]:
+        chance_ns = self.next_chance_ns
+        return [] if chance_ns is None else [now_s + (chance_ns - self.now_ns()) * 1e-9]
+
+    def _bury(self, sequences: Sequence[int], reason: str) -> None:
+        self.deliveries.bury(self.destination, sequences, reason, self.now_ns() + self.patience.second_chance_ns)
+        self.counts.dead += len(sequences)
+
+    def _give_second_chance(self) -> None:
+        self.next_chance_ns = self.deliveries.next_chance(self.destination)
+        if self.next_chance_ns is not None and self.next_chance_ns <= self.now_ns():
+            self.deliveries.give_second_chance(self.destination, self.now_ns())
+            self.next_chance_ns = self.deliveries.next_chance(self.destination)
 
     def _bury_old(self) -> None:
         expired = self.deliveries.expired(self.destination, self.now_ns() - self.patience.give_up_ns)
         reason = f"given up after {self.patience.give_up_ns / 3.6e12:g} hours: {self.problem}"
-        self.deliveries.bury(self.destination, expired, reason)
-        self.counts.dead += len(expired)
+        self._bury(expired, reason)
 
-    def _back_off(self, failures: int) -> float:
+    def _back_off(self, first_s: float, failures: int) -> float:
         """Return the time to the next attempt, s. It doubles, and varies so that receivers are not hit in step."""
-        wait_s = min(FIRST_RETRY_S * 2.0 ** min(failures, 20), self.patience.retry_s)
+        wait_s = min(first_s * 2.0 ** min(failures, 20), self.patience.retry_s)
         return wait_s * random.uniform(0.75, 1.0)

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from dropanchor_service.engines.warm_up import PROGRESS_S, CompilationProgress
+from dropanchor_service.engines.warm_up import PROGRESS_S, CompilationProgress, how_often, where_kept
 from dropanchor_service.runtime.kernel_cache import VARIABLE, sources_stamp
 
 _log = logging.getLogger(__name__)
@@ -22,7 +22,22 @@ def compile_apart(progress: CompilationProgress) -> None:
         return
     shown = f"; {progress.page} shows the progress" if progress.page else ""
     progress.begin("the estimator, which takes about a minute")
-    _log.warning("compiling the estimator; please wait. This happens once after an update%s", shown)
+    _log.warning("compiling the estimator; please wait. %s%s", how_often(), shown)
+    try:
+        _run(progress)
+    except OSError as error:
+        _log.warning(
+            "no process could be started to compile in (%s): the service compiles by itself, and then needs some "
+            "500 MB more memory until its next start",
+            error,
+        )
+    if mark.exists():
+        _log.warning("compiled in %.0f s%s", progress.elapsed_s, where_kept())
+    progress.end()
+
+
+def _run(progress: CompilationProgress) -> None:
+    """Run `dropanchor compile` to its end. Raises OSError when it cannot be started."""
     command = [sys.executable, "-m", "dropanchor_service", "compile"]
     # A session of its own: Ctrl-C goes to the service, which ends the process.
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True) as made:
@@ -34,9 +49,6 @@ def compile_apart(progress: CompilationProgress) -> None:
                     _log.warning("compiling: %.0f s so far", progress.elapsed_s)
         finally:
             made.terminate()
-    if mark.exists():
-        _log.warning("compiled in %.0f s; the result is cached in %s", progress.elapsed_s, mark.parent)
-    progress.end()
 
 
 def mark_complete() -> None:

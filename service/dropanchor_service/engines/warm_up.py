@@ -39,7 +39,7 @@ from dropanchor_service.ingest.decode import read_forms, read_samples
 from dropanchor_service.ingest.kernels.values import shift_times, time_spans
 from dropanchor_service.ingest.publishers import Publishers
 from dropanchor_service.ingest.screening import screen
-from dropanchor_service.runtime.kernel_cache import VARIABLE
+from dropanchor_service.runtime.kernel_cache import VARIABLE, is_kept
 from dropanchor_service.store import LatestPoses, SiteStore, TagTable
 from dropanchor_service.store.groups import Groups
 from dropanchor_service.zones.modes import placed
@@ -78,7 +78,17 @@ class CompilationProgress:
         """What the service does before it is ready, for people."""
         if not self._what:
             return "The service is starting."
-        return f"The service compiles {self._what}: {self.elapsed_s:.0f} s so far. This happens once after an update."
+        return f"The service compiles {self._what}: {self.elapsed_s:.0f} s so far. {how_often()}."
+
+
+def how_often() -> str:
+    """Return how often the kernels are compiled, for people."""
+    return "This happens once after an update" if is_kept() else "This happens at every start; the log says why"
+
+
+def where_kept() -> str:
+    """Return where the compiled kernels are kept, as the end of a sentence."""
+    return f"; the result is cached in {os.environ.get(VARIABLE)}" if is_kept() else ""
 
 
 @contextmanager
@@ -100,7 +110,7 @@ def _compiling(what: str, progress: CompilationProgress) -> Iterator[None]:
                 self.has_begun, self.logged = True, time.monotonic()
                 progress.begin(what)
                 shown = f"; {progress.page} shows the progress" if progress.page else ""
-                _log.warning("compiling %s; please wait. This happens once after an update%s", what, shown)
+                _log.warning("compiling %s; please wait. %s%s", what, how_often(), shown)
             elif time.monotonic() - self.logged >= PROGRESS_S:
                 self.logged = time.monotonic()
                 _log.warning("compiling: %.0f s so far", progress.elapsed_s)
@@ -111,7 +121,7 @@ def _compiling(what: str, progress: CompilationProgress) -> Iterator[None]:
     with _without_blas(), install_listener("numba:compile", listener):
         yield
     if listener.has_begun:
-        _log.warning("compiled in %.0f s; the result is cached in %s", progress.elapsed_s, os.environ.get(VARIABLE))
+        _log.warning("compiled in %.0f s%s", progress.elapsed_s, where_kept())
         progress.end()
 
 

@@ -16,7 +16,7 @@ from dropanchor_service.history.sqlite.damaged_file import damage_in, is_damage
 from dropanchor_service.runtime.recovery import Recovery
 
 FILE_NAME = "events.sqlite"
-VERSION = 3
+VERSION = 4
 BUSY_S = 5.0
 CHECK_S = 1.0  # at a start: a large file is checked in part
 INSTEAD = "new events start, and what waited for its destinations is lost"
@@ -24,6 +24,9 @@ INSTEAD = "new events start, and what waited for its destinations is lost"
 _STAYS = """
 CREATE TABLE stays (tag TEXT NOT NULL, zone TEXT NOT NULL, entered_ns INTEGER NOT NULL, left_ns INTEGER NOT NULL);
 CREATE INDEX stays_by_end ON stays (left_ns);
+"""
+_DEAD_LETTERS = """
+CREATE INDEX dead_letters ON deliveries (destination, again_ns) WHERE dead IS NOT NULL;
 """
 _STAYS_OF_EVENTS = """
 INSERT INTO stays SELECT tag, zone, entered_ns, since_ns FROM (
@@ -46,8 +49,10 @@ CREATE TABLE states (
 ) WITHOUT ROWID;
 CREATE TABLE deliveries (
     destination TEXT NOT NULL, sequence INTEGER NOT NULL, refusals INTEGER NOT NULL DEFAULT 0, dead TEXT,
+    again_ns INTEGER,
     PRIMARY KEY (destination, sequence)
 ) WITHOUT ROWID;
+{_DEAD_LETTERS}
 {_STAYS}
 PRAGMA user_version = {VERSION};
 """
@@ -160,6 +165,11 @@ class Database:
             version = 2
         if version == 2:
             connection.executescript(f"BEGIN; {_STAYS} {_STAYS_OF_EVENTS} PRAGMA user_version = 3; COMMIT;")
+            version = 3
+        if version == 3:
+            connection.executescript(
+                f"BEGIN; ALTER TABLE deliveries ADD again_ns INTEGER; {_DEAD_LETTERS} PRAGMA user_version = 4; COMMIT;"
+            )
             version = VERSION
         if version not in (0, VERSION) or (version == 0 and tables):
             raise EventFileError(

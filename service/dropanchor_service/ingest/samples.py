@@ -8,9 +8,10 @@ import numpy as np
 
 from dropanchor_schemas.kinds import KINDS, SCALARS, Kind
 from dropanchor_schemas.wire import MAX_T_NS, Reason
-from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
+from dropanchor_service.estimation.columns import Array, SampleBatch
 from dropanchor_service.ingest.backlog import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
+from dropanchor_service.ingest.engine_columns import imu_column, scalar_column
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.kernels.values import time_spans
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
@@ -226,8 +227,8 @@ class SampleReader:
         for entry in rejected:
             self._rejections.count_rejected(entry.reason, of_row[entry.messages], entry.kind)
         return SampleBatch(
-            _imu_column(decoded.imu, of_row),
-            *(_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
+            imu_column(decoded.imu, of_row),
+            *(scalar_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
         )
 
     def _note_unknown_anchors(self, decoded: Decoded, of_row: Array, arrived: Array) -> None:
@@ -296,23 +297,3 @@ def _spans(decoded: Decoded) -> _Spans:
     for (indices, t_ns), newest in zip(times_of(decoded), newest_of, strict=True):
         time_spans(t_ns, indices, oldest, newest)
     return _Spans(oldest, newest_of.max(axis=0), newest_of)
-
-
-def _imu_column(samples: Array, of_row: Array) -> Array:
-    """Convert IMU_SAMPLE to the IMU column of the engine, in place."""
-    imu = samples.view(IMU)
-    imu["row"] = of_row[samples["message"]]
-    return imu
-
-
-def _column(scalars: Array, dtype: "np.dtype[np.void]", of_row: Array) -> Array:
-    """Convert SCALAR to a column of the engine, with this dtype."""
-    column = np.empty(len(scalars), dtype)
-    if not len(scalars):
-        return column
-    names = dtype.names or ()
-    column["row"], column["t_ns"] = of_row[scalars["message"]], scalars["t_ns"]
-    column[names[-2]], column["std"] = scalars["value"], scalars["std"]
-    if "anchor" in names:
-        column["anchor"] = scalars["anchor"]
-    return column

@@ -11,7 +11,7 @@ from prometheus_client import CollectorRegistry
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import RedirectResponse
-from starlette.routing import Match, Mount, Route
+from starlette.routing import BaseRoute, Match, Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from dropanchor_service.api.app import DASHBOARD, MAX_BODY_BYTES, PREFIX
@@ -84,7 +84,7 @@ class FrontPage(Route):
     While that owner is away, the page of this node says so.
     """
 
-    def __init__(self, gateway: ASGIApp, page: Mount, owners: Owners) -> None:
+    def __init__(self, gateway: ASGIApp, page: BaseRoute, owners: Owners) -> None:
         super().__init__("/", self._serve, methods=["GET"])
         self.app = self._serve
         self._gateway = gateway
@@ -103,7 +103,7 @@ class FrontPage(Route):
         try:
             await self._gateway(scope, receive, send)
         except ProblemError:
-            await self._page.app(scope, receive, send)
+            await self._page.handle(scope, receive, send)
 
 
 class RequestId:

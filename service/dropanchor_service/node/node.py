@@ -67,7 +67,9 @@ class Node:
         with self._opened:
             bound = listen(self._settings.http.host, self._settings.http.port)
             self._opened.callback(bound.close)
-            self._http = HttpThread(build_server(self.app, self._stopping, certificate=self._certificate), bound)
+            proxies = [str(network) for network in self._settings.http.trusted_proxies]
+            server = build_server(self.app, self._stopping, certificate=self._certificate, trusted_proxies=proxies)
+            self._http = HttpThread(server, bound)
             self._opened.callback(self._http.join, HTTP_STOP_S)
             self._http.start()
             self._opened.callback(self._http.ask_to_stop)

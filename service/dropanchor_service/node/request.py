@@ -3,8 +3,10 @@
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
+from starlette.requests import HTTPConnection
 from starlette.types import Message, Receive, Scope
 
+from dropanchor_service.api.http.behind_proxy import PREFIX, prefix_of
 from dropanchor_service.api.http.of_cluster import CLIENT, HOST, OF_NODES, SCHEME, SECRET
 
 KEPT_BYTES = 1_048_576
@@ -101,6 +103,7 @@ def headers_for_owner(scope: Scope, secret: bytes, request_id: str) -> RawHeader
     client = scope["client"][0] if scope.get("client") else ""
     scheme = "https" if scope["scheme"] in ("https", "wss") else "http"
     about = {SECRET: secret, CLIENT: client.encode(), HOST: host, SCHEME: scheme.encode()}
+    about |= {PREFIX: prefix.encode()} if (prefix := prefix_of(HTTPConnection(scope))) else {}
     headers += [(name.encode(), value) for name, value in about.items()]
     return [*headers, (b"x-request-id", request_id.encode())]
 

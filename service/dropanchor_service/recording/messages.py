@@ -19,7 +19,8 @@ FRAME = "site"
 SITE_TOPIC = "/site"
 ESTIMATE = "estimate"  # the last part of a topic
 IDENTITY_ROTATION = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-COVARIANCE_KNOWN = 3  # foxglove.LocationFix.position_covariance_type
+COVARIANCE_APPROXIMATED = 1  # foxglove.LocationFix.position_covariance_type
+UNKNOWN_VARIANCE = 1e6  # m², of the altitude, which is not estimated
 
 Message = tuple[str, str, bytes]
 """Topic, schema name, JSON."""
@@ -90,12 +91,15 @@ def _numbers(pose: Array, names: Iterable[str]) -> dict[str, object]:
 
 
 def _location(pose: Array, document: SiteDocument) -> dict[str, object]:
-    """Return a foxglove.LocationFix. Its covariance is in east, north and up; up is not estimated."""
+    """Return a foxglove.LocationFix. Its covariance is in east, north and up.
+
+    The altitude is not estimated. JSON has no NaN, so it is 0 with a variance that says that nothing is known.
+    """
     assert document.site.georeference is not None
     lat, lon = lat_lon(document.site.georeference, pose["x"], pose["y"])
     angle = document.site.georeference.rotation_rad
     enu_from_site = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    covariance = np.zeros((3, 3))
+    covariance = np.diag([0.0, 0.0, UNKNOWN_VARIANCE])
     covariance[:2, :2] = enu_from_site @ pose["cov"][:2, :2] @ enu_from_site.T
     known = bool(np.isfinite(covariance).all())
     return {
@@ -104,7 +108,7 @@ def _location(pose: Array, document: SiteDocument) -> dict[str, object]:
         "longitude": float(lon),
         "altitude": 0.0,
         "position_covariance": covariance.reshape(-1).tolist() if known else [0.0] * 9,
-        "position_covariance_type": COVARIANCE_KNOWN if known else 0,
+        "position_covariance_type": COVARIANCE_APPROXIMATED if known else 0,
     }
 
 

@@ -1,10 +1,11 @@
 """The writing side of the recorder: write queued items to one file after the other."""
 
 import logging
+import threading
 import time
 from base64 import b64encode
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from dropanchor_schemas.wire import ENCODING_JSON, ENCODING_PACKED
 from dropanchor_service.estimation.columns import Array
@@ -50,7 +51,9 @@ class SiteChange:
 
 @dataclass(frozen=True)
 class End:
-    """The recording was stopped."""
+    """The recording was stopped. is_done: set when its last file is finished."""
+
+    is_done: threading.Event = field(default_factory=threading.Event)
 
 
 Item = Samples | Poses | SiteChange | End
@@ -82,6 +85,7 @@ class Output:
         self._items_added = 0
         self._pruned_s = 0.0
         self.written = 0
+        self.ended_name: str | None = None  # the last file of the last recording that was stopped
         self._is_omitting = False  # messages, because the open file has no room for their topics
 
     @property
@@ -114,8 +118,10 @@ class Output:
 
     def _add(self, item: Item) -> None:
         match item:
-            case End():
+            case End(is_done):
+                self.ended_name = self.open_name
                 self._finish()
+                is_done.set()
             case SiteChange(turn_ns, document):
                 self._document = document
                 if self._file is not None:

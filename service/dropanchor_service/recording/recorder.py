@@ -1,5 +1,6 @@
 """Record incoming messages and outgoing poses in a series of files."""
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +62,7 @@ class Recorder:
         self._now_ns = now_ns
         self._metadata = metadata
         self._running: RunningRecording | None = None
+        self._ending = threading.Lock()  # nothing is queued behind the end, where it would open another file
         self._site_version = 0
         self._session = ""
         self._preparing = Lock()
@@ -96,6 +98,11 @@ class Recorder:
         """The name of the file that is being written, or None."""
         return self._output.open_name
 
+    @property
+    def ended_name(self) -> str | None:
+        """The name of the last file of the recording that was stopped last; None if it has none."""
+        return self._output.ended_name
+
     def files(self) -> list[RecordedFile]:
         """Return the recorded files, the oldest first."""
         return files.files_in(self.folder)
@@ -124,12 +131,20 @@ class Recorder:
         self._running = RunningRecording(since_ns, None if tags is None else tuple(tags))
         return True
 
-    def stop(self) -> bool:
-        """Stop recording; the file is finished shortly after. Return False when nothing is being recorded."""
-        if self._running is None:
-            return False
-        self._running = None
-        self.writer.put(End(), 0)
+    def stop(self, wait_s: float = 0.0) -> bool:
+        """Stop recording. Return False when nothing is being recorded.
+
+        wait_s: how long to wait until the last file is finished. A disk that takes nothing delays that.
+        """
+        end = End()
+        with self._ending:
+            if self._running is None:
+                return False
+            self._running = None
+            self.writer.put(end, 0)
+        if wait_s > 0:
+            self.writer.hurry()
+            end.is_done.wait(wait_s)
         return True
 
     def record_messages(self, messages: Messages) -> None:
@@ -138,13 +153,15 @@ class Recorder:
         if running is None:
             return
         now_ns = self._now_ns()
-        self._queue_site_change(now_ns)
         if running.tags is not None:
             rows = self._rows(running.tags)
             messages = [message for message in messages if message[0] in rows]
-        if messages:
-            size = sum(len(message[1]) for message in messages) + MESSAGE_OVERHEAD * len(messages)
-            self.writer.put(Samples(now_ns, messages), size, len(messages))
+        size = sum(len(message[1]) for message in messages) + MESSAGE_OVERHEAD * len(messages)
+        with self._ending:
+            if self._running is running:
+                self._queue_site_change(now_ns)
+                if messages:
+                    self.writer.put(Samples(now_ns, messages), size, len(messages))
 
     def record_poses(self, poses: Array) -> None:
         """Queue decimated poses, if a recording is running. poses: POSE, in order of time per row."""
@@ -154,8 +171,9 @@ class Recorder:
         kept = self._decimation.select(poses)
         if running.tags is not None:
             kept = kept[np.isin(kept["row"], list(self._rows(running.tags)))]
-        if len(kept):
-            self.writer.put(Poses(self._now_ns(), kept), kept.nbytes, len(kept))
+        with self._ending:
+            if len(kept) and self._running is running:
+                self.writer.put(Poses(self._now_ns(), kept), kept.nbytes, len(kept))
 
     def _new_file(self, t_ns: int) -> McapFile:
         self.prepare()

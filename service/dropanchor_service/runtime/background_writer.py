@@ -81,6 +81,10 @@ class BackgroundWriter(Generic[Item]):
         if self._bytes > self._max_bytes // 2:
             self._flush_now.set()
 
+    def hurry(self) -> None:
+        """Write what is queued now, and not at the end of the period."""
+        self._flush_now.set()
+
     def _run(self) -> None:
         while not self._stop.is_set():
             self._flush_now.wait(self._period_s)

@@ -4,14 +4,24 @@ numba checks only the source file of the outermost kernel. After an update of an
 it would run the old code. Therefore the folder's name contains a digest of all sources.
 """
 
+import atexit
+import fcntl
 import hashlib
 import logging
 import os
+import shutil
+import stat
 import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
 KERNEL_SOURCES = ("estimation", "ingest/kernels", "answers/kernels", "zones")
+TEMPORARY = "dropanchor-kernels-"
+_LOCK = "lock"
+_YOUNG_S = 60.0  # so long a folder without a lock may be one that another process just makes
 
 _log = logging.getLogger(__name__)
 
@@ -31,23 +41,86 @@ def _sources() -> list[Path]:
     return sorted(source for name in KERNEL_SOURCES for source in (Path(__file__).parents[1] / name).rglob("*.py"))
 
 
-def use_kernel_cache() -> None:
-    """Set the folder of the cache, unless the environment does. Call this before numba is imported."""
+def use_kernel_cache(data_dir: Callable[[], Path | None] = lambda: None) -> None:
+    """Set the folder of the cache, unless the environment does. Call this before numba is imported.
+
+    data_dir: returns the data folder of the service. It has the cache where there is no home.
+    """
     if VARIABLE in os.environ:
         return
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = home / "dropanchor" / f"kernels-{sources_digest()}"
+    name = f"kernels-{sources_digest()}"
+    os.environ[VARIABLE] = str(_in_home(name) or _in_data(data_dir(), name) or _temporary())
+
+
+def is_kept() -> bool:
+    """Return whether the next start finds what is compiled now."""
+    return not Path(os.environ.get(VARIABLE, "")).name.startswith(TEMPORARY)
+
+
+def _in_home(name: str) -> Path | None:
+    try:
+        home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:  # the user has none
+        return None
+    folder = home / "dropanchor" / name
+    return folder if _is_made(folder) else None
+
+
+def _in_data(data_dir: Path | None, name: str) -> Path | None:
+    if data_dir is None or not _is_made(data_dir / name) or not _is_private(data_dir / name):
+        return None
+    for old in data_dir.glob("kernels-*"):  # of the version before an update
+        if old.name != name:
+            shutil.rmtree(old, ignore_errors=True)
+    return data_dir / name
+
+
+def _is_made(folder: Path) -> bool:
+    """Make the folder if there is none. Return whether it can be written."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        writable = os.access(folder, os.W_OK)
     except OSError:
-        writable = False
-    if not writable:
-        # Use a fresh private folder: the code in a cache is executed, so nobody else may have written it.
-        folder = Path(tempfile.mkdtemp(prefix="dropanchor-kernels-"))
-        _log.warning(
-            "%s is not writable, so the estimator is compiled at every start: set %s to a writable folder",
-            home,
-            VARIABLE,
-        )
-    os.environ[VARIABLE] = str(folder)
+        return False
+    return os.access(folder, os.W_OK)
+
+
+def _is_private(folder: Path) -> bool:
+    """Return whether nobody else can write into the folder: the code in a cache is executed."""
+    found = folder.lstat()
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & 0o022
+
+
+def _temporary() -> Path:
+    """Return a fresh private folder that goes with this process. A lock tells others that the process lives."""
+    _remove_left_over()
+    folder = Path(tempfile.mkdtemp(prefix=TEMPORARY))
+    fcntl.flock(os.open(folder / _LOCK, os.O_CREAT | os.O_RDWR, 0o600), fcntl.LOCK_EX)  # until the process ends
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    _log.warning(
+        "no folder keeps the compiled estimator, so it is compiled at every start: set a data folder (--data-dir), or "
+        "%s to a writable folder",
+        VARIABLE,
+    )
+    return folder
+
+
+def _remove_left_over() -> None:
+    """Delete the temporary folders of this user whose process was killed."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{TEMPORARY}*"):
+        with suppress(OSError):
+            if _is_private(folder) and time.time() - folder.stat().st_mtime > _YOUNG_S and _has_no_process(folder):
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _has_no_process(folder: Path) -> bool:
+    try:
+        lock = os.open(folder / _LOCK, os.O_RDWR)
+    except FileNotFoundError:
+        return True
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    finally:
+        os.close(lock)
+    return True

@@ -13,7 +13,8 @@ from dropanchor_service.security.certificate import Certificate
 from dropanchor_service.security.folder import SecurityError, SecurityFolder
 from dropanchor_service.security.identity import Authenticator, IdentityProvider
 from dropanchor_service.security.share_links import ShareLinks
-from dropanchor_service.settings.model import HttpSettings, Settings
+from dropanchor_service.settings.http import HttpSettings
+from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 
 EXPIRY_WARNING = timedelta(days=30)

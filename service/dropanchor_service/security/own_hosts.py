@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from cryptography import x509
 
 from dropanchor_service.security.folder import SecurityFolder
-from dropanchor_service.settings.model import HttpSettings
+from dropanchor_service.settings.http import HttpSettings
 
 LOOPBACK_NAME = "localhost"
 

@@ -6,11 +6,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, IPvAnyNetwork, model_validator
 
 from dropanchor_schemas.destinations import Address
-
-
-def _as_list(value: object) -> object:
-    """Split text at commas, so that an environment variable can hold several networks."""
-    return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
+from dropanchor_service.settings.lists import as_list
 
 
 class _Section(BaseModel):
@@ -32,7 +28,7 @@ class EventSettings(_Section):
 class DeliverySettings(_Section):
     """How events are delivered to destinations. The destinations are set over REST."""
 
-    allow_networks: Annotated[tuple[IPvAnyNetwork, ...], BeforeValidator(_as_list)] = Field(
+    allow_networks: Annotated[tuple[IPvAnyNetwork, ...], BeforeValidator(as_list)] = Field(
         default=(),
         description='Networks of receivers inside, such as "10.1.0.0/16". Other addresses must be public, so that '
         "nobody can reach internal machines through a webhook, or by what a name stands for. A mail server or broker "

@@ -1,11 +1,10 @@
 """The settings of the service. `sources` reads them; they are built once and passed down."""
 
 import difflib
-import re
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
@@ -17,7 +16,9 @@ from dropanchor_service.settings.buckets import refuse_unfit_buckets
 from dropanchor_service.settings.cluster import ClusterSettings
 from dropanchor_service.settings.events import DeliverySettings, EmailSettings, EventSettings, MqttSettings
 from dropanchor_service.settings.history import HistorySettings, RecordingSettings
+from dropanchor_service.settings.http import HttpSettings
 from dropanchor_service.settings.ids import SettingsId, SiteId
+from dropanchor_service.settings.lists import as_list
 from dropanchor_service.settings.quota import Quota, UnknownTags
 from dropanchor_service.settings.sites import ScopeName, SiteSettings
 
@@ -29,75 +30,12 @@ def _is_endpoint(text: str) -> str:
     return text
 
 
-def _as_list(value: Any) -> Any:
-    """Split text at commas, so that an environment variable can hold several endpoints."""
-    return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
-
-
-Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_is_endpoint)], ...], BeforeValidator(_as_list)]
+Endpoints = Annotated[tuple[Annotated[str, AfterValidator(_is_endpoint)], ...], BeforeValidator(as_list)]
 Parameters = TypeVar("Parameters", PaperParameters, AttitudeParameters)
-Port = Annotated[int, Field(ge=0, le=65535)]
-
-
-def _is_origin(text: str) -> str:
-    if text != "*" and not re.fullmatch(r"https?://[^/?#\s]+", text):
-        raise ValueError('an origin such as https://board.example was expected, or "*" for all')
-    return text
-
-
-def _is_host(text: str) -> str:
-    if text != "*" and not re.fullmatch(r"(\*\.)?[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*\.?", text):
-        raise ValueError("a name such as yard.example was expected, without a scheme or port")
-    return text
-
-
-HostNames = Annotated[tuple[Annotated[str, AfterValidator(_is_host)], ...], BeforeValidator(_as_list)]
-Origins = Annotated[tuple[Annotated[str, AfterValidator(_is_origin)], ...], BeforeValidator(_as_list)]
 
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class HttpSettings(_Section):
-    """Where the page and the REST interface are served."""
-
-    host: str = Field(default="127.0.0.1", min_length=1, description="Address to listen on.")
-    port: Port = Field(default=8080, description="Port to listen on; 0 takes any free one.")
-    tls: bool = Field(
-        default=True, description="Serve HTTPS where there is a certificate. Turn it off behind a proxy that ends TLS."
-    )
-    certificate: Path | None = Field(
-        default=None, description="PEM file with its chain; without it, the certificate of `security.folder`."
-    )
-    key: Path | None = Field(default=None, description="PEM file with the private key of the certificate.")
-    requests_per_s: Annotated[float, Field(ge=0.1, le=1e6)] = Field(
-        default=200.0,
-        description="Requests that one key, token or address may make per second, on average. There is no limit on the "
-        "loopback without credentials.",
-    )
-    burst: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=400, description="Requests that it may make at once."
-    )
-
-    allowed_hosts: HostNames = Field(
-        default=(),
-        description="Names by which clients may call the service, such as that of a proxy before it: "
-        '`["yard.example"]`, `["*.example"]`. IP addresses, `localhost`, the names in certificates and, beyond the '
-        "loopback, the name of the machine are always allowed. Requests for another name are refused, since a page "
-        'could have turned it to this machine. `["*"]`: all.',
-    )
-    cors_origins: Origins = Field(
-        default=(),
-        description='Origins of other web pages that may use the REST interface, such as `["https://board.example"]`; '
-        '`["*"]`: all. They need a key like any other client.',
-    )
-
-    @model_validator(mode="after")
-    def _certificate_has_a_key(self) -> "HttpSettings":
-        if (self.certificate is None) != (self.key is None):
-            raise ValueError("certificate and key go together: give both or neither")
-        return self
 
 
 class ZenohSettings(_Section):

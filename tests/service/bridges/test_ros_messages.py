@@ -46,7 +46,7 @@ def test_odometry_moves_in_the_frame_of_the_tag() -> None:
     assert (reader.stamp_and_frame()[1], reader.text()) == ("site", "cart/base_link")
     read_pose(reader)
     assert reader.take("d", 6) == [1.5, 0.0, 0.0, 0.0, 0.0, 0.25]
-    assert reader.take("d", 36) == [0.0] * 36
+    assert reader.take("d", 36) == [1e6 if row == column else 0.0 for row in range(6) for column in range(6)]
     reader.end()
 
 

@@ -7,6 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
@@ -26,6 +27,7 @@ from dropanchor_service.history.sqlite import store as of_history
 from dropanchor_service.node import sentences as of_node
 from dropanchor_service.node.owners import Owner
 from dropanchor_service.plans import images as of_images
+from dropanchor_service.runtime.kernel_cache import VARIABLE
 from dropanchor_service.runtime.recovery import BEGINS_EMPTY, COPY_USED, Recovery
 from dropanchor_service.security import share_links as of_links
 from dropanchor_service.store import HealthTable, TagTable
@@ -138,7 +140,9 @@ def progress() -> Iterator[str]:
         "the zones",
     ):
         compilation.begin(what)
-        yield compilation.sentence
+        for folder in ("/home/.cache/dropanchor/kernels-1", "/tmp/dropanchor-kernels-1"):
+            with patch.dict("os.environ", {VARIABLE: folder}):
+                yield compilation.sentence
 
 
 def in_german(**texts: list[str]) -> list[str]:

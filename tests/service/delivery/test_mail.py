@@ -1,6 +1,7 @@
 """Events reach a real mail server: as plain sentences, many in one mail, through outages and refusals."""
 
 import ssl
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -176,7 +177,7 @@ def test_a_mail_that_the_server_refuses_becomes_dead_letters_that_can_be_sent_ag
         reasons = {reason for _, reason in bench.deliveries.dead("mes")}
         assert reasons == {"the mail server answered 550 shift@example.com: no such user"}
         server.refused.clear()
-        bench.deliveries.retry("mes")
+        bench.deliveries.retry("mes", time.time_ns())
         wait_until(lambda: bench.counts() == (0, 0))
     assert len(server.mails) == 1
 
@@ -246,7 +247,7 @@ def test_the_same_events_make_the_same_message_id_after_a_restart(tmp_path: Path
             wait_until(lambda: bench.counts() == (0, 0))
         bench.deliveries.bury("mes", [1, 2], "as if the answer had not come")
         with bench.store.database.transaction() as connection:
-            connection.executemany("INSERT INTO deliveries VALUES ('mes', ?, 0, NULL)", [(1,), (2,)])
+            connection.executemany("INSERT INTO deliveries VALUES ('mes', ?, 0, NULL, NULL)", [(1,), (2,)])
         bench.store.database.close()
         again = bench_of(server, folder=tmp_path)
         with again.thread:

@@ -52,6 +52,17 @@ def test_a_failure_leaves_the_compiling_to_the_caller(
     assert not any("compiled in" in message for message in caplog.messages)
 
 
+def test_a_compiler_that_cannot_be_started_is_a_sentence_and_leaves_the_compiling_to_the_caller(
+    cache: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.executable", str(cache / "nowhere"))
+    progress = CompilationProgress()
+    compile_apart(progress)
+    assert "the service compiles by itself" in caplog.messages[-1]
+    assert "No such file" in caplog.messages[-1]
+    assert progress.sentence == "The service is starting."
+
+
 def test_a_cache_that_cannot_be_written_is_not_filled(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,15 +39,6 @@ def test_the_name_depends_on_every_package_with_kernels() -> None:
     assert found - of_packages == {package / "evaluation" / name for name in evaluation}
 
 
-def test_without_a_writable_cache_folder_a_fresh_private_folder_is_used(tmp_path: Path) -> None:
-    not_a_folder = tmp_path / "file"
-    not_a_folder.write_text("")
-    first, second = (cache_folder(XDG_CACHE_HOME=str(not_a_folder)) for _ in range(2))
-    assert "dropanchor-kernels-" in first
-    assert first != second
-    assert os.stat(first.strip()).st_mode & 0o077 == 0
-
-
 def test_a_cache_folder_in_the_environment_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "somewhere")
     use_kernel_cache()

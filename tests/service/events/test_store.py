@@ -121,11 +121,14 @@ def test_the_queues_of_an_older_file_go_on(tmp_path: Path) -> None:
     with bench.database.transaction() as connection:
         connection.execute("ALTER TABLE deliveries RENAME destination TO webhook")
         connection.execute("DROP TABLE stays")
+        connection.execute("DROP INDEX dead_letters")
+        connection.execute("ALTER TABLE deliveries DROP COLUMN again_ns")
         connection.execute("PRAGMA user_version = 1")
     bench.database.close()
     database = Database(tmp_path)
     assert Deliveries(database).states()["hook"].pending == 1
-    assert database.rows("PRAGMA user_version") == [(3,)]
+    assert Deliveries(database).next_chance("hook") is None
+    assert database.rows("PRAGMA user_version") == [(4,)]
     database.close()
 
 

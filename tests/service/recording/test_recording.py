@@ -124,7 +124,9 @@ def test_poses_are_recorded_in_schemas_that_viewers_know_and_are_valid(tmp_path:
     assert pose[0]["pose"]["position"] == {"x": 3.0, "y": 4.0, "z": 1.5}
     assert pose[0]["pose"]["orientation"]["z"] == pytest.approx(0.5**0.5)
     assert (len(pose), len(found["foxglove.LocationFix"]), len(found["dropanchor.Estimate"])) == (1, 1, 2)
-    assert found["foxglove.LocationFix"][0]["position_covariance"] == [0.04, 0, 0, 0, 0.01, 0, 0, 0, 0]
+    fix = found["foxglove.LocationFix"][0]
+    assert fix["position_covariance"] == [0.04, 0, 0, 0, 0.01, 0, 0, 0, 1e6]  # nothing says that the altitude is known
+    assert fix["position_covariance_type"] == 1
     assert found["foxglove.FrameTransform"][0]["translation"] == {"x": 1.0, "y": 0.0, "z": 2.5}
     assert found["dropanchor.Estimate"][0]["anchor"] == "7"
     assert "x" not in found["dropanchor.Estimate"][1]

@@ -18,7 +18,7 @@ from dropanchor_service.api.http.of_cluster import HOST, is_of_node
 from dropanchor_service.api.http.permissions import SAFE_METHODS
 from dropanchor_service.security.folder import SecurityFolder
 from dropanchor_service.security.own_hosts import own_hosts
-from dropanchor_service.settings.model import HttpSettings
+from dropanchor_service.settings.http import HttpSettings
 
 FORBIDDEN = 4403
 """The code with which the service ends a WebSocket."""

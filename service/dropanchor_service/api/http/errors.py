@@ -53,6 +53,7 @@ class Kind(Enum):
     NO_RECORDER = (409, "The service cannot record")
     RECORDS_ALREADY = (409, "A recording is running already")
     RECORDS_NOTHING = (409, "No recording is running")
+    RECORDING_UNFINISHED = (409, "The recording is not finished yet")
     NOT_INSTALLED = (409, "The service lacks an optional package")
     TOO_FAR_AHEAD = (409, "The time is too far ahead of the newest pose")
     NOT_GEOREFERENCED = (409, "The site has no georeference")

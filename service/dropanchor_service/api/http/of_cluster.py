@@ -8,13 +8,14 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from dropanchor_service.api.http.behind_proxy import PREFIX, with_prefix
 from dropanchor_service.api.http.errors import Kind, problem_response
 
 BUCKET, EPOCH = "dropanchor-bucket", "dropanchor-epoch"
 """Headers of every answer of an owner."""
 SECRET, CLIENT, HOST, SCHEME = "dropanchor-node", "x-forwarded-for", "x-forwarded-host", "x-forwarded-proto"
 """Headers of every request of a node: its secret, and what it says about the client."""
-OF_NODES = frozenset({SECRET, CLIENT, HOST, SCHEME})
+OF_NODES = frozenset({SECRET, CLIENT, HOST, SCHEME, PREFIX})
 _NODE = "dropanchor_node"
 _SECURE = {"http": "https", "ws": "wss"}
 
@@ -90,4 +91,5 @@ def _of_client(scope: Scope, headers: Headers) -> Scope:
     if headers.get(SCHEME) == "https":
         scheme = _SECURE[scheme]
     state = {**scope.get("state", {}), _NODE: True}
-    return {**scope, "headers": kept, "client": (headers.get(CLIENT, ""), 0), "scheme": scheme, "state": state}
+    scope = {**scope, "headers": kept, "client": (headers.get(CLIENT, ""), 0), "scheme": scheme, "state": state}
+    return with_prefix(scope, headers.get(PREFIX, ""))

@@ -16,6 +16,7 @@ OPEN_PATHS = (
     f"{PREFIX}health/live",
     f"{PREFIX}health/ready",
     f"{PREFIX}openapi.json",
+    f"{PREFIX}docs",
     f"{OMLOX_PREFIX}v2/openapi.json",
     f"{OMLOX_PREFIX}v1/openapi.json",
 )

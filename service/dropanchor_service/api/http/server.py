@@ -4,7 +4,7 @@ import asyncio
 import errno
 import socket
 import ssl
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from threading import Event
@@ -13,6 +13,7 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.server import ServerState
 
+from dropanchor_service.api.http.behind_proxy import ON_THIS_MACHINE, BehindProxy
 from dropanchor_service.api.http.busy_limit import BusyLimit
 from dropanchor_service.api.http.limits import GuardedProtocol
 from dropanchor_service.api.http.open_sockets import Listener, OpenSockets
@@ -78,13 +79,16 @@ def build_server(
     stopping: Event,
     protocol: type[GuardedProtocol] = GuardedProtocol,
     certificate: Certificate | None = None,
+    trusted_proxies: Sequence[str] = ON_THIS_MACHINE,
 ) -> Server:
     """Return a server, to run with `await server.serve(sockets=[listen(host, port)])`.
 
-    stopping: the event that `app` was created with. Raises ListenError when the certificate cannot be used.
+    stopping: the event that `app` was created with. trusted_proxies: addresses and networks of proxies that say who
+    the client is. Raises ListenError when the certificate cannot be used.
     """
     config = uvicorn.Config(
-        BusyLimit(app, open_files.shares().http),
+        BusyLimit(BehindProxy(app, trusted_proxies), open_files.shares().http),
+        proxy_headers=False,
         http=protocol,
         ws=GuardedWebSocket,
         ws_max_size=MAX_MESSAGE_BYTES,

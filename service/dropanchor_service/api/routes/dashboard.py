@@ -6,10 +6,11 @@ from hashlib import sha256
 from importlib.resources import files
 from mimetypes import guess_type
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
-from starlette.responses import Response
-from starlette.routing import Match, Mount
+from starlette.responses import RedirectResponse, Response
+from starlette.routing import BaseRoute, Match, Mount, Route
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
 from starlette.types import Scope
 
@@ -34,6 +35,8 @@ class _Files(StaticFiles):
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
+        if isinstance(response, RedirectResponse):
+            response = _to_folder(response)
         response.headers.update(_HEADERS)
         return response
 
@@ -50,6 +53,13 @@ class _Files(StaticFiles):
         return NotModifiedResponse(response.headers) if is_known else response
 
 
+def _to_folder(response: RedirectResponse) -> Response:
+    """Lead to the same folder as the redirect, from where the client sees it: a proxy may have it below a path."""
+    to = urlsplit(response.headers["location"])
+    folder = to.path.rstrip("/").rpartition("/")[2]
+    return RedirectResponse(f"./{folder}/" + (f"?{to.query}" if to.query else ""))
+
+
 @lru_cache(maxsize=512)
 def _content(path: str, changed_ns: int) -> tuple[bytes, str]:  # noqa: ARG001 - a changed file is read again
     return _with_etag(Path(path).read_bytes())
@@ -64,10 +74,19 @@ def _with_etag(content: bytes) -> tuple[bytes, str]:
     return content, f'"{sha256(content).hexdigest()[:32]}"'
 
 
-def page_mounts(dashboard: Path) -> list[Mount]:
-    """Return the routes of the pages: the dashboard, and the interactive documentation with its program."""
+ELSEWHERE = {"/openapi.json": "api/v1/openapi.json", "/api/v1/docs": "../../docs/"}
+"""Where people look for what is elsewhere, and where it is from there."""
+
+
+def page_mounts(dashboard: Path) -> list[BaseRoute]:
+    """Return the routes of the pages: the interactive documentation with its program, and the dashboard as the last."""
     swagger_ui = _Files(Path(str(files("fastapi_swagger.resources"))))
-    return [Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui"), DashboardMount(dashboard)]
+    leading = [_leading(path, to) for path, to in ELSEWHERE.items()]
+    return [*leading, Mount("/docs/swagger-ui", app=swagger_ui, name="swagger-ui"), DashboardMount(dashboard)]
+
+
+def _leading(path: str, to: str) -> Route:
+    return Route(path, lambda _: RedirectResponse(to), include_in_schema=False)
 
 
 class DashboardMount(Mount):

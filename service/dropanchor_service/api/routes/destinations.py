@@ -147,14 +147,15 @@ def _add_dead_letter_routes(router: APIRouter, site_of: SiteOfRequest) -> None:
         "/destinations/{destination}/dead-letters/retry",
         operation_id="retry_dead_letters",
         summary="Put the dead letters of a destination back into its queue",
+        description="A dead letter goes back by itself once, an hour after it became one.",
         response_model=Retried,
         responses=example_response({"retried": 1}) | problems(*_ONE),
     )
     def retry_dead_letters(destination: DestinationId, request: Request) -> Response:
-        parts = site_of.parts(request).events
-        found(parts.destinations, destination, Kind.UNKNOWN_DESTINATION)
+        site = site_of.parts(request)
+        found(site.events.destinations, destination, Kind.UNKNOWN_DESTINATION)
         with reading():
-            return json_response({"retried": parts.deliveries.retry(destination)})
+            return json_response({"retried": site.events.deliveries.retry(destination, site.answers.now_ns())})
 
     @router.delete(
         "/destinations/{destination}/dead-letters",

@@ -14,6 +14,7 @@ from dropanchor_schemas.answers import PhoneReadingsReceived
 from dropanchor_schemas.samples import decode_json
 from dropanchor_schemas.wire import Reason, Rejection
 from dropanchor_service.api.http.access import secret_of
+from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes import examples
 from dropanchor_service.api.routes.contents import TEXT
@@ -83,7 +84,7 @@ def _add_experiment_routes(router: APIRouter) -> None:
 def _address(request: Request) -> str:
     """Return where the app sends readings, below the site if the request names one."""
     path = request.scope["path"].removesuffix("/code")
-    return f"{str(request.base_url).rstrip('/')}{path}"
+    return f"{str(request.base_url).rstrip('/')}{prefix_of(request)}{path}"
 
 
 def _file(media_type: str, description: str) -> dict[int | str, dict[str, Any]]:

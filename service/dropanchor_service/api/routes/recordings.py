@@ -17,6 +17,7 @@ from dropanchor_service.recording.recorder import Recorder
 
 MEDIA_TYPE = "application/octet-stream"
 CHUNK_BYTES = 262_144
+FINISH_S = 10.0
 FileName = Annotated[
     str,
     Path(
@@ -83,14 +84,15 @@ def _add_stop_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="stop_recording",
         summary="Stop the recording",
         response_model=RecordingState,
+        description="The answer names the last `file`. It comes when the file is finished, at the latest after 10 s.",
         responses=example_response(examples.NO_RECORDING)
         | problems(Kind.NO_RECORDER, Kind.RECORDS_NOTHING, Kind.INVALID_REQUEST),
     )
     def stop_recording(request: Request) -> Response:
         found = _required(site_of, request)
-        if not found.stop():
+        if not found.stop(FINISH_S):
             raise ProblemError(Kind.RECORDS_NOTHING, "No recording is running, so there is nothing to stop.")
-        return json_response(_state(found))
+        return json_response(_state(found) | {"file": found.open_name or found.ended_name})
 
 
 def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
@@ -99,7 +101,9 @@ def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
         operation_id="get_recording",
         summary="Download a recording, to replay it or to open it in Foxglove or Lichtblick",
         response_class=StreamingResponse,
-        responses=_file() | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.INVALID_REQUEST),
+        description="The file of a running recording comes up to where it is, without its index.",
+        responses=_file()
+        | problems(Kind.NO_RECORDER, Kind.UNKNOWN_RECORDING, Kind.RECORDING_UNFINISHED, Kind.INVALID_REQUEST),
     )
     def get_recording(name: FileName, request: Request) -> Response:
         return _download(_opened(_required(site_of, request), name), name)
@@ -107,7 +111,13 @@ def _add_download_route(router: APIRouter, site_of: SiteOfRequest) -> None:
 
 def _opened(recorder: Recorder, name: str) -> BinaryIO:
     """Open the recording with this name. Raises ProblemError."""
-    file = recorder.opened(name)
+    if recorder.running is None and recorder.open_name == name:
+        raise ProblemError(
+            Kind.RECORDING_UNFINISHED,
+            f"{name} is not finished yet: its end is not on the disk. Try again in a second; if it stays so, "
+            "GET /api/v1/health/ready says what is wrong with the disk.",
+        )
+    file = recorder.opened(name)  # none if the retention limit deleted it meanwhile
     if file is None:
         raise ProblemError(
             Kind.UNKNOWN_RECORDING, f"There is no recording {name!r}. GET /api/v1/recordings lists the files."

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Body, Path, Request
 from starlette.responses import Response
 
 from dropanchor_schemas.shares import NewShare, Share, ShareList, ShareRequest
+from dropanchor_service.api.http.behind_proxy import prefix_of
 from dropanchor_service.api.http.errors import Kind, ProblemError, problems
 from dropanchor_service.api.routes.parameters import NO_QUERY, example_response, json_response, saving
 from dropanchor_service.api.routes.site_of_request import SiteOfRequest
@@ -78,7 +79,7 @@ def _add_create_route(router: APIRouter, site_of: SiteOfRequest, links: ShareLin
                 share, secret = links.add(site, body)
         except TooManyLinksError as error:
             raise ProblemError(Kind.ITEMS_FULL, f"There are {MAX_LINKS} share links: revoke some.") from error
-        page = "/" if site_of.only else f"/?site={quote(site, safe='')}"
+        page = prefix_of(request) + ("/" if site_of.only else f"/?site={quote(site, safe='')}")
         view = f"{body.view}&" if body.view else ""
         return json_response(
             share.model_dump() | {"secret": secret, "path": f"{page}#{view}share={secret}"}, status=201

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query, Request
-from pydantic import Field
+from pydantic import Field, field_validator
 from starlette.responses import Response
 
 from dropanchor_schemas.geojson import TrackFeatureCollection
@@ -22,6 +22,10 @@ from dropanchor_service.api.routes.site_of_request import SiteOfRequest
 from dropanchor_service.history.errors import HistoryError
 
 MAX_POSES = 10_000
+_PARQUET_IS_A_FILE = (
+    "Parquet comes as one file, not page by page: /api/v1/tags/TAG/track/file?format=parquet. It needs the extra "
+    "`parquet` of the service: pip install 'dropanchor-service[parquet]'"
+)
 
 _DESCRIPTION = """\
 The stored poses of a tag in order of time. The settings of the service say how many poses it stores. It writes them
@@ -38,6 +42,14 @@ class TrackQuery(Period):
     format: Literal["json", "geojson", "csv", "gpx"] | None = Field(
         default=None, description="The format of the response. The default depends on the header `Accept`."
     )
+
+    @field_validator("format", mode="before")
+    @classmethod
+    def _has_pages(cls, value: object) -> object:
+        """Say where Parquet is: who looks for it here would otherwise take it for missing."""
+        if value == "parquet":
+            raise ValueError(_PARQUET_IS_A_FILE)
+        return value
 
 
 CONTENT: dict[str, Any] = {

@@ -1,7 +1,15 @@
 /** Show the OpenAPI document of this service, and let people try its operations. */
 
+const root = new URL("..", document.baseURI).href.replace(/\/$/, "");
+
+/** Send what people try to this service, also where a proxy has it below a path. */
+const ofThisService = () => ({
+  statePlugins: { spec: { wrapActions: { updateJsonSpec: (update) => (document) => update({ ...document, servers: [{ url: root }] }) } } },
+});
+
 SwaggerUIBundle({
   url: new URL("../api/v1/openapi.json", document.baseURI).href,
+  plugins: [ofThisService],
   dom_id: "#interface",
   deepLinking: true,
   displayRequestDuration: true,

@@ -56,7 +56,7 @@ export class SharePanel {
     const { path } = await (await send(api("shares"), "POST", body)).json();
     await this.#refresh();
     this.#say("");
-    this.#part("link").textContent = new URL(path.slice(1), document.baseURI).href;
+    this.#part("link").textContent = new URL(path.replace(/^[^?#]*/, ""), new URL(".", document.baseURI)).href;
     this.#part("created").hidden = false;
   }
 

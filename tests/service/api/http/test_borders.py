@@ -23,7 +23,7 @@ from dropanchor_service.security.identity import Authenticator
 from dropanchor_service.security.identity import Scope as AccessScope
 from dropanchor_service.security.issued import Table
 from dropanchor_service.security.own_hosts import own_hosts
-from dropanchor_service.settings.model import HttpSettings
+from dropanchor_service.settings.http import HttpSettings
 from support.api import ApiBench, ask, kind_of, make_api_bench
 from support.http_server import running_server
 

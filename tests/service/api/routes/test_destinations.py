@@ -166,7 +166,7 @@ def test_dead_letters_are_listed_sent_again_dropped_and_go_with_their_destinatio
     ask(app, "PUT", MES, json=webhook())
     with parts.store.database.transaction() as connection:
         rows = [(1, "refused"), (2, None), (3, "refused")]
-        connection.executemany("INSERT INTO deliveries VALUES ('mes', ?, 0, ?)", rows)
+        connection.executemany("INSERT INTO deliveries VALUES ('mes', ?, 0, ?, NULL)", rows)
     happen(parts, "a", "b", "c")
     state = ask(app, "GET", MES).json()
     assert (state["pending"], state["dead"], state["oldest_ns"]) == (1, 2, 5)

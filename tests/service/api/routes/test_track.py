@@ -154,3 +154,10 @@ def test_memory_and_history_meet_without_a_gap(tmp_path: Path) -> None:
         bench.move("a", x=1200.0 + 0.2 * tenth, speed=2.0, sigma_pos=0.2)  # not written yet
     assert pose_at(bench, 0.25).x == pytest.approx(1200.5)
     assert pose_at(bench, 5.05).x == pytest.approx(1210.1)
+
+
+def test_a_page_that_wants_parquet_page_by_page_is_told_where_it_is() -> None:
+    refused = ask(make_api_bench().app(), "GET", "/api/v1/tags/a/track?format=parquet")
+    assert refused.status_code == 422
+    assert "/track/file?format=parquet" in refused.json()["detail"]
+    assert "pip install 'dropanchor-service[parquet]'" in refused.json()["detail"]
