@@ -11,9 +11,9 @@ from dropanchor_service.settings.model import Settings
 
 DESCRIPTION = """\
 Compiles the estimator and caches the result, so that the first start of `dropanchor serve` is as fast as any other.
-The cache is in $XDG_CACHE_HOME/dropanchor (~/.cache/dropanchor), or in $NUMBA_CACHE_DIR if that is set; of a
-user without a writable home, in the data folder of the service. It is valid for
-this version on this type of processor; otherwise the service compiles again.
+The cache is in $XDG_CACHE_HOME/dropanchor (~/.cache/dropanchor), or in $NUMBA_CACHE_DIR if that is set. Without a
+writable home it is in $DROPANCHOR_DATA_DIR, the data folder of the service. It is valid for this version on this type
+of processor; otherwise the service compiles again.
 """
 EPILOG = """\
 examples:
