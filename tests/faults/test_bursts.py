@@ -9,8 +9,8 @@ import pytest
 from dropanchor_schemas.keys import samples_key
 from dropanchor_schemas.wire import ENCODING_PACKED, Frame, RangeSample, encode_packed
 from dropanchor_service.ingest.buffer import PER_TURN_OF_TAG
+from dropanchor_service.ingest.due import PENDING_OF_TAG
 from dropanchor_service.ingest.kernels.sequences import MESSAGES_PER_S, WINDOW
-from dropanchor_service.ingest.samples import PENDING_OF_TAG
 from support.ingest import IngestBench
 from support.manual_clock import ManualClock
 from support.service import running_service, settings_file

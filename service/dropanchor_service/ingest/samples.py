@@ -8,10 +8,10 @@ import numpy as np
 
 from dropanchor_schemas.kinds import KINDS, SCALARS, Kind
 from dropanchor_schemas.wire import MAX_T_NS, Reason
-from dropanchor_service.estimation.columns import Array, SampleBatch
+from dropanchor_service.estimation.columns import IMU, Array, SampleBatch
 from dropanchor_service.ingest.backlog import Message
 from dropanchor_service.ingest.decode import Decoded, Forms, read_forms, read_samples
-from dropanchor_service.ingest.engine_columns import imu_column, scalar_column
+from dropanchor_service.ingest.due import due_of_each
 from dropanchor_service.ingest.guarded_engine import GuardedEngine
 from dropanchor_service.ingest.kernels.values import time_spans
 from dropanchor_service.ingest.publishers import Publishers, Sequenced
@@ -25,7 +25,6 @@ from dropanchor_service.store.rings import rank_in_row
 from dropanchor_service.store.rows import MESSAGE
 
 REORDER_BYTES = 2**26
-PENDING_OF_TAG = 32  # messages; a tag with more gives up on what is missing, since all tags wait for its next batches
 _DTYPES = [column.dtype for column in SampleBatch().columns()]
 
 OnGap = Callable[[str, list[Message]], bool]
@@ -87,10 +86,7 @@ class SampleReader:
         return len(self._reorder)
 
     def put_in_order(self, fresh: list[Message], now_ns: int, behind: Collection[int] = ()) -> Ordered:
-        """Find the messages that are due, fresh or pending, and let the others wait.
-
-        behind: rows of which more messages are in the buffer, so that what is missing may be among these.
-        """
+        """Find the messages that are due, fresh or pending, and let the others wait. behind: see `due_of_each`."""
         due_ns, is_full = self._due_ns(fresh, now_ns), self._reorder.is_full
         messages = [*self._reorder.take_due(fresh, due_ns), *fresh] if self.pending else fresh
         rows, payloads, encodings, arrivals = zip(*messages, strict=True) if messages else ((), (), (), ())
@@ -100,7 +96,7 @@ class SampleReader:
             refused = [index for index, why in read.rejected if why == reason]
             self._rejections.count_rejected(reason, of_row[refused], MESSAGE)
         waited = len(messages) - len(fresh)
-        due_of = due_ns if is_full else self._due_of_each(due_ns, of_row, arrived, waited, behind)
+        due_of = due_ns if is_full else due_of_each(due_ns, self.window_ns, of_row, arrived, waited, behind)
         sequenced = self._publishers.sequence(read.forms, of_row, arrived, due_of, waited)
         self._rejections.count_given_up(sequenced.missing)
         self._rejections.count_restarts(sequenced.restarts)
@@ -164,22 +160,6 @@ class SampleReader:
             return now_ns
         return min(now_ns, max((message[3] for message in fresh), default=now_ns)) - self.window_ns
 
-    def _due_of_each(
-        self, due_ns: int, of_row: Array, arrived: Array, waited: int, behind: Collection[int]
-    ) -> int | Array:
-        """Return `due_ns`, of each message if it depends on their rows.
-
-        A row that is behind counts the arrivals of its own. One with too many messages that `waited` has none to wait.
-        """
-        if not behind and waited <= PENDING_OF_TAG:
-            return due_ns
-        newest = np.zeros(int(of_row.max(initial=0)) + 1, np.int64)
-        np.maximum.at(newest, of_row, arrived)
-        is_behind = np.isin(of_row, np.fromiter(behind, np.int64, len(behind)))
-        due: Array = np.where(is_behind, np.minimum(newest[of_row] - self.window_ns, due_ns), due_ns)
-        due[np.bincount(of_row[:waited], minlength=len(newest))[of_row] > PENDING_OF_TAG] = MAX_T_NS
-        return due
-
     def _forms(self, payloads: Sequence[bytes], encodings: Sequence[str]) -> Forms:
         """Return the forms of these payloads. A payload that makes the decoder fail is read as an empty one."""
         try:
@@ -227,8 +207,8 @@ class SampleReader:
         for entry in rejected:
             self._rejections.count_rejected(entry.reason, of_row[entry.messages], entry.kind)
         return SampleBatch(
-            imu_column(decoded.imu, of_row),
-            *(scalar_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
+            _imu_column(decoded.imu, of_row),
+            *(_column(column, dtype, of_row) for column, dtype in zip(scalars, _DTYPES[1:], strict=True)),
         )
 
     def _note_unknown_anchors(self, decoded: Decoded, of_row: Array, arrived: Array) -> None:
@@ -297,3 +277,23 @@ def _spans(decoded: Decoded) -> _Spans:
     for (indices, t_ns), newest in zip(times_of(decoded), newest_of, strict=True):
         time_spans(t_ns, indices, oldest, newest)
     return _Spans(oldest, newest_of.max(axis=0), newest_of)
+
+
+def _imu_column(samples: Array, of_row: Array) -> Array:
+    """Convert IMU_SAMPLE to the IMU column of the engine, in place."""
+    imu = samples.view(IMU)
+    imu["row"] = of_row[samples["message"]]
+    return imu
+
+
+def _column(scalars: Array, dtype: "np.dtype[np.void]", of_row: Array) -> Array:
+    """Convert SCALAR to a column of the engine, with this dtype."""
+    column = np.empty(len(scalars), dtype)
+    if not len(scalars):
+        return column
+    names = dtype.names or ()
+    column["row"], column["t_ns"] = of_row[scalars["message"]], scalars["t_ns"]
+    column[names[-2]], column["std"] = scalars["value"], scalars["std"]
+    if "anchor" in names:
+        column["anchor"] = scalars["anchor"]
+    return column

@@ -33,8 +33,8 @@ class OpenSockets:
         return len(self._open)
 
     @property
-    def are_many_too_many(self) -> bool:
-        """Return whether there are more than the limit and those that are being closed for others."""
+    def are_still_ending(self) -> bool:
+        """Return whether connections that were closed for new ones take all the room that there is beyond the limit."""
         return len(self._open) >= self.limit + ENDING
 
     def add(self, opened: socket.socket) -> None:
@@ -95,7 +95,7 @@ class Listener(socket.socket):
         """Accept a connection. Raises BlockingIOError to be called again later."""
         if time.monotonic() - self._no_files_s < NO_FILES_S:
             raise BlockingIOError(errno.EAGAIN, "no file was left a moment ago")
-        if self.connections.are_many_too_many:
+        if self.connections.are_still_ending:
             raise BlockingIOError(errno.EAGAIN, "the connections that were closed for others still end")
         try:
             accepted, address = super().accept()
