@@ -11,8 +11,10 @@ from pathlib import Path
 
 import httpx
 import pytest
+from playwright.sync_api import expect
 from websockets.sync.client import connect
 
+from support.browser import running_chromium
 from support.proxies import caddy, nginx
 from support.service import command, environment, running_service
 from support.zenoh_router import free_port, wait_until
@@ -74,6 +76,20 @@ def test_every_way_in_stays_below_the_path(proxied: Proxied) -> None:
     assert str(document.url) == f"{proxied.address}/rtls/api/v1/openapi.json"
     assert document.json()["info"]["title"] == "Dropanchor"
     assert proxied.get("/page/main.js").status_code == 200
+
+
+@pytest.mark.browser
+def test_what_is_tried_in_the_documentation_goes_below_the_path(proxied: Proxied) -> None:
+    with running_chromium() as browser, browser.new_context(ignore_https_errors=True) as context:
+        page, asked = context.new_page(), list[str]()
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(f"{proxied.address}/rtls/docs")
+        operation = page.locator("#operations-health-get_live")
+        operation.locator(".opblock-summary-control").click()
+        operation.get_by_role("button", name="Try it out").click()
+        operation.get_by_role("button", name="Execute").click()
+        expect(operation.locator(".live-responses-table tbody .response-col_status")).to_contain_text("200")
+        assert asked[-1] == f"{proxied.address}/rtls/api/v1/health/live"
 
 
 def test_links_and_codes_that_leave_the_service_name_the_path(proxied: Proxied) -> None:
