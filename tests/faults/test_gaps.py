@@ -176,3 +176,19 @@ def test_what_zenoh_does_not_recover_is_fetched_from_the_cache(tmp_path: Path) -
                 wait_until(partial(has_used, service, newest + 1))
         assert service.metric("dropanchor_given_up_messages_total") == 0
         assert service.metric('dropanchor_rejected_total{reason="late"}') == 0
+
+
+def test_a_message_that_is_too_large_for_zenoh_is_missed(tmp_path: Path) -> None:
+    with (
+        running_service("--config", str(settings_file(tmp_path, ["a"]))) as service,
+        connected_session(service.zenoh) as tag,
+    ):
+        now_ns = time.time_ns()
+        first, last = (straight_north(1, now_ns + at * MS).replaced(sequence=at, boot_id=5) for at in (0, 2))
+        tag.put(KEY, encode_packed(first), encoding=ENCODING_PACKED)
+        wait_until(partial(has_used, service, 1))
+        tag.put(KEY, b"\1" * 2**21, encoding=ENCODING_PACKED)
+        tag.put(KEY, encode_packed(last), encoding=ENCODING_PACKED)
+        wait_until(partial(has_used, service, 2))
+        assert service.metric("dropanchor_given_up_messages_total") == 1
+        assert service.metric('dropanchor_rejected_total{reason="payload_too_large"}') == 0
