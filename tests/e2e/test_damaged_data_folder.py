@@ -49,7 +49,7 @@ def test_a_service_with_a_damaged_data_folder_serves_what_is_good_and_names_the_
             assert [one for one in impaired if one.startswith(sentence)] != [], impaired
         assert [zone["id"] for zone in service.get("/api/v1/zones")["zones"]] == ["dock"]
         assert service.get("/api/v1/tags/a/settings")["name"] == "Fork"
-        assert service.get("/api/v1/tags/a/pose")["x"] is not None
+        assert service.get("/api/v1/tags/a/pose")["range_m"] is not None
         for aside in [*data.glob("*.damaged-*"), *data.glob("checkpoints/*.damaged-*")]:
             aside.unlink()
         assert service.get("/api/v1/health/ready")["impaired"] == []

@@ -13,7 +13,7 @@ from dropanchor_service.security.router_file import RouterFileError, unused_chan
 from dropanchor_service.settings.model import ZenohSettings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_service.zenoh_io.exposure import refuse_exposure
-from dropanchor_service.zenoh_io.session import ZenohError, configuration, listening_at, open_session
+from dropanchor_service.zenoh_io.session import ZenohError, listening_at, open_session
 
 DESCRIPTION = "Runs a Zenoh router for tags and services until Ctrl-C or SIGTERM."
 EPILOG = """\
@@ -65,7 +65,7 @@ def _say_what_is_used(settings: ZenohSettings, credentials: SecurityFolder | Non
     source = "as given, not as in" if "listen" in settings.model_fields_set else "as in"
     _log.info("ready at %s (%s %s); access control as in %s", endpoints, source, file, credentials.path / TABLE)
     try:
-        changes = unused_changes(file, configuration(settings, credentials))
+        changes = unused_changes(file, credentials.router_configuration(listening_at(settings, credentials)))
     except RouterFileError as error:
         _log.warning("%s", error)
         return

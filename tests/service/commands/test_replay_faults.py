@@ -39,7 +39,7 @@ def good(run: Simulation, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def places(poses: Path) -> list[float]:
-    return [float(row[name]) for row in read_rows(poses) for name in ("x", "y")]
+    return [float(row[name] or "nan") for row in read_rows(poses) for name in ("x", "y")]
 
 
 @pytest.mark.parametrize(

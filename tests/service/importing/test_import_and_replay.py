@@ -21,7 +21,7 @@ Sources = list[str]
 def poses(folder: Path, out: Path, anchor: str) -> dict[str, tuple[float, float]]:
     assert main(["replay", str(folder), "--anchor", anchor, "--out", str(out)]) == 0
     with out.open(newline="") as file:
-        return {row["t_s"]: (float(row["x"]), float(row["y"])) for row in csv.DictReader(file)}
+        return {row["t_s"]: (float(row["x"] or "nan"), float(row["y"] or "nan")) for row in csv.DictReader(file)}
 
 
 @pytest.fixture(scope="module")

@@ -64,7 +64,7 @@ BAD_LINES = [
     (b'{"anchor": 7, "range_m": 1, "t_ns": 1.5}', "t_ns is 1.5, an integer was expected"),
     (b'{"anchor": 7.5, "range_m": 1}', "anchor is 7.5, a number or a text was expected"),
     (b'{"anchor": -1, "range_m": 1}', "an anchor number is between"),
-    (b'{"anchor": "", "range_m": 1}', "an anchor id is not empty"),
+    (b'{"anchor": "", "range_m": 1}', "an id has 1 to 64 characters, this one has 0"),
     (b'{"anchor": 7, "range_m": 1, "rssi": -80}', "range: there is no field 'rssi'"),
     (b'{"acc": [0, 0], "gyro": [0, 0, 0]}', "acc is [0, 0], a list of three numbers was expected"),
     (b'{"acc": [0, 0, 9]}', "imu: gyro is missing"),
