@@ -23,7 +23,7 @@ help:
 	@echo 'make test     install what the tests need and run them all'
 	@echo 'make check    format, lint, types, import rules, generated files, breaking changes, age of the results'
 	@echo 'make bench    measure what the service costs, print it and write it into $(RESULTS)/performance.md'
-	@echo 'make test-cluster  let each part of a cluster die, and write the silences into $(RESULTS)/cluster.md'
+	@echo 'make test-cluster  upgrade a cluster, let each of its parts die, and write the silences into $(RESULTS)/cluster.md'
 	@echo 'make results  measure everything in $(RESULTS) again: hours, on a machine that does nothing else'
 	@echo 'make install  the set-up alone: a virtual environment in $(VENV)'
 
@@ -97,7 +97,7 @@ bench: install chromium postgresql
 	@$(BIN)/python -m pytest tests/benchmarks -s -m '' $(PYTEST)
 
 test-cluster: install postgresql
-	@$(BIN)/python -m pytest tests/benchmarks/test_cluster_failures.py tests/benchmarks/test_cluster_of_hosts.py -s -m '' $(PYTEST)
+	@$(BIN)/python -m pytest tests/e2e/test_upgrade_on_ray.py tests/benchmarks/test_cluster_failures.py tests/benchmarks/test_cluster_of_hosts.py -s -m '' $(PYTEST)
 
 results: bench
 	@$(BIN)/dropanchor evaluate recordings --into $(RESULTS)/recordings.md $(EVALUATE)

@@ -25,6 +25,7 @@ def head_is_back(cluster: Cluster) -> bool:
     return cluster.head_sees_nodes()
 
 
+@pytest.mark.cluster
 @needs_ray
 @needs_postgresql
 def test_shards_are_exchanged_one_by_one_and_every_sample_is_used_once(
