@@ -98,7 +98,7 @@ def test_a_checkpoint_of_a_clock_that_was_set_back_is_not_used(
     wait_until(lambda: running.bench.x_of("a") == [4.0])
     running.stop()
     heard_ns = running.bench.tags.at(0).last_heard_ns or 0
-    monkeypatch.setattr(checkpointer.time, "time_ns", lambda: heard_ns - 3600 * 10**9)
+    monkeypatch.setattr(time, "time_ns", lambda: heard_ns - 3600 * 10**9)
     after = CheckpointBench(tmp_path)
     after.checkpoints.load()
     assert after.bench.tags.all() == []
