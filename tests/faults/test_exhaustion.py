@@ -20,6 +20,10 @@ from support.zenoh_router import connected_session, wait_until
 FILES = 128
 CLIENTS = 200
 WRITTEN = 'dropanchor_checkpoints_total{outcome="written"}'
+SOCKET = (  # a tag without a name: the service ends this WebSocket, and the client never answers
+    b"GET /api/v1/ingest/stream HTTP/1.1\r\nhost: 127.0.0.1\r\nupgrade: websocket\r\nconnection: upgrade\r\n"
+    b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\nsec-websocket-version: 13\r\n\r\n"
+)
 STREAM = b"GET /api/v1/stream HTTP/1.1\r\nhost: 127.0.0.1\r\n\r\n"
 
 
@@ -64,7 +68,9 @@ def check_beside(service: Running, session: zenoh.Session, address: str, text: b
 
 
 @pytest.mark.usefixtures("few_files")
-@pytest.mark.parametrize("text", [b"", STREAM], ids=["silent", "streams that are not read"])
+@pytest.mark.parametrize(
+    "text", [b"", STREAM, SOCKET], ids=["silent", "streams that are not read", "ended web sockets"]
+)
 def test_clients_that_hold_connections_stop_neither_health_checks_nor_checkpoints(tmp_path: Path, text: bytes) -> None:
     config = tmp_path / "dropanchor.toml"
     config.write_text("checkpoint_s = 0.2\n")

@@ -12,6 +12,7 @@ from dropanchor_service.runtime.worker import Worker
 
 OLD_S = 5.0  # an older newest checkpoint is a problem
 REST = 3  # pause, relative to the duration of the last write, so that a slow disk is not always busy
+AHEAD_S = 60.0  # by which a checkpoint may be ahead: the clocks of two machines differ
 _TURN_S = 1.0  # wait for a turn of the ingest thread
 
 _log = logging.getLogger(__name__)
@@ -45,6 +46,7 @@ class CheckpointThread(Worker):
             _log.info("there is no usable checkpoint: all tags start afresh")
             return
         try:
+            _refuse_future(snapshot)
             self._state.restore(snapshot)
         except CheckpointError as error:
             _log.warning("the newest checkpoint is not used: %s; all tags start afresh", error)
@@ -129,3 +131,10 @@ class CheckpointThread(Worker):
         self._messages, self._current_s = self._of
         self._metrics.checkpoints.labels("written").inc()
         self._metrics.checkpoint_bytes.set(size)
+
+
+def _refuse_future(snapshot: Snapshot) -> None:
+    """Raise CheckpointError for a checkpoint that is newer than now: until its time comes, its poses would not age."""
+    ahead_s = (int(snapshot.arrays["counts"]["last_heard_ns"].max(initial=0)) - time.time_ns()) * 1e-9
+    if ahead_s > AHEAD_S:
+        raise CheckpointError(f"it is {ahead_s:.0f} s ahead of the clock of this machine, which was set back")

@@ -4,6 +4,7 @@ import asyncio
 import ssl
 import time
 from collections.abc import AsyncIterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import ClassVar
@@ -25,10 +26,14 @@ _MAX_ANSWER = 200
 
 @dataclass(frozen=True)
 class WebhookChannel:
-    """Posts events to allowed addresses only."""
+    """Posts events to allowed addresses only.
+
+    lookups: a thread of its own, since a name whose server does not answer holds one for half a minute.
+    """
 
     webhook: WebhookDestination
     client: httpx.AsyncClient
+    lookups: ThreadPoolExecutor
     timeout_s: float
     allow_networks: Sequence[Network]
     portion: ClassVar[Portion] = Portion(AT_ONCE)
@@ -49,7 +54,8 @@ class WebhookChannel:
 
     async def _post(self, event: bytes) -> Outcome:
         url = checked_url(self.webhook.url)
-        address = allowed(await asyncio.to_thread(resolved, url), self.allow_networks)
+        found = await asyncio.get_running_loop().run_in_executor(self.lookups, resolved, url)
+        address = allowed(found, self.allow_networks)
         assert self.webhook.secret is not None
         request = self.client.build_request(
             "POST",
@@ -73,8 +79,12 @@ async def open_webhook(
     webhook: WebhookDestination, tls: ssl.SSLContext, timeout_s: float, allow_networks: Sequence[Network]
 ) -> AsyncIterator[WebhookChannel]:
     """Open the way to a webhook. It follows no redirects and no proxy settings."""
-    async with httpx.AsyncClient(verify=tls, timeout=timeout_s, follow_redirects=False, trust_env=False) as client:
-        yield WebhookChannel(webhook, client, timeout_s, allow_networks)
+    lookups = ThreadPoolExecutor(1, "webhook")
+    try:
+        async with httpx.AsyncClient(verify=tls, timeout=timeout_s, follow_redirects=False, trust_env=False) as client:
+            yield WebhookChannel(webhook, client, lookups, timeout_s, allow_networks)
+    finally:
+        lookups.shutdown(wait=False, cancel_futures=True)
 
 
 def _judged(response: httpx.Response) -> Outcome:

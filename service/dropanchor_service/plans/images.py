@@ -51,17 +51,21 @@ class ImageFolder:
         if self._folder is not None:
             self._path(self._folder, image).unlink(missing_ok=True)
 
-    def keep_only(self, images: Collection[PlanImage], recovery: Recovery) -> None:
-        """Delete all other images, and what a killed writer has left. Set damaged ones aside."""
+    def delete_others(self, images: Collection[PlanImage]) -> None:
+        """Delete all images but these, and what a killed writer has left."""
         if self._folder is None:
             return
-        kept = {self._path(self._folder, image): image.id for image in images}
+        kept = {self._path(self._folder, image) for image in images}
         for path in self._folder.glob("*"):
             if path not in kept and _NAME.fullmatch(path.name):
                 with suppress(OSError):  # a disk that is read-only: the next start tries again
                     path.unlink()
-        for path, digest in kept.items():
-            recovery.read_alone(path, partial(_require, digest), INSTEAD)
+
+    def check(self, images: Collection[PlanImage], recovery: Recovery) -> None:
+        """Set aside those of these images that are damaged."""
+        if self._folder is not None:
+            for image in images:
+                recovery.read_alone(self._path(self._folder, image), partial(_require, image.id), INSTEAD)
 
     def _path(self, folder: Path, image: PlanImage) -> Path:
         return folder / f"{image.id}{_ENDINGS[image.media_type]}"

@@ -7,7 +7,7 @@ from threading import Lock
 from dropanchor_schemas.plans import Plan, PlanImage
 from dropanchor_service.plans.images import ImageFolder
 from dropanchor_service.plans.reading.messages import ReadPlan
-from dropanchor_service.runtime.recovery import Recovery
+from dropanchor_service.runtime.recovery import Recovery, was_damaged
 from dropanchor_service.store.items import NamedItems, adapter_of
 from dropanchor_service.store.preconditions import Precondition, always
 
@@ -34,7 +34,9 @@ class PlanStore(NamedItems[Plan]):
         self._images_lock = Lock()
         self._folder = ImageFolder(None if folder is None else folder / "plans")
         self._images: dict[str, PlanImage] = {plan.image.id: plan.image for plan in self.all.values()}
-        self._folder.keep_only(self._images.values(), recovery)
+        if path is None or not was_damaged(path):  # the plans that were in it still need their images
+            self._folder.delete_others(self._images.values())
+        self._folder.check(self._images.values(), recovery)
 
     def image(self, image: str) -> PlanImage | None:
         """Return the image with this id; None if it was not uploaded or is no longer kept."""

@@ -17,6 +17,7 @@ def configure(level: str = "INFO") -> None:
     formatter.converter = time.gmtime
     handler.setFormatter(formatter)
     logging.basicConfig(level=level, handlers=[handler], force=True)
+    logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs whole URLs, and those of webhooks are secrets
     logging.getLogger("uvicorn").setLevel(logging.WARNING)  # its start and stop messages repeat ours
 
 

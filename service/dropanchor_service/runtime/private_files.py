@@ -7,22 +7,30 @@ from collections.abc import Iterator
 from pathlib import Path
 
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
-_FOLDER = 0o700
+# What a service writes into its data folder. All else there is somebody else's: it may be a home, or /tmp.
+_WRITTEN = (
+    *("owner.lock", ".lock", "site", "sites", "site.json*", "checkpoints", "recordings", "plans", "plans.json*"),
+    *("history.sqlite*", "events.sqlite*", "zones.json*", "event_rules.json*", "destinations.json*", "webhooks.json*"),
+    *("omlox_*.json*", "share_key*", "share_links.json*", "kernels-*", "cluster"),
+)
+_OF_DISKS = ("lost+found",)
 
 _log = logging.getLogger(__name__)
 
 
 def keep_private(folder: Path | None) -> None:
-    """Let only the user of this process read what it writes from now on, and what the data folder holds already.
+    """Let only the user of this process read what it writes from now on, and what the data folder holds of a service.
 
-    folder: may be missing. One that another user owns stays as it is, with a warning.
+    folder: may be missing. One that holds files of others stays as it is, but not what is in it of a service. One that
+    another user owns stays as it is, with a warning.
     """
     os.umask(_OTHERS)
-    if folder is None or not folder.is_dir() or not folder.stat().st_mode & _OTHERS:
+    if folder is None or not folder.is_dir():
         return
     try:
-        for path in [*_below(folder), folder]:  # the folder last: an interrupted start does all of it again
-            path.chmod(_FOLDER if path.is_dir() else stat.S_IMODE(path.stat().st_mode) & ~_OTHERS)
+        if folder.stat().st_mode & _OTHERS:
+            for path in _of_service(folder):  # the folder last: an interrupted start does all of it again
+                path.chmod(stat.S_IMODE(path.stat().st_mode) & ~_OTHERS)
     except OSError as error:
         _log.warning(
             "other users may read %s (%s): make the user of the service its owner, or run chmod -R go= %s",
@@ -32,7 +40,17 @@ def keep_private(folder: Path | None) -> None:
         )
 
 
-def _below(folder: Path) -> Iterator[Path]:
-    """Yield all files and folders below, but no links: what they point at may be somebody else's."""
-    for root, folders, files in os.walk(folder):
-        yield from (path for name in (*folders, *files) if not (path := Path(root, name)).is_symlink())
+def _of_service(folder: Path) -> Iterator[Path]:
+    """Yield what a service has written there, and at last the folder if it holds nothing else."""
+    written = {path for pattern in _WRITTEN for path in folder.glob(pattern) if not path.is_symlink()}
+    for path in written:
+        yield from _within(path)
+    if all(path in written or path.is_symlink() or path.name in _OF_DISKS for path in folder.iterdir()):
+        yield folder
+
+
+def _within(path: Path) -> Iterator[Path]:
+    """Yield a path and all files and folders below it, but no links: what they point at may be somebody else's."""
+    for root, folders, files in os.walk(path):
+        yield from (below for name in (*folders, *files) if not (below := Path(root, name)).is_symlink())
+    yield path

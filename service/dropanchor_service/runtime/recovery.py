@@ -171,6 +171,11 @@ def copy_of(path: Path) -> Path:
     return path.with_name(f"{path.name}{COPY}")
 
 
+def was_damaged(path: Path) -> bool:
+    """Return whether a file was set aside, and nobody has moved that away."""
+    return any(path.parent.glob(f"{path.name}{MARK}*"))
+
+
 def _set_aside_below(root: Path) -> list[Path]:
     found = [aside for where in _WHERE for aside in sorted(root.glob(f"{where}{MARK}*"))]
     return [aside for aside in found if not aside.name.endswith(_COMPANIONS)]

@@ -91,6 +91,20 @@ def test_poses_are_restored_after_a_restart_but_do_not_count_as_tracking(
     assert after.engine.configured == {0: [], 1: []}
 
 
+def test_a_checkpoint_of_a_clock_that_was_set_back_is_not_used(
+    running: CheckpointBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    running.send("a", 4.0)
+    wait_until(lambda: running.bench.x_of("a") == [4.0])
+    running.stop()
+    heard_ns = running.bench.tags.at(0).last_heard_ns or 0
+    monkeypatch.setattr(time, "time_ns", lambda: heard_ns - 3600 * 10**9)
+    after = CheckpointBench(tmp_path)
+    after.checkpoints.load()
+    assert after.bench.tags.all() == []
+    assert "it is 3600 s ahead of the clock of this machine, which was set back" in caplog.text
+
+
 def test_rows_with_changed_settings_start_afresh_and_all_rows_do_after_an_anchor_has_moved(
     running: CheckpointBench, tmp_path: Path
 ) -> None:

@@ -2,11 +2,13 @@
 
 import asyncio
 import ssl
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import httpx
 import pytest
 
 from dropanchor_schemas.destinations import WebhookDestination
@@ -95,6 +97,25 @@ def test_a_receiver_that_does_not_answer_delays_no_other() -> None:
         wait_until(lambda: bench.counts() == (0, 0))
         assert bench.counts("slow") == (10, 0)
         wait_until(lambda: bench.thread.problem_of(0, "slow") == "there was no answer within 0.3 s")
+
+
+def test_a_name_whose_server_does_not_answer_delays_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench, slow, fast = DeliveryBench(timeout_s=0.3), Receiver(), Receiver()
+    is_over = threading.Event()
+
+    def resolving(url: httpx.URL) -> list[str]:
+        if url.port == slow.port:
+            is_over.wait(30.0)
+        return ["127.0.0.1"]
+
+    monkeypatch.setattr("dropanchor_service.delivery.webhook.resolved", resolving)
+    with running_receiver(slow), delivering(bench, fast):
+        bench.hook(slow, "slow")
+        for _ in range(3):
+            bench.happen(*map(str, range(40)))
+            wait_until(lambda: bench.counts() == (0, 0), 5.0)
+            wait_until(lambda: bench.thread.problem_of(0, "slow") == "there was no answer within 0.3 s")
+        is_over.set()
 
 
 def test_a_redirect_is_not_followed() -> None:

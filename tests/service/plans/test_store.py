@@ -39,6 +39,22 @@ def test_a_restart_keeps_plans_with_their_images_and_nothing_else(tmp_path: Path
     assert files(tmp_path) == {f"{used.id}.png", "notes.txt"}
 
 
+def test_the_images_of_plans_that_were_damaged_stay_until_somebody_has_looked(tmp_path: Path) -> None:
+    store = PlanStore(tmp_path)
+    used = add(store)
+    put(store, plan(used))
+    whole = (tmp_path / "plans.json").read_bytes()
+    for name in ("plans.json", "plans.json.last-good"):
+        (tmp_path / name).write_bytes(whole[:-9])
+    for _ in range(2):
+        assert PlanStore(tmp_path).all == {}
+        assert files(tmp_path) == {f"{used.id}.png"}
+    (aside,) = tmp_path.glob("plans.json.damaged-*")
+    aside.unlink()
+    (tmp_path / "plans.json").write_bytes(whole)  # mended by hand
+    assert PlanStore(tmp_path).content(used) == b"pixels"
+
+
 @pytest.mark.parametrize("in_memory", [True, False])
 def test_a_plan_needs_an_image_that_was_uploaded(tmp_path: Path, in_memory: bool) -> None:
     store = PlanStore(None if in_memory else tmp_path)

@@ -5,7 +5,7 @@ import logging
 
 import pytest
 
-from dropanchor_service.runtime.logs import REPEAT_S, RareLog
+from dropanchor_service.runtime.logs import REPEAT_S, RareLog, configure
 from dropanchor_service.runtime.repeats import LINES, WINDOW_S, CountingHandler
 
 
@@ -76,3 +76,14 @@ def test_lines_that_differ_in_their_values_only_are_counted_after_the_first_ones
     assert log.lines()[LINES:] == [
         f"repeated {20_000 - LINES:,} times in the last minute: the tag tag-0 is unknown",
     ]
+
+
+def test_the_log_has_no_urls_of_webhooks() -> None:
+    root = logging.getLogger()
+    before, level = root.handlers[:], root.level
+    try:
+        configure("DEBUG")
+        assert not logging.getLogger("httpx").isEnabledFor(logging.INFO)
+    finally:
+        root.handlers[:] = before
+        root.setLevel(level)

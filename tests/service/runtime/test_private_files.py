@@ -41,6 +41,19 @@ def test_a_folder_of_an_older_service_becomes_private_and_links_out_of_it_are_le
     assert modes(data) == {"data": 0o700, "recordings": 0o700, "site.json": 0o600, "a.mcap": 0o600}
 
 
+def test_files_of_others_in_the_folder_and_the_folder_with_them_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "recordings").mkdir()
+    (tmp_path / "public").mkdir()
+    for name in ("site.json", "recordings/a.mcap", "public/index.html"):
+        (tmp_path / name).write_text("")
+    tmp_path.chmod(0o1777)
+    keep_private(tmp_path)
+    assert stat.S_IMODE(tmp_path.stat().st_mode) == 0o1777
+    kept, private = {"public": 0o755, "index.html": 0o644}, {"recordings": 0o700, "site.json": 0o600, "a.mcap": 0o600}
+    found = modes(tmp_path)
+    assert {name: found[name] for name in (*kept, *private)} == kept | private
+
+
 def test_a_folder_of_another_user_is_named_and_the_service_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

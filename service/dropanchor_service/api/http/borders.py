@@ -89,8 +89,16 @@ def _is_foreign(headers: Headers, border: Border) -> bool:
         return site in ("cross-site", "same-site")
     if site == "same-origin" or origin in border.origins or ALL in border.origins:
         return False
-    netloc = urlsplit(origin).netloc
+    netloc = _netloc(origin)
     return netloc not in _hosts(headers) and not (border.own is not None and border.own.has(netloc))
+
+
+def _netloc(origin: str) -> str:
+    """Return the host and port of an origin; empty when it has none, as `null`."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:  # such as http://[
+        return ""
 
 
 def _no_such_host(host: str) -> str:

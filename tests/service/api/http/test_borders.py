@@ -68,6 +68,7 @@ def behind(border: Border) -> Any:
     [
         {"origin": EVIL},
         {"origin": "null"},
+        {"origin": "http://["},
         {"origin": "http://test:81"},
         {"origin": EVIL, "sec-fetch-site": "cross-site"},
         {"sec-fetch-site": "cross-site"},
