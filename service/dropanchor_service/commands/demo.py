@@ -13,6 +13,7 @@ from dropanchor_service.commands.lan import show_addresses
 from dropanchor_service.commands.options import add_service_options, settings_of
 from dropanchor_service.commands.recorded import recorded_tag
 from dropanchor_service.runtime import logs
+from dropanchor_service.runtime.private_files import keep_private
 from dropanchor_service.runtime.signals import interrupts
 from dropanchor_service.service import Service
 from dropanchor_service.settings.model import PaperSettings, Settings, ZenohSettings
@@ -98,6 +99,7 @@ class DemoSetup:
 @contextmanager
 def _demo_setup(arguments: argparse.Namespace) -> Iterator[DemoSetup]:
     settings = settings_of(arguments)
+    keep_private(settings.data_dir)
     if settings.sites:
         raise SettingsError("the demo has one site: leave out [sites], or use dropanchor serve")
     if settings.paper == PaperSettings():

@@ -66,7 +66,11 @@ ESTIMATE_SCHEMA: dict[str, Any] = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("tags", metavar="TAG", nargs="*", help="tags to show (default: all)")
     add_rest_options(parser)
-    parser.add_argument("--host", default="127.0.0.1", help="address for the viewers (default: %(default)s)")
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address for the viewers (default: %(default)s); any program or open web page of this machine may connect",
+    )
     parser.add_argument("--port", type=int, default=PORT, help="port for the viewers (default: %(default)s); 0: any")
     parser.add_argument("--max-hz", type=positive, default=10, metavar="HZ", help="updates per second (default: 10)")
     parser.add_argument(

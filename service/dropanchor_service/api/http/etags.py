@@ -18,7 +18,7 @@ def matches(if_match: str | None, current: BaseModel | None) -> bool:
     """Return whether the current resource meets an `If-Match`; without the header every resource does."""
     if if_match is None:
         return True
-    return current is not None and if_match in ("*", etag_of(current))
+    return current is not None and (if_match == "*" or etag_of(current) in map(str.strip, if_match.split(",")))
 
 
 def _precondition(

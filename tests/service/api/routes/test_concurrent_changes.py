@@ -28,7 +28,8 @@ def test_a_change_that_names_the_current_anchor_is_made_and_one_that_names_an_ol
     assert kind_of(late) == "changed-meanwhile"
     assert kind_of(ask(app, "DELETE", ANCHOR, headers={"if-match": first})) == "changed-meanwhile"
     assert [anchor.x for anchor in bench.answers.site.site.anchors] == [1.0]
-    assert ask(app, "DELETE", ANCHOR, headers={"if-match": moved.headers["etag"]}).status_code == 204
+    either = f"{first}, {moved.headers['etag']}"
+    assert ask(app, "DELETE", ANCHOR, headers={"if-match": either}).status_code == 204
     assert kind_of(ask(app, "PUT", ANCHOR, json={"id": "17"}, headers={"if-match": "*"})) == "changed-meanwhile"
 
 
