@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import isnan
 
 from dropanchor_service.answers.frames import STATES, published_states
 from dropanchor_service.estimation.columns import Array, Frame
@@ -71,9 +72,10 @@ def _in_site_frame(site: Accuracy, is_alone: bool) -> Iterator[str]:
         f"RMSE {site.rmse:.3f} m (mean {site.mean:.3f}, median {site.median:.3f}, 95 % {site.p95:.3f}, "
         f"worst {site.worst:.3f}) over {site.compared} poses{'' if is_alone else ' in the frame of the site'}"
     )
+    tracking = "never tracking" if isnan(site.rmse_tracking) else f"RMSE while tracking {site.rmse_tracking:.3f} m"
     yield (
-        f"RMSE while tracking {site.rmse_tracking:.3f} m; after the best rotation about the anchor "
-        f"{site.rmse_rotated:.3f} m; ATE (best rigid motion) {site.ate:.3f} m"
+        f"{tracking}; after the best rotation about the anchor {site.rmse_rotated:.3f} m; "
+        f"ATE (best rigid motion) {site.ate:.3f} m"
     )
     yield f"truth inside the 95 % ellipse: {site.coverage:.1%}"
 

@@ -62,7 +62,9 @@ def test_what_shows_late_in_a_recording_of_averaged_ranges_holds_from_its_start(
     folder = changed(tmp_path, run, "range", ["range_m"], lambda _: next(averaged))
     start = f"--start={run.truth.x[0]},{run.truth.y[0]},{run.truth.heading[0]}"
     assert "tracking" not in {pose["state"] for pose in poses(folder, start)}
-    assert "from 0.0 s on: The module averages about 10 ranges" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "from 0.0 s on: The module averages about 10 ranges" in said
+    assert "never tracking; after the best rotation" in said
 
 
 def test_ranges_in_millimetres_of_which_few_are_possible_are_not_believed(
