@@ -15,7 +15,7 @@ from playwright.sync_api import expect
 from websockets.sync.client import connect
 
 from support.browser import running_chromium
-from support.proxies import caddy, nginx
+from support.proxies import caddy, nginx, of_guide
 from support.service import command, environment, running_service
 from support.zenoh_router import free_port, wait_until
 
@@ -26,6 +26,7 @@ Proxy = Callable[[Path, str], AbstractContextManager[tuple[str, Path]]]
 class Proxied:
     """A secured service behind a proxy. client: asks for what is below the path, with the key of an operator."""
 
+    service: str
     address: str
     client: httpx.Client
     tls: ssl.SSLContext
@@ -47,7 +48,7 @@ def proxied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     made("security", "init", "--host", "localhost", "--listen", f"tls/127.0.0.1:{free_port()}")
     made("tag", "add", "a/b")
     admin, tag_key = made("key", "add", "page", "--scope", "admin"), made("key", "add", "cart", "--tag", "a/b")
-    (tmp_path / "yard.toml").write_text("[http]\ntls = false\n")
+    (tmp_path / "yard.toml").write_text(of_guide("toml"))
     options = ["--config", str(tmp_path / "yard.toml"), "--data-dir", str(tmp_path / "data")]
     listen = f"tls/127.0.0.1:{free_port()}"
     with (
@@ -56,7 +57,7 @@ def proxied(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     ):
         tls = ssl.create_default_context(cafile=certificate)
         with httpx.Client(verify=tls, trust_env=False, headers={"authorization": f"Bearer {admin}"}) as client:
-            place = Proxied(address, client, tls, tag_key)
+            place = Proxied(service.url, address, client, tls, tag_key)
             wait_until(lambda: is_ready(place), 60.0)
             yield place
 
@@ -90,6 +91,12 @@ def test_what_is_tried_in_the_documentation_goes_below_the_path(proxied: Proxied
         operation.get_by_role("button", name="Execute").click()
         expect(operation.locator(".live-responses-table tbody .response-col_status")).to_contain_text("200")
         assert asked[-1] == f"{proxied.address}/rtls/api/v1/health/live"
+
+
+def test_the_settings_of_the_guide_let_in_who_uses_the_name_of_the_proxy(proxied: Proxied) -> None:
+    for name, status in (("yard.example.com", 200), ("other.example.com", 421)):
+        answer = proxied.client.get(f"{proxied.service}/docs/", headers={"host": name})
+        assert answer.status_code == status, name
 
 
 def test_links_and_codes_that_leave_the_service_name_the_path(proxied: Proxied) -> None:

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,17 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 
+from dropanchor_schemas.wire import ENCODING_JSON, Frame, encode_json
+from dropanchor_service.api.formats.track import NESTED, RELATIVES
 from dropanchor_service.reference import fields_page
 from support.guides import blocks_of, follow
-from support.service import Running
+from support.service import Running, straight_north
 from support.yard import running_yard
+from support.zenoh_router import wait_until
 
 GUIDE, TAG = "read-exports.md", "forklift-7"
-RELATIVE = "relative_"
-"""Begin of the columns that are empty here, so that no reader of CSV can tell their type: north is known."""
-TEXTS = {"anchor": "VARCHAR"}  # what a reader of CSV has to be told
+EMPTY = RELATIVES  # of a tag that knows north
+TYPES = {"anchor": "VARCHAR"} | dict.fromkeys(EMPTY, "DOUBLE")  # what a reader of CSV has to be told
 KINDS = {"i": "integer", "f": "number", "O": "text", "M": "timestamp", "U": "text"}
 DUCKDB = {"BIGINT": "integer", "FLOAT": "number", "DOUBLE": "number", "VARCHAR": "text"}
 
@@ -58,6 +61,16 @@ def test_the_guide_reads_the_exports(tool: str, service: Running, tmp_path: Path
         assert "[(True,)]" in said
 
 
+@pytest.mark.parametrize("tool", ["pandas", "DuckDB"])
+def test_the_guide_reads_the_exports_of_a_tag_without_any_place(tool: str, service: Running, tmp_path: Path) -> None:
+    content, headers = encode_json(Frame(ranges=straight_north(20).ranges)), {"content-type": ENCODING_JSON}
+    service.ask("POST", "/api/v1/ingest/samples?tag=cart", content=content, headers=headers).raise_for_status()
+    wait_until(lambda: bool(service.ask("GET", "/api/v1/tags/cart/track").json().get("poses")))
+    blocks = [*blocks_of(GUIDE, ""), *blocks_of(GUIDE, tool)]
+    said = follow([replace(block, text=block.text.replace(TAG, "cart")) for block in blocks], tmp_path, service.url)
+    assert ("[(None,)]" if tool == "DuckDB" else "CSV holds the same poses: True") in said
+
+
 def test_pandas_pyarrow_and_duckdb_see_the_types_of_the_table_in_parquet(exports: Path) -> None:
     file = exports / "track.parquet"
     expected = fields_page.of_poses()["track, Parquet"]
@@ -68,17 +81,13 @@ def test_pandas_pyarrow_and_duckdb_see_the_types_of_the_table_in_parquet(exports
 
 def test_pandas_pyarrow_and_duckdb_see_the_types_of_the_table_in_csv(exports: Path) -> None:
     file = exports / "track.csv"
-    expected = without_relative(fields_page.of_poses()["track, CSV"]) | {"t_utc": "timestamp"}  # readers know ISO 8601
-    options = pyarrow.csv.ConvertOptions(column_types={"anchor": pyarrow.string()})
+    expected = fields_page.of_poses()["track, CSV"] | {"t_utc": "timestamp"}  # readers know ISO 8601
+    told = {"anchor": pyarrow.string()} | dict.fromkeys(EMPTY, pyarrow.float64())
+    options = pyarrow.csv.ConvertOptions(column_types=told)
     in_arrow = pyarrow.csv.read_csv(file, convert_options=options)
-    of_arrow = {field.name: fields_page.of_arrow(field.type) for field in in_arrow.schema}
-    of_pandas = kinds_of(pd.read_csv(file, dtype={"anchor": "string"}, parse_dates=["t_utc"]))
-    of_duckdb = in_duckdb(f"SELECT * FROM read_csv('{file}', types = {TEXTS})")
-    assert [without_relative(kinds) for kinds in (of_arrow, of_pandas, of_duckdb)] == [expected] * 3
-
-
-def without_relative(kinds: dict[str, str]) -> dict[str, str]:
-    return {name: kind for name, kind in kinds.items() if not name.startswith(RELATIVE)}
+    assert {field.name: fields_page.of_arrow(field.type) for field in in_arrow.schema} == expected
+    assert kinds_of(pd.read_csv(file, dtype={"anchor": "string"}, parse_dates=["t_utc"])) == expected
+    assert in_duckdb(f"SELECT * FROM read_csv('{file}', types = {TYPES})") == expected
 
 
 def test_csv_parquet_geojson_and_json_hold_the_same_values(exports: Path, service: Running) -> None:
@@ -90,14 +99,14 @@ def test_csv_parquet_geojson_and_json_hold_the_same_values(exports: Path, servic
     assert len(poses) == len(rows) == len(in_parquet) > 8
     assert any(pose["sigma_obs_m"] is None for pose in poses)
     for pose, row, stored in zip(poses, rows, in_parquet, strict=True):
-        for name in pose.keys() - {"covariance", "relative_pose", "t_utc"}:
+        assert pose["relative_pose"] is None
+        assert all(row[name] == "" and stored[name] is None for name in RELATIVES)
+        for name in pose.keys() - {*NESTED, "t_utc"}:
             value = pose[name]
             is_number = isinstance(value, float)
             assert row[name] == ("" if value is None else str(value)), name
             assert stored[name] == (pytest.approx(value, rel=1e-6) if is_number else value), name
         assert float(row["cov_xh"]) == pose["covariance"][0][2]
-        assert pose["relative_pose"] is None
-        assert {row[name] for name in row if name.startswith(RELATIVE)} == {""}
 
 
 def test_unknown_figures_are_empty_cells_that_readers_take_for_no_number(service: Running) -> None:

@@ -15,9 +15,9 @@ from typing import Any
 from tqdm import tqdm
 
 from dropanchor_schemas.wire import Reason
-from dropanchor_service.answers.frames import STATES, published_states
+from dropanchor_service.answers.frames import FRAMES, STATES, published_states
 from dropanchor_service.commands.replay_output import VALUES, Write, opened, values_of
-from dropanchor_service.estimation.columns import Array
+from dropanchor_service.estimation.columns import Array, Frame
 from dropanchor_service.evaluation.offline import OfflineService, settings_of
 from dropanchor_service.recording.mcap_file import SESSION
 from dropanchor_service.recording.reading import RecordingReader, Turn
@@ -27,6 +27,8 @@ from dropanchor_tag_client.recording import RecordingError
 COLUMNS = ("tag", "t_ns", *VALUES)
 TOLERANCE_M = 1e-9
 MAX_PENDING = 100_000  # poses that wait for the recorded estimates of the same times
+
+_Place = tuple[float, float, str]  # x, y and their frame
 
 
 def replay_files(arguments: argparse.Namespace, files: Sequence[Path]) -> int:
@@ -79,7 +81,8 @@ class Outcome:
     """Statistics of the replayed poses, and their differences from the recorded ones.
 
     compared: poses with a recorded estimate of the same time. equal: of these, equal within TOLERANCE_M.
-    one_sided: poses whose position is known on one side only. worst_m: largest difference.
+    one_sided: poses whose position is known on one side only, or in the site on one side only. worst_m: largest
+    difference.
     """
 
     poses: Counter[str] = field(default_factory=Counter)
@@ -88,22 +91,22 @@ class Outcome:
     equal: int = 0
     one_sided: int = 0
     worst_m: float = 0.0
-    _positions: dict[tuple[str, int], tuple[float, float]] = field(default_factory=dict)
-    _estimates: list[tuple[str, int, float, float]] = field(default_factory=list)
+    _positions: dict[tuple[str, int], _Place] = field(default_factory=dict)
+    _estimates: list[tuple[str, int, _Place]] = field(default_factory=list)
 
     def add(self, turn: Turn, tags: Sequence[str], poses: Array) -> None:
         """Add the poses of a turn. A pose may come a turn earlier or later than recorded, so both sides are kept."""
         states = published_states(poses["state"], poses["frame"]).tolist()
-        for tag, t_ns, x, y, state in zip(
-            tags, *(poses[name].tolist() for name in ("t_ns", "x", "y")), states, strict=True
+        for tag, t_ns, x, y, frame, state in zip(
+            tags, *(poses[name].tolist() for name in ("t_ns", "x", "y", "frame")), states, strict=True
         ):
             self.poses[tag] += 1
             self.states.setdefault(tag, Counter())[STATES[state]] += 1
-            self._positions[tag, t_ns] = (x, y)
+            self._positions[tag, t_ns] = (x, y, FRAMES[frame])
         for tag, estimate in turn.estimates:
             place = estimate.get("relative_pose", estimate)  # older recordings have no relative_pose
             x, y = (place.get(name, math.nan) for name in ("x", "y"))
-            self._estimates.append((tag, estimate["t_ns"], x, y))
+            self._estimates.append((tag, estimate["t_ns"], (x, y, estimate.get("frame", FRAMES[Frame.SITE]))))
         if len(self._positions) > MAX_PENDING:
             self._compare()
 
@@ -119,26 +122,34 @@ class Outcome:
         if self.one_sided:
             yield (
                 f"recorded poses: {self.one_sided} not compared, because only the recording or only the replay has a "
-                "position. This is normal if tags were already running when the recording started: the replay starts "
-                "with new estimators"
+                "position, or knows north. This is normal if tags were already running when the recording started: "
+                "the replay starts with new estimators"
             )
 
     def _compare(self) -> None:
         pending = []
-        for tag, t_ns, x, y in self._estimates:
-            position = self._positions.get((tag, t_ns))
-            if position is None:
-                pending.append((tag, t_ns, x, y))
+        for tag, t_ns, recorded in self._estimates:
+            replayed = self._positions.get((tag, t_ns))
+            if replayed is None:
+                pending.append((tag, t_ns, recorded))
                 continue
-            if math.isnan(x) != math.isnan(position[0]):
+            difference_m = _difference_m(recorded, replayed)
+            if difference_m is None:
                 self.one_sided += 1
                 continue
             self.compared += 1
-            difference_m = 0.0 if math.isnan(x) else math.hypot(position[0] - x, position[1] - y)
             self.equal += difference_m <= TOLERANCE_M
             self.worst_m = max(self.worst_m, difference_m)
         self._estimates = pending[-MAX_PENDING:]
         self._positions.clear()
+
+
+def _difference_m(one: _Place, other: _Place) -> float | None:
+    """Return how far two places are apart, or None if they cannot be compared."""
+    known = [not math.isnan(place[0]) for place in (one, other)]
+    if not any(known):
+        return 0.0
+    return math.dist(one[:2], other[:2]) if all(known) and one[2] == other[2] else None
 
 
 def _rows(tags: Sequence[str], poses: Array) -> Iterator[list[Any]]:

@@ -13,7 +13,7 @@ from dropanchor_schemas.track import TrackPose
 from dropanchor_schemas.tracks import TagSummary
 from dropanchor_service.api.formats.figures import FIGURES
 from dropanchor_service.api.formats.parquet import schema_of
-from dropanchor_service.api.formats.track import COVARIANCES
+from dropanchor_service.api.formats.track import COVARIANCES, NESTED, RELATIVES
 from dropanchor_service.recording.schemas import ESTIMATE, all_schemas
 from dropanchor_service.reference.markdown import table
 
@@ -29,8 +29,9 @@ timestamp. Ids such as `tag` and `anchor` are texts, also where they look like n
 empty cell; in JSON and Parquet it is null. [How to read exports](../how-to/read-exports.md) in Python and DuckDB.
 
 The properties of a GeoJSON feature are the fields of JSON. GPX holds latitude, longitude, `time` and the state alone.
-CSV and Parquet have the covariance as {", ".join(f"`{name}`" for name in COVARIANCES)}: m², m·rad and rad².
-In a recording `covariance` has nine numbers, row by row. `lat` and `lon` exist in a track if the site is georeferenced.
+CSV and Parquet have the covariance as {", ".join(f"`{name}`" for name in COVARIANCES)}: m², m·rad and rad²,
+and `relative_pose` as columns that begin with `relative_`. In a recording `covariance` has nine numbers, row by row.
+`lat` and `lon` exist in a track if the site is georeferenced.
 """
 _COLUMNS = "in columns: each is a list with one entry for each tag"
 
@@ -50,8 +51,8 @@ def of_poses() -> dict[str, Kinds]:
 
 def of_csv() -> Kinds:
     """Return the types of the columns of a track as CSV."""
-    in_json = _of_model(TrackPose)
-    return {name: kind for name, kind in in_json.items() if name != "covariance"} | dict.fromkeys(COVARIANCES, "number")
+    plain = {name: kind for name, kind in _of_model(TrackPose).items() if name not in NESTED}
+    return plain | dict.fromkeys([*COVARIANCES, *RELATIVES], "number")
 
 
 def of_figures() -> dict[str, Kinds]:

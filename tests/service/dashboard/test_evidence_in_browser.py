@@ -68,6 +68,21 @@ def marks(page: WatchedPage, plot: str, name: str) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", d)]
 
 
+def test_every_mark_of_the_legend_stands_before_its_word(chromium: Browser, place: Place) -> None:
+    with watched_page(chromium, place.url) as page:
+        drive(place)
+        select(page)
+        legend = page.page.locator(".legend").filter(has=page.page.locator("i.measured"))
+        legend.scroll_into_view_if_needed()
+        around = legend.bounding_box()
+        for mark in legend.locator("i").all():
+            box = mark.bounding_box()
+            assert around
+            assert box
+            assert around["x"] <= box["x"] < around["x"] + around["width"]
+            assert around["y"] <= box["y"] < around["y"] + around["height"]
+
+
 def test_the_plots_show_every_measurement_where_it_belongs(chromium: Browser, place: Place) -> None:
     with watched_page(chromium, place.url, reduced_motion="reduce") as page:
         innovations = drive(place)

@@ -21,7 +21,7 @@ GEOREFERENCED = {GEOJSON: "GeoJSON", GPX: "GPX"}
 GAP_NS = 10_000_000_000  # a longer gap starts a new segment of a GPX track
 
 _PLACED = ("tracking", "coasting", "degraded")
-_NESTED = ("covariance", "relative_pose")
+NESTED = ("covariance", "relative_pose")
 COVARIANCES = {"var_x": (0, 0), "cov_xy": (0, 1), "cov_xh": (0, 2), "var_y": (1, 1), "cov_yh": (1, 2), "var_h": (2, 2)}
 _OF_RELATIVE = ("x", "y", "heading_rad", "p_mode", "sigma_pos_m")
 RELATIVES = [f"relative_{name}" for name in (*_OF_RELATIVE, *COVARIANCES)]
@@ -80,7 +80,7 @@ def _feature(pose: dict[str, Any]) -> dict[str, Any]:
 
 def _csv(pages: Iterable[TrackPage], head: Head) -> Iterator[bytes]:  # noqa: ARG001 - a table has no place for the head
     for number, page in enumerate(pages):
-        names = [name for name in page.columns if name not in _NESTED]
+        names = [name for name in page.columns if name not in NESTED]
         text = io.StringIO(newline="")
         writer = csv.writer(text)
         if number == 0:
