@@ -19,12 +19,11 @@ from dropanchor_tag_client.options import (
     spool_settings,
 )
 from dropanchor_tag_client.sources.axes import AXES, mounting
-from dropanchor_tag_client.sources.modules.catalogue import MODULES
+from dropanchor_tag_client.sources.modules.catalogue import MODULES, SUFFIX
 from dropanchor_tag_client.sources.modules.detect import Arrived
 from dropanchor_tag_client.sources.modules.device_clock import DeviceClock
-from dropanchor_tag_client.sources.modules.module import Module
+from dropanchor_tag_client.sources.modules.module import Module, commands
 from dropanchor_tag_client.sources.modules.outlet import ManyTags, OneTag, Outlet
-from dropanchor_tag_client.sources.modules.patterns.files import SUFFIX, commands, module_of_file, module_of_patterns
 from dropanchor_tag_client.sources.modules.reader import Reader
 from dropanchor_tag_client.sources.modules.status_log import StatusLog
 from dropanchor_tag_client.upkeep import Upkeep
@@ -130,10 +129,16 @@ def _module(arguments: argparse.Namespace) -> Module | None:
     if arguments.pattern:
         if name != _AUTO:
             raise ValueError("--pattern describes the module: leave out --module")
+        from dropanchor_tag_client.sources.modules.patterns.files import module_of_patterns
+
         return module_of_patterns(arguments.pattern)
     if name == _AUTO:
         return None
-    return module_of_file(Path(name)) if name.endswith(SUFFIX) else MODULES[name]
+    if not name.endswith(SUFFIX):
+        return MODULES[name]
+    from dropanchor_tag_client.sources.modules.patterns.files import module_of_file
+
+    return module_of_file(Path(name))
 
 
 def _module_name(text: str) -> str:

@@ -1,14 +1,17 @@
 """The supported modules: those that need a parser of their own, and those that are a pattern."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from dropanchor_tag_client.sources.modules.dwm1001 import Dwm1001
 from dropanchor_tag_client.sources.modules.dwm3001 import Dwm3001
 from dropanchor_tag_client.sources.modules.linktrack import LinkTrack
 from dropanchor_tag_client.sources.modules.makerfabs import Makerfabs
 from dropanchor_tag_client.sources.modules.module import Module
-from dropanchor_tag_client.sources.modules.patterns.files import module_of_file, shipped_files
 from dropanchor_tag_client.sources.modules.trek1000 import Trek1000
+
+SUFFIX = ".toml"
+"""Of files that describe a module by patterns."""
 
 _WITH_PARSER = (
     Module("dwm1001", 115_200, Dwm1001, (b"\r\r", b"lec\r"), "Is it set up as a tag, and is an anchor on?"),
@@ -30,10 +33,13 @@ class _Catalogue(Mapping[str, Module]):
 
     def __init__(self) -> None:
         self._known = {module.name: module for module in _WITH_PARSER}
-        self._files = shipped_files()
+        self._files = {path.stem: path for path in sorted((Path(__file__).parent / "shipped").glob(f"*{SUFFIX}"))}
 
     def __getitem__(self, name: str) -> Module:
         if name not in self._known:
+            # 1.4 MB, which a module with a parser of its own does not need
+            from dropanchor_tag_client.sources.modules.patterns.files import module_of_file
+
             self._known[name] = module_of_file(self._files[name])
         return self._known[name]
 

@@ -3,9 +3,6 @@
 import re
 import shlex
 
-from dropanchor_tag_client.sources.modules.patterns.parser import pattern
-from dropanchor_tag_client.sources.modules.patterns.suggest import suggestion
-
 _KEPT_BYTES = 4096
 _SHOWN = 120
 _LINE_END = re.compile(rb"[\r\n]+")
@@ -53,6 +50,10 @@ def visible(text: str) -> str:
 
 def way_out(line: str) -> str:
     """Return how a line that no module prints can be read: by a pattern that fits it, if one suggests itself."""
+    # 1 MB, which a module that is understood does not need
+    from dropanchor_tag_client.sources.modules.patterns.parser import pattern
+    from dropanchor_tag_client.sources.modules.patterns.suggest import suggestion
+
     suggested = suggestion(line)
     if suggested is not None and pattern(suggested).found(line):
         return f"If it holds a range, try: --pattern {shlex.quote(suggested)}"

@@ -19,3 +19,8 @@ class Module(NamedTuple):
     start_commands: tuple[bytes, ...]
     hint: str
     poll: tuple[bytes, ...] = ()
+
+
+def commands(texts: list[str]) -> tuple[bytes, ...]:
+    """Return what is written to a module for each of the commands."""
+    return tuple(text.encode() + b"\r\n" for text in texts)

@@ -5,21 +5,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from dropanchor_tag_client.sources.modules.module import Module
+from dropanchor_tag_client.sources.modules.module import Module, commands
 from dropanchor_tag_client.sources.modules.patterns.fields import PatternError
 from dropanchor_tag_client.sources.modules.patterns.parser import Pattern, Patterns, pattern
 
-SUFFIX = ".toml"
-_SHIPPED = Path(__file__).parents[1] / "shipped"
 _BAUD = 115_200
 _HINT = "Is an anchor on, and is --baud right?"
 _TEXTS = ("patterns", "ignore", "start", "poll")
 _KEYS = (*_TEXTS, "repeats", "baud", "hint")
-
-
-def shipped_files() -> dict[str, Path]:
-    """Return the files in the package by the name of their module."""
-    return {path.stem: path for path in sorted(_SHIPPED.glob(f"*{SUFFIX}"))}
 
 
 def module_of_file(path: Path) -> Module:
@@ -57,11 +50,6 @@ def _module(path: Path, given: dict[str, Any]) -> Module:
         raise ValueError(f"{path}: repeats is {repeats!r}, true or false was expected")
     parser = _parser(_checked(given["patterns"], str(path)), tuple(ignore), repeats)
     return Module(path.stem, baud, parser, commands(start), hint, commands(poll))
-
-
-def commands(texts: list[str]) -> tuple[bytes, ...]:
-    """Return what is written to a module for each of the commands."""
-    return tuple(text.encode() + b"\r\n" for text in texts)
 
 
 def _parser(
