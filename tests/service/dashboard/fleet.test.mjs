@@ -172,6 +172,15 @@ test("the hypotheses of a tag without north are no places of the map", () => {
   assert.deepEqual([0, 1].map((row) => hasGhosts(fleet, row)), [false, true]);
 });
 
+test("a lost tag without north is drawn nowhere, since its cross would say where it was", () => {
+  const fleet = new Fleet();
+  const own = { x: 3, y: 4, heading_rad: 0, hypotheses: [] };
+  fleet.apply(frame(["a"], { state: ["lost"], frame: ["relative"], x: [null], y: [null], relative_pose: [own] }), 0);
+  assert.deepEqual(fleet.spot(0), [NaN, NaN]);
+  fleet.apply(frame(["a"], { state: ["lost"], frame: ["site"], x: [1], y: [2], relative_pose: [null] }), 0);
+  assert.deepEqual(fleet.spot(0), [1, 2]);
+});
+
 test("a relative tag is drawn where its own frame has it, and has no coordinates of the site", () => {
   const fleet = new Fleet();
   const own = { x: 3, y: 4, heading_rad: 0, hypotheses: [] };

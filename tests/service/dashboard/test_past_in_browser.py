@@ -206,7 +206,7 @@ def test_a_period_is_chosen_and_a_wrong_or_an_empty_one_is_explained(
 ) -> None:
     place, end_ns = past
     with watched_page(chromium, place.url) as page:
-        page.wait_for_map(3)
+        page.wait_for_map(2)  # "turned" was lost an hour ago, nobody knows where
         page.page.locator("#history").click()
         wait_for_past(page, 3)
         page.page.locator("[data-part='to']").fill("2020-01-02T00:00:00")

@@ -92,11 +92,12 @@ export class Fleet {
     return this.value.frame[row] === "relative";
   }
 
-  /** Return where the dot of a tag belongs: its place on the map, or the one in its own frame. @param {number} row
-   * @returns {[number, number]} */
+  /** Return where the dot of a tag belongs: its place on the map, or the one in its own frame. A lost tag has only the first:
+   * its cross says where it was. @param {number} row @returns {[number, number]} */
   spot(row) {
     const { x, y } = this.number;
-    return Number.isNaN(x[row]) ? [this.ownX[row], this.ownY[row]] : [x[row], y[row]];
+    if (!Number.isNaN(x[row])) return [x[row], y[row]];
+    return STATES[this.state[row]]?.name === "lost" ? [NaN, NaN] : [this.ownX[row], this.ownY[row]];
   }
 
   /** @param {number} row */
