@@ -96,8 +96,7 @@ class Service:
         self.metrics = Metrics()
         self.clock = UtcClock()
         self.latest = LatestPoses()
-        if (lock := own_data_folder(settings, shared=claimed is not None)) is not None:
-            self._opened.enter_context(lock)
+        self._opened.enter_context(own_data_folder(settings, shared=claimed is not None))
         put_site_files_in_place(settings)
         self._recovery = Recovery(settings.data_dir)
         self.sites = open_sites(settings, self._recovery)

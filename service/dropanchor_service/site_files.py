@@ -2,42 +2,30 @@
 
 import json
 import logging
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 
 from dropanchor_schemas.file_names import file_name_of
 from dropanchor_service.runtime.atomic_file import sync_folder, write_atomically
+from dropanchor_service.runtime.data_files import OF_SITE
 from dropanchor_service.runtime.recovery import copy_of
 from dropanchor_service.settings.model import Settings
 from dropanchor_service.settings.sources import SettingsError
 from dropanchor_tag_client.folder_lock import FolderInUseError, FolderLock
 
 OWNER_FILE = "site"  # names the site whose files lie in the data folder itself
-_OF_SITE = (
-    "site.json*",
-    "plans",
-    "plans.json*",
-    "history.sqlite*",
-    "recordings",
-    "events.sqlite*",
-    "zones.json*",
-    "event_rules.json*",
-    "destinations.json*",
-    "webhooks.json*",
-    "omlox_*.json*",
-)
 
 _log = logging.getLogger(__name__)
 
 
-def own_data_folder(settings: Settings, shared: bool) -> FolderLock | None:
-    """Return the lock of the data folder, which only this process may write; None without one. Raises SettingsError.
+def own_data_folder(settings: Settings, shared: bool) -> AbstractContextManager[object]:
+    """Return the lock of the data folder, which only this process may write. Raises SettingsError.
 
     shared: with the other shards of a node, whose leases tell them what each may write.
     """
     folder = settings.data_dir
     if folder is None:
-        return None
+        return nullcontext()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         return FolderLock(folder, shared=shared)
@@ -47,7 +35,7 @@ def own_data_folder(settings: Settings, shared: bool) -> FolderLock | None:
         raise SettingsError(f"data_dir: {folder} is no folder: choose another one") from error
     except OSError as error:
         _log.error("data_dir: %s cannot be used (%s): nothing survives a restart", folder, error.strerror)
-        return None
+        return nullcontext()
 
 
 def folder_of_site(data_dir: Path, site: str) -> Path:
@@ -135,4 +123,4 @@ def _write_owner(folder: Path, site: str) -> None:
 
 
 def _files_in(folder: Path) -> list[Path]:
-    return [path for pattern in _OF_SITE for path in sorted(folder.glob(pattern)) if path.suffix != ".part"]
+    return [path for pattern in OF_SITE for path in sorted(folder.glob(pattern)) if path.suffix != ".part"]

@@ -98,12 +98,14 @@ def test_a_recording_is_replayed_as_a_live_tag_and_the_page_remains_after_its_en
         assert process.wait(60.0) == 0
 
 
-def test_a_missing_recording_is_reported() -> None:
-    found = subprocess.run(
-        command("demo", "--recording", "nowhere"), capture_output=True, text=True, env=environment(), timeout=120
-    )
+def test_a_missing_recording_is_reported_and_the_data_folder_kept_private(tmp_path: Path) -> None:
+    tmp_path.chmod(0o755)
+    (tmp_path / "site.json").touch(mode=0o644)
+    options = ("--recording", "nowhere", "--data-dir", str(tmp_path))
+    found = subprocess.run(command("demo", *options), capture_output=True, text=True, env=environment(), timeout=120)
     assert found.returncode == 2
     assert "nowhere is not a folder" in found.stderr
+    assert (tmp_path / "site.json").stat().st_mode & 0o077 == 0
 
 
 def test_tags_with_an_unknown_start_are_ambiguous_at_first() -> None:

@@ -3,7 +3,7 @@
 import os
 import resource
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +63,8 @@ class Parts:
         settings = load_settings(options={"data_dir": str(folder / "data"), "security": security}, environment={})
         self.folder = folder / "data"
         self.recovery = Recovery(self.folder)
-        self.lock = own_data_folder(settings, shared=False)
+        self.lock = ExitStack()
+        self.lock.enter_context(own_data_folder(settings, shared=False))
         try:
             self._open(settings)
         except SettingsError:

@@ -6,13 +6,9 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
+from dropanchor_service.runtime.data_files import OF_SERVICE
+
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
-# What a service writes into its data folder. All else there is somebody else's: it may be a home, or /tmp.
-_WRITTEN = (
-    *("owner.lock", ".lock", "site", "sites", "site.json*", "checkpoints", "recordings", "plans", "plans.json*"),
-    *("history.sqlite*", "events.sqlite*", "zones.json*", "event_rules.json*", "destinations.json*", "webhooks.json*"),
-    *("omlox_*.json*", "share_key*", "share_links.json*", "kernels-*", "cluster"),
-)
 _OF_DISKS = ("lost+found",)
 
 _log = logging.getLogger(__name__)
@@ -42,7 +38,7 @@ def keep_private(folder: Path | None) -> None:
 
 def _of_service(folder: Path) -> Iterator[Path]:
     """Yield what a service has written there, and at last the folder if it holds nothing else."""
-    written = {path for pattern in _WRITTEN for path in folder.glob(pattern) if not path.is_symlink()}
+    written = {path for pattern in OF_SERVICE for path in folder.glob(pattern) if not path.is_symlink()}
     for path in written:
         yield from _within(path)
     if all(path in written or path.is_symlink() or path.name in _OF_DISKS for path in folder.iterdir()):

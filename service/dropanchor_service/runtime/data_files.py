@@ -1,0 +1,12 @@
+"""The names of what a service writes into its data folder."""
+
+OF_SITE = (
+    *("site.json*", "plans", "plans.json*", "history.sqlite*", "recordings", "events.sqlite*", "zones.json*"),
+    *("event_rules.json*", "destinations.json*", "webhooks.json*", "omlox_*.json*"),
+)
+"""Patterns of what belongs to one site, and moves with it."""
+OF_SERVICE = (
+    *OF_SITE,
+    *("owner.lock", ".lock", "site", "sites", "checkpoints", "share_key*", "share_links.json*", "kernels-*", "cluster"),
+)
+"""Patterns of all that a service writes there; the rest is somebody else's."""
